@@ -3,18 +3,17 @@
 
 import warp as wp
 
-from lgvi_kernels.advance.alarms import make_fail
+from lgvi_kernels.advance.alarms import make_fail, make_resting
 from lgvi_kernels.advance.gathering import make_note_actuators, make_signals
 from lgvi_kernels.advance.spec import make_types
 from lgvi_kernels.advance.stepping import make_stepping
 from lgvi_kernels.advance.watching import make_watching
 from lgvi_kernels.lanes.arithmetic import add, any_positive, mul, neg, ones, positive, sub  # noqa: F401
 from lgvi_kernels.lanes.packet import failures
-from lgvi_kernels.lanes.sums import at_rest, choose
 
 
 def make_constants(spec):
-    """The function that puts together what is the same in every step of packet i."""
+    """The function that puts together in c what is the same in every step of packet i."""
     types, stepping = make_types(spec), make_stepping(spec)
     Constants, DragFlow, Inertia, Params, Events = (
         types.Constants, types.DragFlow, types.Inertia, types.Params, types.Events
@@ -23,10 +22,9 @@ def make_constants(spec):
     watched, dragged, controlled = spec.watched, spec.dragged, spec.control is not None
 
     @wp.func(inline=True)
-    def constants(i: int, inertia: wp.array(dtype=Inertia), params: wp.array(dtype=Params), events: wp.array(dtype=Events),
-                  table: wp.array2d(dtype=Number), memory: wp.array2d(dtype=Lane), tolerance: real, force_tolerance: real,
-                  monitor: Monitor, h: wp.float64):  # fmt: skip
-        c = Constants()
+    def constants(c: wp.ref[Constants], i: int, inertia: wp.array(dtype=Inertia), params: wp.array(dtype=Params),
+                  events: wp.array(dtype=Events), table: wp.array2d(dtype=Number), memory: wp.array2d(dtype=Lane),
+                  tolerance: real, force_tolerance: real, monitor: wp.ref[Monitor], h: wp.float64):  # fmt: skip
         c.inertia = inertia[i % inertia.shape[0]]
         c.params = params[i % params.shape[0]]
         c.tolerance = tolerance
@@ -41,7 +39,6 @@ def make_constants(spec):
             c.loop = monitor.loop[i % monitor.loop.shape[0]]
         if wp.static(dragged):
             c.drag = prepare(DragFlow(), c.params.own, real(h))
-        return c
 
     return constants
 
@@ -54,7 +51,7 @@ def make_reached(spec):
     water_velocity = stepping.method.water_velocity
 
     @wp.func(inline=True)
-    def reached(x: State, c: Constants, monitor: Monitor, h: wp.float64, frozen: Lane):
+    def reached(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], h: wp.float64, frozen: Lane):
         zero = ones(x.b.x) - ones(x.b.x)
         distance, margin, beyond = nearest(x, c, real(h), spacing(x, x, c, real(h)))
         early = positive(margin - distance, positive(frozen, zero, beyond), zero)
@@ -71,72 +68,68 @@ def make_reached(spec):
 
 
 def make_opening(spec):
-    """(x, c, monitor, k0, k1, h, opening, frozen): the state with the lead of its first step, after the looks at the start."""
+    """(x, c, monitor, k0, k1, h, opening, frozen): x gets the lead of its first step, after the looks at the start."""
     types, stepping, watching = make_types(spec), make_stepping(spec), make_watching(spec)
     State, Constants, Monitor, Alarm, Lane = types.State, types.Constants, types.Monitor, types.Alarm, types.Lane
     feed, respond, opened, begin = stepping.feed, stepping.respond, stepping.opened, watching.begin
     real, looking, controlled = spec.real, bool(spec.warning_rows) or spec.energy, spec.control is not None
     asked, reports = controlled and spec.control.asked, controlled and spec.control.reports
-    note_actuators = make_note_actuators(spec, types.View, stepping.at_step)
+    note_actuators = make_note_actuators(spec, types, stepping.at_step)
 
     @wp.func(inline=True)
-    def opening_of(
-        x: State, c: Constants, monitor: Monitor, k0: int, k1: int, h: wp.float64, opening: real, frozen: Lane
-    ):
+    def opening_of(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int, h: wp.float64,
+                   opening: real, frozen: Lane):  # fmt: skip
         if k0 == 0:
             if wp.static(looking):
                 begin(x, c, monitor, h, frozen)
             if wp.static(controlled):
                 x.alarm = Alarm()
                 if wp.static(not asked):
-                    x.alarm = feed(x, c, monitor, 0, h, real(0.0))
+                    feed(x, c, monitor, 0, h, real(0.0))
             x = opened(x, c, opening)
         if wp.static(asked):
             # A launch without steps measures alone: so the host sees the start. Such a kernel has no lead.
             x.alarm = Alarm()
             if k1 > k0:
-                x.alarm = respond(x, c, monitor, k0, h)
+                respond(x, c, monitor, k0, h)
             else:
-                x.alarm = feed(x, c, monitor, k0, h, real(0.0))
+                feed(x, c, monitor, k0, h, real(0.0))
         if wp.static(controlled):
             if k0 == 0:
                 if wp.static(reports):
                     note_actuators(x, c, h, 0)
                 for j in range(monitor.signals.shape[0]):
                     monitor.first_signals[c.packet, j] = c.memory[c.packet, monitor.signals[j]]
-        return x
 
     return opening_of
 
 
 def make_begun(spec):
-    """(state, its last good one, frozen lanes): before the step k0, with the lanes frozen that end before it."""
+    """The function that brings x before the step k0, with the lanes frozen that end before it."""
     types, stepping, real, width = make_types(spec), make_stepping(spec), spec.real, spec.width
     State, Constants, Monitor, Lane, Ints = types.State, types.Constants, types.Monitor, types.Lane, types.Ints
     checked, watched, controlled = spec.checked, spec.watched, spec.control is not None
     asked, opening_of, fail = controlled and spec.control.asked, make_opening(spec), make_fail(width)
+    keep, _, rest = make_resting(spec)
     reached = make_reached(spec) if watched else stepping.method.step
-    keep_signals, _ = make_signals(Lane)
+    keep_signals, _ = make_signals(types)
 
     @wp.func(inline=True)
-    def begun(x: State, c: Constants, monitor: Monitor, k0: int, k1: int, h: wp.float64, opening: real,
-              status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints)):  # fmt: skip
+    def begun(x: wp.ref[State], frozen: wp.ref[Lane], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int,
+              h: wp.float64, opening: real, state: wp.array2d(dtype=Lane), status: wp.array(dtype=Ints),
+              failed_step: wp.array(dtype=Ints)):  # fmt: skip
         """Frozen lanes rest at the origin."""
-        zero = ones(x.b.x) - ones(x.b.x)
-        frozen = zero
-        kept = x
         if wp.static(checked):
-            for j in range(wp.static(width)):
-                # Positive in the lanes that an earlier launch froze.
-                frozen[j] = real(status[c.packet][j])
+            # Positive in the lanes that an earlier launch froze.
+            frozen = Lane(status[c.packet])
             if any_positive(frozen):
-                x = choose(frozen, at_rest(x), x)
+                rest(x, frozen)
         # Lanes that end before their first step, by their code.
-        early = zero
+        early = ones(frozen) - ones(frozen)
         if wp.static(watched):
             if k0 == 0:
                 early = reached(x, c, monitor, h, frozen)
-        x = opening_of(x, c, monitor, k0, k1, h, opening, frozen)
+        opening_of(x, c, monitor, k0, k1, h, opening, frozen)
         if wp.static(controlled and checked):
             if wp.static(asked) or k0 == 0:
                 failed = failures(x, frozen)
@@ -145,10 +138,9 @@ def make_begun(spec):
             if any_positive(early):
                 fail(early, k0, c.packet, status, failed_step)
                 if wp.static(controlled):
-                    keep_signals(c.memory, c.packet, monitor, 0, early)
-                kept = choose(early, x, kept)
+                    keep_signals(c, monitor, 0, early)
+                keep(x, c, early, state)
                 frozen = frozen + early
-                x = choose(frozen, at_rest(x), x)
-        return x, kept, frozen
+                rest(x, frozen)
 
     return begun

@@ -147,14 +147,13 @@ def make_trial(real):
     return trial_between
 
 
-def make_water_around(water_velocity, part_step, real):
+def make_water_around(types, water_velocity, part_step, real):
     """(good, x, c, k, h, stage_h, lead_h, opening) -> R^T u at the start and at the end of a step, zero for water at rest."""
-    moving = water_velocity is not None
+    State, Constants, Lane, moving = types.State, types.Constants, types.Lane, water_velocity is not None
 
     @wp.func(inline=True)
-    def water_around(
-        good: Any, x: Any, c: Any, k: int, h: wp.float64, stage_h: Any, lead_h: Any, opening: real, zero: Any
-    ):
+    def water_around(good: wp.ref[State], x: wp.ref[State], c: wp.ref[Constants], k: int, h: wp.float64,
+                     stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), opening: real, zero: Lane):  # fmt: skip
         still = vec3(zero, zero, zero)
         end_still = still
         if wp.static(moving):
@@ -167,18 +166,24 @@ def make_water_around(water_velocity, part_step, real):
     return water_around
 
 
-def make_arrival(watch, part_step, choose, water_velocity, real, width, most_parts):
+def make_arrival(types, watch, part_step, choose, water_velocity, real, width, most_parts):
     """The function that makes the last step of members that reach an event: the part of it that ends there.
 
     part_step: (x, c, k, h, part, parts, ...) -> the state after `parts` equal steps of part h from step k on; water_velocity:
     (x, c, h) -> R^T u, or None where a sample can compute it later; most_parts: how many parts one without a solution gets.
     """
+    State, Constants, Lane = types.State, types.Constants, types.Lane
     spacing, spacing_of, nearest = SPACINGS * EPSILON[real], watch.spacing, watch.nearest
-    trial_between, water_around = make_trial(real), make_water_around(water_velocity, part_step, real)
+    trial_between, water_around = make_trial(real), make_water_around(types, water_velocity, part_step, real)
 
     @wp.func(inline=False)
-    def arrival(good: Any, x: Any, code: Any, c: Any, k: int, h: wp.float64, stage_h: Any, lead_h: Any, opening: real):
-        """(state, code, part, R^T u) where each lane stops, and why: `part` of the step k from good, before it, to x."""
+    def arrival(good: wp.ref[State], x: wp.ref[State], stopped: wp.ref[State], code: wp.ref[Lane], c: wp.ref[Constants],
+                k: int, h: wp.float64, stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real),
+                opening: real):  # fmt: skip
+        """(part, R^T u) where each lane stops: `part` of the step k from good, before it, to x.
+
+        The states there go into `stopped`, and why they stop into `code`.
+        """
         stopped = good
         between = spacing_of(good, x, c, real(h))
         begin, begin_margin, begin_code = nearest(good, c, real(h), between)
@@ -244,6 +249,6 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
                                 low_distance = real(0.5) * low_distance
                             side = int(-1)
                 part_of_step[j] = part
-        return stopped, code, part_of_step, still
+        return part_of_step, still
 
     return arrival

@@ -34,7 +34,7 @@ CONTROL_NON_FINITE = 8
 
 
 def make_feed(spec, types, method, at_step, opened):
-    """(feed, respond): the alarm after a tick at the state after k steps.
+    """(feed, respond): a tick at the state after k steps, which gets its alarm.
 
     Where the host is asked, feed only measures and guides; respond, at the start of the next launch, does the rest with what
     the host has written into the memory. method: see Step; at_step, opened: see Stepping.
@@ -42,31 +42,32 @@ def make_feed(spec, types, method, at_step, opened):
     State, Constants, Monitor = types.State, types.Constants, types.Monitor
     Reference, truth = reference_struct(spec.width, spec.real), make_truth(spec, types, method)
     seen, acted = make_seen(spec, types, method, truth, at_step, opened), make_acted(spec, types)
-    gather = make_gather(spec, types.View, at_step)
+    gather = make_gather(spec, types, at_step)
 
     @wp.func(inline=False)
-    def feed(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: spec.real):
+    def feed(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
+    ):
         """Measure, guide, control, allocate, send."""
         y, r = seen(x, c, monitor, k, h, opening)
-        alarm = acted(x.alarm, y, r, c, monitor)
+        acted(x, y, r, c, monitor)
         gather(x, c, monitor, k, h)
-        return alarm
 
     @wp.func(inline=False)
-    def ask(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: spec.real):
+    def ask(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
+    ):
         """Measure and guide."""
         y, r = seen(x, c, monitor, k, h, opening)
         gather(x, c, monitor, k, h)
-        return x.alarm
 
     @wp.func(inline=False)
-    def respond(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
+    def respond(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64):
         """Control, allocate and send, with what the last tick noted and the host's answer."""
         y = measured_of(truth(x, c, monitor, k, h), c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
         r = wanted_of(Reference(), c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW))
-        alarm = acted(x.alarm, y, r, c, monitor)
+        acted(x, y, r, c, monitor)
         gather(x, c, monitor, k, h)
-        return alarm
 
     return (ask, respond) if spec.control.asked else (feed, method.step)
 
@@ -80,7 +81,7 @@ def make_truth(spec, types, method):
     turned, moved = "axes" in spec.parts, "origin" in spec.parts
 
     @wp.func
-    def truth(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
+    def truth(x: State, c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64):
         y = Measurement()
         nu, Om = velocities(c.inertia, x.p, x.pi)
         through = nu
@@ -140,7 +141,7 @@ def make_seen(spec, types, method, truth, at_step, opened):
         return r
 
     @wp.func
-    def seen(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
+    def seen(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real):
         z = opened(at_step(x, k, h), c, -opening)
         if wp.static(momentum is not None):
             z.p = momentum(z)
@@ -161,13 +162,14 @@ def make_seen(spec, types, method, truth, at_step, opened):
 
 
 def make_acted(spec, types):
-    """(alarm, y, r, c, monitor): control, allocate and send; the alarm with that of lanes whose commands are no numbers."""
-    Constants, Monitor, Alarm, real, checked = types.Constants, types.Monitor, types.Alarm, spec.real, spec.checked
-    Wrench = wrench_struct(spec.width, real)
+    """(x, y, r, c, monitor): control, allocate and send; x gets the alarm of lanes whose commands are no numbers."""
+    State, Constants, Monitor, real, checked = types.State, types.Constants, types.Monitor, spec.real, spec.checked
+    Wrench, Reference = wrench_struct(spec.width, real), reference_struct(spec.width, real)
+    Measurement = measurement_struct(spec.width, real, spec.shared_rows)
     act, allocate, send = (in_turn(spec.control.parts, role) for role in ("control", "allocate", "send"))
 
     @wp.func
-    def acted(alarm: Alarm, y: Any, r: Any, c: Constants, monitor: Monitor):
+    def acted(x: wp.ref[State], y: Measurement, r: Reference, c: wp.ref[Constants], monitor: wp.ref[Monitor]):
         w = Wrench()
         if wp.static(act is not None):
             w = act(w, r, y, c.loop)
@@ -195,7 +197,6 @@ def make_acted(spec, types):
             if any_positive(bad):
                 for j in range(monitor.commands):
                     remember(y, j, positive(bad, zero, remembered(y, j)))
-            alarm.code = positive(alarm.code, alarm.code, bad)
-        return alarm
+            x.alarm.code = positive(x.alarm.code, x.alarm.code, bad)
 
     return acted

@@ -22,15 +22,6 @@ def put_tick(monitor: Any, start: int, j: int, i: int, v: Any):
         monitor.ticks[start + monitor.columns[j + 2], i] = v.z
 
 
-@wp.func(inline=False)
-def gather_signals(memory: Any, i: int, monitor: Any, tick: int):
-    """Write the signals at a tick behind its motion."""
-    count = monitor.signals.shape[0]
-    start = (tick % monitor.slots + 1) * monitor.numbers - count
-    for j in range(count):
-        monitor.ticks[start + j, i] = memory[i, monitor.signals[j]]
-
-
 def make_gather_motion(compensated, moved):
     """(y, x, c, monitor): write the motion at a tick into the tick's rows; moved: see make_truth."""
 
@@ -53,58 +44,64 @@ def make_gather_motion(compensated, moved):
     return gather_motion
 
 
-def make_gather(spec, View, at_step):
+def make_gather(spec, types, at_step):
     """(x, c, monitor, k, h): write the signals after a tick, where something is gathered at all of them."""
-    reports = spec.control.reports
-    note_actuators = make_note_actuators(spec, View, at_step)
+    State, Constants, Monitor, reports = types.State, types.Constants, types.Monitor, spec.control.reports
+    note_actuators = make_note_actuators(spec, types, at_step)
+
+    @wp.func(inline=False)
+    def gather_signals(c: wp.ref[Constants], monitor: wp.ref[Monitor], tick: int):
+        """Write the signals at a tick behind its motion."""
+        count = monitor.signals.shape[0]
+        start = (tick % monitor.slots + 1) * monitor.numbers - count
+        for j in range(count):
+            monitor.ticks[start + j, c.packet] = c.memory[c.packet, monitor.signals[j]]
 
     @wp.func
-    def gather(x: Any, c: Any, monitor: Any, k: int, h: wp.float64):
+    def gather(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64):
         if monitor.slots > 0:
             if wp.static(reports):
                 note_actuators(x, c, h, k)
-            gather_signals(c.memory, c.packet, monitor, k // monitor.every)
+            gather_signals(c, monitor, k // monitor.every)
 
     return gather
 
 
 @functools.cache
-def make_note_actuators(spec, View, at_step):
+def make_note_actuators(spec, types, at_step):
     """(x, c, h, k): the actuators write where they are into the bus (role `report` of their laws); nothing where none does."""
+    State, Constants, View, real = types.State, types.Constants, types.View, spec.real
     report = superpose(spec.laws, "report")
 
-    # It takes a view and the laws' numbers alone: all constants of a packet would take longer to pass than to use.
     @wp.func(inline=False)
-    def write_report(view: View, params: Any):
+    def note_actuators(x: wp.ref[State], c: wp.ref[Constants], h: wp.float64, k: int):
         if wp.static(report is not None):
-            view = report(view, view, params)
-
-    @wp.func
-    def note_actuators(x: Any, c: Any, h: wp.float64, k: int):
-        write_report(look(View(), at_step(x, k, h), c, x.b.x.dtype(h)), c.params)
+            view = look(View(), at_step(x, k, h), c, real(h))
+            view = report(view, view, c.params)
 
     return note_actuators
 
 
 @functools.cache
-def make_signals(Lane):
+def make_signals(types):
     """(keep_signals, sample_signals): of lanes that freeze the signals are kept, and samples write them."""
+    Constants, Monitor, Lane = types.Constants, types.Monitor, types.Lane
 
     @wp.func(inline=False)
-    def keep_signals(memory: wp.array2d(dtype=Lane), i: int, monitor: Any, half: int, code: Lane):
+    def keep_signals(c: wp.ref[Constants], monitor: wp.ref[Monitor], half: int, code: Lane):
         """half: where the memory's half begins that holds the signals of lanes with a code."""
         for j in range(monitor.signals.shape[0]):
-            held = memory[i, half + monitor.signals[j]]
-            memory[i, monitor.kept + j] = positive(code, held, memory[i, monitor.kept + j])
+            held = c.memory[c.packet, half + monitor.signals[j]]
+            c.memory[c.packet, monitor.kept + j] = positive(code, held, c.memory[c.packet, monitor.kept + j])
 
     @wp.func(inline=False)
     def sample_signals(
-        out: wp.array2d(dtype=Lane), i: int, end: int, memory: wp.array2d(dtype=Lane), monitor: Any, frozen: Lane
+        out: wp.array2d(dtype=Lane), end: int, c: wp.ref[Constants], monitor: wp.ref[Monitor], frozen: Lane
     ):
         """Write the signals as the last numbers of a sample, which ends before the column `end`."""
         count = monitor.signals.shape[0]
         for j in range(count):
-            live = memory[i, monitor.signals[j]]
-            out[i, end - count + j] = positive(frozen, memory[i, monitor.kept + j], live)
+            live = c.memory[c.packet, monitor.signals[j]]
+            out[c.packet, end - count + j] = positive(frozen, c.memory[c.packet, monitor.kept + j], live)
 
     return keep_signals, sample_signals

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels.advance.beginning import make_begun, make_constants
+from lgvi_kernels.advance.beginning import make_constants
 from lgvi_kernels.advance.chunks import make_chunks
-from lgvi_kernels.advance.rows import make_rows
 from lgvi_kernels.advance.spec import Types, make_types
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_kernels.lanes.subnormals import flush_subnormals, put_back
@@ -32,9 +31,8 @@ def make_advance(spec):
     spec = bounded_spec(spec)
     types, real = make_types(spec), spec.real
     Lane, Number, Ints, Monitor = types.Lane, types.Number, types.Ints, types.Monitor
-    Inertia, Params, Events = types.Inertia, types.Params, types.Events
-    constants, begun, chunks = make_constants(spec), make_begun(spec), make_chunks(spec)
-    read, write, _ = make_rows(Lane, types.State, spec.paced, spec.compensated)
+    Constants, Inertia, Params, Events = types.Constants, types.Inertia, types.Params, types.Events
+    constants, chunks = make_constants(spec), make_chunks(spec)
     composed, lead_coefficient = spec.composed, spec.lead[1] if spec.lead is not None else 0.0
 
     @wp.kernel(module="unique", enable_backward=False, module_options={"cpu_compiler_flags": CPU_FLAGS})
@@ -70,17 +68,16 @@ def make_advance(spec):
     ):
         mode = flush_subnormals()
         i = wp.tid()
-        c = constants(i, inertia, params, events, table, memory, tolerance, force_tolerance, monitor, h)
+        c = Constants()
+        constants(c, i, inertia, params, events, table, memory, tolerance, force_tolerance, monitor, h)
         # Times 1: a plain assignment would be a reference into the array, read anew in each step.
         first_h = real(1.0) * stage_h[0]
         opening = real(1.0) * lead_h[lead_h.shape[0] - 1]
         if wp.static(not composed):
             # Computed from first_h, the compiler keeps one number in a register for the stage and its leads.
             opening = real(wp.static(lead_coefficient)) * first_h
-        x, kept, frozen = begun(read(state, i), c, monitor, k0, k1, h, opening, status, failed_step)
-        x = chunks(x, kept, frozen, c, monitor, k0, k1, s0, sample_step, h, stage_h, lead_h, first_h, opening, status,
-                   failed_step, failed_size, numbers, columns, out)  # fmt: skip
-        write(state, i, x)
+        chunks(c, monitor, k0, k1, s0, sample_step, h, stage_h, lead_h, first_h, opening, state, status, failed_step,
+               failed_size, numbers, columns, out)  # fmt: skip
         put_back(mode)
 
     return Advance(advance, types)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steps that are made again: in equal parts, where a step has no solution; up to an event, where it stops a member.
 
-Both are rare, so their functions are not inlined: the loop over steps keeps its registers.
+Both are rare, so their functions are not inlined: the loop over steps keeps its registers. They take references, since a
+state or constants by value are copied for each call.
 """
 
 import functools
@@ -39,14 +40,15 @@ def make_in_parts(spec):
     _, _, back_up = make_rows(Lane, State, paced, compensated)
 
     @wp.func(inline=False)
-    def in_parts(x: State, c: Constants, k: int, h: wp.float64, part: real, parts: int, stage_h: wp.array(dtype=real),
-                 lead_h: wp.array(dtype=real), opening: real, among: Lane):  # fmt: skip
-        """Make `parts` equal parts of step k, each `part` of its length.
+    def in_parts(start: wp.ref[State], c: wp.ref[Constants], k: int, h: wp.float64, part: real, parts: int,
+                 stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), opening: real, among: Lane):  # fmt: skip
+        """The state after `parts` equal parts of step k, each `part` of its length.
 
         The state comes and goes with the lead of a whole step: here that lead is undone, and the lead of a part made.
         among: the lanes that count; a packet that chooses its steps asks for the tolerance in them alone.
         """
         stages = lead_h.shape[0] - 1
+        x = start
         x.alarm = Alarm()
         if wp.static(paced):
             x.alarm.code = ones(among) - among
@@ -85,17 +87,15 @@ def make_retry(spec):
     to_event = watch.alarm if watched else method.step
 
     @wp.func(inline=False)
-    def retried(good: State, x: State, code: Lane, c: Constants, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
-                lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
-        """(state, code) after step k: where it had no solution, by 2, 4, ... equal parts, as soon as those have one."""
-        unity = ones(code)
+    def retried(good: wp.ref[State], x: wp.ref[State], codes: wp.ref[Lane], c: wp.ref[Constants], k: int, h: wp.float64,
+                stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
+        """Make step k again where it had no solution, by 2, 4, ... equal parts, as soon as those have one."""
+        unity = ones(codes)
         zero = unity - unity
-        # A sum, since a plain assignment would be a second name of `code`.
-        codes = code + zero
         pending = zero
         # 1, 2, 4: a step too large, (24) or the forces not converged: equations that are easier for a shorter step.
         for j in range(wp.static(width)):
-            if code[j] == real(1.0) or code[j] == real(2.0) or code[j] == real(4.0):
+            if codes[j] == real(1.0) or codes[j] == real(2.0) or codes[j] == real(4.0):
                 pending[j] = real(1.0)
         parts = int(1)
         while parts < wp.static(MOST_PARTS) and any_positive(pending):
@@ -116,10 +116,9 @@ def make_retry(spec):
                     pending[j] = real(0.0)
                     codes[j] = new_codes[j]
             x = choose(solved, y, x)
-        return x, codes
 
     arrival = method.step
     if watched:
         water = method.water_velocity if spec.still else None
-        arrival = make_arrival(watch, in_parts, choose, water, real, width, MOST_PARTS if spec.substep else 1)
+        arrival = make_arrival(types, watch, in_parts, choose, water, real, width, MOST_PARTS if spec.substep else 1)
     return Retry(retried, arrival)

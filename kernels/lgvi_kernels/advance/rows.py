@@ -24,9 +24,8 @@ WASTE = 9
 def make_rows(Lane, State, paced, compensated):
     """(read, write, back_up) of the state and of the laws' memory. paced: a packet chooses its steps."""
 
-    @wp.func
-    def read(state: wp.array2d(dtype=Lane), i: int):
-        x = State()
+    @wp.func(inline=True)
+    def read(x: wp.ref[State], state: wp.array2d(dtype=Lane), i: int):
         x.R0 = vec3(state[i, 0], state[i, 1], state[i, 2])
         x.R1 = vec3(state[i, 3], state[i, 4], state[i, 5])
         x.R2 = vec3(state[i, 6], state[i, 7], state[i, 8])
@@ -45,7 +44,6 @@ def make_rows(Lane, State, paced, compensated):
             x.b_low = vec3(state[i, 27], state[i, 28], state[i, 29])
             x.p_low = vec3(state[i, 30], state[i, 31], state[i, 32])
             x.pi_low = vec3(state[i, 33], state[i, 34], state[i, 35])
-        return x
 
     @wp.func
     def write(state: wp.array2d(dtype=Lane), i: int, x: Any):

@@ -95,13 +95,17 @@ def make_stepping(spec):
             x = to_event(x, c, real(h))
         return x
 
-    @wp.func(inline=False)
-    def stepped(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
-                lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
+    @wp.func(inline=spec.explicit is not None)
+    def stepped(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, n: int, h: wp.float64,
+                stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
         """The steps k to k + n: the loop that takes the time, apart from all else, which would spoil its schedule."""
+        # Copies of what lies behind the references: only such can the loop keep in registers.
+        y = x
+        own = c
+        limits = monitor
         for j in range(n):
-            x = one_step(x, c, monitor, k + j, h, stage_h, lead_h, first_h, opening)
-        return x
+            y = one_step(y, own, limits, k + j, h, stage_h, lead_h, first_h, opening)
+        x = y
 
     feed, respond = make_feed(spec, types, method, at_step, opened) if spec.control else (step, step)
 
@@ -114,20 +118,23 @@ def make_held(types, real, one_step, feed):
     State, Constants, Monitor = types.State, types.Constants, types.Monitor
 
     @wp.func(inline=False)
-    def held(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
-             lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
+    def held(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, n: int, h: wp.float64,
+             stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
         """The steps k to k + n, and a tick of the controller at each of its times between and after them.
 
         The ticks are around the loop over steps: a test in it would cost more, and a chunk that ends at each of them most.
         """
+        own = c
+        limits = monitor
         at = k
         while at < k + n:
-            m = wp.min(k + n - at, monitor.every - at % monitor.every)
+            m = wp.min(k + n - at, limits.every - at % limits.every)
+            y = x
             for j in range(m):
-                x = one_step(x, c, monitor, at + j, h, stage_h, lead_h, first_h, opening)
+                y = one_step(y, own, limits, at + j, h, stage_h, lead_h, first_h, opening)
+            x = y
             at += m
-            if at % monitor.every == 0:
-                x.alarm = feed(x, c, monitor, at, h, opening)
-        return x
+            if at % limits.every == 0:
+                feed(x, c, monitor, at, h, opening)
 
     return held

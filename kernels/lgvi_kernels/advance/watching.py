@@ -51,8 +51,9 @@ def make_watching(spec):
         return growth(y, c, t, e[c.packet, 0], e[c.packet, 1], e[c.packet, 2])
 
     @wp.func(inline=False)
-    def energy_alarm(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, among: Lane):
-        """The alarm after k steps, with that of the lanes, among these, whose energy explodes."""
+    def energy_alarm(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64,
+                     opening: real, among: Lane):  # fmt: skip
+        """Raise the alarm after k steps in the lanes, among these, whose energy explodes."""
         g = created(closed(x, c, k, h, opening), c, monitor, real(wp.float64(k) * h))
         unity = ones(g)
         over = positive(among, g - real(wp.static(monitors.MOST_ENERGY)) * unity, unity - unity)
@@ -60,14 +61,14 @@ def make_watching(spec):
         alarm.size = positive(alarm.code, alarm.size, positive(over, g * g, alarm.size))
         grew = real(wp.static(float(monitors.ENERGY_GREW))) * unity
         alarm.code = positive(alarm.code, alarm.code, positive(over, grew, unity - unity))
-        return alarm
+        x.alarm = alarm
 
     @wp.func
     def warn(y: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, frozen: Lane):
         """Note the rows that are crossed after k steps; for the most serious one, the first such k and its value."""
-        # Any lane: without the check of energy no row reads it.
+        # Any lane: no other row reads it.
         g = frozen
-        if wp.static(energetic):
+        if wp.static("energy" in spec.warning_rows):
             g = created(y, c, monitor, real(wp.float64(k) * h))
         crossings = look_at(y, c, monitor.limits[c.packet % monitor.limits.shape[0]], g)
         bits = positive(frozen, frozen - frozen, crossings.bits)
@@ -81,11 +82,11 @@ def make_watching(spec):
                 monitor.warned[c.packet][j] = old | new
 
     @wp.func(inline=False)
-    def begin(x: State, c: Constants, monitor: Monitor, h: wp.float64, frozen: Lane):
+    def begin(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], h: wp.float64, frozen: Lane):
         """Look at the start, whose energy later ones are compared with."""
         y = x
         if wp.static(momentum is not None):
-            y.p = momentum(x)
+            y.p = momentum(y)
         if wp.static(energetic):
             T, U = energies(y, c)
             monitor.energy[c.packet, 0] = T
@@ -95,7 +96,8 @@ def make_watching(spec):
             warn(y, c, monitor, 0, h, frozen)
 
     @wp.func(inline=False)
-    def note(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real, frozen: Lane):
+    def note(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real,
+             frozen: Lane):  # fmt: skip
         """Look at the state after k steps, without the lead of the next."""
         warn(closed(x, c, k, h, opening), c, monitor, k, h, frozen)
 

@@ -287,7 +287,8 @@ def prepare(
             joint distributions need it. Default False.
         failed: "refuse" (default) for an error where members fail, "nan" for NaN in their place; for `of` only.
         common_noise: Whether forces with noise act on every member alike. Default False.
-        threads: Number of threads; default all cores.
+        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less than a
+            million steps of vehicles).
         width: Vehicles per packet; default from the CPU.
         checks: "safe", "all" or "none".
         on_failure: "freeze", "raise" or "substep".

@@ -171,6 +171,8 @@ class Term:
     driven_fields: ClassVar[tuple[str, ...]] = ()
     # Fields that follow from another one, of which alone a fault is told; set by a term before its fields are checked.
     following: ClassVar[tuple[str, ...]] = ()
+    # Numbers with whose sizes the diagonal of `braking` grows, as it does with the speeds and the density where there are any.
+    braking_grows_with: ClassVar[tuple[str, ...]] = ()
 
     name: str = ""
 

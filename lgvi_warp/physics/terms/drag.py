@@ -43,6 +43,7 @@ class Drag(Term):
 
     type: ClassVar[str] = "drag"
     device: ClassVar[str] = "drag_matrix"
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
     strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
     exact_flow: ClassVar[tuple[str, ...]] = ("drag", "drag_directions")
 
@@ -153,6 +154,7 @@ class DragMatrix(Term):
     """
 
     type: ClassVar[str] = "drag_matrix"
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
     strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
 
     linear: Any = number((6, 6), "N s/m, N s, N m s", ((0.0,) * 6,) * 6)

@@ -24,6 +24,7 @@ class BodyLift(Term):
 
     type: ClassVar[str] = "body_lift"
     device: ClassVar[str] = "lift"
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("matrix",)
     strengths: ClassVar[tuple[str, ...]] = ("matrix",)
     dissipative: ClassVar[bool] = False
 

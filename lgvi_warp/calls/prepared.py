@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, samples_for, statistics_for
+from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, outputs, samples_for, statistics_for, values_of
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
@@ -212,14 +212,20 @@ class Prepared:
         if not self._of:
             return self._runner.run(fleet, progress)
         large = any(each.over_path or each.is_function for each in self._of)
-        outputs = self._runner.evaluate(
-            fleet, self._of, PATHS_AT_ONCE if large else fleet.members, progress, warned=False
-        )
-        values = outputs.values
-        if outputs.failed.any():
+        if large:
+            found = self._runner.evaluate(fleet, self._of, PATHS_AT_ONCE, progress, warned=False)
+        else:
+            result = self._runner.run(fleet, progress, warned=False)
+            numbers, status = values_of(result, fleet, self._of), np.asarray(result.status)
+            values = numbers[0] if len(numbers) == 1 else np.concatenate(numbers, axis=1)
+            if np.isfinite(values).all() and not status.any():
+                return values[:, 0] if values.shape[1] == 1 else values
+            found = outputs(self._of, [numbers], [status], result.provenance)
+        values = found.values
+        if found.failed.any():
             if self._refuse:
-                raise FailedMembers([outputs.text('mend what fails, or take NaN for them: failed="nan"')])
-            values = np.where(outputs.failed[:, None], np.nan, values)
+                raise FailedMembers([found.text('mend what fails, or take NaN for them: failed="nan"')])
+            values = np.where(found.failed[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
 
 

@@ -127,23 +127,37 @@ class Runner:
         warned: bool = True,
     ) -> Outputs:
         """Run members, so many at a time, and keep their quantities alone."""
-        looks_at_members = any(each.looks_at_members for each in of)
         groups, ends, content, n = [], [], dict[str, Any](), fleet.members
         for first in range(0, n, at_once):
             stop = min(first + at_once, n)
             group = fleet if stop - first == n else fleet.subset(np.arange(first, stop))
             result = self.run(group, progress and part(progress, first / n, stop / n), warned)
-            members = group.select(0, group.members) if looks_at_members else None
-            groups.append([each.values(result, members) for each in of])
+            groups.append(values_of(result, group, of))
             ends.append(np.asarray(result.status))
             content = result.provenance
-        labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
-        values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
-        odd = ~np.isfinite(values).all(axis=1)
-        codes = np.unique(status) if status.any() else [Status.OK]
-        counts = {Status(int(code)).name.lower(): int((status == code).sum()) for code in codes}
-        counts |= {"quantity not finite": int(odd.sum())} if odd.any() else {}
-        return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
+        return outputs(of, groups, ends, content)
+
+
+def outputs(
+    of: Sequence[OfResult], groups: Sequence[list[np.ndarray]], ends: Sequence[np.ndarray], content: dict[str, Any]
+) -> Outputs:
+    """Join the quantities of groups of members, and count how these ended.
+
+    groups: for each, as of `values_of`. ends: the status of each group's members.
+    """
+    labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
+    values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
+    odd = ~np.isfinite(values).all(axis=1)
+    codes = np.unique(status) if status.any() else [Status.OK]
+    counts = {Status(int(code)).name.lower(): int((status == code).sum()) for code in codes}
+    counts |= {"quantity not finite": int(odd.sum())} if odd.any() else {}
+    return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
+
+
+def values_of(result: Result, fleet: Ensemble, of: Sequence[OfResult]) -> list[np.ndarray]:
+    """The numbers (n, m) of each quantity."""
+    members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in of) else None
+    return [each.values(result, members) for each in of]
 
 
 def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:

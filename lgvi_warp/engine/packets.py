@@ -246,6 +246,8 @@ class Packets:
         m = self.members.count
         none = np.zeros(m, np.uint16), np.zeros(m, np.int64), np.full(m, np.nan)
         warnings: tuple[np.ndarray, np.ndarray, np.ndarray] = self._warnings() if warned else none
+        if not (self._status.any() or warnings[0].any() or self.plan.method.adaptive or self.plan.spec.substep):
+            return MemberStatus.clear(m, 0)
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
         pace = self.state_lanes.view[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
         code = self._status[:m].astype(np.uint8)

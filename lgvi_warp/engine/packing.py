@@ -20,7 +20,7 @@ from lgvi_warp.engine.shared import AXES, FRAME, context
 from lgvi_warp.engine.states import Starts
 from lgvi_warp.engine.survey import framed
 from lgvi_warp.methods import modified_inertia
-from lgvi_warp.physics import inertia, notation, vehicle
+from lgvi_warp.physics import inertia, notation, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
 from lgvi_warp.sampling.members import Members
@@ -115,7 +115,9 @@ class Packing:
     def _law(self, i: int, term: Any, module: Any, numbers: Any) -> Packed:
         parameters = Ensemble.own(term, numbers)
         packed: Packed
-        if i > 0 or not self.plan.spec.drag:
+        if term in terms.IMPLIED:  # packed when the kernel was chosen; neither depends on the step
+            packed = self._shared(("implied", term.key), lambda own: term.packed({}, self._context(own)))
+        elif i > 0 or not self.plan.spec.drag:
             packed = term.packed(parameters, self._context(numbers))
         elif module is built_in("laws", term.exact_flow[0]):
             frame = numbers[FRAME][0]

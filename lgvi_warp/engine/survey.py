@@ -151,7 +151,7 @@ def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -
         p[AXES] = shared(AXES, p, lambda n: _frame_of(method, inertia.Blocks(*nothing, n["vehicle.inertia"])))
         if not shared.keeps(AXES):
             shared.varied.add(AXES)
-        mass = shared("mass", p, lambda n: inertia.in_axes(n[AXES][0].Q, vehicle.mass_matrix(n)))
+        mass = shared("mass", p, _mass_in_axes)
         p[FRAME] = replace(p[AXES][0], M=mass), *p[AXES][1:]
         if not (shared.keeps(AXES) and shared.keeps("mass")):
             shared.varied.add(FRAME)
@@ -161,6 +161,12 @@ def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -
             shared.varied.update((FRAME, AXES))
     shared.remember(parameters, p)
     return p
+
+
+def _mass_in_axes(numbers: Any) -> np.ndarray:
+    """Mass matrices (n, 3, 3) in the kernel's axes, of a vehicle whose mass does not turn them."""
+    axes, matrices = numbers[AXES][0], vehicle.mass_matrix(numbers)
+    return inertia.in_axes(axes.Q, matrices) if axes.turned else matrices
 
 
 def _survey_of_slice(
@@ -181,7 +187,8 @@ def _survey_of_slice(
     def is_felt(term: Term, numbers: Any) -> bool:
         if term not in terms.IMPLIED:
             return term.present(numbers_of(term, numbers))
-        return any(np.any(value) for value in term.packed({}, context(numbers, *run)).values.values())
+        packed = shared(("implied", term.key), numbers, lambda own: term.packed({}, context(own, *run)))
+        return any(value.any() for value in packed.values.values())
 
     def parts(term: Any, numbers: Any) -> frozenset[str]:
         return frozenset(term.parts(numbers_of(term, numbers)))
@@ -223,7 +230,7 @@ def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
     """What a survey says of the axes and origins of some members."""
     return {
         "turned": not frame.aligned,
-        "turned_axes": bool(np.any(np.eye(3) != frame.Q)),
+        "turned_axes": bool(np.any(notation.EYE != frame.Q)),
         "coupled": frame.coupled,
         "moved": bool(np.any(frame.origin)),
         "forces_moved": bool(np.any(frame.forces)),

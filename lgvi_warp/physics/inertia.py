@@ -103,7 +103,7 @@ class Frame:
     @functools.cached_property
     def turned(self) -> bool:
         """Whether some member's axes are not the user's."""
-        return bool((np.eye(3) != self.Q).any())
+        return bool((notation.EYE != self.Q).any())
 
     @functools.cached_property
     def shifted(self) -> bool:
@@ -135,7 +135,7 @@ class Frame:
 
     def inertia_at(self, E: np.ndarray) -> np.ndarray:
         """Mass matrix (n, 6, 6) in these axes, where M^-1 C is E (n, 3, 3) [m]: J = Js + E^T M E."""
-        J = self.J[:, :, None] * np.eye(3)
+        J = self.J[:, :, None] * notation.EYE
         return joined(self.M + 0.0 * E, self.M @ E, J + np.swapaxes(E, -1, -2) @ self.M @ E)
 
     def vector(self, v: np.ndarray) -> np.ndarray:
@@ -175,7 +175,7 @@ def schur(body: Blocks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def in_axes(Q: np.ndarray, A: np.ndarray) -> np.ndarray:
     """Matrices in other axes, Q^T A Q."""
-    if np.all(np.eye(3) == Q):
+    if np.all(notation.EYE == Q):
         return A
     return np.asarray(np.swapaxes(Q, -1, -2) @ A @ Q)
 

@@ -11,6 +11,9 @@ import numpy as np
 
 # A matrix whose off-diagonal elements are below this fraction of its largest is diagonal as given.
 DIAGONAL = 1e-14
+# The unit matrix, which takes longer to make than to use.
+EYE = np.eye(3)
+EYE.flags.writeable = False
 # Places of the entries of a 3x3 matrix off its diagonal, row by row.
 OFF_DIAGONAL = [1, 2, 3, 5, 6, 7]
 # How far from orthogonal an attitude may be: the round-off of one printed with ten digits.

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -90,10 +90,10 @@ class Draws:
         """
         if self.members > KEPT:
             return self._drawn(first, stop, start)
-        every = self._few.items() if start else ((name, self._few[name]) for name in self.scene.parameters)
+        every = self._few if start else self._few_parameters
         if (first, stop) == (0, self.members):
-            return dict(every)
-        return {name: values[first:stop] if len(values) > 1 else values for name, values in every}
+            return every.copy()
+        return {name: values[first:stop] if len(values) > 1 else values for name, values in every.items()}
 
     @functools.cached_property
     def _few(self) -> dict[str, np.ndarray]:
@@ -101,6 +101,16 @@ class Draws:
         for name in self.varied_names & few.keys():
             few[name].flags.writeable = False
         return few
+
+    @functools.cached_property
+    def _few_parameters(self) -> dict[str, np.ndarray]:
+        return {name: self._few[name] for name in self.scene.parameters}
+
+    def with_columns(self, columns: Columns) -> Draws:
+        """The draws of other members, of which a table's columns have other values; the targets are the same."""
+        draws = replace(self, columns=columns, total=len(columns[0][1]), places=None)
+        vars(draws).update(drawn_names=self.drawn_names, varied_names=self.varied_names)
+        return draws
 
     def _drawn(self, first: int, stop: int, start: bool) -> dict[str, np.ndarray]:
         """Draw what `values` returns."""

@@ -39,7 +39,7 @@ class Target:
     name: str
     index: tuple[int, ...] | None = None
 
-    @property
+    @functools.cached_property
     def label(self) -> str:
         """The name with the index, such as "start.position[2]"."""
         return self.name if self.index is None else f"{self.name}[{','.join(map(str, self.index))}]"

@@ -191,6 +191,9 @@ class DragMatrix(Term):
         return "drag_matrix" if aligned else "drag_matrix_turned"
 
 
+BESIDE = ~np.eye(6, dtype=bool)
+
+
 def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
     """Which of the matrices (n, 6, 6) would speed a vehicle up, and the worst velocity (n, 6) for each.
 
@@ -218,19 +221,17 @@ def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
     diagonal = np.einsum("nii->ni", matrices)
     brakes = (diagonal >= 0.0).all(axis=1)
     # Most matrices have few entries beside the diagonal, the same ones in all members.
-    beside = [(i, j) for i, j in np.argwhere(matrices.any(axis=0)).tolist() if i != j]
-    if not beside:
+    i, j = np.nonzero(matrices.any(axis=0) & BESIDE)
+    if not len(i):
         return np.asarray(brakes)
-    alone, others = np.ones(len(matrices), bool), np.zeros((len(matrices), 6))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        size = 1.0 / np.cbrt(diagonal)
-        for i, j in beside:
-            entry = matrices[:, i, j]
-            alone &= entry == 0.0
-            scaled = np.abs(entry) * size[:, i] * size[:, j] ** 2
-            others[:, i] += scaled
-            others[:, j] += 2.0 * scaled
-        return np.asarray(brakes & (alone | (others <= 3.0).all(axis=1)))
+        size, entries = 1.0 / np.cbrt(diagonal), matrices[:, i, j]
+        scaled = np.abs(entries) * size[:, i] * size[:, j] ** 2
+        others = np.zeros((6, len(matrices)))
+        for k in range(len(i)):
+            others[i[k]] += scaled[:, k]
+            others[j[k]] += 2.0 * scaled[:, k]
+        return np.asarray(brakes & (~entries.any(axis=1) | (others <= 3.0).all(axis=0)))
 
 
 def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -215,12 +215,15 @@ class Prepared:
         if large:
             found = self._runner.evaluate(fleet, self._of, PATHS_AT_ONCE, progress, warned=False)
         else:
-            result = self._runner.run(fleet, progress, warned=False)
-            numbers, status = values_of(result, fleet, self._of), np.asarray(result.status)
+            samples = self._runner.samples(fleet, progress) if all(each.is_plain for each in self._of) else None
+            result, status = samples or (self._runner.run(fleet, progress, warned=False), None)
+            status = status if samples else np.asarray(result.status)
+            numbers = values_of(result, fleet, self._of)
             values = numbers[0] if len(numbers) == 1 else np.concatenate(numbers, axis=1)
-            if np.isfinite(values).all() and not status.any():
+            if (status is None or not status.any()) and np.isfinite(values).all():
                 return values[:, 0] if values.shape[1] == 1 else values
-            found = outputs(self._of, [numbers], [status], result.provenance)
+            status = np.zeros(len(values), np.uint8) if status is None else status
+            found = outputs(self._of, [numbers], [status], {})
         values = found.values
         if found.failed.any():
             if self._refuse:

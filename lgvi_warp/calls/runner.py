@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,15 +13,19 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.control.signals import ordered
+from lgvi_warp.engine import single_block
+from lgvi_warp.engine.block import parts
+from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.shared import SharedResultsCache
+from lgvi_warp.engine.state_lanes import load_kernel
 from lgvi_warp.engine.survey import survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.results.quantities import EndQuantity, OfResult
-from lgvi_warp.results.result import Result
-from lgvi_warp.runs.request import Request, enough_iterations
+from lgvi_warp.results.result import DrawnParameters, Result
+from lgvi_warp.runs.request import ALL_SAMPLES, Request, enough_iterations
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.statistics.base import Statistic
@@ -96,6 +101,7 @@ class Runner:
                 return plan.for_members(fleet)
         plan = replace(self.request, fleet=fleet).plan(survey_all=False)
         plan.compile()
+        load_kernel(plan.spec)  # few members pack faster by it, and calls are many
         if plan.method.reason:  # chosen once, by the members of the first plan
             self.request = replace(self.request, method=plan.method)
         kind = self._kinds.setdefault(names, _Kind(plan.shared))
@@ -117,6 +123,27 @@ class Runner:
 
         plan = self.plan(fleet)
         return self.request.run(plan, fields=plan.fields, progress=progress, known=known, warned=warned)
+
+    def samples(
+        self, fleet: Ensemble, progress: Callable[[float], None] | None = None
+    ) -> tuple[SimpleNamespace, np.ndarray | None] | None:
+        """Run few members for their samples alone, at a part of the cost of a Result.
+
+        Returns: What plain quantities read of a Result, and the status (n,), None where all reached the end. None where it
+            takes a Result.
+        """
+        request, plan = self.request, self.plan(fleet)
+        if progress is not None or plan.on_failure == "raise" or request.observed != ALL_SAMPLES:
+            return None
+        if not isinstance(request.executor, Threads):
+            return None
+        blocks = parts(fleet.members, plan.grid.steps, request.count(plan), False)
+        if not single_block.fits(plan, blocks):
+            return None
+        samples, status = single_block.run_for_samples(plan)
+        parameters, terms = DrawnParameters(fleet, fleet.members), fleet.scene.terms
+        known = dict(samples=samples, time=plan.grid.times, terms=terms, members=fleet.members, parameters=parameters)
+        return SimpleNamespace(**known), status
 
     def evaluate(
         self,
@@ -154,7 +181,7 @@ def outputs(
     return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
 
 
-def values_of(result: Result, fleet: Ensemble, of: Sequence[OfResult]) -> list[np.ndarray]:
+def values_of(result: Any, fleet: Ensemble, of: Sequence[OfResult]) -> list[np.ndarray]:
     """The numbers (n, m) of each quantity."""
     members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in of) else None
     return [each.values(result, members) for each in of]

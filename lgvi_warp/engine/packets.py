@@ -246,7 +246,7 @@ class Packets:
         m = self.members.count
         none = np.zeros(m, np.uint16), np.zeros(m, np.int64), np.full(m, np.nan)
         warnings: tuple[np.ndarray, np.ndarray, np.ndarray] = self._warnings() if warned else none
-        if not (self._status.any() or warnings[0].any() or self.plan.method.adaptive or self.plan.spec.substep):
+        if self.untroubled and not (warnings[0].any() or self.plan.method.adaptive or self.plan.spec.substep):
             return MemberStatus.clear(m, 0)
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
         pace = self.state_lanes.view[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
@@ -264,6 +264,11 @@ class Packets:
             self._of_members(self.monitor.substeps, np.int64) if self.plan.spec.substep else np.zeros(m, np.int64),
             stopped_by,
         )
+
+    @property
+    def untroubled(self) -> bool:
+        """Whether no member has failed or was stopped so far."""
+        return not self._status.any()
 
     def ended(self) -> tuple[np.ndarray, np.ndarray]:
         """Status (m,) of each member, and the last step (m,) of those it made itself.

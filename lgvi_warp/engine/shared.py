@@ -104,6 +104,8 @@ class SharedResultsCache:
     _kept: dict[Any, Any] = field(default_factory=dict)
     _varying: dict[Any, bool] = field(default_factory=dict)
     _last: _Few | None = None
+    # The last survey, and what it asked (see lgvi_warp.engine.survey).
+    surveyed: Any = None
 
     def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
         """A result from memory, or computed."""

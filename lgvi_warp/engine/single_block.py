@@ -28,6 +28,27 @@ def run_single_block(
 
     names: of the samples to keep. warned: whether warnings are looked for. advanced: called with the steps of vehicles so far.
     """
+    samples, packets = _advanced(plan, names, advanced)
+    with np.errstate(invalid="ignore", over="ignore"):
+        outcome = packets.outcome(warned)
+    packets.leave()
+    return samples, outcome
+
+
+def run_for_samples(
+    plan: Plan, advanced: Callable[[Block, int], None] = lambda block, steps: None
+) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+    """Advance all members; their samples, and their status (n,), None where all reached the end."""
+    samples, packets = _advanced(plan, plan.fields, advanced)
+    status = None if packets.untroubled else packets.outcome(warned=False).status
+    packets.leave()
+    return samples, status
+
+
+def _advanced(
+    plan: Plan, names: Sequence[str], advanced: Callable[[Block, int], None]
+) -> tuple[dict[str, np.ndarray], Packets]:
+    """Samples of all members, and their packets at the end."""
     n = plan.ensemble.members
     block = Block(0, n)
     # As of `run_block`.
@@ -43,9 +64,7 @@ def run_single_block(
             if when.start < when.stop and names:
                 _keep(samples, when, unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table))
             advanced(block, n * k1)
-        outcome = packets.outcome(warned)
-        packets.leave()
-    return samples, outcome
+    return samples, packets
 
 
 def _keep(samples: dict[str, np.ndarray], when: slice, values: Any) -> None:

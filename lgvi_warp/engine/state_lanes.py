@@ -69,6 +69,11 @@ def kernel_pays(spec: Spec, members: int) -> bool:
     return members >= MANY or (spec.width, spec.real) in _loaded
 
 
+def load_kernel(spec: Spec) -> None:
+    """Load the kernel that packs states of a run: from then on every run of its width and type packs by it."""
+    kernel_of(spec.width, spec.real)
+
+
 @functools.cache
 def kernel_of(width: int, real: Any) -> Any:
     """The kernel that packs states, loaded, and compiled first if Warp's cache has none."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.oddities import Oddities
 from lgvi_warp.scene.plausibility import of_numbers
-from lgvi_warp.scene.slices import over_members
+from lgvi_warp.scene.slices import AT_ONCE, over_members
 
 Parameters = Mapping[str, np.ndarray]
 
@@ -129,7 +129,30 @@ def survey(
             return _survey_of_slice(ensemble.parameters(first, stop), ensemble, method, known, odd, first, stop)
 
     count = min(ensemble.members, most or ensemble.members) if ensemble.varied() else 1
+    if not odd and count <= AT_ONCE:
+        return _again(ensemble, method, known, count) or look(0, count)
     return functools.reduce(Survey.joined, over_members(look, count))
+
+
+class _Asked(NamedTuple):
+    """A survey's questions whose answers may vary, each with its answer: (key, function of numbers, answer); and the survey."""
+
+    scene: Any
+    method: Method
+    questions: tuple[tuple[Any, Callable[[Any], Any], Any], ...]
+    survey: Survey
+
+
+def _again(ensemble: Ensemble, method: Method, shared: SharedResultsCache, count: int) -> Survey | None:
+    """The survey that was made before, if these members answer all that may vary as those did; else None."""
+    last = shared.surveyed
+    if last is None or last.scene is not ensemble.scene or last.method is not method:
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        p = framed(method, ensemble.parameters(0, count), shared)
+        same = all(shared(key, p, ask) == answer for key, ask, answer in last.questions)
+    survey: Survey = last.survey
+    return survey if same else None
 
 
 def survey_of(
@@ -179,15 +202,28 @@ def _survey_of_slice(
     stop: int,
 ) -> Survey:
     p = framed(method, parameters, shared)
-    frame, scene, numbers_of = p[FRAME][0], ensemble.scene, ensemble.own
-    aligned = shared("aligned", p, lambda numbers: numbers[AXES][0].aligned)
-    # Weight and buoyancy do not depend on the step.
-    run = frame, ensemble.indices_of(first, stop), ensemble.seed, math.nan, aligned
+    scene, numbers_of = ensemble.scene, ensemble.own
+    questions: list[tuple[Any, Callable[[Any], Any], Any]] = []
+
+    def ask(key: Any, compute: Callable[[Any], Any]) -> Any:
+        answer = shared(key, p, compute)
+        if not shared.keeps(key):
+            questions.append((key, compute, answer))
+        return answer
+
+    aligned = ask("aligned", lambda numbers: numbers[AXES][0].aligned)
 
     def is_felt(term: Term, numbers: Any) -> bool:
         if term not in terms.IMPLIED:
             return term.present(numbers_of(term, numbers))
-        packed = shared(("implied", term.key), numbers, lambda own: term.packed({}, context(own, *run)))
+        # Weight and buoyancy depend neither on the step nor on which members these are.
+        run = ensemble.indices_of(first, stop), ensemble.seed, math.nan, aligned
+
+        def pack(own: Any) -> Any:
+            frame = dict.__getitem__(own, FRAME)[0]  # the context notes whether it is read
+            return term.packed({}, context(own, frame, *run))
+
+        packed = shared(("implied", term.key), numbers, pack)
         return any(value.any() for value in packed.values.values())
 
     def parts(term: Any, numbers: Any) -> frozenset[str]:
@@ -200,30 +236,33 @@ def _survey_of_slice(
         return water is not None and bool(np.any(water[..., 2]))
 
     def of_each(name: str, compute: Any, laws: Iterable[Term]) -> dict[str, Any]:
-        return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in laws}
+        return {t.key: ask((name, t.key), functools.partial(compute, t)) for t in laws}
 
     felt = of_each("felt", is_felt, (*terms.IMPLIED, *scene.terms))
     drags = of_each("drag", parts, (term for term in scene.terms if term.exact_flow))
     rising = of_each("rises", rises, (term for term in scene.terms if term.carries))
     parts_of_control = scene.controller.parts if scene.controller else ()
     features = of_each("features", lambda part, numbers: part.features(numbers_of(part, numbers)), parts_of_control)
-    of_axes = shared("facts of axes", p, lambda numbers: _facts(*numbers[AXES]))
-    mass = shared("shape of mass", p, lambda numbers: SHAPES_OF_MASS.index(shape_of_mass(numbers[FRAME][0].M)))
-    return Survey(
+    of_axes = ask("facts of axes", lambda numbers: _facts(*numbers[AXES]))
+    mass = ask("shape of mass", lambda numbers: SHAPES_OF_MASS.index(shape_of_mass(numbers[FRAME][0].M)))
+    found = Survey(
         **of_axes,
         mass=mass,
-        bent=bool(drags) and not shared("exact flow", p, lambda numbers: numbers[FRAME][0].principal),
+        bent=bool(drags) and not ask("exact flow", lambda numbers: numbers[FRAME][0].principal),
         felt=frozenset(key for key, yes in felt.items() if yes),
         drag=frozenset().union(*drags.values()),
         rising=frozenset(key for key, yes in rising.items() if yes),
-        weightless=shared("weightless", p, lambda numbers: bool(np.any(numbers["environment.gravity"] == 0.0))),
-        buoyant=shared("buoyant", p, lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
+        weightless=ask("weightless", lambda numbers: bool(np.any(numbers["environment.gravity"] == 0.0))),
+        buoyant=ask("buoyant", lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
         delayed="controller.delay" in p
-        and shared("delayed", p, lambda numbers: bool(np.any(numbers["controller.delay"] > 0.0))),
-        lever=shared("lever", p, vehicle.lopsided),
+        and ask("delayed", lambda numbers: bool(np.any(numbers["controller.delay"] > 0.0))),
+        lever=ask("lever", vehicle.lopsided),
         features=frozenset(f"{key}.{word}" for key, words in features.items() for word in words),
         odd=of_numbers(scene, p, first, stop, shared) if odd else Oddities({}),
     )
+    if not odd:
+        shared.surveyed = _Asked(scene, method, tuple(questions), found)
+    return found
 
 
 def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:

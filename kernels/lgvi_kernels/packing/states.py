@@ -13,9 +13,7 @@ import warp as wp
 from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane, mul, positive, sub, vec3  # noqa: F401
 
 # As those of the other kernels, but for what would change bits.
-EXACT_FLAGS = (
-    "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=100000 -ffp-contract=off -mstackrealign"
-)
+EXACT_FLAGS = "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=100000 -ffp-contract=off -mstackrealign"
 
 # Rows of `places`: where each kind of numbers lies in memory, and the bytes from member to member and from number to number.
 # An address of 0: there are none. MASS: of translation, where inertia is diagonal; INERTIA: 6x6, where it is not. RUN holds
@@ -34,17 +32,28 @@ PEAKS = 4
 def _number(width):
     """C++ that reads the number `at` of a kind for each lane; lanes beyond the last member read that of the last one."""
     V = f"wp::vec_t<{width}, wp::float64>"
-    read = "memcpy(&r[j], begin + {} * step, sizeof(wp::float64));"
+    # A function that is called: a copy at each of some eighty places would take seconds to compile.
     return f"""
+    struct Read {{
+        static __attribute__((noinline)) {V} numbers(const char* begin, wp::int64 step, wp::int64 first, wp::int64 members) {{
+            {V} r;
+            if (step == 0) {{
+                wp::float64 shared;
+                memcpy(&shared, begin, sizeof(shared));
+                return {V}(shared);
+            }}
+            if (first + {width} <= members) {{
+                begin += first * step;
+                for (int j = 0; j < {width}; ++j) memcpy(&r[j], begin + j * step, sizeof(wp::float64));
+                return r;
+            }}
+            for (int j = 0; j < {width}; ++j)
+                memcpy(&r[j], begin + (first + j < members ? first + j : members - 1) * step, sizeof(wp::float64));
+            return r;
+        }}
+    }};
     const wp::int64* place = (const wp::int64*)places.data + 3 * kind;
-    const char* begin = (const char*)place[0] + at * place[2];
-    const wp::int64 step = place[1], first = (wp::int64)packet * {width};
-    {V} r;
-    if (first + {width} <= members)
-        for (int j = 0; j < {width}; ++j) {read.format("(first + j)")}
-    else
-        for (int j = 0; j < {width}; ++j) {read.format("(first + j < members ? first + j : members - 1)")}
-    return r;
+    return Read::numbers((const char*)place[0] + at * place[2], place[1], (wp::int64)packet * {width}, members);
     """
 
 

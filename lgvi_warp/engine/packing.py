@@ -116,7 +116,7 @@ class Packing:
         parameters = Ensemble.own(term, numbers)
         packed: Packed
         if term in terms.IMPLIED:  # packed when the kernel was chosen; neither depends on the step
-            packed = self._shared(("implied", term.key), lambda own: term.packed({}, self._context(own)))
+            packed = self.plan.shared(("implied", term.key), numbers, lambda own: term.packed({}, self._context(own)))
         elif i > 0 or not self.plan.spec.drag:
             packed = term.packed(parameters, self._context(numbers))
         elif module is built_in("laws", term.exact_flow[0]):

@@ -15,7 +15,7 @@ import warp as wp
 
 from lgvi_kernels import built_in
 from lgvi_kernels.maps.collocation import SLOPE_FIELDS
-from lgvi_warp.engine.arrays import memory_rows
+from lgvi_warp.engine.arrays import memory_rows, row_count
 from lgvi_warp.engine.shared import AXES, FRAME, context
 from lgvi_warp.engine.states import Starts
 from lgvi_warp.engine.survey import framed
@@ -64,7 +64,7 @@ class Packing:
     def _inertia(self, numbers: Any) -> Fields:
         frame, U, _ = numbers[FRAME]
         parts, scale = self.plan.spec.parts, self._scale(frame)
-        diagonal = _diagonal(frame.M)
+        diagonal = frame.mass_diagonal
         fields: Fields = {"J": frame.J / scale[:, None], "inverse_scale": 1.0 / scale}
         if diagonal is not None:
             # The same bits as below, without the zeros.
@@ -194,7 +194,7 @@ def rows_shared(plan: Plan) -> bool:
     packing = Packing(plan, plan.ensemble.select(0, members if members <= KEPT else 1))
     each = (("law", packing.laws()), ("part", packing.control()), ("event", packing.events()))
     sizes = {
-        (kind, i): law.rows.shape[1] for kind, packed in each for i, law in enumerate(packed) if law.rows is not None
+        (kind, i): row_count(law) for kind, packed in each for i, law in enumerate(packed) if law.rows is not None
     }
     number = 8 if plan.spec.real == wp.float64 else 4
     return sum(sizes.values()) * plan.spec.width * number > LARGE_TABLE and all(map(plan.shared.keeps, sizes))
@@ -205,16 +205,9 @@ def _once(values: np.ndarray) -> np.ndarray:
     return values[:1] if values.strides[0] == 0 else values
 
 
-def _diagonal(matrices: np.ndarray) -> np.ndarray | None:
-    """Diagonals (n, 3) of matrices (n, 3, 3) that have no other entries; None where one has."""
-    if notation.off_diagonal(matrices).any():
-        return None
-    return np.einsum("nii->ni", matrices)
-
-
 def _diagonal_mass(frame: Frame) -> np.ndarray | None:
     """Diagonals (n, 3) of the mass matrices, if momenta are products of these and velocities alone; else None."""
-    return None if np.any(frame.E) else _diagonal(frame.M)
+    return None if np.any(frame.E) else frame.mass_diagonal
 
 
 def _inertia_of_state(numbers: Any) -> np.ndarray:

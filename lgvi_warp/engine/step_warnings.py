@@ -11,7 +11,7 @@ from lgvi_warp.common.status import Warnings
 from lgvi_warp.methods.limits import MUNK, RESTORING, longest_stage, oscillation_limit, rotation_limit
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
-from lgvi_warp.physics import hydrostatics, notation, vehicle
+from lgvi_warp.physics import hydrostatics, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Numbers, Term, own
 
@@ -229,10 +229,8 @@ def _most_munk(frame: Frame) -> float:
     """A bound on `munk_factor` of all members."""
     if len(frame.M) == 1:
         return float((munk_factor(frame) * frame.J.min(axis=1)).max() / frame.J.min())
-    if notation.off_diagonal(frame.M).any():
-        return np.inf
-    M = np.einsum("nii->ni", frame.M)
-    return float((1.0 / M.min() - 1.0 / M.max()) / frame.J.min())
+    M = frame.mass_diagonal
+    return np.inf if M is None else float((1.0 / M.min() - 1.0 / M.max()) / frame.J.min())
 
 
 def _longest_arm(p: Numbers, frame: Frame) -> float:

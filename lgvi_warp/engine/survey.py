@@ -37,9 +37,11 @@ COUPLINGS = ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))
 
 def shape_of_mass(M: np.ndarray) -> str:
     """The simplest shape that fits every mass matrix (n, 3, 3) [kg]."""
-    off, diagonal = notation.off_diagonal(M), np.einsum("nii->ni", M)
-    if off.any() and (np.abs(off).max(axis=1) > DIAGONAL * np.abs(diagonal).max(axis=1)).any():
-        return "full"
+    diagonal = np.einsum("nii->ni", M)
+    if notation.only_diagonal(M) is None:
+        off = notation.off_diagonal(M)
+        if (np.abs(off).max(axis=1) > DIAGONAL * np.abs(diagonal).max(axis=1)).any():
+            return "full"
     return "isotropic" if (diagonal == diagonal[:, :1]).all() else "diagonal"
 
 

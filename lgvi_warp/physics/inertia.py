@@ -110,6 +110,11 @@ class Frame:
         """Whether some member's origin of the state is not the user's."""
         return bool(self.origin.any())
 
+    @functools.cached_property
+    def mass_diagonal(self) -> np.ndarray | None:
+        """Diagonals (., 3) of the mass matrices, where none has another entry; else None."""
+        return notation.only_diagonal(self.M)
+
     @property
     def principal(self) -> bool:
         """Whether the user's axes are principal axes of M and J, in any order, about the same origin."""

@@ -110,6 +110,19 @@ def off_diagonal(matrices: np.ndarray) -> np.ndarray:
     return matrices.reshape(-1, 9)[:, OFF_DIAGONAL]
 
 
+def only_diagonal(matrices: np.ndarray) -> np.ndarray | None:
+    """Diagonals of 3x3 matrices, if all other entries are zero.
+
+    Args:
+        matrices: Matrices (n, 3, 3).
+
+    Returns:
+        Diagonals (n, 3); None where some matrix has another entry.
+    """
+    diagonals = np.einsum("nii->ni", matrices)
+    return diagonals if np.count_nonzero(matrices) == np.count_nonzero(diagonals) else None
+
+
 def rotations(R: np.ndarray) -> np.ndarray:
     """Which matrices are rotations to within ORTHOGONAL.
 

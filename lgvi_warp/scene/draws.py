@@ -128,9 +128,11 @@ class Draws:
         drawn = [(target, column[members]) for target, column in self.columns]
         for variation in wanted:
             drawn += variation.values(levels[variation.key])
+        own: set[str] = set()
         for target, column in drawn:
             if target.name in values:
-                variations.put(values, target, column)
+                variations.put(values, target, column, target.name in own)
+                own.add(target.name)
         return values
 
     def members_of(self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int) -> Members:

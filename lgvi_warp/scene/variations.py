@@ -142,14 +142,15 @@ def symmetric(drawn: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     return upper
 
 
-def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> None:
-    """Set the values (n, ...) of a target among the numbers (1 or n, ...) by name, in place."""
+def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray, into: bool = False) -> None:
+    """Set the values (n, ...) of a target among the numbers (1 or n, ...) by name; into: in the array that is there."""
     if target.index is None:
         values[target.name] = drawn
         return
     array = values[target.name]
-    array, shared = np.empty((len(drawn), *array.shape[1:]), array.dtype), array
-    array[...] = shared
+    if not into:
+        array, shared = np.empty((len(drawn), *array.shape[1:]), array.dtype), array
+        array[...] = shared
     every: tuple[Any, ...] = (slice(None),)
     array[every + target.index] = drawn
     if target.name in MATRICES:

@@ -263,17 +263,16 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingCon
     """
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = context.frame.from_forces
-    n = max(len(linear), len(quadratic), len(X))
     XT = np.swapaxes(X, 1, 2)
     columns = np.flatnonzero(quadratic.any(axis=0).any(axis=0)).tolist()
-    rows = np.empty((n, 72 if context.aligned else 36 + 12 * len(columns)))
-    rows[:, :36] = (XT @ linear @ X).reshape(-1, 36)
+    constant = (XT @ linear @ X).reshape(-1, 36)
     values = {"constant": int(linear.any())}
     if context.aligned:
-        rows[:, 36:] = (XT @ quadratic @ X).reshape(-1, 36)
+        rows = (constant, (XT @ quadratic @ X).reshape(-1, 36))
         return Packed(values | {"quadratic": int(bool(columns))}, rows)
-    XT = np.broadcast_to(XT, (n, 6, 6))
-    for at, j in zip(range(36, rows.shape[1], 12), columns, strict=True):
-        rows[:, at : at + 6] = X[:, j, :]
-        rows[:, at + 6 : at + 12] = np.einsum("nij,nj->ni", XT, np.broadcast_to(quadratic[:, :, j], (n, 6)))
-    return Packed(values | {"count": len(columns)}, rows)
+    n = max(len(quadratic), len(X))
+    XT, wrenches = np.broadcast_to(XT, (n, 6, 6)), np.broadcast_to(quadratic, (n, 6, 6))
+    parts = [constant]
+    for j in columns:
+        parts += [X[:, j, :], np.einsum("nij,nj->ni", XT, wrenches[:, :, j])]
+    return Packed(values | {"count": len(columns)}, tuple(parts))

@@ -19,7 +19,7 @@ from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.shared import SharedResultsCache
 from lgvi_warp.engine.state_lanes import load_kernel
-from lgvi_warp.engine.survey import survey
+from lgvi_warp.engine.survey import Survey, survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.provenance import provenance
@@ -85,19 +85,24 @@ class Runner:
         scene, chosen = fleet.scene, self.request.method
         self._auto = (chosen if isinstance(chosen, Method) else scene.run.method_of(chosen)).iterations == "auto"
         self._kinds: dict[frozenset[str], _Kind] = {}
-        self._last: Plan | None = None
+        # The last plan, with the survey that it was chosen by; one pair, since threads may call at once.
+        self._last: tuple[Survey, Plan] | None = None
 
     def plan(self, fleet: Ensemble) -> Plan:
         """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
         names = frozenset(fleet.varied_names)
         kind = self._kinds.get(names)
         if kind is not None and self._last is not None:
-            last = self._last
+            last_facts, last = self._last
             method = last.method
             if self._auto:
                 method = replace(method, iterations=enough_iterations(fleet, method, last.grid.h, last.dtype))
-            plan = kind.plans.get((method, survey(fleet, method, kind.shared, odd=False, most=SURVEYED).decisive))
+            facts = survey(fleet, method, kind.shared, odd=False, most=SURVEYED)
+            if facts is last_facts and method is last.method:  # what decides agrees: it need not be compared
+                return last.for_members(fleet)
+            plan = kind.plans.get((method, facts.decisive))
             if plan is not None:
+                self._last = facts, plan
                 return plan.for_members(fleet)
         plan = replace(self.request, fleet=fleet).plan(survey_all=False)
         plan.compile()
@@ -106,7 +111,8 @@ class Runner:
             self.request = replace(self.request, method=plan.method)
         kind = self._kinds.setdefault(names, _Kind(plan.shared))
         facts = survey(fleet, plan.method, kind.shared, odd=False, most=SURVEYED)
-        kind.plans[plan.method, facts.decisive] = self._last = plan
+        kind.plans[plan.method, facts.decisive] = plan
+        self._last = facts, plan
         return plan
 
     def run(self, fleet: Ensemble, progress: Callable[[float], None] | None = None, warned: bool = True) -> Result:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from lgvi_kernels.advance.rows import STATE_FIELDS
 from lgvi_kernels.advance.spec import Spec
 from lgvi_kernels.lanes.arithmetic import lane
 from lgvi_kernels.packing.states import PEAKS, PLACES, make_pack_states
@@ -41,6 +42,9 @@ class StateLanes(Lanes):
         inputs = [places, self.array, peaks]
         with build_lock:
             self._launch = wp.launch(kernel, dim=packets, inputs=inputs, device="cpu", record_cmd=True)
+        # The arrays that were packed last, and what was copied of them to lie as the kernel reads it.
+        self._arrays: list[Any] = [None] * (len(PLACES) - 1)
+        self._copies: list[Any] = [None] * (len(PLACES) - 1)
         self._places, self.peaks = places.numpy(), peaks.numpy().reshape(packets, PEAKS, self._spec.width)
 
     def write(self, starts: Starts, members: int) -> None:
@@ -49,9 +53,12 @@ class StateLanes(Lanes):
         if self._launch is None:
             put_rows(self.view, self.rows())
             return
-        found = [_place(getattr(starts, name)) for name in PLACES[:-1]]
-        run = (members, int(starts.inertial), 18 if self._spec.compensated else 0)
-        self._places[...] = [place for place, _ in found] + [run]
+        for i, values in enumerate(starts[:-1]):
+            # What all calls share lies where it lay.
+            if values is not self._arrays[i]:
+                self._arrays[i] = values
+                self._places[i], self._copies[i] = _place(values)
+        self._places[-1] = members, starts.inertial, STATE_FIELDS if self._spec.compensated else 0
         self._launch.launch()
 
     def rows(self) -> np.ndarray:
@@ -85,7 +92,7 @@ def kernel_of(width: int, real: Any) -> Any:
 
 
 def _place(values: np.ndarray | None) -> tuple[tuple[int, int, int], Any]:
-    """Where numbers lie: address, and the bytes from member to member and from number to number; and the array itself."""
+    """Where numbers lie: address, and the bytes from member to member and from number to number; and what lies there."""
     if values is None:
         return (0, 0, 0), None
     if values.dtype != np.float64:

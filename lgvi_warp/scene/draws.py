@@ -125,7 +125,8 @@ class Draws:
         members = np.arange(first, stop) if self.places is None else self.places[first:stop]
         space = self.space.of([variation.key for variation in wanted]) if self.sampling.kind == "random" else self.space
         levels = self.sampling.draw(space, members) if wanted else {}
-        drawn = [(target, column[members]) for target, column in self.columns]
+        rows = slice(first, stop) if self.places is None else members
+        drawn = [(target, column[rows]) for target, column in self.columns]
         for variation in wanted:
             drawn += variation.values(levels[variation.key])
         own: set[str] = set()
@@ -140,14 +141,14 @@ class Draws:
         m = len(indices)
         start = {key.removeprefix("start."): values.pop(key) for key in tuple(values) if key.startswith("start.")}
         # In one memory layout, on which the order of the sums of a matrix product depends.
-        R = _of_each(np.ascontiguousarray(self._attitude(start)), m)
+        R = np.ascontiguousarray(self._attitude(start))
         if "velocity_inertial" in start:
             # Written out: the order of the sum, and so its bits, must not depend on the number of members.
             v = start["velocity_inertial"]
             nu = R[:, 0] * v[:, :1] + R[:, 1] * v[:, 1:2] + R[:, 2] * v[:, 2:]
         else:
             nu = start["velocity"]
-        position, nu, Om = (_of_each(x, m) for x in (start["position"], nu, start["angular_velocity"]))
+        R, position, nu, Om = (_of_each(x, m) for x in (R, start["position"], nu, start["angular_velocity"]))
         return Members(values, position, R, nu, Om, indices, seed)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -77,6 +77,8 @@ class PhysicalChecks:
         self._refuse(self._look_at(first, stop, parameters), stop - first)
 
     def _refuse(self, findings: Mapping[str, Unphysical], looked_at: int) -> None:
+        if not findings:
+            return
         faults = Faults()
         all_seen = looked_at == self.members
         for key, finding in findings.items():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_kernels.packing.states import PLACES
 from lgvi_warp.distributions import Normal, UniformRotation
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.state_lanes import StateLanes
@@ -111,6 +112,11 @@ def test_every_part_of_a_start_in_every_width(width):
             lanes.write(starts, members)
         found, expected = (lanes.view for lanes in both)
         np.testing.assert_array_equal(found, expected)
+
+
+def test_the_order_of_what_a_start_is_made_of():
+    """The kernel finds each kind of numbers in the row of its name."""
+    assert Starts._fields[:-1] == PLACES[:-1]
 
 
 def test_numbers_that_lie_apart_in_memory_are_found():

@@ -55,7 +55,7 @@ class StateLanes(Lanes):
             return
         for i, values in enumerate(starts[:-1]):
             # What all calls share lies where it lay.
-            if values is not self._arrays[i]:
+            if values is not self._arrays[i] or self._copies[i] is not values:
                 self._arrays[i] = values
                 self._places[i], self._copies[i] = _place(values)
         self._places[-1] = members, starts.inertial, STATE_FIELDS if self._spec.compensated else 0

@@ -18,7 +18,7 @@ from lgvi_warp.engine.block import parts
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.shared import SharedResultsCache
-from lgvi_warp.engine.state_lanes import load_kernel
+from lgvi_warp.engine.state_lanes import MANY, kernel_for
 from lgvi_warp.engine.survey import Survey, survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
@@ -106,7 +106,7 @@ class Runner:
                 return plan.for_members(fleet)
         plan = replace(self.request, fleet=fleet).plan(survey_all=False)
         plan.compile()
-        load_kernel(plan.spec)  # few members pack faster by it, and calls are many
+        kernel_for(plan.spec, MANY)  # few members pack faster by it, too, and calls are many
         if plan.method.reason:  # chosen once, by the members of the first plan
             self.request = replace(self.request, method=plan.method)
         kind = self._kinds.setdefault(names, _Kind(plan.shared))

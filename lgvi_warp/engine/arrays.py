@@ -160,6 +160,8 @@ class LawArrays:
         self._bounded = [_bounded(dtype) for _, dtype in kinds]
         self.places: list[Any] = []
         self._sizes: Any = None
+        # Rows that all members share, as they were written, by their place in the table; None for those that members own.
+        self._written: dict[int, np.ndarray | None] = {}
 
     def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0) -> None:
         """Write what the terms packed, and the parts of a controller."""

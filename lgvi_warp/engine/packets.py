@@ -22,7 +22,7 @@ from lgvi_warp.engine.arrays import Group, LawArrays, Structs
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.engine.state_lanes import StateLanes, kernel_pays
+from lgvi_warp.engine.state_lanes import StateLanes, kernel_for
 from lgvi_warp.engine.step_warnings import (
     at_start,
     calm,
@@ -52,7 +52,7 @@ class Packets:
         self._controlled = bool(loop)
         self.inertia, self._limits = (Structs(*kind) for kind in (inertia, limits))
         self.laws = LawArrays(self.count, (params, *loop, events), types.Lane, types.Number)
-        self.state_lanes = StateLanes(plan.spec, self.count, kernel_pays(plan.spec, plan.ensemble.members))
+        self.state_lanes = StateLanes(plan.spec, self.count, kernel_for(plan.spec, plan.ensemble.members))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_step = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_size = wp.zeros(self.count, dtype=types.Lane, device="cpu")

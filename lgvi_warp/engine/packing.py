@@ -193,9 +193,7 @@ def rows_shared(plan: Plan) -> bool:
     members = plan.ensemble.members
     packing = Packing(plan, plan.ensemble.select(0, members if members <= KEPT else 1))
     each = (("law", packing.laws()), ("part", packing.control()), ("event", packing.events()))
-    sizes = {
-        (kind, i): row_count(law) for kind, packed in each for i, law in enumerate(packed) if law.rows is not None
-    }
+    sizes = {(kind, i): row_count(law) for kind, packed in each for i, law in enumerate(packed) if law.rows is not None}
     number = 8 if plan.spec.real == wp.float64 else 4
     return sum(sizes.values()) * plan.spec.width * number > LARGE_TABLE and all(map(plan.shared.keeps, sizes))
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from typing import Any
 
@@ -25,15 +26,18 @@ MANY = 50_000
 class StateLanes(Lanes):
     """The states of a block's members, (packets, fields of a state) of lanes.
 
-    peaks: per packet and lane, what of the starts is looked at for warnings (see PEAKS); None where the twin wrote the states.
+    kernel: as of `kernel_for`. peaks: per packet and lane, what of the starts is looked at for warnings (see PEAKS); None where
+        the twin writes the states.
     """
 
-    def __init__(self, spec: Spec, packets: int, by_kernel: bool):
+    def __init__(self, spec: Spec, packets: int, kernel: Any = None):
         super().__init__(packets, spec.state_fields, lane(spec.width, spec.real))
-        self._spec, self._launch, self._starts = spec, None, None
+        self._spec = spec
+        self._launch: Any = None
+        self._starts: Any = None
         self.peaks: np.ndarray | None = None
-        if by_kernel:
-            self._record(kernel_of(spec.width, spec.real), packets)
+        if kernel is not None:
+            self._record(kernel, packets)
 
     def _record(self, kernel: Any, packets: int) -> None:
         """Record a launch of the kernel, which reads anew where each kind of numbers lies."""
@@ -71,14 +75,13 @@ class StateLanes(Lanes):
 _loaded: set[tuple[int, Any]] = set()
 
 
-def kernel_pays(spec: Spec, members: int) -> bool:
-    """Whether the kernel should write the states of a run of so many members: always, once it is loaded."""
-    return members >= MANY or (spec.width, spec.real) in _loaded
-
-
-def load_kernel(spec: Spec) -> None:
-    """Load the kernel that packs states of a run: from then on every run of its width and type packs by it."""
-    kernel_of(spec.width, spec.real)
+def kernel_for(spec: Spec, members: int) -> Any:
+    """The kernel that packs the states of a run of so many members; None where its twin should."""
+    if (spec.width, spec.real) not in _loaded and members < MANY:
+        return None
+    with contextlib.suppress(OSError):  # a cache that cannot be written, and has no such kernel
+        return kernel_of(spec.width, spec.real)
+    return None
 
 
 @functools.cache

@@ -205,7 +205,7 @@ def calm(plan: Watched, members: Members, frame: Frame, peaks: np.ndarray) -> bo
     h, method, p = plan.grid.h, plan.method, members.parameters
     momentum, rate, time, speed = np.sqrt(peaks)
     total = frame.J.sum(axis=1)
-    if (frame.J > (1.0 + 0.5e-9) * (total[:, None] - frame.J)).any():
+    if ((1.0 + 0.5e-9) * (total[:, None] - frame.J) < frame.J).any():
         return False
     if plan.dtype != "float32_compensated" and not np.finfo(plan.dtype).eps * time / h < BELOW * PRECISION:
         return False

@@ -137,7 +137,7 @@ def survey(
 
 
 class _Asked(NamedTuple):
-    """A survey's questions whose answers may vary, each with its answer: (key, function of numbers, answer); and the survey."""
+    """A survey, and its questions whose answers may vary, each with its answer: (key, function of numbers, answer)."""
 
     scene: Any
     method: Method

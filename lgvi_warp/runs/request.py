@@ -194,7 +194,8 @@ def enough_iterations(fleet: Ensemble, method: Method, h: float, dtype: str) -> 
     """
     for n in range(MOST_FIXED + 1):
         trial = Request(fleet, replace(method, iterations=n), 2.0 * h, 2.0 * h, SaveAt(), dtype)
-        if not np.any(run_plan(trial.plan(), trial.count).status == Status.NOT_CONVERGED):
+        plan = trial.plan()
+        if not np.any(run_plan(plan, trial.count(plan)).status == Status.NOT_CONVERGED):
             return n
     return None
 

@@ -10,7 +10,7 @@ import lgvi_warp as lw
 from lgvi_kernels.packing.states import PLACES
 from lgvi_warp.distributions import Normal, UniformRotation
 from lgvi_warp.engine.packing import Packing
-from lgvi_warp.engine.state_lanes import StateLanes
+from lgvi_warp.engine.state_lanes import StateLanes, kernel_of
 from lgvi_warp.engine.states import Starts
 from lgvi_warp.engine.step_warnings import at_start, calm
 from lgvi_warp.runs.settle import make_plan
@@ -76,7 +76,10 @@ def test_the_kernel_has_the_bits_of_its_twin(name, method, dtype):
         fleet = drawn(name, varied, members)
         plan = make_plan(fleet, method, h=0.01, t1=0.01, dtype=dtype, width=8)
         starts = Packing(plan, fleet.select(0, members)).starts()
-        both = [StateLanes(plan.spec, -(-members // 8), by_kernel) for by_kernel in (True, False)]
+        both = [
+            StateLanes(plan.spec, -(-members // 8), kernel)
+            for kernel in (kernel_of(plan.spec.width, plan.spec.real), None)
+        ]
         for lanes in both:
             lanes.write(starts, members)
         found, expected = (lanes.view.tobytes() for lanes in both)
@@ -89,7 +92,7 @@ def test_every_part_of_a_start_in_every_width(width):
     """What members share and what they have of their own, in all of 2^5 forms; numbers that are none stay none."""
     rng, members = np.random.default_rng(width), 2 * width + 1
     plan = make_plan(lw.Ensemble(SCENES["paper"], members), "psi_s", h=0.01, t1=0.01, width=width, dtype="float32")
-    both = [StateLanes(plan.spec, 3, by_kernel) for by_kernel in (True, False)]
+    both = [StateLanes(plan.spec, 3, kernel) for kernel in (kernel_of(plan.spec.width, plan.spec.real), None)]
 
     def numbers(own, *shape):
         return rng.normal(size=(members if own else 1, *shape))
@@ -128,7 +131,7 @@ def test_numbers_that_lie_apart_in_memory_are_found():
     attitudes = rng.normal(size=(members, 4, 4))[:, :3, :3]
     starts = Starts(attitudes, table[:, 3:6], table[:, 1:10:4], table[:, 19:16:-1], None, None, None, table[:, 7:10],
                     table[:, 8:11], None, table[:, 0], False)  # fmt: skip
-    both = [StateLanes(plan.spec, 2, by_kernel) for by_kernel in (True, False)]
+    both = [StateLanes(plan.spec, 2, kernel) for kernel in (kernel_of(plan.spec.width, plan.spec.real), None)]
     for lanes in both:
         lanes.write(starts, members)
     np.testing.assert_array_equal(both[0].view, both[1].view)
@@ -160,7 +163,9 @@ def test_bounds_never_hide_a_warning(scene, numbers, method):
     value = scene.parameters().get(numbers)
     for h, size in itertools.product((1e-3, 0.05, 1.0), (1e-2, 1.0, 30.0)):
         velocity, rate = (size * rng.normal(size=(members, 3)) for _ in range(2))
-        own = {} if value is None else {numbers: value * np.exp(rng.normal(size=members)).reshape(-1, *[1] * value.ndim)}
+        own = (
+            {} if value is None else {numbers: value * np.exp(rng.normal(size=members)).reshape(-1, *[1] * value.ndim)}
+        )
         attitude, place = np.repeat(np.eye(3)[None], members, axis=0), 10.0 * rng.normal(size=(members, 3))
         try:
             fleet = lw.Ensemble.from_states(scene, place, attitude, velocity, rate, own)
@@ -168,7 +173,7 @@ def test_bounds_never_hide_a_warning(scene, numbers, method):
         except lw.SceneError:  # the method does not take the scene, or not with such drag
             continue
         packing = Packing(plan, fleet.select(0, members))
-        lanes = StateLanes(plan.spec, 3, True)
+        lanes = StateLanes(plan.spec, 3, kernel_of(8, plan.spec.real))
         lanes.write(packing.starts(), members)
         momentum = lanes.rows()[:, 12:15] * packing.scale[:, None]
         bits, _ = at_start(plan, packing.members, packing.frame, momentum, packing.water)

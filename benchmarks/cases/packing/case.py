@@ -8,7 +8,7 @@ import numpy as np
 import lgvi_warp as lw
 from benchmarks.cases.calls.case import PAPER, REMUS, least, scenes
 from lgvi_warp.engine.packets import Packets
-from lgvi_warp.engine.state_lanes import load_kernel
+from lgvi_warp.engine.state_lanes import MANY, kernel_for
 from lgvi_warp.runs.settle import make_plan
 
 # Members of a block of a short run, and steps of a short run.
@@ -42,7 +42,7 @@ def set_up(fleet, method, byte, rounds):
     """Time of a member of one block [us]: to draw its numbers, to check them, to pack them; and of its kernel."""
     plan = make_plan(fleet, method, h=0.01, t1=0.01 * STEPS, dtype="float32", survey_all=False)
     plan.compile()
-    load_kernel(plan.spec)
+    assert kernel_for(plan.spec, members=MANY)
     members = fleet.select(0, BLOCK)
     packets = Packets(plan, members)
 

@@ -158,10 +158,14 @@ def make_pack_states(width, real):
             pi = vector(places, wp.static(MOMENTS), 0, i, m) * Om
         else:
             p = vec3(
-                row_times(places, 0, i, m, nu, Om), row_times(places, 1, i, m, nu, Om), row_times(places, 2, i, m, nu, Om)
+                row_times(places, 0, i, m, nu, Om),
+                row_times(places, 1, i, m, nu, Om),
+                row_times(places, 2, i, m, nu, Om),
             )
             pi = vec3(
-                row_times(places, 3, i, m, nu, Om), row_times(places, 4, i, m, nu, Om), row_times(places, 5, i, m, nu, Om)
+                row_times(places, 3, i, m, nu, Om),
+                row_times(places, 4, i, m, nu, Om),
+                row_times(places, 5, i, m, nu, Om),
             )
         peaks[i, 0] = dot(p, p)
         if inertial != none:

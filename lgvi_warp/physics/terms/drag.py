@@ -264,7 +264,7 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingCon
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = context.frame.from_forces
     XT = np.swapaxes(X, 1, 2)
-    entries = quadratic.any(axis=0)
+    entries = np.asarray(quadratic.any(axis=0))
     columns = np.flatnonzero(entries.any(axis=0)).tolist()
     constant = (XT @ linear @ X).reshape(-1, 36)
     values = {"constant": int(linear.any())}

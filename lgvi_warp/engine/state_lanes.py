@@ -26,8 +26,8 @@ MANY = 50_000
 class StateLanes(Lanes):
     """The states of a block's members, (packets, fields of a state) of lanes.
 
-    kernel: as of `kernel_for`. peaks: per packet and lane, what of the starts is looked at for warnings (see PEAKS); None where
-        the twin writes the states.
+    kernel: as of `kernel_for`. peaks: per packet and lane, what of the starts is looked at for warnings (see PEAKS);
+        None where the twin writes the states.
     """
 
     def __init__(self, spec: Spec, packets: int, kernel: Any = None):

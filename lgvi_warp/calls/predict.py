@@ -126,7 +126,7 @@ def predict(
 
     Args:
         fleet: An Ensemble, or a Scene, which stands for its own ensemble.
-        threads: Number of threads; default all cores.
+        threads: Number of threads; default as of `lw.solve`.
         store: As for solve; the disk is the one that its folder lies on. None: a run in memory.
         **settings: Arguments of solve that decide the plan and what is kept: method, h, t1, save, dtype, width, checks,
             on_failure, statistics, keep, until.
@@ -148,8 +148,8 @@ def predict(
     faults = Faults()
     request = Request.of(faults, ensemble_of(fleet), threads=threads, **settings)
     faults.raise_if_any()
-    observed, count = request.observed, request.count
-    plan = request.plan(survey_all=False)
+    observed, plan = request.observed, request.plan(survey_all=False)
+    count = request.count(plan)
     into, fields = (None, request.saved) if store is None else with_saved_fields(store, request)
     joined = into is not None or bool(observed.watch(plan.grid.times)[0])
     blocks_of_run = parts(plan.ensemble.members, plan.grid.steps, count, joined)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, samples_for, statistics_for
+from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, outputs, samples_for, statistics_for, values_of
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
@@ -212,14 +212,23 @@ class Prepared:
         if not self._of:
             return self._runner.run(fleet, progress)
         large = any(each.over_path or each.is_function for each in self._of)
-        outputs = self._runner.evaluate(
-            fleet, self._of, PATHS_AT_ONCE if large else fleet.members, progress, warned=False
-        )
-        values = outputs.values
-        if outputs.failed.any():
+        if large:
+            found = self._runner.evaluate(fleet, self._of, PATHS_AT_ONCE, progress, warned=False)
+        else:
+            samples = self._runner.samples(fleet, progress) if all(each.is_plain for each in self._of) else None
+            result, status = samples or (self._runner.run(fleet, progress, warned=False), None)
+            status = status if samples else np.asarray(result.status)
+            numbers = values_of(result, fleet, self._of)
+            values = numbers[0] if len(numbers) == 1 else np.concatenate(numbers, axis=1)
+            if (status is None or not status.any()) and np.isfinite(values).all():
+                return values[:, 0] if values.shape[1] == 1 else values
+            status = np.zeros(len(values), np.uint8) if status is None else status
+            found = outputs(self._of, [numbers], [status], {})
+        values = found.values
+        if found.failed.any():
             if self._refuse:
-                raise FailedMembers([outputs.text('mend what fails, or take NaN for them: failed="nan"')])
-            values = np.where(outputs.failed[:, None], np.nan, values)
+                raise FailedMembers([found.text('mend what fails, or take NaN for them: failed="nan"')])
+            values = np.where(found.failed[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
 
 
@@ -288,7 +297,8 @@ def prepare(
             joint distributions need it. Default False.
         failed: "refuse" (default) for an error where members fail, "nan" for NaN in their place; for `of` only.
         common_noise: Whether forces with noise act on every member alike. Default False.
-        threads: Number of threads; default all cores.
+        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less than a
+            million steps of vehicles).
         width: Vehicles per packet; default from the CPU.
         checks: "safe", "all" or "none".
         on_failure: "freeze", "raise" or "substep".

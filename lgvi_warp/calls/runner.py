@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,15 +13,19 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.control.signals import ordered
+from lgvi_warp.engine import single_block
+from lgvi_warp.engine.block import parts
+from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.shared import SharedResultsCache
-from lgvi_warp.engine.survey import survey
+from lgvi_warp.engine.state_lanes import MANY, kernel_for
+from lgvi_warp.engine.survey import Survey, survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.results.quantities import EndQuantity, OfResult
-from lgvi_warp.results.result import Result
-from lgvi_warp.runs.request import Request, enough_iterations
+from lgvi_warp.results.result import DrawnParameters, Result
+from lgvi_warp.runs.request import ALL_SAMPLES, Request, enough_iterations
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.statistics.base import Statistic
@@ -80,27 +85,34 @@ class Runner:
         scene, chosen = fleet.scene, self.request.method
         self._auto = (chosen if isinstance(chosen, Method) else scene.run.method_of(chosen)).iterations == "auto"
         self._kinds: dict[frozenset[str], _Kind] = {}
-        self._last: Plan | None = None
+        # The last plan, with the survey that it was chosen by; one pair, since threads may call at once.
+        self._last: tuple[Survey, Plan] | None = None
 
     def plan(self, fleet: Ensemble) -> Plan:
         """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
         names = frozenset(fleet.varied_names)
         kind = self._kinds.get(names)
         if kind is not None and self._last is not None:
-            last = self._last
+            last_facts, last = self._last
             method = last.method
             if self._auto:
                 method = replace(method, iterations=enough_iterations(fleet, method, last.grid.h, last.dtype))
-            plan = kind.plans.get((method, survey(fleet, method, kind.shared, odd=False, most=SURVEYED).decisive))
+            facts = survey(fleet, method, kind.shared, odd=False, most=SURVEYED)
+            if facts is last_facts and method is last.method:  # what decides agrees: it need not be compared
+                return last.for_members(fleet)
+            plan = kind.plans.get((method, facts.decisive))
             if plan is not None:
+                self._last = facts, plan
                 return plan.for_members(fleet)
         plan = replace(self.request, fleet=fleet).plan(survey_all=False)
         plan.compile()
+        kernel_for(plan.spec, MANY)  # few members pack faster by it, too, and calls are many
         if plan.method.reason:  # chosen once, by the members of the first plan
             self.request = replace(self.request, method=plan.method)
         kind = self._kinds.setdefault(names, _Kind(plan.shared))
         facts = survey(fleet, plan.method, kind.shared, odd=False, most=SURVEYED)
-        kind.plans[plan.method, facts.decisive] = self._last = plan
+        kind.plans[plan.method, facts.decisive] = plan
+        self._last = facts, plan
         return plan
 
     def run(self, fleet: Ensemble, progress: Callable[[float], None] | None = None, warned: bool = True) -> Result:
@@ -118,6 +130,27 @@ class Runner:
         plan = self.plan(fleet)
         return self.request.run(plan, fields=plan.fields, progress=progress, known=known, warned=warned)
 
+    def samples(
+        self, fleet: Ensemble, progress: Callable[[float], None] | None = None
+    ) -> tuple[SimpleNamespace, np.ndarray | None] | None:
+        """Run few members for their samples alone, at a part of the cost of a Result.
+
+        Returns: What plain quantities read of a Result, and the status (n,), None where all reached the end. None where it
+            takes a Result.
+        """
+        request, plan = self.request, self.plan(fleet)
+        if progress is not None or plan.on_failure == "raise" or request.observed != ALL_SAMPLES:
+            return None
+        if not isinstance(request.executor, Threads):
+            return None
+        blocks = parts(fleet.members, plan.grid.steps, request.count(plan), False)
+        if not single_block.fits(plan, blocks):
+            return None
+        samples, status = single_block.run_for_samples(plan)
+        parameters, terms = DrawnParameters(fleet, fleet.members), fleet.scene.terms
+        known = dict(samples=samples, time=plan.grid.times, terms=terms, members=fleet.members, parameters=parameters)
+        return SimpleNamespace(**known), status
+
     def evaluate(
         self,
         fleet: Ensemble,
@@ -127,23 +160,37 @@ class Runner:
         warned: bool = True,
     ) -> Outputs:
         """Run members, so many at a time, and keep their quantities alone."""
-        looks_at_members = any(each.looks_at_members for each in of)
         groups, ends, content, n = [], [], dict[str, Any](), fleet.members
         for first in range(0, n, at_once):
             stop = min(first + at_once, n)
             group = fleet if stop - first == n else fleet.subset(np.arange(first, stop))
             result = self.run(group, progress and part(progress, first / n, stop / n), warned)
-            members = group.select(0, group.members) if looks_at_members else None
-            groups.append([each.values(result, members) for each in of])
+            groups.append(values_of(result, group, of))
             ends.append(np.asarray(result.status))
             content = result.provenance
-        labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
-        values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
-        odd = ~np.isfinite(values).all(axis=1)
-        codes = np.unique(status) if status.any() else [Status.OK]
-        counts = {Status(int(code)).name.lower(): int((status == code).sum()) for code in codes}
-        counts |= {"quantity not finite": int(odd.sum())} if odd.any() else {}
-        return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
+        return outputs(of, groups, ends, content)
+
+
+def outputs(
+    of: Sequence[OfResult], groups: Sequence[list[np.ndarray]], ends: Sequence[np.ndarray], content: dict[str, Any]
+) -> Outputs:
+    """Join the quantities of groups of members, and count how these ended.
+
+    groups: for each, as of `values_of`. ends: the status of each group's members.
+    """
+    labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
+    values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
+    odd = ~np.isfinite(values).all(axis=1)
+    codes = np.unique(status) if status.any() else [Status.OK]
+    counts = {Status(int(code)).name.lower(): int((status == code).sum()) for code in codes}
+    counts |= {"quantity not finite": int(odd.sum())} if odd.any() else {}
+    return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
+
+
+def values_of(result: Any, fleet: Ensemble, of: Sequence[OfResult]) -> list[np.ndarray]:
+    """The numbers (n, m) of each quantity."""
+    members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in of) else None
+    return [each.values(result, members) for each in of]
 
 
 def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:

@@ -60,7 +60,8 @@ def solve(
         save: Which samples to save, and when; default every [run] save_every of the scene, else the start and the end.
         dtype: "float64" (default), "float32", or "float32_compensated", which keeps each number of the state as a sum of two
             (for many short steps, far from the origin).
-        threads: Number of threads; default all cores.
+        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less than a
+            million steps of vehicles).
         width: Vehicles per packet; default from the CPU.
         checks: "safe" (default) gives each member a status, freezes it when it fails, and warns if its parameters and its
             start do not suit the step; "all" also warns of what arises on the way; "none" leaves all that code out.

@@ -11,6 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.engine.executors.base import deaf
 from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.state_lanes import MANY, kernel_for
 from lgvi_warp.runs.request import Request
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -45,7 +46,8 @@ def warm(plans: Sequence[Plan], workers: int) -> Iterator[tuple[Plan, Phases]]:
 
 
 def _phases(data: bytes) -> Phases:
-    """Compile the kernel of a pickled plan in this process."""
+    """Compile the kernels of a pickled plan in this process: its own, and that which packs the states of many members."""
     plan: Plan = pickle.loads(data)
     plan.compile()
+    kernel_for(plan.spec, MANY)
     return plan.phases

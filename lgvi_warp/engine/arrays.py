@@ -146,7 +146,7 @@ class LawArrays:
 
     kinds: for each group of laws (terms, a controller's parts, events) Warp's struct of its numbers, and its NumPy type.
     memory: what laws and method remember from step to step; the second half is a backup.
-    places: where in table and memory each law's rows lie, and how many there are; None before `write`.
+    places: where in table and memory each law's rows lie; none before `write`.
     remembered: rows of the memory that each law has, without scratch rows.
     """
 
@@ -158,59 +158,74 @@ class LawArrays:
         self._packets, self._Lane, self._Number = packets, Lane, Number or Lane
         self.structs = [Structs(*kind) for kind in kinds]
         self._bounded = [_bounded(dtype) for _, dtype in kinds]
-        self.places: Any = None
+        self.places: list[Any] = []
+        self._sizes: Any = None
+        # Rows that all members share, as they were written, by their place in the table; None for those that members own.
+        self._written: dict[int, np.ndarray | None] = {}
 
     def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0) -> None:
         """Write what the terms packed, and the parts of a controller."""
         laws = [law for group in groups for law in group.packed]
-        rows = [_present(law.rows) for law in laws]
-        starts = [part for law in laws for part in (_present(law.memory), np.zeros((1, law.work)))]
-        row, memory, places = 1, bus, []
-        self.remembered = []
-        for law, part in zip(laws, rows, strict=True):
-            work, end = memory + memory_rows(law) - law.work, memory + memory_rows(law)
-            wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
-            row_fields = {name: place for name, place, part in wanted if part is not None}
-            # The table's first row is none's: it is 0, and what a law without rows reads.
-            size = part.shape[1]
-            ends = (row, row + size - 1) if size else (0, 0)
-            places.append((row_fields, (*ends, memory, end - 1, bus)))
-            self.remembered.append(slice(memory, work))
-            row, memory = row + size, end
-        moved = self.places != (places, row, memory)
+        sizes = tuple((row_count(law), memory_count(law), law.work) for law in laws), scratch, bus
+        moved = self._sizes != sizes
         if moved:
             # A law may have as many rows as its members need: those after it, though shared, then lie elsewhere.
             for structs in self.structs:
                 structs.forget()
-            self.places = places, row, memory
-        next_places = iter(places)
+            self._sizes, self._written = sizes, {}
+            self._place(laws, bus)
+        next_places = iter(self.places)
         for structs, bounded, group in zip(self.structs, self._bounded, groups, strict=True):
             structs.write(
                 self._packets, _nested(group, bounded, list(itertools.islice(next_places, len(group.packed))))
             )
-        self._write_table(rows, [known for group in groups for known in group.shared], row, moved)
-        self._write_memory(starts, bus, memory + scratch, moved)
+        self._write_table(laws, [known for group in groups for known in group.shared], moved)
+        self._write_memory(laws, bus, scratch, moved)
 
-    def _write_table(self, rows_of_laws: list[np.ndarray], shared: Sequence[bool], size: int, moved: bool) -> None:
-        """Write the laws' rows; the first row of the table is none's."""
-        count = self._packets if any(len(rows) > 1 for rows in rows_of_laws) else 1
-        new = moved or len(self.table.view) != count
-        if new:
-            self.table = Lanes(count, size, self._Number)
+    def _place(self, laws: Sequence[Packed], bus: int) -> None:
+        """Give each law its rows of table and memory."""
+        row, memory = 1, bus
+        self.places, self.remembered = [], []
+        for law in laws:
+            # The table's first row is none's: it is 0, and what a law without rows reads.
+            size, end = row_count(law), memory + memory_rows(law)
+            work = end - law.work
+            wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
+            row_fields = {name: place for name, place, part in wanted if part is not None}
+            ends = (row, row + size - 1) if size else (0, 0)
+            self.places.append((row_fields, (*ends, memory, end - 1, bus)))
+            self.remembered.append(slice(memory, work))
+            row, memory = row + size, end
+        self._rows, self._memory = row, memory
+
+    def _write_table(self, laws: Sequence[Packed], shared: Sequence[bool], moved: bool) -> None:
+        """Write the laws' rows; the first row of the table is none's. Rows that members share are written when they change."""
+        parts_of_laws = [row_parts(law) for law in laws]
+        count = self._packets if any(len(part) > 1 for parts in parts_of_laws for part in parts) else 1
+        if moved or len(self.table.view) != count:
+            self.table, self._written = Lanes(count, self._rows, self._Number), {}
         first = 1
-        for rows, known in zip(rows_of_laws, shared, strict=True):
-            if new or not known:
-                put_rows(self.table.view[:, first : first + rows.shape[1]], rows)
-            first += rows.shape[1]
+        for parts, known in zip(parts_of_laws, shared, strict=True):
+            for part in parts:
+                at, first = first, first + part.shape[1]
+                before = self._written.get(at) if len(part) == 1 else None
+                if before is not None and (known or np.array_equal(before, part)):
+                    continue
+                put_rows(self.table.view[:, at:first], part)
+                self._written[at] = part.copy() if len(part) == 1 else None
 
-    def _write_memory(self, parts: list[np.ndarray], first: int, half: int, moved: bool) -> None:
+    def _write_memory(self, laws: Sequence[Packed], first: int, scratch: int, moved: bool) -> None:
+        half = self._memory + scratch
         if moved:
             self.memory = Lanes(self._packets, 2 * half, self._Lane)
+        if not half:
+            return
         view = self.memory.view
         view[...] = 0.0
-        for part in parts:
-            put_rows(view[:, first : first + part.shape[1]], part)
-            first += part.shape[1]
+        for law in laws:
+            if law.memory is not None:
+                put_rows(view[:, first : first + law.memory.shape[1]], law.memory)
+            first += memory_rows(law)
         view[:, half:] = view[:, :half]
 
 
@@ -226,11 +241,24 @@ def _bounded(dtype: np.dtype) -> list[tuple[str, ...]]:
 
 def memory_rows(law: Packed) -> int:
     """Rows of the memory that a law has, its scratch rows among them."""
-    return _present(law.memory).shape[1] + law.work
+    return memory_count(law) + law.work
 
 
-def _present(rows: np.ndarray | None) -> np.ndarray:
-    return np.zeros((1, 0)) if rows is None else rows
+def memory_count(law: Packed) -> int:
+    """Rows of the memory in which a law remembers something."""
+    return 0 if law.memory is None else law.memory.shape[1]
+
+
+def row_parts(law: Packed) -> tuple[np.ndarray, ...]:
+    """A law's rows of the table as arrays (1 or n, rows) side by side; none for a law without."""
+    if law.rows is None:
+        return ()
+    return law.rows if isinstance(law.rows, tuple) else (law.rows,)
+
+
+def row_count(law: Packed) -> int:
+    """Rows of the table that a law has."""
+    return sum(part.shape[1] for part in row_parts(law))
 
 
 def _nested(

@@ -27,6 +27,18 @@ def block_size(members: int) -> int:
     return size
 
 
+# Fewer members run on one thread by default, unless their steps are so many that several threads save more than they cost.
+FEW_MEMBERS, FEW_STEPS = 2_000, 1_000_000
+
+
+def default_threads(members: int, steps: int, cores: int) -> int:
+    """Threads of a run that names no number: one for few members of a short run, else all cores.
+
+    A block costs about a millisecond beside its kernel, and so does a second thread.
+    """
+    return 1 if members < FEW_MEMBERS and members * steps < FEW_STEPS else cores
+
+
 # Steps of vehicles in a block beyond which its own cost, a millisecond, is small beside that of its kernel.
 WORTHWHILE = 4_000_000
 

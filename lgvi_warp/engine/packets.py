@@ -18,12 +18,14 @@ from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, 
 from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
-from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, Structs
+from lgvi_warp.engine.arrays import Group, LawArrays, Structs
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.state_lanes import StateLanes, kernel_for
 from lgvi_warp.engine.step_warnings import (
     at_start,
+    calm,
     departure,
     leaves_rotations,
     munk_factor,
@@ -50,8 +52,7 @@ class Packets:
         self._controlled = bool(loop)
         self.inertia, self._limits = (Structs(*kind) for kind in (inertia, limits))
         self.laws = LawArrays(self.count, (params, *loop, events), types.Lane, types.Number)
-        self.state_lanes = Lanes(self.count, plan.spec.state_fields, types.Lane)
-        self._rows = np.empty((self.count * width, plan.spec.state_fields))
+        self.state_lanes = StateLanes(plan.spec, self.count, kernel_for(plan.spec, plan.ensemble.members))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_step = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
         self.failed_size = wp.zeros(self.count, dtype=types.Lane, device="cpu")
@@ -99,10 +100,7 @@ class Packets:
         if plan.spec.warning_rows:
             self._limits.write(self.count, [((), self._watched_limits(), False)])
             self.monitor.limits = self._limits.array
-        m = members.count
-        packing.state(self._rows[:m])
-        self._rows[m:] = self._rows[m - 1]
-        self.state_lanes.view[...] = self._rows.reshape(self.count, -1, self._rows.shape[1]).transpose(0, 2, 1)
+        self.state_lanes.write(packing.starts(), members.count)
         self._warned: tuple[np.ndarray, np.ndarray] | None = None
         if self._launch is None:
             return
@@ -248,6 +246,8 @@ class Packets:
         m = self.members.count
         none = np.zeros(m, np.uint16), np.zeros(m, np.int64), np.full(m, np.nan)
         warnings: tuple[np.ndarray, np.ndarray, np.ndarray] = self._warnings() if warned else none
+        if self.untroubled and not (warnings[0].any() or self.plan.method.adaptive or self.plan.spec.substep):
+            return MemberStatus.clear(m, 0)
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
         pace = self.state_lanes.view[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
         code = self._status[:m].astype(np.uint8)
@@ -264,6 +264,11 @@ class Packets:
             self._of_members(self.monitor.substeps, np.int64) if self.plan.spec.substep else np.zeros(m, np.int64),
             stopped_by,
         )
+
+    @property
+    def untroubled(self) -> bool:
+        """Whether no member has failed or was stopped so far."""
+        return not self._status.any()
 
     def ended(self) -> tuple[np.ndarray, np.ndarray]:
         """Status (m,) of each member, and the last step (m,) of those it made itself.
@@ -283,12 +288,7 @@ class Packets:
         Step and value are those of the more serious of the two; of two equals, those of the start.
         """
         if self._warned is None:
-            momentum = self._rows[: self.members.count, 12:15] * self.scale[:, None]
-            none = np.zeros(self.members.count, np.uint16), np.zeros(0)
-            checked = self.plan.checks != "none"
-            self._warned = (
-                at_start(self.plan, self.members, self.frame, momentum, self._packing.water) if checked else none
-            )
+            self._warned = self._warned_at_start()
         bits, value = self._warned
         step = np.zeros(len(bits), np.int64)
         value = value if len(value) else np.full(len(bits), np.nan)
@@ -302,6 +302,14 @@ class Packets:
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
         bits = bits | noted
         return self._with_departed(bits, step, value) if leaves_rotations(self.plan.method) else (bits, step, value)
+
+    def _warned_at_start(self) -> tuple[np.ndarray, np.ndarray]:
+        """(bits, value) of the warnings at the start; no value where there are none."""
+        plan, members, peaks = self.plan, self.members, self.state_lanes.peaks
+        if plan.checks == "none" or (peaks is not None and calm(plan, members, self.frame, peaks.max(axis=(0, 2)))):
+            return np.zeros(members.count, np.uint16), np.zeros(0)
+        momentum = self.state_lanes.rows()[:, 12:15] * self.scale[:, None]
+        return at_start(plan, members, self.frame, momentum, self._packing.water)
 
     def _with_departed(
         self, bits: np.ndarray, step: np.ndarray, value: np.ndarray

@@ -14,13 +14,13 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels import built_in
-from lgvi_kernels.advance.rows import STATE_FIELDS
 from lgvi_kernels.maps.collocation import SLOPE_FIELDS
-from lgvi_warp.engine.arrays import memory_rows
+from lgvi_warp.engine.arrays import memory_rows, row_count
 from lgvi_warp.engine.shared import AXES, FRAME, context
+from lgvi_warp.engine.states import Starts
 from lgvi_warp.engine.survey import framed
 from lgvi_warp.methods import modified_inertia
-from lgvi_warp.physics import inertia, notation, vehicle
+from lgvi_warp.physics import inertia, notation, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
 from lgvi_warp.sampling.members import Members
@@ -64,7 +64,7 @@ class Packing:
     def _inertia(self, numbers: Any) -> Fields:
         frame, U, _ = numbers[FRAME]
         parts, scale = self.plan.spec.parts, self._scale(frame)
-        diagonal = _diagonal(frame.M)
+        diagonal = frame.mass_diagonal
         fields: Fields = {"J": frame.J / scale[:, None], "inverse_scale": 1.0 / scale}
         if diagonal is not None:
             # The same bits as below, without the zeros.
@@ -118,7 +118,9 @@ class Packing:
     def _law(self, i: int, term: Any, module: Any, numbers: Any) -> Packed:
         parameters = Ensemble.own(term, numbers)
         packed: Packed
-        if i > 0 or not self.plan.spec.drag:
+        if term in terms.IMPLIED:  # packed when the kernel was chosen; neither depends on the step
+            packed = self.plan.shared(("implied", term.key), numbers, lambda own: term.packed({}, self._context(own)))
+        elif i > 0 or not self.plan.spec.drag:
             packed = term.packed(parameters, self._context(numbers))
         elif module is built_in("laws", term.exact_flow[0]):
             frame = numbers[FRAME][0]
@@ -149,43 +151,23 @@ class Packing:
         # Gauss collocation: the slopes of the last step, and room for their extrapolation.
         return 2 * len(spec.gauss[1]) * SLOPE_FIELDS if spec.gauss else 0
 
-    def state(self, rows: np.ndarray) -> None:
-        """Write the members' states into rows (m, fields of a state)."""
-        m, frame, spec = self.members, self.frame, self.plan.spec
+    def starts(self) -> Starts:
+        """What the members' states are made of."""
+        m, frame, axes = self.members, self.frame, self.numbers[AXES][0]
         attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
-        turned, shifted = self.numbers[AXES][0].turned, self.numbers[AXES][0].shifted
-        R, nu, Om, position = attitude, velocity, rate, m.position
-        if turned:
-            R = attitude @ frame.Q
-        if shifted:
-            nu = velocity + notation.cross(rate, frame.origin)
-            position = position + notation.rotate_out(attitude, frame.origin)
-        water = self.water
-        if water is not None:
-            nu = nu - water
-        if turned:
-            nu, Om = notation.rotate_into(frame.Q, nu), notation.rotate_into(frame.Q, rate)
-        rows[:, :9] = R.reshape(-1, 9)
-        rows[:, 9:12] = position
         mass = self._shared("diagonal mass", lambda numbers: _diagonal_mass(numbers[FRAME][0]))
-        scale = self.scale[:, None]
-        if mass is not None and not spec.inertial:
-            rows[:, 12:15], rows[:, 15:STATE_FIELDS] = mass * nu / scale, frame.J * Om / scale
-        else:
-            n = max(len(nu), len(Om))
-            twist = np.concatenate([np.broadcast_to(v, (n, 3)) for v in (nu, Om)], axis=1)
-            I6 = self._shared("inertia of the state", lambda numbers: numbers[FRAME][0].inertia_at(numbers[FRAME][0].E))
-            n = max(n, len(I6))
-            momenta = np.einsum("nij,nj->ni", np.broadcast_to(I6, (n, 6, 6)), np.broadcast_to(twist, (n, 6)))
-            if spec.inertial:
-                linear = notation.rotate_out(R, momenta[:, :3])
-                momenta = np.concatenate(np.broadcast_arrays(linear, momenta[:, 3:]), axis=1)
-            rows[:, 12:STATE_FIELDS] = momenta / scale
-        if spec.compensated:
-            low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)
-            rows[:, STATE_FIELDS:] = np.where(np.isfinite(low), low, 0.0)
-        else:
-            rows[:, STATE_FIELDS:] = 0.0
+        inertia = None if mass is not None else self._shared("inertia of the state", _inertia_of_state)
+        return Starts(
+            attitude, m.position, velocity, rate,
+            water=self.water,
+            axes=frame.Q if axes.turned else None,
+            origin=frame.origin if axes.shifted else None,
+            mass=mass,
+            moments=frame.J,
+            inertia=inertia,
+            scale=self.scale,
+            inertial=self.plan.spec.inertial,
+        )  # fmt: skip
 
     @functools.cached_property
     def water(self) -> np.ndarray | None:
@@ -214,9 +196,7 @@ def rows_shared(plan: Plan) -> bool:
     members = plan.ensemble.members
     packing = Packing(plan, plan.ensemble.select(0, members if members <= KEPT else 1))
     each = (("law", packing.laws()), ("part", packing.control()), ("event", packing.events()))
-    sizes = {
-        (kind, i): law.rows.shape[1] for kind, packed in each for i, law in enumerate(packed) if law.rows is not None
-    }
+    sizes = {(kind, i): row_count(law) for kind, packed in each for i, law in enumerate(packed) if law.rows is not None}
     number = 8 if plan.spec.real == wp.float64 else 4
     return sum(sizes.values()) * plan.spec.width * number > LARGE_TABLE and all(map(plan.shared.keeps, sizes))
 
@@ -226,16 +206,15 @@ def _once(values: np.ndarray) -> np.ndarray:
     return values[:1] if values.strides[0] == 0 else values
 
 
-def _diagonal(matrices: np.ndarray) -> np.ndarray | None:
-    """Diagonals (n, 3) of matrices (n, 3, 3) that have no other entries; None where one has."""
-    if notation.off_diagonal(matrices).any():
-        return None
-    return np.einsum("nii->ni", matrices)
-
-
 def _diagonal_mass(frame: Frame) -> np.ndarray | None:
     """Diagonals (n, 3) of the mass matrices, if momenta are products of these and velocities alone; else None."""
-    return None if frame.whole is not None or np.any(frame.E) else _diagonal(frame.M)
+    return None if frame.whole is not None or np.any(frame.E) else frame.mass_diagonal
+
+
+def _inertia_of_state(numbers: Any) -> np.ndarray:
+    """Mass matrices (n, 6, 6) about the origin of the state, in the kernel's axes."""
+    frame = numbers[FRAME][0]
+    return np.asarray(frame.inertia_at(frame.E))
 
 
 def _water(numbers: Any, frame: Frame) -> Fields:

@@ -101,7 +101,9 @@ class Plan:
     def for_members(self, ensemble: Ensemble) -> Plan:
         """The same plan, with the same kernel, for other members of the scene, of which the survey of this one holds."""
         check_backward_drag(ensemble, self.kernel_choice, self.method, self.grid.h)
-        return replace(self, ensemble=ensemble)
+        plan = object.__new__(Plan)  # in a fourth of the time of `replace`
+        vars(plan).update(vars(self), ensemble=ensemble)
+        return plan
 
     def subplan(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
         """The plan for some of the members, with all choices made for the whole ensemble.

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.physics.terms.base import PackingContext
-from lgvi_warp.scene.draws import KEPT
+from lgvi_warp.scene.slices import AT_ONCE
 
 Value = TypeVar("Value")
 
@@ -84,8 +84,8 @@ def context(numbers: Mapping[str, np.ndarray], *run: Any) -> PackingContext:
     return (TrackedContext if isinstance(numbers, TrackedParameters) else PackingContext)(numbers, *run)
 
 
-class _Few(NamedTuple):
-    """Numbers of few members as they were given, completed by their frame, and results that follow from these alone."""
+class _Last(NamedTuple):
+    """Numbers of some members as they were given, completed by their frame, and results that follow from these alone."""
 
     given: Mapping[str, np.ndarray]
     numbers: Mapping[str, Any]
@@ -107,7 +107,9 @@ class SharedResultsCache:
     user_axes: bool = False
     _kept: dict[Any, Any] = field(default_factory=dict)
     _varying: dict[Any, bool] = field(default_factory=dict)
-    _last: _Few | None = None
+    _last: _Last | None = None
+    # The last survey, and what it asked (see lgvi_warp.engine.survey).
+    surveyed: Any = None
 
     def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
         """A result from memory, or computed."""
@@ -138,9 +140,9 @@ class SharedResultsCache:
         return last.numbers
 
     def remember(self, parameters: Mapping[str, np.ndarray], numbers: Mapping[str, Any]) -> None:
-        """Keep what follows from the numbers of few members until others come: a run looks at them more than once."""
-        few = all(len(parameters[name]) <= KEPT for name in self.varied if name in parameters)
-        self._last = _Few(parameters, numbers, {}) if few else None
+        """Keep what follows from the numbers of some members until others come: a run looks at them more than once."""
+        few = all(len(parameters[name]) <= AT_ONCE for name in self.varied if name in parameters)
+        self._last = _Last(parameters, numbers, {}) if few else None
 
     def keeps(self, key: Any) -> bool:
         """Whether a computation that ran is shared by all members."""

@@ -13,7 +13,7 @@ from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics import hydrostatics, vehicle
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms.base import Term, own
+from lgvi_warp.physics.terms.base import Numbers, Term, own
 
 if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
@@ -192,6 +192,79 @@ def at_start(
     note(Warnings.MUNK_UNSTABLE, munk, oscillation_limit(method, MUNK))
     note(Warnings.RESTORING_UNSTABLE, swing, oscillation_limit(method, RESTORING))
     return bits, value
+
+
+# What a bound must be below a limit, lest round-off decide.
+BELOW = 1.0 - 1e-9
+
+
+def calm(plan: Watched, members: Members, frame: Frame, peaks: np.ndarray) -> bool:
+    """Whether bounds on all members together show that the start of none gives a warning; `at_start` decides where not.
+
+    peaks: (4,), the largest of what the kernel notes when it packs the starts (see lgvi_kernels.packing.states.PEAKS).
+    """
+    h, method, p = plan.grid.h, plan.method, members.parameters
+    momentum, rate, time, speed = np.sqrt(peaks)
+    total = frame.J.sum(axis=1)
+    if ((1.0 + 0.5e-9) * (total[:, None] - frame.J) < frame.J).any():
+        return False
+    if plan.dtype != "float32_compensated" and not np.finfo(plan.dtype).eps * time / h < BELOW * PRECISION:
+        return False
+    if method.adaptive:
+        return True
+    coarse, least = BELOW * COARSE / longest_stage(method), frame.J.min()
+    munk = h * momentum * np.sqrt(_most_munk(frame))
+    swing = h * np.sqrt(_longest_arm(p, frame) / least)
+    if not munk < min(coarse, BELOW * oscillation_limit(method, MUNK)):
+        return False
+    if not swing < min(coarse, BELOW * oscillation_limit(method, RESTORING)):
+        return False
+    if not h * rate < BELOW * rotation_limit(method):
+        return False
+    if not (_split(plan) and _dragged(plan.kernel_choice)):
+        return True
+    return bool(_most_drag(plan, p, speed, rate) < BELOW * SPLIT_DRAG_NUMBER)
+
+
+def _most_munk(frame: Frame) -> float:
+    """A bound on `munk_factor` of all members."""
+    if len(frame.M) == 1:
+        return float((munk_factor(frame) * frame.J.min(axis=1)).max() / frame.J.min())
+    M = frame.mass_diagonal
+    return np.inf if M is None else float((1.0 / M.min() - 1.0 / M.max()) / frame.J.min())
+
+
+def _longest_arm(p: Numbers, frame: Frame) -> float:
+    """A bound on the moment of weight and buoyancy about the origin of the forces, of all members [N m]."""
+
+    def most(values: np.ndarray) -> float:
+        return float(np.sqrt(np.einsum("ni,ni->n", values, values).max()) if values.ndim > 1 else np.abs(values).max())
+
+    arm = most(p["vehicle.buoyancy"]) * most(p["vehicle.center_of_buoyancy"])
+    if "vehicle.center_of_gravity" in p:
+        arm += most(vehicle.weight(p)) * most(p["vehicle.center_of_gravity"])
+    return arm + most(hydrostatics.net(p)) * most(frame.forces) if frame.forces.any() else arm
+
+
+def _most_drag(plan: Watched, p: Numbers, speed: float, rate: float) -> float:
+    """A bound on `_drag_number` of all members at speeds and rates up to these [m/s, rad/s]; infinite where none is known."""
+    speeds, total = np.array([[speed] * 3 + [rate] * 3]), np.zeros(6)
+    density = p["environment.water_density"].max(keepdims=True)
+    for term, _ in plan.kernel_choice.laws:
+        if type(term).braking is Term.braking:
+            continue
+        numbers = own(term, p)
+        if not term.braking_grows_with or any(
+            len(value) > 1 and name not in term.braking_grows_with for name, value in numbers.items()
+        ):
+            return np.inf
+        most = {
+            name: np.maximum(value.max(axis=0), -value.min(axis=0))[None] if name in term.braking_grows_with else value
+            for name, value in numbers.items()
+        }
+        total = total + np.einsum("nii->ni", term.braking(most, speeds, density))[0]
+    least = np.einsum("nii->ni", vehicle.inertia6(p)).min(axis=0)
+    return float(plan.grid.h * (total / least).max())
 
 
 def _size(vectors: np.ndarray) -> np.ndarray:

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.oddities import Oddities
 from lgvi_warp.scene.plausibility import of_numbers
-from lgvi_warp.scene.slices import over_members
+from lgvi_warp.scene.slices import AT_ONCE, over_members
 
 Parameters = Mapping[str, np.ndarray]
 
@@ -37,9 +37,11 @@ COUPLINGS = ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))
 
 def shape_of_mass(M: np.ndarray) -> str:
     """The simplest shape that fits every mass matrix (n, 3, 3) [kg]."""
-    off, diagonal = notation.off_diagonal(M), np.einsum("nii->ni", M)
-    if off.any() and (np.abs(off).max(axis=1) > DIAGONAL * np.abs(diagonal).max(axis=1)).any():
-        return "full"
+    diagonal = np.einsum("nii->ni", M)
+    if notation.only_diagonal(M) is None:
+        off = notation.off_diagonal(M)
+        if (np.abs(off).max(axis=1) > DIAGONAL * np.abs(diagonal).max(axis=1)).any():
+            return "full"
     return "isotropic" if (diagonal == diagonal[:, :1]).all() else "diagonal"
 
 
@@ -97,12 +99,11 @@ class Survey:
     delayed: bool = False  # the commands of a controller are delayed
     turned_axes: bool = False  # axes other than the user's, even if only in their order or sense
     features: frozenset[str] = frozenset()  # what the device code of a controller's parts must have, as "key.feature"
-    inverse: frozenset[tuple[int, int]] = (
-        frozenset()
-    )  # entries of the inverse inertia beside the diagonal, in the user's axes
+    # Entries of the inverse inertia beside its diagonal, in the user's axes.
+    inverse: frozenset[tuple[int, int]] = frozenset()
     lever: bool = False  # the dry body's centre is off the user's origin, or added mass couples there
 
-    @property
+    @functools.cached_property
     def decisive(self) -> tuple[Any, ...]:
         """All that decides what a kernel must contain: surveys that agree in it lead to one kernel."""
         facts = vars(self) | {"odd": None, "residual_coupling": self.residual_coupling > UNCOUPLED}
@@ -134,7 +135,30 @@ def survey(
             return _survey_of_slice(ensemble.parameters(first, stop), ensemble, method, known, odd, first, stop)
 
     count = min(ensemble.members, most or ensemble.members) if ensemble.varied() else 1
+    if not odd and count <= AT_ONCE:
+        return _again(ensemble, method, known, count) or look(0, count)
     return functools.reduce(Survey.joined, over_members(look, count))
+
+
+class _Asked(NamedTuple):
+    """A survey, and its questions whose answers may vary, each with its answer: (key, function of numbers, answer)."""
+
+    scene: Any
+    method: Method
+    questions: tuple[tuple[Any, Callable[[Any], Any], Any], ...]
+    survey: Survey
+
+
+def _again(ensemble: Ensemble, method: Method, shared: SharedResultsCache, count: int) -> Survey | None:
+    """The survey that was made before, if these members answer all that may vary as those did; else None."""
+    last = shared.surveyed
+    if last is None or last.scene is not ensemble.scene or last.method is not method:
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        p = framed(method, ensemble.parameters(0, count), shared)
+        same = all(shared(key, p, ask) == answer for key, ask, answer in last.questions)
+    survey: Survey = last.survey
+    return survey if same else None
 
 
 def survey_of(
@@ -159,7 +183,7 @@ def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -
         )
         if not shared.keeps(AXES):
             shared.varied.add(AXES)
-        mass = shared("mass", p, lambda n: inertia.in_axes(n[AXES][0].Q, vehicle.mass_matrix(n)))
+        mass = shared("mass", p, _mass_in_axes)
         frame = replace(p[AXES][0], M=mass)
         if user_axes:
             frame = inertia.user_frame_with_mass(p[AXES][0], mass, p["vehicle.inertia"])
@@ -174,6 +198,12 @@ def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -
     return p
 
 
+def _mass_in_axes(numbers: Any) -> np.ndarray:
+    """Mass matrices (n, 3, 3) in the kernel's axes, of a vehicle whose mass does not turn them."""
+    axes, matrices = numbers[AXES][0], vehicle.mass_matrix(numbers)
+    return inertia.in_axes(axes.Q, matrices) if axes.turned else matrices
+
+
 def _survey_of_slice(
     parameters: Parameters,
     ensemble: Ensemble,
@@ -184,15 +214,29 @@ def _survey_of_slice(
     stop: int,
 ) -> Survey:
     p = framed(method, parameters, shared)
-    frame, scene, numbers_of = p[FRAME][0], ensemble.scene, ensemble.own
-    aligned = shared("aligned", p, lambda numbers: numbers[AXES][0].aligned)
-    # Weight and buoyancy do not depend on the step.
-    run = frame, ensemble.indices_of(first, stop), ensemble.seed, math.nan, aligned
+    scene, numbers_of = ensemble.scene, ensemble.own
+    questions: list[tuple[Any, Callable[[Any], Any], Any]] = []
+
+    def ask(key: Any, compute: Callable[[Any], Any]) -> Any:
+        answer = shared(key, p, compute)
+        if not shared.keeps(key):
+            questions.append((key, compute, answer))
+        return answer
+
+    aligned = ask("aligned", lambda numbers: numbers[AXES][0].aligned)
 
     def is_felt(term: Term, numbers: Any) -> bool:
         if term not in terms.IMPLIED:
             return term.present(numbers_of(term, numbers))
-        return any(np.any(value) for value in term.packed({}, context(numbers, *run)).values.values())
+        # Weight and buoyancy depend neither on the step nor on which members these are.
+        run = ensemble.indices_of(first, stop), ensemble.seed, math.nan, aligned
+
+        def pack(own: Any) -> Any:
+            frame = dict.__getitem__(own, FRAME)[0]  # the context notes whether it is read
+            return term.packed({}, context(own, frame, *run))
+
+        packed = shared(("implied", term.key), numbers, pack)
+        return any(value.any() for value in packed.values.values())
 
     def parts(term: Any, numbers: Any) -> frozenset[str]:
         return frozenset(term.parts(numbers_of(term, numbers)))
@@ -204,7 +248,7 @@ def _survey_of_slice(
         return water is not None and bool(np.any(water[..., 2]))
 
     def of_each(name: str, compute: Any, laws: Iterable[Term]) -> dict[str, Any]:
-        return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in laws}
+        return {t.key: ask((name, t.key), functools.partial(compute, t)) for t in laws}
 
     felt = of_each("felt", is_felt, (*terms.IMPLIED, *scene.terms))
     drags = of_each("drag", parts, (term for term in scene.terms if term.exact_flow))
@@ -214,24 +258,27 @@ def _survey_of_slice(
     if shared.user_axes:
         matrices = (term for term in scene.terms if term.pattern_device)
         features |= of_each("entries", lambda term, numbers: term.entries(numbers_of(term, numbers)), matrices)
-    of_axes = shared("facts of axes", p, lambda numbers: _facts(*numbers[AXES]))
-    mass = shared("shape of mass", p, lambda numbers: SHAPES_OF_MASS.index(shape_of_mass(numbers[FRAME][0].M)))
-    return Survey(
+    of_axes = ask("facts of axes", lambda numbers: _facts(*numbers[AXES]))
+    mass = ask("shape of mass", lambda numbers: SHAPES_OF_MASS.index(shape_of_mass(numbers[FRAME][0].M)))
+    found = Survey(
         **of_axes,
         mass=mass,
-        bent=bool(drags) and not shared("exact flow", p, lambda numbers: numbers[FRAME][0].principal),
+        bent=bool(drags) and not ask("exact flow", lambda numbers: numbers[FRAME][0].principal),
         felt=frozenset(key for key, yes in felt.items() if yes),
         drag=frozenset().union(*drags.values()),
         rising=frozenset(key for key, yes in rising.items() if yes),
-        weightless=shared("weightless", p, lambda numbers: bool(np.any(numbers["environment.gravity"] == 0.0))),
-        buoyant=shared("buoyant", p, lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
+        weightless=ask("weightless", lambda numbers: bool(np.any(numbers["environment.gravity"] == 0.0))),
+        buoyant=ask("buoyant", lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
         delayed="controller.delay" in p
-        and shared("delayed", p, lambda numbers: bool(np.any(numbers["controller.delay"] > 0.0))),
-        lever=shared("lever", p, vehicle.lopsided),
-        inverse=shared("inverse", p, lambda numbers: _entries_beside(numbers[FRAME][0])),
+        and ask("delayed", lambda numbers: bool(np.any(numbers["controller.delay"] > 0.0))),
+        lever=ask("lever", vehicle.lopsided),
+        inverse=ask("inverse", lambda numbers: _entries_beside(numbers[FRAME][0])),
         features=frozenset(f"{key}.{word}" for key, words in features.items() for word in words),
         odd=of_numbers(scene, p, first, stop, shared) if odd else Oddities({}),
     )
+    if not odd:
+        shared.surveyed = _Asked(scene, method, tuple(questions), found)
+    return found
 
 
 def _entries_beside(frame: Frame) -> frozenset[tuple[int, int]]:
@@ -247,7 +294,7 @@ def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
     """What a survey says of the axes and origins of some members."""
     return {
         "turned": not frame.aligned,
-        "turned_axes": bool(np.any(np.eye(3) != frame.Q)),
+        "turned_axes": bool(np.any(notation.EYE != frame.Q)),
         "coupled": frame.coupled,
         "moved": bool(np.any(frame.origin)),
         "forces_moved": bool(np.any(frame.forces)),

@@ -107,12 +107,17 @@ class Frame:
     @functools.cached_property
     def turned(self) -> bool:
         """Whether some member's axes are not the user's."""
-        return bool((np.eye(3) != self.Q).any())
+        return bool((notation.EYE != self.Q).any())
 
     @functools.cached_property
     def shifted(self) -> bool:
         """Whether some member's origin of the state is not the user's."""
         return bool(self.origin.any())
+
+    @functools.cached_property
+    def mass_diagonal(self) -> np.ndarray | None:
+        """Diagonals (., 3) of the mass matrices, where none has another entry; else None."""
+        return notation.only_diagonal(self.M)
 
     @property
     def principal(self) -> bool:
@@ -146,7 +151,7 @@ class Frame:
         """Mass matrix (n, 6, 6) in these axes, where M^-1 C is E (n, 3, 3) [m]: J = Js + E^T M E."""
         if self.whole is not None:
             return self.whole
-        J = self.J[:, :, None] * np.eye(3)
+        J = self.J[:, :, None] * notation.EYE
         return joined(self.M + 0.0 * E, self.M @ E, J + np.swapaxes(E, -1, -2) @ self.M @ E)
 
     def vector(self, v: np.ndarray) -> np.ndarray:
@@ -186,7 +191,7 @@ def schur(body: Blocks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def in_axes(Q: np.ndarray, A: np.ndarray) -> np.ndarray:
     """Matrices in other axes, Q^T A Q."""
-    if np.all(np.eye(3) == Q):
+    if np.all(notation.EYE == Q):
         return A
     return np.asarray(np.swapaxes(Q, -1, -2) @ A @ Q)
 

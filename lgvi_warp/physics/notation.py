@@ -11,6 +11,9 @@ import numpy as np
 
 # A matrix whose off-diagonal elements are below this fraction of its largest is diagonal as given.
 DIAGONAL = 1e-14
+# The unit matrix, which takes longer to make than to use.
+EYE = np.eye(3)
+EYE.flags.writeable = False
 # Places of the entries of a 3x3 matrix off its diagonal, row by row.
 OFF_DIAGONAL = [1, 2, 3, 5, 6, 7]
 # How far from orthogonal an attitude may be: the round-off of one printed with ten digits.
@@ -105,6 +108,19 @@ def off_diagonal(matrices: np.ndarray) -> np.ndarray:
         Entries (n, 6), row by row.
     """
     return matrices.reshape(-1, 9)[:, OFF_DIAGONAL]
+
+
+def only_diagonal(matrices: np.ndarray) -> np.ndarray | None:
+    """Diagonals of 3x3 matrices, if all other entries are zero.
+
+    Args:
+        matrices: Matrices (n, 3, 3).
+
+    Returns:
+        Diagonals (n, 3); None where some matrix has another entry.
+    """
+    diagonals = np.einsum("nii->ni", matrices)
+    return diagonals if np.count_nonzero(matrices) == np.count_nonzero(diagonals) else None
 
 
 def rotations(R: np.ndarray) -> np.ndarray:

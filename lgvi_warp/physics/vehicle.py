@@ -293,7 +293,9 @@ def inertia_blocks(p: Numbers) -> inertias.Blocks:
 
 def mass_matrix(p: Numbers) -> np.ndarray:
     """Mass and added mass (n, 3, 3) [kg] of a vehicle whose mass matrix has no coupling."""
-    return np.asarray(p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"])
+    body = p["vehicle.mass"][:, None, None] * notation.EYE
+    added = p["vehicle.added_mass"]
+    return np.asarray(np.add(body, added, out=body if len(added) <= len(body) else None))
 
 
 def inertia6(p: Numbers) -> np.ndarray:

@@ -65,6 +65,11 @@ class OfResult:
         """Whether it is a function of a Result."""
         return not isinstance(self.of, Functional)
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it reads samples and parameters of a Result alone."""
+        return type(self) is OfResult and not self.is_function
+
     def values(self, result: Result, members: Any = None) -> np.ndarray:
         """Compute its numbers for each member.
 

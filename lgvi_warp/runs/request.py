@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.control.signals import check_signals
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.executors.base import Executor
+from lgvi_warp.engine.executors.threads import threads_for
 from lgvi_warp.engine.keepers.observation import Observation, observe
 from lgvi_warp.engine.plan import NotSurveyed, Plan, choose_plan
 from lgvi_warp.methods.method import Method
@@ -39,7 +39,7 @@ class Request:
     h: step [s].
     t1: end of the run [s].
     observed: statistics, members whose samples are kept, and when the run stops.
-    threads: None for all cores.
+    threads: None for as many as the run is worth.
     executor: None for threads.
     settled: steps and sample times of a run that goes on; None where h, t1 and save say them.
     """
@@ -90,10 +90,9 @@ class Request:
         named = self.fleet.scene.run.save_fields
         return FIELDS if named is None else tuple(named)
 
-    @property
-    def count(self) -> int:
-        """The number of threads."""
-        return self.threads or machine.thread_count()
+    def count(self, plan: Plan) -> int:
+        """The number of threads of a plan's run."""
+        return self.threads or threads_for(plan)
 
     def grid(self) -> TimeGrid:
         """Choose the steps and the sample times."""
@@ -152,10 +151,10 @@ class Request:
         """
         settings = {"observed": self.observed, "fields": self.saved, "executor": self.executor, **settings}
         try:
-            result = run_plan(plan, self.count, **settings)
+            result = run_plan(plan, self.count(plan), **settings)
         except NotSurveyed:
             plan = plan.replanned(survey_all=True)
-            result = run_plan(plan, self.count, **settings)
+            result = run_plan(plan, self.count(plan), **settings)
         indices, kept = self.again(plan, result.status)
         if kept is not None:
             result = replace(result, kept=kept, kept_members=indices)
@@ -171,7 +170,8 @@ class Request:
         if not len(indices):
             return indices, None
         chosen = plan.with_neighbours(indices)
-        result = run_plan(plan.subplan([int(i) for i in chosen], self.saved), self.count)
+        part = plan.subplan([int(i) for i in chosen], self.saved)
+        result = run_plan(part, self.count(part))
         return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
 
@@ -198,7 +198,8 @@ def enough_iterations(fleet: Ensemble, method: Method, h: float, dtype: str) -> 
     """
     for n in range(MOST_FIXED + 1):
         trial = Request(fleet, replace(method, iterations=n), 2.0 * h, 2.0 * h, SaveAt(), dtype)
-        if not np.any(run_plan(trial.plan(), trial.count).status == Status.NOT_CONVERGED):
+        plan = trial.plan()
+        if not np.any(run_plan(plan, trial.count(plan)).status == Status.NOT_CONVERGED):
             return n
     return None
 

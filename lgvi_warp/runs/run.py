@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -11,12 +12,14 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Interrupted, MembersFailed
+from lgvi_warp.engine import single_block
 from lgvi_warp.engine.block import Block, parts
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
 from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.loop import Merged, RunProgress, run_blocks
+from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.results import member_fields
@@ -70,7 +73,11 @@ def run_plan(
         on_block(gathered.of_block(block))
 
     joined = bool(gathered.observing.keepers) or not isinstance(runner, Threads)
-    runs, work = parts(total, plan.grid.steps, threads, joined), Work(plan, gathered.keepers, warned=warned)
+    runs = parts(total, plan.grid.steps, threads, joined)
+    if not joined and on_block is None and single_block.fits(plan, runs):
+        gathered.take_all(*single_block.run_single_block(plan, gathered.names, warned, overall.at))
+        return ended(total)
+    work = Work(plan, gathered.keepers, warned=warned)
     try:
         n = run_blocks(
             work, runs, runner, overall.at, enough=gathered.observing.enough, merged=merged,
@@ -92,14 +99,37 @@ class _Gathered:
 
     def __init__(self, plan: Plan, observed: Observation, fields: Sequence[str] | None, known: Known | None):
         self.plan, self.observed, self.fields, self.known = plan, observed, fields, known
-        self.outcomes, self.samples = Outcomes(plan), Samples(plan, fields) if observed.samples else None
         self.observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
-        self.keepers = (self.outcomes, *((self.samples,) if self.samples else ()), *self.observing.keepers)
+        self._whole: tuple[dict[str, np.ndarray], MemberStatus] | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the samples to keep."""
+        if not self.observed.samples:
+            return ()
+        return self.plan.fields if self.fields is None else tuple(self.fields)
+
+    @functools.cached_property
+    def keepers(self) -> tuple[Any, ...]:
+        """The keepers of a run by blocks: of outcomes, of samples where these are kept, and of statistics."""
+        samples = (Samples(self.plan, self.fields),) if self.observed.samples else ()
+        return (Outcomes(self.plan), *samples, *self.observing.keepers)
+
+    def take_all(self, samples: dict[str, np.ndarray], outcome: MemberStatus) -> None:
+        """Take what was gathered without keepers: the samples and the outcome of all members."""
+        self._whole = samples, outcome
+
+    @property
+    def outcome(self) -> MemberStatus:
+        """The outcome of all members."""
+        return self._whole[1] if self._whole else self.keepers[0].all
 
     def histories(self, at: slice) -> dict[str, np.ndarray]:
         """Samples of some members, by field."""
-        kept = self.samples.fields if self.samples and self.samples.fields else {}
-        return {name: values[:, at] for name, values in kept.items()}
+        if self._whole:
+            return self._whole[0]
+        kept = self.keepers[1].fields if self.observed.samples else None
+        return {name: values[:, at] for name, values in (kept or {}).items()}
 
     def of_block(self, block: Block) -> Result:
         """The result of a block's members: their samples and outcomes, without statistics and messages.
@@ -108,7 +138,7 @@ class _Gathered:
         """
         plan, at = self.plan, slice(block.first, block.stop)
         of_members = {
-            name: values.copy() for name, values in member_fields.member_fields(plan, self.outcomes.all.at(at)).items()
+            name: values.copy() for name, values in member_fields.member_fields(plan, self.outcome.at(at)).items()
         }
         return Result(
             time=plan.grid.times.copy(),
@@ -127,7 +157,7 @@ class _Gathered:
             content, texts = provenance(plan, self.observed, self.fields), messages(plan)
         else:
             content, texts = self.known(plan)
-        of_members = {name: values[:n] for name, values in member_fields.member_fields(plan, self.outcomes.all).items()}
+        of_members = {name: values[:n] for name, values in member_fields.member_fields(plan, self.outcome).items()}
         estimates, remarks = Estimates(), tuple[str, ...]()
         if complete:
             estimates, remarks = self.observing.read(content["ensemble"], of_members["status"])

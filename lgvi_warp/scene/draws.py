@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -90,10 +90,10 @@ class Draws:
         """
         if self.members > KEPT:
             return self._drawn(first, stop, start)
-        every = self._few.items() if start else ((name, self._few[name]) for name in self.scene.parameters)
+        every = self._few if start else self._few_parameters
         if (first, stop) == (0, self.members):
-            return dict(every)
-        return {name: values[first:stop] if len(values) > 1 else values for name, values in every}
+            return every.copy()
+        return {name: values[first:stop] if len(values) > 1 else values for name, values in every.items()}
 
     @functools.cached_property
     def _few(self) -> dict[str, np.ndarray]:
@@ -101,6 +101,16 @@ class Draws:
         for name in self.varied_names & few.keys():
             few[name].flags.writeable = False
         return few
+
+    @functools.cached_property
+    def _few_parameters(self) -> dict[str, np.ndarray]:
+        return {name: self._few[name] for name in self.scene.parameters}
+
+    def with_columns(self, columns: Columns) -> Draws:
+        """The draws of other members, of which a table's columns have other values; the targets are the same."""
+        draws = replace(self, columns=columns, total=len(columns[0][1]), places=None)
+        vars(draws).update(drawn_names=self.drawn_names, varied_names=self.varied_names)
+        return draws
 
     def _drawn(self, first: int, stop: int, start: bool) -> dict[str, np.ndarray]:
         """Draw what `values` returns."""
@@ -115,12 +125,15 @@ class Draws:
         members = np.arange(first, stop) if self.places is None else self.places[first:stop]
         space = self.space.of([variation.key for variation in wanted]) if self.sampling.kind == "random" else self.space
         levels = self.sampling.draw(space, members) if wanted else {}
-        drawn = [(target, column[members]) for target, column in self.columns]
+        rows = slice(first, stop) if self.places is None else members
+        drawn = [(target, column[rows]) for target, column in self.columns]
         for variation in wanted:
             drawn += variation.values(levels[variation.key])
+        own: set[str] = set()
         for target, column in drawn:
             if target.name in values:
-                variations.put(values, target, column)
+                variations.put(values, target, column, target.name in own)
+                own.add(target.name)
         return values
 
     def members_of(self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int) -> Members:
@@ -128,14 +141,14 @@ class Draws:
         m = len(indices)
         start = {key.removeprefix("start."): values.pop(key) for key in tuple(values) if key.startswith("start.")}
         # In one memory layout, on which the order of the sums of a matrix product depends.
-        R = _of_each(np.ascontiguousarray(self._attitude(start)), m)
+        R = np.ascontiguousarray(self._attitude(start))
         if "velocity_inertial" in start:
             # Written out: the order of the sum, and so its bits, must not depend on the number of members.
             v = start["velocity_inertial"]
             nu = R[:, 0] * v[:, :1] + R[:, 1] * v[:, 1:2] + R[:, 2] * v[:, 2:]
         else:
             nu = start["velocity"]
-        position, nu, Om = (_of_each(x, m) for x in (start["position"], nu, start["angular_velocity"]))
+        R, position, nu, Om = (_of_each(x, m) for x in (R, start["position"], nu, start["angular_velocity"]))
         return Members(values, position, R, nu, Om, indices, seed)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -365,8 +365,8 @@ class Ensemble(Summarized):
             SceneError: If a member is unphysical.
         """
         pairs = [(target, columns[target.label]) for target, _ in self._draws.columns]
-        ensemble = self._drawing(columns=pairs, total=len(pairs[0][1]), places=None)
-        ensemble._indices = None
+        ensemble = copy.copy(self)
+        ensemble._draws, ensemble._indices = self._draws.with_columns(pairs), None
         ensemble._check_physical()
         return ensemble
 

@@ -29,6 +29,12 @@ class Unphysical:
     count: int
 
 
+RIGID, ADDED = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
+Numbers = Mapping[str, np.ndarray]
+# (numbers, tolerance of the body's inertia) -> mask (n,).
+Check = Callable[[Numbers, float], np.ndarray]
+
+
 def _odd_entry(value: Any) -> tuple[str, Any]:
     """Return the place of the first entry that is not finite, as in "[1,2]", and the entry; or "" and the value itself."""
     numbers = np.asarray(value)
@@ -71,6 +77,8 @@ class PhysicalChecks:
         self._refuse(self._look_at(first, stop, parameters), stop - first)
 
     def _refuse(self, findings: Mapping[str, Unphysical], looked_at: int) -> None:
+        if not findings:
+            return
         faults = Faults()
         all_seen = looked_at == self.members
         for key, finding in findings.items():
@@ -104,43 +112,58 @@ class PhysicalChecks:
         return unphysical
 
 
-def _vehicle_checks(p: Mapping[str, np.ndarray], varied: AbstractSet[str], tolerance: float) -> dict[str, np.ndarray]:
+def _vehicle_checks(p: Numbers, varied: AbstractSet[str], tolerance: float) -> dict[str, np.ndarray]:
     """Return masks (n,) by name: which members' varied numbers of vehicle and environment are unphysical."""
+    return {key: check(p, tolerance) for key, check in _checks_of(frozenset(p), frozenset(varied))}
 
-    def heavy() -> np.ndarray:
-        return np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] >= vehicles.LEAST)
 
-    def light_with_water() -> np.ndarray:
-        total = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
-        return heavy() & ~_positive_definite(total)
-
-    def impossible_body() -> np.ndarray:
-        good = _positive_definite(p[rigid])
-        possible = np.where(good[:, None, None], p[rigid], np.eye(6))
-        return np.asarray(~good | vehicles.impossible(possible, tolerance))
-
-    def negative(key: str) -> np.ndarray:
-        return np.asarray(~(np.isfinite(p[key]) & (p[key] >= 0.0)))
-
-    def not_finite(key: str) -> np.ndarray:
-        return np.asarray(~np.isfinite(p[key]).all(axis=1))
-
-    rigid, added = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
-    checks: dict[str, Callable[[], np.ndarray]] = {}
-    if "vehicle.mass" in p:
-        checks["vehicle.mass"] = lambda: ~heavy()
-        checks["vehicle.inertia"] = lambda: ~_positive_definite(p["vehicle.inertia"])
-        checks["vehicle.mass + vehicle.added_mass"] = light_with_water
+@functools.lru_cache(maxsize=64)
+def _checks_of(names: frozenset[str], varied: frozenset[str]) -> tuple[tuple[str, Check], ...]:
+    """The checks of numbers of vehicle and environment that vary, by name. Kept, since a call of few members asks again."""
+    vectors, sizes = ("center_of_buoyancy", "center_of_gravity"), ("buoyancy", "weight")
+    checks: dict[str, Check] = {}
+    if "vehicle.mass" in names:
+        checks["vehicle.mass"] = lambda p, tolerance: ~_heavy(p)
+        checks["vehicle.inertia"] = lambda p, tolerance: ~_positive_definite(p["vehicle.inertia"])
+        checks["vehicle.mass + vehicle.added_mass"] = _light_with_water
     else:
-        checks[rigid] = impossible_body
-        checks[f"{rigid} + {added}"] = lambda: ~_positive_definite(p[rigid] + p[added])
-    for keys, check in ((("center_of_buoyancy", "center_of_gravity"), not_finite), (("buoyancy", "weight"), negative)):
-        checks |= {key: functools.partial(check, key) for key in map("vehicle.{}".format, keys) if key in p}
-    if "environment.gravity" in p:
-        checks["environment.gravity"] = functools.partial(negative, "environment.gravity")
+        checks[RIGID] = _impossible_body
+        checks[f"{RIGID} + {ADDED}"] = lambda p, tolerance: ~_positive_definite(p[RIGID] + p[ADDED])
+    known = [f"vehicle.{name}" for name in vectors if f"vehicle.{name}" in names]
+    checks |= {key: functools.partial(_not_finite, key) for key in known}
+    known = [f"vehicle.{name}" for name in sizes if f"vehicle.{name}" in names]
+    if "environment.gravity" in names:
+        known.append("environment.gravity")
+    checks |= {key: functools.partial(_negative, key) for key in known}
+    checks["environment.water_density"] = _no_density
+    return tuple((key, check) for key, check in checks.items() if not varied.isdisjoint(key.split(" + ")))
+
+
+def _heavy(p: Numbers) -> np.ndarray:
+    return np.asarray(np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] >= vehicles.LEAST))
+
+
+def _light_with_water(p: Numbers, tolerance: float) -> np.ndarray:
+    return _heavy(p) & ~_positive_definite(vehicles.mass_matrix(p))
+
+
+def _impossible_body(p: Numbers, tolerance: float) -> np.ndarray:
+    good = _positive_definite(p[RIGID])
+    possible = np.where(good[:, None, None], p[RIGID], np.eye(6))
+    return np.asarray(~good | vehicles.impossible(possible, tolerance))
+
+
+def _negative(key: str, p: Numbers, tolerance: float) -> np.ndarray:
+    return np.asarray(~(np.isfinite(p[key]) & (p[key] >= 0.0)))
+
+
+def _not_finite(key: str, p: Numbers, tolerance: float) -> np.ndarray:
+    return np.asarray(~np.isfinite(p[key]).all(axis=1))
+
+
+def _no_density(p: Numbers, tolerance: float) -> np.ndarray:
     density = p["environment.water_density"]
-    checks["environment.water_density"] = lambda: ~(np.isfinite(density) & (density > 0))
-    return {key: check() for key, check in checks.items() if any(name in varied for name in key.split(" + "))}
+    return np.asarray(~(np.isfinite(density) & (density > 0)))
 
 
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:

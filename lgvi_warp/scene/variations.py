@@ -39,7 +39,7 @@ class Target:
     name: str
     index: tuple[int, ...] | None = None
 
-    @property
+    @functools.cached_property
     def label(self) -> str:
         """The name with the index, such as "start.position[2]"."""
         return self.name if self.index is None else f"{self.name}[{','.join(map(str, self.index))}]"
@@ -142,14 +142,15 @@ def symmetric(drawn: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     return upper
 
 
-def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> None:
-    """Set the values (n, ...) of a target among the numbers (1 or n, ...) by name, in place."""
+def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray, into: bool = False) -> None:
+    """Set the values (n, ...) of a target among the numbers (1 or n, ...) by name; into: in the array that is there."""
     if target.index is None:
         values[target.name] = drawn
         return
     array = values[target.name]
-    array, shared = np.empty((len(drawn), *array.shape[1:]), array.dtype), array
-    array[...] = shared
+    if not into:
+        array, shared = np.empty((len(drawn), *array.shape[1:]), array.dtype), array
+        array[...] = shared
     every: tuple[Any, ...] = (slice(None),)
     array[every + target.index] = drawn
     if target.name in MATRICES:

@@ -31,7 +31,8 @@ def check_threads(faults: Faults, threads: Any) -> None:
 def executor_of(choice: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
     """The executor that a name stands for, or the executor itself where an object is given.
 
-    threads: number of threads, processes or workers; None (default) for all cores.
+    threads: number of threads, processes or workers; None (default) for all cores, of threads for as many
+        as the run is worth.
     """
     faults = Faults()
     check_threads(faults, threads)
@@ -60,4 +61,4 @@ def executor_of(choice: Any, threads: int | None = None, scheduler: str | None =
         return cluster
     from lgvi_warp.engine.executors.threads import Threads
 
-    return Threads(count)
+    return Threads(threads)

@@ -11,7 +11,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from lgvi_warp.engine.block import Block
+from lgvi_warp.common import machine
+from lgvi_warp.engine.block import Block, default_threads
 from lgvi_warp.engine.executors.base import Advanced, finished_blocks
 from lgvi_warp.engine.work import Work
 
@@ -28,11 +29,19 @@ class ThisThread:
             yield block, work(block, lambda: False, functools.partial(advanced, block))
 
 
+def threads_for(plan: Any) -> int:
+    """Number of threads of a plan's run where nobody names it."""
+    return default_threads(plan.ensemble.members, plan.grid.steps, machine.thread_count())
+
+
 @dataclass(frozen=True)
 class Threads:
-    """Runs blocks in threads of this process."""
+    """Runs blocks in threads of this process.
 
-    threads: int
+    threads: how many; None: as many as the run is worth (see `default_threads`).
+    """
+
+    threads: int | None = None
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
         """Run all blocks and yield each with its result.
@@ -42,7 +51,8 @@ class Threads:
         """
         # The main thread waits, so that blocks at work come to their end when it hears an interrupt. One block alone would
         # be lost in any thread.
-        if len(blocks) == 1 or (self.threads == 1 and threading.current_thread() is not threading.main_thread()):
+        threads = self.threads or threads_for(work.plan)
+        if len(blocks) == 1 or (threads == 1 and threading.current_thread() is not threading.main_thread()):
             yield from ThisThread().run(work, blocks, advanced)
             return
         stop = threading.Event()
@@ -50,7 +60,7 @@ class Threads:
         def run_one(block: Block) -> Any:
             return work(block, stop.is_set, functools.partial(advanced, block))
 
-        with ThreadPoolExecutor(self.threads, thread_name_prefix="lgvi_warp") as pool:
+        with ThreadPoolExecutor(threads, thread_name_prefix="lgvi_warp") as pool:
             futures: dict[Future[Any], Block] = {}
             done: queue.SimpleQueue[Future[Any]] = queue.SimpleQueue()
             try:

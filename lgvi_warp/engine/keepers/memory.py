@@ -63,7 +63,7 @@ class Samples:
 
     def __init__(self, plan: Plan, fields: Sequence[str] | None = None):
         self.names = tuple(plan.fields if fields is None else fields)
-        self.fields = _empty(plan, self.names, plan.ensemble.members)
+        self.fields = empty_samples(plan, self.names, plan.ensemble.members)
 
     @classmethod
     def elsewhere(cls, names: Sequence[str]) -> Samples:
@@ -78,7 +78,7 @@ class Samples:
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockSamples:
         """The keeper of a block's samples."""
         if self.fields is None:
-            return _BlockSamples(_empty(plan, self.names, block.count), sent=True)
+            return _BlockSamples(empty_samples(plan, self.names, block.count), sent=True)
         return _BlockSamples({name: values[:, block.first : block.stop] for name, values in self.fields.items()})
 
     def merge(self, block: Block, part: dict[str, np.ndarray] | None) -> None:
@@ -88,7 +88,7 @@ class Samples:
             self.fields[name][:, block.first : block.stop] = values
 
 
-def _empty(plan: Plan, names: Sequence[str], members: int) -> dict[str, np.ndarray]:
+def empty_samples(plan: Plan, names: Sequence[str], members: int) -> dict[str, np.ndarray]:
     """Uninitialised arrays for all samples of so many members, by field."""
     k, real = len(plan.grid.times), machine.DTYPES[plan.dtype]
     fields = {name: np.empty((k, members, *plan.layout.table[name].shape), real) for name in names}

@@ -66,13 +66,14 @@ class Packed(NamedTuple):
     Args:
         values: The fields of the device struct by name: numbers (n,), vectors (n, 3) in the kernel's axes, whole numbers,
             or whole numbers (n,).
-        rows: The term's rows of the device table, shape (n, rows); None for none.
+        rows: The term's rows of the device table, shape (n, rows), or several such arrays, which stand side by side, each
+            with an n of its own; None for none.
         memory: What the term remembers from step to step, at the start, shape (n, rows); None for none.
         work: Number of scratch rows that the device code may overwrite during one call.
     """
 
     values: dict[str, Any]
-    rows: np.ndarray | None = None
+    rows: np.ndarray | tuple[np.ndarray, ...] | None = None
     memory: np.ndarray | None = None
     work: int = 0
 
@@ -173,6 +174,8 @@ class Term:
     driven_fields: ClassVar[tuple[str, ...]] = ()
     # Fields that follow from another one, of which alone a fault is told; set by a term before its fields are checked.
     following: ClassVar[tuple[str, ...]] = ()
+    # Numbers with whose sizes the diagonal of `braking` grows, as it does with the speeds and the density where there are any.
+    braking_grows_with: ClassVar[tuple[str, ...]] = ()
 
     name: str = ""
 

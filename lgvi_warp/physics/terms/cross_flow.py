@@ -33,6 +33,7 @@ class CrossFlow(Term):
     """
 
     type: ClassVar[str] = "cross_flow"
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("drag_coefficient", "diameters")
 
     stations: Any = number(("k",), "m", rising=True)
     diameters: Any = number(("k",), "m", least=0.0)

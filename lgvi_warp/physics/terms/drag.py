@@ -43,6 +43,7 @@ class Drag(Term):
 
     type: ClassVar[str] = "drag"
     device: ClassVar[str] = "drag_matrix"
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
     strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
     exact_flow: ClassVar[tuple[str, ...]] = ("drag", "drag_directions")
     pattern_device: ClassVar[str] = "drag_matrix_pattern"
@@ -159,6 +160,7 @@ class DragMatrix(Term):
     """
 
     type: ClassVar[str] = "drag_matrix"
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
     strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
     pattern_device: ClassVar[str] = "drag_matrix_pattern"
 
@@ -199,6 +201,9 @@ class DragMatrix(Term):
         return "drag_matrix" if aligned else "drag_matrix_turned"
 
 
+BESIDE = ~np.eye(6, dtype=bool)
+
+
 def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
     """Which of the matrices (n, 6, 6) would speed a vehicle up, and the worst velocity (n, 6) for each.
 
@@ -226,19 +231,17 @@ def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
     diagonal = np.einsum("nii->ni", matrices)
     brakes = (diagonal >= 0.0).all(axis=1)
     # Most matrices have few entries beside the diagonal, the same ones in all members.
-    beside = [(i, j) for i, j in np.argwhere(matrices.any(axis=0)).tolist() if i != j]
-    if not beside:
+    i, j = np.nonzero(matrices.any(axis=0) & BESIDE)
+    if not len(i):
         return np.asarray(brakes)
-    alone, others = np.ones(len(matrices), bool), np.zeros((len(matrices), 6))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        size = 1.0 / np.cbrt(diagonal)
-        for i, j in beside:
-            entry = matrices[:, i, j]
-            alone &= entry == 0.0
-            scaled = np.abs(entry) * size[:, i] * size[:, j] ** 2
-            others[:, i] += scaled
-            others[:, j] += 2.0 * scaled
-        return np.asarray(brakes & (alone | (others <= 3.0).all(axis=1)))
+        size, entries = 1.0 / np.cbrt(diagonal), matrices[:, i, j]
+        scaled = np.abs(entries) * size[:, i] * size[:, j] ** 2
+        others = np.zeros((6, len(matrices)))
+        for k in range(len(i)):
+            others[i[k]] += scaled[:, k]
+            others[j[k]] += 2.0 * scaled[:, k]
+        return np.asarray(brakes & (~entries.any(axis=1) | (others <= 3.0).all(axis=0)))
 
 
 def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -276,17 +279,17 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingCon
     """
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = context.frame.from_forces
-    n = max(len(linear), len(quadratic), len(X))
     XT = np.swapaxes(X, 1, 2)
-    columns = np.flatnonzero(quadratic.any(axis=0).any(axis=0)).tolist()
-    rows = np.empty((n, 72 if context.aligned else 36 + 12 * len(columns)))
-    rows[:, :36] = (XT @ linear @ X).reshape(-1, 36)
+    entries = np.asarray(quadratic.any(axis=0))
+    columns = np.flatnonzero(entries.any(axis=0)).tolist()
+    constant = (XT @ linear @ X).reshape(-1, 36)
     values = {"constant": int(linear.any())}
     if context.aligned:
-        rows[:, 36:] = (XT @ quadratic @ X).reshape(-1, 36)
+        rows = (constant, (XT @ quadratic @ X).reshape(-1, 36))
         return Packed(values | {"quadratic": int(bool(columns))}, rows)
-    XT = np.broadcast_to(XT, (n, 6, 6))
-    for at, j in zip(range(36, rows.shape[1], 12), columns, strict=True):
-        rows[:, at : at + 6] = X[:, j, :]
-        rows[:, at + 6 : at + 12] = np.einsum("nij,nj->ni", XT, np.broadcast_to(quadratic[:, :, j], (n, 6)))
-    return Packed(values | {"count": len(columns)}, rows)
+    parts = [constant]
+    for j in columns:
+        # X^T q of a column q, whose entries are mostly zero; members side by side, which is twice as fast.
+        wrench = sum(X[:, i, :].T * quadratic[:, i, j] for i in np.flatnonzero(entries[:, j]).tolist())
+        parts += [X[:, j, :], np.asarray(wrench).T]
+    return Packed(values | {"count": len(columns)}, tuple(parts))

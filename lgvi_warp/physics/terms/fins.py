@@ -37,6 +37,7 @@ class Fins(Term):
     """
 
     type: ClassVar[str] = "fins"
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("area", "lift_slope", "drag", "drag_normal")
 
     position: Any = number(("n", 3), "m")
     chord: Any = number(("n", 3), "1")

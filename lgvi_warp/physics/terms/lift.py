@@ -25,6 +25,7 @@ class BodyLift(Term):
 
     type: ClassVar[str] = "body_lift"
     device: ClassVar[str] = "lift"
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("matrix",)
     strengths: ClassVar[tuple[str, ...]] = ("matrix",)
     dissipative: ClassVar[bool] = False
     pattern_device: ClassVar[str] = "lift_pattern"

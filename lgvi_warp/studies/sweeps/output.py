@@ -179,7 +179,7 @@ class Sweep(SweepTable):
             members: their indices.
             at: values of the grid by name; may be left out where there is no grid.
             save: which samples, and when; default as the scene says.
-            threads: number of threads; default all cores.
+            threads: number of threads; default as of `lw.solve`.
 
         Returns:
             Their result.

@@ -70,7 +70,7 @@ def sweep(
         out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
             whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
             code and what that leads to; by `version` where lw.control.Callback and lw.metrics.CustomMetric have one.
-        threads: As of solve; default all cores.
+        threads: As of solve.
         executor: As of solve; default "threads".
         scheduler: As of solve; default None.
         progress: As of solve, of all cells together; None, the default, for nobody.

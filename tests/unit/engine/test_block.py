@@ -3,7 +3,7 @@
 
 import pytest
 
-from lgvi_warp.engine.block import Block, block_size, blocks
+from lgvi_warp.engine.block import Block, block_size, blocks, default_threads
 
 
 @pytest.mark.parametrize(("members", "size"), [
@@ -21,3 +21,11 @@ def test_each_member_is_in_one_block(members):
     assert {block.count for block in found[:-1]} <= {block_size(members)}
     assert 0 < found[-1].count <= block_size(members)
     assert found[0] == Block(0, min(members, block_size(members)))
+
+
+@pytest.mark.parametrize(
+    ("members", "steps", "threads"), [(1, 1, 1), (1_999, 500, 1), (1_999, 501, 8), (2_000, 1, 8), (1_000, 100_000, 8)]
+)
+def test_few_members_of_a_short_run_take_one_thread(members, steps, threads):
+    """Several cost more than they save there; a long run of few members is worth them."""
+    assert default_threads(members, steps, 8) == threads

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, SharedResultsCache, TrackedParameters, context
-from lgvi_warp.scene.draws import KEPT
+from lgvi_warp.scene.slices import AT_ONCE
 
 NUMBERS = {"a.x": np.ones((1, 3)), "b.y": np.zeros(5)}
 WAYS = {
@@ -57,8 +57,8 @@ def test_a_context_notes_what_it_is_asked_for(name, field):
     assert type(context(NUMBERS, "frame", np.arange(5), 7, 0.01, True)).__name__ == "PackingContext"
 
 
-@pytest.mark.parametrize(("members", "remembers"), [(1, True), (KEPT, True), (KEPT + 1, False)])
-def test_what_follows_from_few_members_is_remembered(members, remembers):
+@pytest.mark.parametrize(("members", "remembers"), [(1, True), (AT_ONCE, True), (AT_ONCE + 1, False)])
+def test_what_follows_from_members_of_a_block_is_remembered(members, remembers):
     shared, mass = SharedResultsCache({"vehicle.mass", MEMBERS}), np.ones(members)
     numbers = {"vehicle.mass": mass, "vehicle.buoyancy": np.ones(1)}
     assert shared.completed(numbers) is None

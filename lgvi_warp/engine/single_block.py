@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run of few members, in one block and in the thread that asks: no executor, no keepers, the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.engine.block import Block
+from lgvi_warp.engine.keepers.memory import empty_samples
+from lgvi_warp.engine.outcome import MemberStatus
+from lgvi_warp.engine.packets import Packets
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.work import at_start, unpacked
+
+
+def fits(plan: Plan, blocks: Sequence[Block]) -> bool:
+    """Whether a run can be made so: in one block, without a function of the host and without what is gathered at ticks."""
+    return len(blocks) == 1 and not (plan.launches.has_callback or plan.launches.gathered or plan.layout.signals)
+
+
+def run_single_block(
+    plan: Plan, names: Sequence[str], warned: bool, advanced: Callable[[Block, int], None]
+) -> tuple[dict[str, np.ndarray], MemberStatus]:
+    """Advance all members; their samples (k, n, ...) by field, and their outcome.
+
+    names: of the samples to keep. warned: whether warnings are looked for. advanced: called with the steps of vehicles so far.
+    """
+    samples, packets = _advanced(plan, names, advanced)
+    with np.errstate(invalid="ignore", over="ignore"):
+        outcome = packets.outcome(warned)
+    packets.leave()
+    return samples, outcome
+
+
+def run_for_samples(
+    plan: Plan, advanced: Callable[[Block, int], None] = lambda block, steps: None
+) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+    """Advance all members; their samples, and their status (n,), None where all reached the end."""
+    samples, packets = _advanced(plan, plan.fields, advanced)
+    status = None if packets.untroubled else packets.outcome(warned=False).status
+    packets.leave()
+    return samples, status
+
+
+def _advanced(
+    plan: Plan, names: Sequence[str], advanced: Callable[[Block, int], None]
+) -> tuple[dict[str, np.ndarray], Packets]:
+    """Samples of all members, and their packets at the end."""
+    n = plan.ensemble.members
+    block = Block(0, n)
+    # As of `run_block`.
+    with np.errstate(invalid="ignore", over="ignore"):
+        members = plan.ensemble.select(0, n)
+        plan.check_block(block, members)
+        packets = Packets.of(plan, members)
+        samples = empty_samples(plan, names, n)
+        _keep(samples, slice(0, 1), at_start(plan, members, packets))
+        for k0, k1 in plan.launches.segments(n):
+            raw = packets.advance(k0, k1)[:, :n]
+            when = slice(*plan.launches.samples_due(k0, k1))
+            if when.start < when.stop and names:
+                _keep(samples, when, unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table))
+            advanced(block, n * k1)
+    return samples, packets
+
+
+def _keep(samples: dict[str, np.ndarray], when: slice, values: Any) -> None:
+    for name, place in samples.items():
+        place[when] = values[name]

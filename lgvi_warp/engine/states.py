@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The states at which members start, in the axes, about the origin and in the units of the kernel that advances them.
+
+The order of every sum is written out: lgvi_kernels/packing/states.py has it too, and so the same bits.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lgvi_kernels.advance.rows import STATE_FIELDS
+from lgvi_warp.physics import notation
+
+
+class Starts(NamedTuple):
+    """What the states of m members are made of, each (1 or m, ...).
+
+    Attitude (3, 3), position (3,) [m], velocity (3,) [m/s] and angular velocity (3,) [rad/s] as the user gives them.
+    water: (3,) [m/s], its velocity in the user's body axes; None where it rests.
+    axes, origin: of the kernel in the user's, (3, 3) and (3,) [m]; None where they are the user's.
+    mass, moments: (3,) [kg] and (3,) [kg m2] in the kernel's axes, where momenta are products of these and velocities alone.
+    inertia: (6, 6), where they are not; else None.
+    scale: () [kg m2], what momenta are divided by. inertial: whether the state holds R p in place of p.
+    """
+
+    attitude: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    water: np.ndarray | None
+    axes: np.ndarray | None
+    origin: np.ndarray | None
+    mass: np.ndarray | None
+    moments: np.ndarray
+    inertia: np.ndarray | None
+    scale: np.ndarray
+    inertial: bool
+
+
+def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Products A v, (n, k), of matrices (1 or n, k, d) and vectors (1 or n, d)."""
+    return _summed(matrices * vectors[:, None, :])
+
+
+def into(axes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Products Q^T v, (n, 3), of matrices (1 or n, 3, 3) and vectors (1 or n, 3)."""
+    return times(np.swapaxes(axes, 1, 2), vectors)
+
+
+def _summed(terms: np.ndarray) -> np.ndarray:
+    """The sum over the last dimension, from the first term to the last."""
+    total = terms[..., 0] + terms[..., 1]
+    for i in range(2, terms.shape[-1]):
+        total += terms[..., i]
+    return np.asarray(total)
+
+
+def write_rows(starts: Starts, rows: np.ndarray, compensated: bool) -> None:
+    """Write the states into rows (m, fields of a state)."""
+    R, position, nu, Om = starts.attitude, starts.position, starts.velocity, starts.angular_velocity
+    if starts.origin is not None:
+        nu = nu + notation.cross(Om, starts.origin)
+        position = position + times(R, starts.origin)
+    if starts.water is not None:
+        nu = nu - starts.water
+    if starts.axes is not None:
+        Q = starts.axes
+        R = _summed(R[:, :, None, :] * np.swapaxes(Q, 1, 2)[:, None, :, :])
+        nu, Om = into(Q, nu), into(Q, Om)
+    if starts.mass is not None:
+        p, pi = starts.mass * nu, starts.moments * Om
+    else:
+        assert starts.inertia is not None
+        momenta = times(starts.inertia, np.concatenate(np.broadcast_arrays(nu, Om), axis=1))
+        p, pi = momenta[:, :3], momenta[:, 3:]
+    if starts.inertial:
+        p = times(R, p)
+    scale = starts.scale[:, None]
+    rows[:, :9] = R.reshape(-1, 9)
+    rows[:, 9:12] = position
+    rows[:, 12:15] = p / scale
+    rows[:, 15:STATE_FIELDS] = pi / scale
+    if compensated:
+        low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)
+        rows[:, STATE_FIELDS:] = np.where(np.isfinite(low), low, 0.0)
+    else:
+        rows[:, STATE_FIELDS:] = 0.0

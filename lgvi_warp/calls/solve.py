@@ -123,7 +123,7 @@ def solve(
     plan = request.plan(survey_all=store is not None)
     # Parts of a run, and other processes and machines, must agree on a width.
     if only is None and isinstance(request.executor, Threads):
-        plan = with_best_width(plan, request.count)
+        plan = with_best_width(plan, request.count(plan))
     try:
         if store is None:
             return request.run(plan, progress=callback(progress), partial=True, on_block=on_block)

@@ -307,12 +307,19 @@ def test_what_is_shared_changes_no_bit(vehicle, paper):
         assert alone == arrays(Packets(plan, fleet.select(0, 6))), name
 
 
+# Commands along a schedule, which have rows, and a memory of their lag.
+PUSHING = {
+    "position": [[-0.5, 0.2, 0.0]], "direction": [[1.0, 0.0, 0.0]], "coefficient": [20.0], "limit": [1.0],
+    "time_constant": [0.3], "times": [0.0, 0.3, 0.6], "command_schedule": [[0.2], [0.9], [0.1]],
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("columns", [(5,), (2, 5)])
 def test_packets_take_members_whose_laws_have_other_rows(columns):
     """Turned axes: a drag matrix has as many rows as some member has columns, and the thrusters' rows come after them."""
     inertia = [[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]
     vehicle = lw.Vehicle(mass=10.0, added_mass=[1.0, 2.0, 3.0], inertia=inertia)
-    thrusters = Thrusters(position=[[-0.5, 0.2, 0.0]], direction=[[1.0, 0.0, 0.0]], coefficient=[20.0], command=[0.5])
+    thrusters = Thrusters(**PUSHING)
     drag = DragMatrix(linear=np.eye(6), quadratic=np.diag([10.0, 20.0, 0.0, 1.0, 2.0, 0.0]))
     scene = lw.Scene(vehicle, terms=[drag, thrusters], start=lw.Start(velocity=[1.0, 0.2, 0.1]))
     names = ["drag_matrix.quadratic[2,2]", "drag_matrix.quadratic[5,5]"]
@@ -321,6 +328,21 @@ def test_packets_take_members_whose_laws_have_other_rows(columns):
     few, more = [np.zeros((6, 2)) for _ in range(2)]
     more[:, [names.index(f"drag_matrix.quadratic[{j},{j}]") for j in columns]] = 3.0
     blocks = [fleet.with_columns(dict(zip(names, X.T, strict=True))).select(0, 6) for X in (few, more, few)]
+    packets = Packets(plan, blocks[0])
+    for members in blocks:
+        packets.refill(members)
+        assert arrays(packets) == arrays(Packets(plan, members))
+
+
+def test_packets_take_members_whose_commands_reach_their_limits():
+    # Commands are cut on the host: a block has as many pieces as its members need.
+    vehicle = lw.Vehicle(mass=10.0, added_mass=[1.0, 2.0, 3.0], inertia=[1.0, 2.0, 2.5])
+    name = "thrusters.limit[0]"
+    table = Table(values={name: np.linspace(0.5, 1.0, 6)})
+    fleet = lw.Ensemble(lw.Scene(vehicle, terms=[Thrusters(**PUSHING)]), None, 0, None, table)
+    plan = make_plan(fleet, "psi_x", **SHORT)
+    free, cut = np.ones(6), np.array([1.0, 1.0, 0.5, 1.0, 0.7, 1.0])
+    blocks = [fleet.with_columns({name: limit}).select(0, 6) for limit in (free, cut, free)]
     packets = Packets(plan, blocks[0])
     for members in blocks:
         packets.refill(members)

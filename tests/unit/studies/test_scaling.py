@@ -120,7 +120,7 @@ def test_the_width_of_each_kernel_is_the_fastest(faster, better):
         assert one.best == (lanes if better or one.before == lanes else one.before)
     assert {(plan.ensemble.members, plan.grid.steps, plan.grid.h) for plan in plans} == {(512, 128, 0.01)}
     methods = [plan.method.name for plan in plans if plan.dtype == "float64"]
-    assert set(methods) == {"psi_s", "psi_x", "rk8"}
+    assert set(methods) == {"psi_s", "psi_1", "psi_x", "rk8"}
     assert any(plan.ensemble.scene.terms for plan in plans)
     dense = tuning.TERMS["dense"][0].linear
     assert (dense != 0.0).all()

@@ -164,8 +164,11 @@ def choose_plan(
     # Those of `save` are checked before: these are of statistics.
     check_signals(faults, "statistics", fields, scene.controller)
     faults.raise_if_any()
-    shared = _shared(ensemble)
+    shared, varied = _shared(ensemble), ensemble.varied_names
+    shared.take(scene, varied, method)
     facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
+    # Before anything is packed, which depends on more than the scene and the method.
+    shared.note(scene, varied, method)
     choice = choose_kernel(ensemble, method, facts, built_in, checks != "none")
     check_backward_drag(ensemble, choice, method, grid.h)
     if on_failure == "substep":
@@ -194,7 +197,11 @@ def choose_plan(
         facts=facts,
         shared=shared,
     )
-    if not rows_shared(plan):
+    settings = method, grid.h, dtype, width, checks, on_failure, layout.fields, facts.decisive
+    shared.take(scene, varied, settings)
+    few_rows = not rows_shared(plan)
+    shared.note(scene, varied, settings)
+    if few_rows:
         return plan
     spec = spec._replace(shared_rows=True)
     return replace(plan, spec=spec, kernel=Kernel(spec, choice))

@@ -99,7 +99,7 @@ class Survey:
     features: frozenset[str] = frozenset()  # what the device code of a controller's parts must have, as "key.feature"
     lever: bool = False  # the dry body's centre is off the user's origin, or added mass couples there
 
-    @functools.cached_property
+    @property
     def decisive(self) -> tuple[Any, ...]:
         """All that decides what a kernel must contain: surveys that agree in it lead to one kernel."""
         facts = vars(self) | {"odd": None, "residual_coupling": self.residual_coupling > UNCOUPLED}

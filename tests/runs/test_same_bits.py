@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Same inputs, same bits: any number of threads, any order of members, alone or among others, after a failure beside."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -156,3 +159,13 @@ def test_what_is_known_of_a_scene_changes_no_bit():
     for _ in range(2):
         for run in runs:
             assert solved(known, *run) == solved(made(), *run), run
+
+
+def test_what_is_known_of_a_scene_goes_with_it():
+    scene = lw.Scene.named("remus_100", start=lw.Start(velocity=[1.5, 0.0, 0.0]))
+    fleet = lw.Ensemble(scene, 3, 1, {"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+    lw.solve(fleet, "psi_x", h=0.01, t1=0.02)
+    left = weakref.ref(scene)
+    del scene, fleet
+    gc.collect()
+    assert left() is None

@@ -83,7 +83,8 @@ def test_the_kernel_has_the_bits_of_its_twin(name, method, dtype):
         ]
         for lanes in both * 2:  # few members are packed by the kernel from the second time on
             lanes.write(starts, members)
-        assert both[0].peaks is not None and both[1].peaks is None
+        assert both[0].peaks is not None
+        assert both[1].peaks is None
         found, expected = (lanes.view.tobytes() for lanes in both)
         assert found == expected, (varied, members)
         assert np.isfinite(both[0].view).all()

@@ -26,6 +26,7 @@ from lgvi_warp.engine.packing import rows_shared
 from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, check_substep, check_ticks
 from lgvi_warp.engine.sample_layout import SampleLayout
 from lgvi_warp.engine.shared import MEMBERS, SEED, SharedResultsCache
+from lgvi_warp.engine.state_lanes import kernel_for
 from lgvi_warp.engine.survey import Survey, survey, survey_of
 from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.method import Method
@@ -69,9 +70,10 @@ class Plan:
         return self.kernel.phases
 
     def compile(self) -> float:
-        """Load the kernel, and compile it first if Warp's cache has none; how long it took [s]."""
+        """Load the kernel, and that which packs states, compiled first if Warp's cache has none; how long it took [s]."""
         start = time.perf_counter()
         self.kernel.load()
+        kernel_for(self.spec, self.ensemble.members)
         _ = self.kernel.dtypes, self.launches.times  # made here, before threads ask for them
         return time.perf_counter() - start
 

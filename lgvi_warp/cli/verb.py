@@ -28,7 +28,7 @@ SHARED: dict[str, dict[str, Any]] = {
     "--keep": {
         "help": "samples of members to keep: all (default), none, failed, or indices 3,17 (statistics are those of the scene)"
     },
-    "--threads": {"metavar": "N", "type": int, "help": "threads (default: all cores)"},
+    "--threads": {"metavar": "N", "type": int, "help": "threads (default: all cores, one for few members)"},
     "--executor": {"default": "threads", "help": "threads (default), processes or dask"},
     "--scheduler": {"metavar": "ADDRESS", "help": "of Dask; without one, a cluster on this machine"},
     "--store": {"choices": ["npz", "zarr"], "default": "npz", "help": "as for run"},
@@ -38,7 +38,7 @@ SHARED: dict[str, dict[str, Any]] = {
 # Arguments of the verbs that write files about a scene's ensemble.
 SCENE = "scene --out --duration --members --seed --set"
 EXECUTOR = "--threads --executor --scheduler"
-WORKERS = "threads, processes or workers (default: all cores)"
+WORKERS = "threads, processes or workers (default: all cores; one thread for few members)"
 FOLDER = "folder for the files, replaced if they exist (default: {})"
 
 # Options of every verb, which may stand before it too -> what they are without being given.

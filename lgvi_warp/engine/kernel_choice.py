@@ -200,8 +200,10 @@ MOST_BACKWARD_DRAG = 0.5
 
 def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method, h: float) -> None:
     """Refuse drag too strong for the backward stages of a composition with steps h [s], judged by the members' starts."""
+    if not choice.drag:
+        return
     back = -h * min(0.0, *method.stages)
-    if back == 0.0 or not choice.drag:
+    if back == 0.0:
         return
     term: Any = choice.laws[0][0]
 

@@ -26,6 +26,7 @@ from lgvi_warp.engine.packing import rows_shared
 from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, check_substep, check_ticks
 from lgvi_warp.engine.sample_layout import SampleLayout
 from lgvi_warp.engine.shared import MEMBERS, SEED, SharedResultsCache
+from lgvi_warp.engine.state_lanes import kernel_for
 from lgvi_warp.engine.survey import Survey, survey, survey_of
 from lgvi_warp.engine.widths import default_width, measured
 from lgvi_warp.methods.method import Method
@@ -69,9 +70,10 @@ class Plan:
         return self.kernel.phases
 
     def compile(self) -> float:
-        """Load the kernel, and compile it first if Warp's cache has none; how long it took [s]."""
+        """Load the kernel, and that which packs states, compiled first if Warp's cache has none; how long it took [s]."""
         start = time.perf_counter()
         self.kernel.load()
+        kernel_for(self.spec, self.ensemble.members)
         _ = self.kernel.dtypes, self.launches.times  # made here, before threads ask for them
         return time.perf_counter() - start
 
@@ -171,7 +173,11 @@ def choose_plan(
     check_signals(faults, "statistics", fields, scene.controller)
     faults.raise_if_any()
     shared = _shared(ensemble, _adds_forces(method) and bool(damping_terms(scene.terms)))
+    varied = ensemble.varied_names
+    shared.take(scene, varied, method)
     facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
+    # Before anything is packed, which depends on more than the scene and the method.
+    shared.note(scene, varied, method)
     choice = choose_kernel(ensemble, method, facts, built_in, checks, shared.user_axes)
     check_backward_drag(ensemble, choice, method, grid.h)
     if on_failure == "substep":
@@ -201,7 +207,11 @@ def choose_plan(
         facts=facts,
         shared=shared,
     )
-    if rows_shared(plan):
+    settings = method, grid.h, dtype, width, checks, on_failure, layout.fields, facts.decisive
+    shared.take(scene, varied, settings)
+    many_rows = rows_shared(plan)
+    shared.note(scene, varied, settings)
+    if many_rows:
         spec = spec._replace(shared_rows=True)
         plan = replace(plan, spec=spec, kernel=Kernel(spec, choice))
     # A kernel's hash takes its source: only where some kernel was measured here.

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import weakref
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
@@ -92,6 +93,19 @@ class _Last(NamedTuple):
     results: dict[Any, Any]
 
 
+# What was found of scenes, whose numbers never change: (names that vary, settings) -> results, and which keys vary; of each
+# scene for so many runs at most.
+MOST_KNOWN = 32
+_known: weakref.WeakKeyDictionary[Any, dict[Any, tuple[dict[Any, Any], dict[Any, bool]]]] = weakref.WeakKeyDictionary()
+
+
+def _known_of(scene: Any) -> dict[Any, tuple[dict[Any, Any], dict[Any, bool]]]:
+    try:
+        return _known.setdefault(scene, {})
+    except TypeError:  # a scene of another kind, to which nothing can refer weakly
+        return {}
+
+
 @dataclass
 class SharedResultsCache:
     """Results computed once, as far as they follow from numbers that vary from no member to another.
@@ -110,6 +124,19 @@ class SharedResultsCache:
     _last: _Last | None = None
     # The last survey, and what it asked (see lgvi_warp.engine.survey).
     surveyed: Any = None
+
+    def take(self, scene: Any, names: Iterable[str], settings: Any) -> None:
+        """Take what `note` kept of an earlier run of the same scene with these settings, in which the same names varied."""
+        kept, varying = _known_of(scene).get((frozenset(names), settings), ({}, {}))
+        self._kept.update(kept)
+        self._varying.update(varying)
+
+    def note(self, scene: Any, names: Iterable[str], settings: Any) -> None:
+        """Keep what is known now for later runs; settings: all that it follows from beside the scene's numbers."""
+        known = _known_of(scene)
+        if len(known) >= MOST_KNOWN:
+            known.clear()
+        known[frozenset(names), settings] = dict(self._kept), dict(self._varying)
 
     def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
         """A result from memory, or computed."""

@@ -21,23 +21,24 @@ from lgvi_warp.engine.states import Starts, write_rows
 
 # Members of a run for which it pays to load the kernel, which takes some tens of milliseconds once it is compiled.
 MANY = 50_000
+# Fewer members that are packed once take less time than a launch takes to be recorded.
+FEW = 256
 
 
 class StateLanes(Lanes):
     """The states of a block's members, (packets, fields of a state) of lanes.
 
     kernel: as of `kernel_for`. peaks: per packet and lane, what of the starts is looked at for warnings (see PEAKS);
-        None where the twin writes the states.
+        None where the twin wrote the states.
     """
 
     def __init__(self, spec: Spec, packets: int, kernel: Any = None):
         super().__init__(packets, spec.state_fields, lane(spec.width, spec.real))
         self._spec = spec
+        self._kernel, self._packets = kernel, packets
         self._launch: Any = None
         self._starts: Any = None
         self.peaks: np.ndarray | None = None
-        if kernel is not None:
-            self._record(kernel, packets)
 
     def _record(self, kernel: Any, packets: int) -> None:
         """Record a launch of the kernel, which reads anew where each kind of numbers lies."""
@@ -53,10 +54,12 @@ class StateLanes(Lanes):
 
     def write(self, starts: Starts, members: int) -> None:
         """Write the states of some members; lanes beyond the last of them get its own."""
-        self._starts, self._members = starts, members
-        if self._launch is None:
+        first, self._starts, self._members = self._starts is None, starts, members
+        if self._kernel is None or (first and members < FEW):
             put_rows(self.view, self.rows())
             return
+        if self._launch is None:
+            self._record(self._kernel, self._packets)
         for i, values in enumerate(starts[:-1]):
             # What all calls share lies where it lay.
             if values is not self._arrays[i] or self._copies[i] is not values:

@@ -10,8 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgvi_kernels.advance.rows import STATE_FIELDS
 from lgvi_warp.physics import notation
+
+# Of a state: attitude row by row, position, momenta p and pi.
+NUMBERS = 18
 
 
 class Starts(NamedTuple):
@@ -81,9 +83,9 @@ def write_rows(starts: Starts, rows: np.ndarray, compensated: bool) -> None:
     rows[:, :9] = R.reshape(-1, 9)
     rows[:, 9:12] = position
     rows[:, 12:15] = p / scale
-    rows[:, 15:STATE_FIELDS] = pi / scale
+    rows[:, 15:NUMBERS] = pi / scale
     if compensated:
-        low = rows[:, :STATE_FIELDS] - rows[:, :STATE_FIELDS].astype(np.float32)
-        rows[:, STATE_FIELDS:] = np.where(np.isfinite(low), low, 0.0)
+        low = rows[:, :NUMBERS] - rows[:, :NUMBERS].astype(np.float32)
+        rows[:, NUMBERS:] = np.where(np.isfinite(low), low, 0.0)
     else:
-        rows[:, STATE_FIELDS:] = 0.0
+        rows[:, NUMBERS:] = 0.0

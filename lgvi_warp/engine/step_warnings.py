@@ -11,7 +11,7 @@ from lgvi_warp.common.status import Warnings
 from lgvi_warp.methods.limits import MUNK, RESTORING, longest_stage, oscillation_limit, rotation_limit
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
-from lgvi_warp.physics import hydrostatics, vehicle
+from lgvi_warp.physics import hydrostatics, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Numbers, Term, own
 
@@ -259,12 +259,18 @@ def _most_drag(plan: Watched, p: Numbers, speed: float, rate: float) -> float:
         ):
             return np.inf
         most = {
-            name: np.maximum(value.max(axis=0), -value.min(axis=0))[None] if name in term.braking_grows_with else value
+            name: _largest_sizes(value)[None] if name in term.braking_grows_with else value
             for name, value in numbers.items()
         }
         total = total + np.einsum("nii->ni", term.braking(most, speeds, density))[0]
     least = np.einsum("nii->ni", vehicle.inertia6(p)).min(axis=0)
     return float(plan.grid.h * (total / least).max())
+
+
+def _largest_sizes(values: np.ndarray) -> np.ndarray:
+    """The largest size of each number (n, ...) among all members."""
+    largest, least = (notation.reduced(operation, values) for operation in (np.maximum, np.minimum))
+    return np.asarray(np.maximum(largest, -least))
 
 
 def _size(vectors: np.ndarray) -> np.ndarray:

@@ -103,7 +103,7 @@ class Survey:
     inverse: frozenset[tuple[int, int]] = frozenset()
     lever: bool = False  # the dry body's centre is off the user's origin, or added mass couples there
 
-    @functools.cached_property
+    @property
     def decisive(self) -> tuple[Any, ...]:
         """All that decides what a kernel must contain: surveys that agree in it lead to one kernel."""
         facts = vars(self) | {"odd": None, "residual_coupling": self.residual_coupling > UNCOUPLED}

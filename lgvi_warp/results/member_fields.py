@@ -50,11 +50,15 @@ def _failure_value(plan: Plan, outcome: MemberStatus) -> np.ndarray:
 
 def _warning_time(plan: Plan, outcome: MemberStatus) -> np.ndarray:
     """Time when the most serious warning was first seen [s]; NaN without."""
+    if not outcome.warnings.any():
+        return np.full(len(outcome.status), np.nan)
     return np.where(outcome.warnings != 0, outcome.warning_step * plan.grid.h, np.nan)
 
 
 def _warning_value(plan: Plan, outcome: MemberStatus) -> np.ndarray:
     """The value that was seen at that time; NaN without."""
+    if not outcome.warnings.any():
+        return np.full(len(outcome.status), np.nan)
     return np.where(outcome.warnings != 0, outcome.warning_value, np.nan)
 
 

@@ -106,10 +106,16 @@ class Draws:
     def _few_parameters(self) -> dict[str, np.ndarray]:
         return {name: self._few[name] for name in self.scene.parameters}
 
+    @functools.cached_property
+    def _start_names(self) -> tuple[str, ...]:
+        """Names of what members have at the start."""
+        return tuple(name for name in {**self.scene.start, **self.explicit} if name.startswith("start."))
+
     def with_columns(self, columns: Columns) -> Draws:
         """The draws of other members, of which a table's columns have other values; the targets are the same."""
         draws = replace(self, columns=columns, total=len(columns[0][1]), places=None)
-        vars(draws).update(drawn_names=self.drawn_names, varied_names=self.varied_names)
+        known = dict(drawn_names=self.drawn_names, varied_names=self.varied_names, _start_names=self._start_names)
+        vars(draws).update(known)
         return draws
 
     def _drawn(self, first: int, stop: int, start: bool) -> dict[str, np.ndarray]:
@@ -139,7 +145,7 @@ class Draws:
     def members_of(self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int) -> Members:
         """Members from all their numbers by name, which loses those of the start."""
         m = len(indices)
-        start = {key.removeprefix("start."): values.pop(key) for key in tuple(values) if key.startswith("start.")}
+        start = {key.removeprefix("start."): values.pop(key) for key in self._start_names}
         # In one memory layout, on which the order of the sums of a matrix product depends.
         R = np.ascontiguousarray(self._attitude(start))
         if "velocity_inertial" in start:
@@ -159,7 +165,9 @@ class Draws:
 
 def _of_each(values: np.ndarray, members: int) -> np.ndarray:
     """Return values (1 or n, ...) as those of n members, which nobody writes into."""
-    if len(values) == members and not values.flags.writeable:
+    if len(values) == members:
+        values = values.view()
+        values.flags.writeable = False
         return values
     return np.broadcast_to(values, (members, *values.shape[1:]))
 

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Same inputs, same bits: any number of threads, any order of members, alone or among others, after a failure beside."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -127,3 +130,42 @@ def test_laws_with_rows_that_members_share(laws, dtype):
     varied = lw.Ensemble.from_states(scene, *states, {"waves.amplitudes[0]": np.full(40, 0.3)})
     assert [make_plan(fleet, h=0.05, t1=1.0).spec.shared_rows for fleet in (shared, varied)] == [True, False]
     assert same(*(lw.solve(fleet, "psi_s", h=0.05, t1=1.0, dtype=dtype) for fleet in (shared, varied)))
+
+
+def test_what_is_known_of_a_scene_changes_no_bit():
+    """A scene that has run, by other methods, steps and members, gives the bits of one that never did."""
+
+    def made():
+        drag = lw.terms.Drag(quadratic=(10.0, 20.0, 20.0, 1.0, 2.0, 2.0))
+        start = lw.Start(velocity=[1.0, 0.2, 0.1], angular_velocity=[0.1, 0.2, 0.3])
+        return lw.Scene.named("nordkvist_sanyal", terms=[drag], start=start)
+
+    def solved(scene, column, values, method, h):
+        fleet = lw.Ensemble(scene, None, 0, None, lw.designs.Table(values={column: np.asarray(values)}))
+        result = lw.solve(fleet, method, h=h, t1=0.1, width=4)
+        return [value.tobytes() for value in result.samples.values()], result.provenance["kernel"]
+
+    runs = [
+        (column, values, method, h)
+        for method, h in (("psi_x", 0.01), ("rk4", 0.02), ("psi_x", 0.02))
+        # Without drag another kernel runs; mass and inertia take part in other results.
+        for column, values in (
+            ("drag.quadratic[0]", [0.0, 0.0]),
+            ("drag.quadratic[0]", [5.0, 7.0]),
+            ("vehicle.mass", [120.0]),
+        )
+    ]
+    known = made()
+    for _ in range(2):
+        for run in runs:
+            assert solved(known, *run) == solved(made(), *run), run
+
+
+def test_what_is_known_of_a_scene_goes_with_it():
+    scene = lw.Scene.named("remus_100", start=lw.Start(velocity=[1.5, 0.0, 0.0]))
+    fleet = lw.Ensemble(scene, 3, 1, {"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+    lw.solve(fleet, "psi_x", h=0.01, t1=0.02)
+    left = weakref.ref(scene)
+    del scene, fleet
+    gc.collect()
+    assert left() is None

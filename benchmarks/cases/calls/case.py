@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What surrounds the kernel: a call of a prepared run, a whole solve and the set-up of a member, beside the kernel alone."""
 
+import itertools
 import time
 
 import numpy as np
@@ -76,7 +77,9 @@ def set_up(name, scene, vary, method, members, rounds):
     values = fleet.select(0, members)
     packets = Packets(plan, values)
     draw, _ = least(lambda: fleet.select(0, members), rounds)
-    pack, _ = least(lambda: packets.refill(values), rounds)
+    # In turn, since a plan remembers what follows from the last members.
+    others = itertools.cycle([fleet.select(0, members), values])
+    pack, _ = least(lambda: packets.refill(next(others)), rounds)
     fresh = fleet.subset(np.arange(members))
     fresh.checked = 0
     check, _ = least(lambda: fresh.check_block(0, members, values.parameters), rounds)

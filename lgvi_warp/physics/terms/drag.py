@@ -11,6 +11,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.inertia import Frame
+from lgvi_warp.physics.notation import reduced
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 ZEROS = (0.0,) * 6
@@ -280,7 +281,7 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingCon
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = context.frame.from_forces
     XT = np.swapaxes(X, 1, 2)
-    entries = np.asarray(quadratic.any(axis=0))
+    entries = reduced(np.logical_or, quadratic)
     columns = np.flatnonzero(entries.any(axis=0)).tolist()
     constant = (XT @ linear @ X).reshape(-1, 36)
     values = {"constant": int(linear.any())}

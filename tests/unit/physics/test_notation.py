@@ -157,3 +157,11 @@ def test_vectors_into_axes_and_out():
     inside = notation.rotate_into(Q, v)
     np.testing.assert_allclose(inside[4], Q[4].T @ v[4], rtol=0, atol=ROUND)
     np.testing.assert_allclose(notation.rotate_out(Q, inside), v, rtol=0, atol=4 * ROUND)
+
+
+@pytest.mark.parametrize("members", [1, 63, 64, 128, 640, 700])
+@pytest.mark.parametrize("operation", [np.maximum, np.minimum, np.logical_or])
+def test_numbers_of_all_members_together(members, operation):
+    values = np.random.default_rng(members).normal(size=(members, 2, 3)) * (np.arange(6).reshape(2, 3) > 1)
+    for each in (values, values.transpose(0, 2, 1), values[:, 0, 0]):
+        np.testing.assert_array_equal(notation.reduced(operation, each), operation.reduce(each, axis=0))

@@ -20,6 +20,8 @@ PROBLEMS = ("vehicle", *DRIVEN)
 TOLERANCES = (1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-15)
 ENSEMBLE = (1e-5, 1e-9, 1e-15)
 SIZE = 18
+# Of the velocities among the numbers of a state.
+FIRST = 12
 
 
 def system(problem: Problem) -> list[tuple[Any, Any]]:
@@ -29,15 +31,36 @@ def system(problem: Problem) -> list[tuple[Any, Any]]:
 
 
 def absolute(x: Any) -> Any:
-    """|x|, whose series changes where x changes its sign."""
-    return hy.relu(x) + hy.relu(-x)
+    """|x| of a velocity: its sign is a parameter, which an event changes, since a series does not see a change of sign."""
+    return hy.par[int(str(x).removeprefix("x")) - FIRST] * x
+
+
+def turns(problem: Problem) -> list[Any]:
+    """Events where a velocity changes its sign: the step ends there, and the next one begins with the other sign."""
+    if not problem.driven:
+        return []
+
+    def turned(j: int) -> Any:
+        def callback(ta: Any, direction: int, lane: int) -> bool:
+            ta.pars[j, lane] = direction
+            return True
+
+        return hy.t_event_batch(hy.make_vars(f"x{FIRST + j:02d}"), callback=callback)
+
+    return [turned(j) for j in range(SIZE - FIRST)]
 
 
 def integrator(problem: Problem, tolerance: float) -> Any:
     """A batch integrator of two of the machine's registers, so that one's operation is made while the other's waits."""
     width = 2 * hy.recommended_simd_size(float)
     state = np.repeat(problem.matrix_state()[:1].T, width, axis=1)
-    return hy.taylor_adaptive_batch(system(problem), np.ascontiguousarray(state), tol=tolerance)
+    options = {"t_events": turns(problem), "pars": signs(state)} if problem.driven else {}
+    return hy.taylor_adaptive_batch(system(problem), np.ascontiguousarray(state), tol=tolerance, **options)
+
+
+def signs(state: np.ndarray) -> np.ndarray:
+    """Of the velocities of states (18, lanes)."""
+    return np.where(state[FIRST:] < 0.0, -1.0, 1.0)
 
 
 def extended(problem: Problem) -> np.ndarray:
@@ -56,6 +79,7 @@ class Batch:
 
     def __init__(self, problem: Problem, tolerance: float, threads: int):
         self.ta, self.t1, self.threads = integrator(problem, tolerance), problem.t1, threads
+        self.driven = problem.driven
         width = self.ta.batch_size
         self.count = problem.members
         packets = -(-self.count // width)
@@ -72,11 +96,17 @@ class Batch:
         with ThreadPoolExecutor(self.threads) as pool:
             list(pool.map(self._part, self.own, self.parts))
 
+    def _begin(self, ta: Any, i: int) -> None:
+        ta.set_time(0.0)
+        ta.state[:] = self.start[i]
+        if self.driven:
+            ta.pars[:] = signs(self.start[i])
+            ta.reset_cooldowns()
+
     def _part(self, ta: Any, packets: np.ndarray) -> None:
         state = ta.state
         for i in packets:
-            ta.set_time(0.0)
-            state[:] = self.start[i]
+            self._begin(ta, i)
             ta.propagate_until(self.t1)
             self.ends[i] = state
 
@@ -84,8 +114,7 @@ class Batch:
         """heyoka's ensemble."""
 
         def prepared(ta: Any, i: int) -> Any:
-            ta.set_time(0.0)
-            ta.state[:] = self.start[i]
+            self._begin(ta, i)
             return ta
 
         found = hy.ensemble_propagate_until_batch(

@@ -143,7 +143,6 @@ def test_lanes_by_hand_are_lw_solve(name, method):
     # Both leave out as much as the method does at this step: what half of it would mend.
     left_out = problem.error(half, same)["error_max"]
     apart = problem.error(same, ours)["error_max"]
-    print(name, method, left_out, apart)
     assert apart < max(left_out, 1e-12)
     assert apart < 1e-8
     # Some 100 steps, each of which rounds positions of 10 m to 1e-6 m.

@@ -136,41 +136,63 @@ def loops_of(blocks: dict[int, Block]) -> dict[int, set[int]]:
     for address, block in blocks.items():
         for to in block.after:
             before[to].append(address)
-    over = dominators(blocks, before)
+    nearest = nearest_dominators(blocks, before)
     loops: dict[int, set[int]] = defaultdict(set)
-    for address, block in blocks.items():
-        for header in block.after:
-            if address in over and header in over[address]:
+    for address in nearest:
+        for header in blocks[address].after:
+            if dominates(header, address, nearest):
                 body, waiting = loops[header] | {header}, [address]
                 while waiting:
                     one = waiting.pop()
                     if one not in body:
                         body.add(one)
-                        waiting += before[one]
+                        waiting += [way for way in before[one] if way in nearest]
                 loops[header] = body
     return loops
 
 
-def dominators(blocks: dict[int, Block], before: dict[int, list[int]]) -> dict[int, set[int]]:
-    """The blocks through which every way to a block goes, itself among them; of blocks that are reached."""
-    first = next(iter(blocks))
-    order, seen, waiting = [], {first}, [first]
-    while waiting:
-        one = waiting.pop()
-        order.append(one)
-        new = [to for to in blocks[one].after if to not in seen]
-        seen |= set(new)
-        waiting += new
-    over = {one: set(order) for one in order} | {first: {first}}
+def dominates(header: int, one: int, nearest: dict[int, int]) -> bool:
+    """Whether every way to a block goes through another, or these are the same."""
+    while one != header and nearest[one] != one:
+        one = nearest[one]
+    return one == header
+
+
+def nearest_dominators(blocks: dict[int, Block], before: dict[int, list[int]]) -> dict[int, int]:
+    """For each block that is reached the last one through which every way to it goes; of the first block itself.
+
+    Cooper, Harvey & Kennedy (2001), A simple, fast dominance algorithm.
+    """
+    order = from_the_start(blocks)
+    place = {one: i for i, one in enumerate(order)}
+    nearest = {order[0]: order[0]}
     changed = True
     while changed:
         changed = False
         for one in order[1:]:
-            ways = [over[way] for way in before[one] if way in over]
-            found = set.intersection(*ways) | {one}
-            changed = changed or found != over[one]
-            over[one] = found
-    return over
+            common, *ways = (way for way in before[one] if way in nearest)
+            for other in ways:
+                while other != common:
+                    later = max(other, common, key=place.__getitem__)
+                    other, common = nearest[later], min(other, common, key=place.__getitem__)
+            changed = changed or nearest.get(one) != common
+            nearest[one] = common
+    return nearest
+
+
+def from_the_start(blocks: dict[int, Block]) -> list[int]:
+    """The blocks that are reached, each before those that are only reached through it (reversed postorder)."""
+    first = next(iter(blocks))
+    finished, seen, waiting = [], {first}, [(first, iter(blocks[first].after))]
+    while waiting:
+        _, ways = waiting[-1]
+        new = next((to for to in ways if to not in seen), None)
+        if new is None:
+            finished.append(waiting.pop()[0])
+        else:
+            seen.add(new)
+            waiting.append((new, iter(blocks[new].after)))
+    return finished[::-1]
 
 
 def loop_over_steps(blocks: dict[int, Block], loops: dict[int, set[int]]) -> int:
@@ -188,19 +210,23 @@ def loop_over_steps(blocks: dict[int, Block], loops: dict[int, set[int]]) -> int
         header = largest
 
 
-def work_of_step(path: Path) -> int:
-    """Arithmetic instructions of the loop over steps, and of the functions that were not put into their place."""
-    found = functions(path)
-    name = next(name for name in found if KERNEL in name)
-    blocks = blocks_of(found[name])
+def work_of(blocks: dict[int, Block]) -> int:
+    """Arithmetic instructions of the loop over steps."""
     loops = loops_of(blocks)
-    body = loops[loop_over_steps(blocks, loops)]
-    work = 0
+    body, work = loops[loop_over_steps(blocks, loops)], 0
     for one in body:
         depth = sum(one in loop for loop in loops.values() if loop < body)
         work += (blocks[one].arithmetic + OUTSIDE * blocks[one].calls) * ROUNDS**depth
-    outside = (found[other] for other in found if other != name and not other.startswith(GRADIENTS))
-    return work + sum(bool(ARITHMETIC.match(mnemonic)) for code in outside for _, mnemonic, _ in code)
+    return work
+
+
+def work_of_step(path: Path) -> int:
+    """Arithmetic instructions of the loop over steps, and of the functions that were not put into their place."""
+    found = functions(path)
+    kernel = next(name for name in found if KERNEL in name)
+    outside = (code for name, code in found.items() if name != kernel and not name.startswith(GRADIENTS))
+    apart = sum(bool(ARITHMETIC.match(mnemonic)) for code in outside for _, mnemonic, _ in code)
+    return work_of(blocks_of(found[kernel])) + apart
 
 
 def figures(scene: str) -> dict[str, dict[str, float]]:

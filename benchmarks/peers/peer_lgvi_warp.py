@@ -43,7 +43,7 @@ METHODS: tuple[Setting, ...] = (
     ("kl6(psi_x)", "float32", (1, 2, 4, 8)),
 )
 # By their order's steps a second, those of float32 as far as its digits go.
-EXPLICIT = {"rk4": 4, "rk5": 5, "rk8": 8}
+EXPLICIT = {"rk4": 4, "rk5": 5, "rk5_ck": 5, "rk8": 8}
 ENOUGH = {4: 64, 5: 128, 8: 32}, {4: 12, 5: 12, 8: 4}
 DRIVEN_METHODS: tuple[Setting, ...] = (
     ("psi_x", "float64", (8, 16, 32, 64, 128, 256, 512)),

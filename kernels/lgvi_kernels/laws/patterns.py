@@ -55,6 +55,43 @@ def make_less(entries):
     return less
 
 
+def make_along(entries):
+    """(view, row) -> the velocity that the twist in six rows measures, of which the other numbers are zero."""
+    less = make_row(entries)
+
+    @wp.func
+    def along(view: Any, row: int):
+        return -less(ones(view.b.x) - ones(view.b.x), view, row, view.nu, view.Om)
+
+    return along
+
+
+def make_twist(entries):
+    """(w, view, row, size) -> w plus the wrench in six rows times a size; its other numbers are zero."""
+
+    @wp.func
+    def twist(w: Any, view: Any, row: int, size: Any):
+        f = w.force
+        t = w.torque
+        if wp.static(0 in entries):
+            f.x = f.x + size * row1(view, row)
+        if wp.static(1 in entries):
+            f.y = f.y + size * row1(view, row + 1)
+        if wp.static(2 in entries):
+            f.z = f.z + size * row1(view, row + 2)
+        if wp.static(3 in entries):
+            t.x = t.x + size * row1(view, row + 3)
+        if wp.static(4 in entries):
+            t.y = t.y + size * row1(view, row + 4)
+        if wp.static(5 in entries):
+            t.z = t.z + size * row1(view, row + 5)
+        w.force = f
+        w.torque = t
+        return w
+
+    return twist
+
+
 # Every entry of a matrix.
 FULL = tuple((i, j) for i in range(6) for j in range(6))
 less_whole = make_less(FULL)

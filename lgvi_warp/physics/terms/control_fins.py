@@ -157,6 +157,14 @@ class ControlFins(Commanded, Fins):
         # Whether fins lag, or the rate of one is limited.
         return bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
 
+    @property
+    def pattern_device(self) -> str:  # type: ignore[override]
+        """That of fixed fins, where they stand and are of no other kind."""
+        return Fins.pattern_device if self.device_in(True) == "fins" else ""
+
+    def entries(self, numbers: Numbers) -> tuple[str, ...]:
+        return super().entries(self._turned(numbers))
+
     def _turned(self, numbers: Numbers) -> Numbers:
         """The numbers of fins that stand: fixed fins, whose chords and normals are turned by the commands."""
         chord, normal = unit_directions(numbers)

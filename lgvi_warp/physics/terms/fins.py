@@ -37,6 +37,7 @@ class Fins(Term):
     """
 
     type: ClassVar[str] = "fins"
+    pattern_device: ClassVar[str] = "fins_pattern"
     braking_grows_with: ClassVar[tuple[str, ...]] = ("area", "lift_slope", "drag", "drag_normal")
 
     position: Any = number(("n", 3), "m")
@@ -78,6 +79,12 @@ class Fins(Term):
         rows = np.concatenate(np.broadcast_arrays(normal, arm), axis=-1)
         return np.asarray(np.einsum("nk,nki,nkj->nij", size, rows, rows))
 
+    def entries(self, numbers: Numbers) -> tuple[str, ...]:
+        # Of the twists in the user's axes and about his origin.
+        twists = zip("cn", unit_directions(numbers), strict=True)
+        found = {kind: _twist(numbers["position"], direction) for kind, direction in twists}
+        return tuple(f"{kind}{i}" for kind, rows in found.items() for i in range(6) if np.any(rows[..., i]))
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         rows = fin_rows(numbers, context)
         count = rows.shape[1]
@@ -115,6 +122,12 @@ def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
         blocks.append(np.concatenate([np.diagonal(s, axis1=-2, axis2=-1), s[..., *off], w[..., *off]], axis=-1))
     between = [matrix[..., :3, 3:].reshape(*matrix.shape[:-2], 9) for matrix in (S, W)]
     return side_by_side(c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1])
+
+
+def _twist(point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """`twist` in the user's axes and about his origin."""
+    point, direction = np.broadcast_arrays(point, direction)
+    return np.concatenate([direction, np.cross(point, direction)], axis=-1)
 
 
 def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:

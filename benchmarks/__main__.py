@@ -31,7 +31,7 @@ def sentence(path):
 def listed(package, file):
     """A line of help for each module of a package. file: where its docstring stands, for its name."""
     folder = Path(package.__path__[0])
-    return "\n".join(f"  {name:16}{sentence(folder / file.format(name))}" for name in names(package))
+    return "\n".join(f"  {name:18}{sentence(folder / file.format(name))}" for name in names(package))
 
 
 def run(arguments):

@@ -465,8 +465,9 @@ class Packs(Pull):
 LAWS = [
     (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "write law(w, view, p)"),
     (device(law=pull_plain), "pull.law", "not a Warp function", "@wp.func"),
-    (device(), "pull.device", "has none of law, damping, flow, evolve, follow", "add_a_force.md"),
+    (device(), "pull.device", "has none of law, damping, push, flow, evolve, follow", "add_a_force.md"),
     (device(law=pull_law, follow=pull_law), "pull.device", "has follow and no evolve", "add_a_force.md"),
+    (device(push=pull_law), "pull.device", "has push and no damping", "add_a_force.md"),
     ("pull", "pull.device = 'pull'", "not known", "give a module"),
 ]
 

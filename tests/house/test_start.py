@@ -62,3 +62,13 @@ def test_the_version_is_the_same_everywhere():
 def test_an_unknown_name_is_refused():
     with pytest.raises(AttributeError, match="has no attribute 'Scenes'"):
         lw.Scenes
+
+
+def test_a_kernel_without_a_controller_loads_no_code_of_ticks():
+    code = (
+        "import lgvi_warp as lw; from lgvi_warp.runs.settle import make_plan; "
+        "make_plan(lw.Ensemble(lw.Scene.named('remus_100')), 'rk4', h=0.1, t1=1.0).kernel.advance"
+    )
+    modules = modules_after(code)
+    assert "lgvi_kernels.advance.stepping" in modules
+    assert not {"lgvi_kernels.advance.feeding"} & set(modules)

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels.advance.events import Watch, make_watch
-from lgvi_kernels.advance.feeding import make_feed
 from lgvi_kernels.advance.method import Step, make_method
 from lgvi_kernels.advance.monitor import make_backward, make_drag_rate
 from lgvi_kernels.advance.spec import make_types
@@ -107,7 +106,12 @@ def make_stepping(spec):
             y = one_step(y, own, limits, k + j, h, stage_h, lead_h, first_h, opening)
         x = y
 
-    feed, respond = make_feed(spec, types, method, at_step, opened) if spec.control else (step, step)
+    feed, respond = step, step
+    if spec.control:
+        # A tick's code takes as long to load as all the rest: here, where a scene has one.
+        from lgvi_kernels.advance.feeding import make_feed
+
+        feed, respond = make_feed(spec, types, method, at_step, opened)
 
     held = make_held(types, real, one_step, feed) if spec.control else step
     return Stepping(method, watch, at_step, opened, one_step, stepped, feed, respond, held)

@@ -127,8 +127,10 @@ def test_the_rate_limit_is_exact(command, reached):
 
 
 def test_without_a_rate_limit_nothing_is_kept():
-    assert not terms.ControlFins(**WING, drag=0.0).memory
-    assert terms.ControlFins(**WING, drag=0.0, rate_limit=2.0).memory
+    moved = {"times": [0.0, 1.0], "command_schedule": [[0.0], [0.1]]}
+    assert not terms.ControlFins(**WING, drag=0.0, **moved).memory
+    assert terms.ControlFins(**WING, drag=0.0, **moved, rate_limit=2.0).memory
+    assert not terms.ControlFins(**WING, drag=0.0, rate_limit=2.0).memory
 
 
 @pytest.mark.slow

@@ -180,8 +180,7 @@ def at_start(
         return bits, value
     coarse = COARSE / longest_stage(method)
     munk = h * np.sqrt(munk_factor(frame)) * _size(momentum)
-    center = frame.forces if frame.center is None else frame.center
-    arm = hydrostatics.moment(members.parameters) + hydrostatics.net(members.parameters)[:, None] * center
+    arm = hydrostatics.moment(members.parameters) + hydrostatics.net(members.parameters)[:, None] * frame.balance
     swing = h * np.sqrt(_size(arm) / frame.J.min(axis=1))
     note(Warnings.MUNK_COARSE, munk, coarse)
     note(Warnings.RESTORING_COARSE, swing, coarse)
@@ -235,7 +234,7 @@ def _most_munk(frame: Frame) -> float:
 
 
 def _longest_arm(p: Numbers, frame: Frame) -> float:
-    """A bound on the moment of weight and buoyancy about the origin of the forces, of all members [N m]."""
+    """A bound on the moment of weight and buoyancy about the balance of the frame, of all members [N m]."""
 
     def most(values: np.ndarray) -> float:
         return float(np.sqrt(np.einsum("ni,ni->n", values, values).max()) if values.ndim > 1 else np.abs(values).max())
@@ -243,7 +242,7 @@ def _longest_arm(p: Numbers, frame: Frame) -> float:
     arm = most(p["vehicle.buoyancy"]) * most(p["vehicle.center_of_buoyancy"])
     if "vehicle.center_of_gravity" in p:
         arm += most(vehicle.weight(p)) * most(p["vehicle.center_of_gravity"])
-    return arm + most(hydrostatics.net(p)) * most(frame.forces) if frame.forces.any() else arm
+    return arm + most(hydrostatics.net(p)) * most(frame.balance) if frame.balance.any() else arm
 
 
 def _most_drag(plan: Watched, p: Numbers, speed: float, rate: float) -> float:

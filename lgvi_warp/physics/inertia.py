@@ -131,6 +131,11 @@ class Frame:
         """Matrices (., 6, 6) that give the user's velocities from those at the origin of the forces, in these axes."""
         return motion_from(self.forces, self.Q)
 
+    @property
+    def balance(self) -> np.ndarray:
+        """The origin about which weight and buoyancy swing the vehicle, (., 3) [m]: that of least coupling."""
+        return self.forces if self.center is None else self.center
+
     @functools.cached_property
     def inverse(self) -> np.ndarray:
         """The inverse (n, 6, 6) of the whole inertia."""

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import register_width, thread_seconds
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.packets import Packets
@@ -80,5 +82,6 @@ def with_best_width(plan: Plan, threads: int, clock: Callable[[], float] = threa
         return plan
     one, two = candidates(plan, (1,)), candidates(plan, (2,))
     found = measure(plan, two if [plan.spec.width] == one else one, clock=clock)
-    widths.keep_measured(plan.kernel.hash, found.best)
+    with contextlib.suppress(OSError, SceneError):  # a run goes on where nothing can be kept
+        widths.keep_measured(plan.kernel.hash, found.best)
     return plan.of_width(found.best, "measured")

@@ -61,6 +61,15 @@ def test_a_long_run_measures_two_widths_and_later_runs_know(tuned_widths):
     assert clock.readings == 0
 
 
+def test_a_run_goes_on_where_its_width_cannot_be_kept(tuned_widths):
+    tuned_widths.mkdir()  # a file cannot stand here
+    try:
+        chosen = with_best_width(plan_of(members=2_000_000), 1, Clock(1e-5 * 512 * 8))
+        assert chosen.width_source == "measured"
+    finally:
+        tuned_widths.rmdir()
+
+
 def test_the_faster_width_is_taken(tuned_widths):
     plan = plan_of()
     (one,), (two,) = candidates(plan, (1,)), candidates(plan, (2,))

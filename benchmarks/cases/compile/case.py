@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import lgvi_warp as lw
-from benchmarks import own_process
+from benchmarks import own_process, problems
 from lgvi_warp.common import warp_setup
 from lgvi_warp.runs.settle import make_plan
 
@@ -21,6 +21,7 @@ KERNELS = (
     ("bluerov2_heavy", "psi_s"),
     ("remus_100", "psi_x"),
     ("remus_100", "rk8"),
+    ("all terms", "rk8"),
 )
 
 
@@ -28,7 +29,8 @@ def processor_seconds(vehicle, method, cache):
     """Processor time of this process from the plan to a loaded kernel [s]."""
     os.environ["WARP_CACHE_PATH"] = cache
     warp_setup.start()
-    plan = make_plan(lw.Ensemble(lw.Scene.named(vehicle)), method, h=0.01, t1=1.0)
+    scene = problems.all_terms(noise=False) if vehicle == "all terms" else lw.Scene.named(vehicle)
+    plan = make_plan(lw.Ensemble(scene), method, h=0.01, t1=1.0)
     before = time.process_time()
     plan.compile()
     return time.process_time() - before

@@ -66,7 +66,7 @@ class Drag(Term):
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
         # Those of the diagonals.
         matrices = {kind: numbers[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
-        return entries_of(l=matrices["linear"], q=matrices["quadratic"])
+        return entry_words(l=matrices["linear"], q=matrices["quadratic"])
 
     def packed_exact(self, numbers: Numbers, frame: Frame, scale: np.ndarray) -> Packed:
         """The numbers for the exact flow of drag, which acts on each momentum by itself.
@@ -187,7 +187,7 @@ class DragMatrix(Term):
         return bad
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
-        return entries_of(l=numbers["linear"], q=numbers["quadratic"])
+        return entry_words(l=numbers["linear"], q=numbers["quadratic"])
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The matrices in the axes and about the origin of the forces.
@@ -266,7 +266,7 @@ def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.nda
     return bad, worst
 
 
-def entries_of(**matrices: np.ndarray) -> tuple[str, ...]:
+def entry_words(**matrices: np.ndarray) -> tuple[str, ...]:
     """The entries that are not zero for some member, as words such as "q01"; matrices (n, 6, 6) by their letter."""
     found = {letter: np.argwhere((matrix != 0.0).any(axis=0)) for letter, matrix in matrices.items()}
     return tuple(f"{letter}{i}{j}" for letter, places in found.items() for i, j in places.tolist())

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
-from lgvi_warp.physics.terms.drag import entries_of
+from lgvi_warp.physics.terms.drag import entry_words
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,7 +38,7 @@ class BodyLift(Term):
         return np.asarray(numbers["matrix"] * speeds[:, :1, None] + ahead)
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
-        return entries_of(m=numbers["matrix"])
+        return entry_words(m=numbers["matrix"])
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces.

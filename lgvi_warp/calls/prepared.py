@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from lgvi_warp.runs.request import ensemble_of, scene_of
 from lgvi_warp.sampling.designs.designs import salib_problem
 from lgvi_warp.sampling.designs.levels import UnitCubePoints
 from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.sampling.final import Final
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, whole_columns
 from lgvi_warp.scene.ensemble import Ensemble
@@ -104,25 +106,32 @@ class Prepared:
     def states(
         self,
         position: Any,
-        attitude: Any,
-        velocity: Any,
-        angular_velocity: Any,
+        attitude: Any = None,
+        velocity: Any = None,
+        angular_velocity: Any = None,
         parameters: Any = None,
         *,
         indices: Any = None,
-        seed: int = 0,
+        seed: int | None = None,
+        t0: float | None = None,
     ) -> Any:
-        """Run members from given states; in every call row i has member i's noise, unless indices or the seed differ.
+        """Run members from given states, or on from the end of another run, for as long as the run was prepared for.
+
+        In every call row i has member i's noise, unless indices or the seed differ; what goes on has the noise that follows.
+        From `result.final` on, with the numbers that it has, calls one after the other have the bits of one run.
 
         Args:
-            position: (n, 3) [m], inertial axes.
+            position: (n, 3) [m], inertial axes; or `result.final` of another run, in place of all four arrays.
             attitude: (n, 3, 3), body to inertial axes.
             velocity: (n, 3) [m/s], body axes.
             angular_velocity: (n, 3) [rad/s], body axes.
-            parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None.
+            parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None, those of the scene, or of
+                `result.final`.
             indices: (n,), whole numbers from 0 that key the noise of each member, such as its index in another ensemble;
-                members with the same index have the same noise. Default None for 0 to n - 1.
-            seed: the seed of the noise, a whole number from 0. Default 0.
+                members with the same index have the same noise. Default None for 0 to n - 1, or those of `result.final`.
+            seed: the seed of the noise, a whole number from 0. Default None for 0, or that of `result.final`.
+            t0: time of the states [s], a whole number of steps: waves, schedules and noise are those from there on. Default
+                None for 0, or that of `result.final`. Times of samples that the run was prepared with count from here.
 
         Returns:
             As of a call.
@@ -132,8 +141,16 @@ class Prepared:
                 finite are taken: their members fail.
             FailedMembers: if members failed, unless failed="nan".
         """
-        fleet = Ensemble.from_states(self._fleet.scene, position, attitude, velocity, angular_velocity, parameters)
-        fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
+        scene, final = self._fleet.scene, position if isinstance(position, Final) else None
+        if final is None:
+            fleet = Ensemble.from_states(scene, position, attitude, velocity, angular_velocity, parameters)
+            fleet.seed = int(EnsembleSettings(fleet.members, 0 if seed is None else seed).seed)
+        else:
+            fleet = members_at(scene, final, parameters)
+            fleet.seed = final.seed if seed is None else int(EnsembleSettings(fleet.members, seed).seed)
+            fleet.indices = final.indices
+        if t0 is not None:
+            fleet.start_time = Faults().number("t0", t0, "s", 0.0) or 0.0
         return self._answer(self._with_noise(fleet, None, indices), None)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -210,7 +227,7 @@ class Prepared:
             fleet = copy.copy(fleet)
             fleet.indices = np.zeros(fleet.members, dtype=np.int64)
         if not self._of:
-            return self._runner.run(fleet, progress)
+            return self._runner.run(fleet, progress, final=replace(self._runner.request, fleet=fleet).keeps_final)
         large = any(each.over_path or each.is_function for each in self._of)
         if large:
             found = self._runner.evaluate(fleet, self._of, PATHS_AT_ONCE, progress, warned=False)
@@ -230,6 +247,28 @@ class Prepared:
                 raise FailedMembers([found.text('mend what fails, or take NaN for them: failed="nan"')])
             values = np.where(found.failed[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
+
+
+def members_at(scene: Any, final: Final, parameters: Any = None) -> Ensemble:
+    """Members of a scene in the states, and with the parameters, that others ended with.
+
+    parameters: (n, ...) by name, in place of those that they had; entries of a number by their own names.
+    """
+    n, of_scene, had = final.members, scene.parameters(), dict(final.parameters)
+    numbers = {name: np.array(np.broadcast_to(had[name], (n, *np.shape(value)))) for name, value in of_scene.items()
+               if name in had and not np.array_equal(np.broadcast_to(value, had[name].shape), had[name])}  # fmt: skip
+    faults = Faults()
+    columns = {} if parameters is None else columns_by_name(faults, "parameters", parameters) or {}
+    faults.raise_if_any()
+    for name, column in columns.items():
+        (target,) = variations.targets(name)
+        if target.index is not None and target.name in numbers:
+            variations.put(numbers, target, np.asarray(column, dtype=np.float64), into=True)
+        else:
+            numbers[name] = column
+    # Where they go on from has their states, and attitudes that a method let drift from rotations.
+    rest, upright = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))
+    return Ensemble.from_states(scene, rest, upright, rest, rest, numbers or None).going_on(final)
 
 
 def scene_numbers(scene: Any) -> dict[str, np.ndarray]:

@@ -22,9 +22,10 @@ from lgvi_warp.engine.state_lanes import MANY, kernel_for
 from lgvi_warp.engine.survey import Survey, survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.results.provenance import provenance
+from lgvi_warp.results.drawn import DrawnParameters
+from lgvi_warp.results.provenance import provenance, starts_at
 from lgvi_warp.results.quantities import EndQuantity, OfResult
-from lgvi_warp.results.result import DrawnParameters, Result
+from lgvi_warp.results.result import Result
 from lgvi_warp.runs.request import ALL_SAMPLES, Request, enough_iterations
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.like import SceneLike
@@ -90,6 +91,8 @@ class Runner:
 
     def plan(self, fleet: Ensemble) -> Plan:
         """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
+        if fleet.final is not None or fleet.start_time:
+            return self.plan(fleet.from_zero()).from_time(fleet)
         names = frozenset(fleet.varied_names)
         kind = self._kinds.get(names)
         if kind is not None and self._last is not None:
@@ -115,9 +118,16 @@ class Runner:
         self._last = facts, plan
         return plan
 
-    def run(self, fleet: Ensemble, progress: Callable[[float], None] | None = None, warned: bool = True) -> Result:
+    def run(
+        self,
+        fleet: Ensemble,
+        progress: Callable[[float], None] | None = None,
+        warned: bool = True,
+        final: bool = False,
+    ) -> Result:
         """Run some members.
 
+        final: whether the result holds what another run needs to go on.
         Returns: Their result, whose provenance names the members' number but not their values, and whose messages leave out
             what is odd about their values.
         """
@@ -125,10 +135,10 @@ class Runner:
 
         def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
             content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.request.observed))
-            return {**content, "ensemble": few}, plan.grid.messages
+            return {**content, "ensemble": few, **starts_at(plan)}, plan.grid.messages
 
         plan = self.plan(fleet)
-        return self.request.run(plan, fields=plan.fields, progress=progress, known=known, warned=warned)
+        return self.request.run(plan, fields=plan.fields, progress=progress, known=known, warned=warned, final=final)
 
     def samples(
         self, fleet: Ensemble, progress: Callable[[float], None] | None = None

@@ -17,6 +17,7 @@ from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.measured_width import with_best_width
 from lgvi_warp.runs.request import Request, ensemble_of
+from lgvi_warp.sampling.final import Final
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.store.settings import Store
@@ -46,8 +47,9 @@ def solve(
     scheduler: str | None = None,
     only: range | None = None,
     on_block: Callable[[Result], None] | None = None,
+    start: Final | None = None,
 ) -> Result:
-    """Advance every member of the fleet from t = 0 to t1 and return the samples and statistics asked for.
+    """Advance every member of the fleet from t = 0, or from `start`, to t1 and return the samples and statistics asked for.
 
     What is left out is taken from the scene's [run] section; the defaults below hold where that says nothing. Nothing is
     printed unless `progress` says so. The same inputs give the same bits for any number of threads, on one type of machine.
@@ -56,7 +58,7 @@ def solve(
         fleet: An Ensemble, or a Scene, which stands for its own ensemble (one vehicle if it has none).
         method: A name or a Method. Default: chosen by what acts, "psi_s" where nothing damps the motion.
         h: Step [s].
-        t1: End of the run [s].
+        t1: End of the run [s], counted from t = 0.
         save: Which samples to save, and when; default every [run] save_every of the scene, else the start and the end.
         dtype: "float64" (default), "float32", or "float32_compensated", which keeps each number of the state as a sum of two
             (for many short steps, far from the origin).
@@ -87,6 +89,8 @@ def solve(
             blocks than there are. The result is of the members of these blocks.
         on_block: Called with the Result of each block of members as soon as it is finished, a copy, in order, in the thread
             that called: to look at a run while it goes on. Default: nothing is called.
+        start: `result.final` of another run of these members, from which this one goes on: with the same settings and numbers
+            the two have the bits of one run. Samples, statistics and messages are of this run alone. Default: from t = 0.
 
     Returns:
         A Result, of every member unless `until` or `only` says otherwise.
@@ -108,8 +112,11 @@ def solve(
         -0.02 m
     """
     faults = Faults()
+    members = ensemble_of(fleet)
+    with faults.including():
+        members = members if start is None else members.going_on(start)
     request = Request.of(
-        faults, ensemble_of(fleet), statistics=statistics, keep=keep, until=until, executor=executor, threads=threads,
+        faults, members, statistics=statistics, keep=keep, until=until, executor=executor, threads=threads,
         scheduler=scheduler, method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks,
         on_failure=on_failure, device=device,
     )  # fmt: skip
@@ -126,7 +133,8 @@ def solve(
         plan = with_best_width(plan, request.count(plan))
     try:
         if store is None:
-            return request.run(plan, progress=callback(progress), partial=True, on_block=on_block)
+            report, final = callback(progress), request.keeps_final
+            return request.run(plan, progress=report, partial=True, on_block=on_block, final=final)
         return run_stored(request, plan, store, callback(progress), only, on_block)
     finally:
         # Packets and their plan refer to each other: their arrays would stay until Python looks for such circles.

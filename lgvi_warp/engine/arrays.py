@@ -147,12 +147,13 @@ class LawArrays:
     kinds: for each group of laws (terms, a controller's parts, events) Warp's struct of its numbers, and its NumPy type.
     memory: what laws and method remember from step to step; the second half is a backup.
     places: where in table and memory each law's rows lie; none before `write`.
-    remembered: rows of the memory that each law has, without scratch rows.
+    remembered: rows of the memory that each law has, without those in which it works. scratch: the first row of the method's.
     """
 
     table: Lanes
     memory: Lanes
     remembered: list[slice]
+    scratch: int
 
     def __init__(self, packets: int, kinds: Sequence[tuple[Any, np.dtype]], Lane: Any, Number: Any = None):
         self._packets, self._Lane, self._Number = packets, Lane, Number or Lane
@@ -196,7 +197,7 @@ class LawArrays:
             self.places.append((row_fields, (*ends, memory, end - 1, bus)))
             self.remembered.append(slice(memory, work))
             row, memory = row + size, end
-        self._rows, self._memory = row, memory
+        self._rows, self.scratch = row, memory
 
     def _write_table(self, laws: Sequence[Packed], shared: Sequence[bool], moved: bool) -> None:
         """Write the laws' rows; the first row of the table is none's. Rows that members share are written when they change."""
@@ -215,7 +216,7 @@ class LawArrays:
                 self._written[at] = part.copy() if len(part) == 1 else None
 
     def _write_memory(self, laws: Sequence[Packed], first: int, scratch: int, moved: bool) -> None:
-        half = self._memory + scratch
+        half = self.scratch + scratch
         if moved:
             self.memory = Lanes(self._packets, 2 * half, self._Lane)
         if not half:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from lgvi_kernels.advance.beginning import STARTS
 from lgvi_kernels.advance.spec import CHUNK
 from lgvi_warp.methods.saveat import TimeGrid
 
@@ -33,11 +34,25 @@ class Launches:
     every: int | None  # steps between two ticks; None without a controller
     has_callback: bool  # a function of the host answers each tick
     ticks: bool  # samples are gathered at all ticks
+    begins: int = STARTS  # how the first launch begins (see lgvi_kernels.advance.beginning)
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether members go on from where another run ended; the tick there was its last one."""
+        return self.begins != STARTS
+
+    def beginning(self, k0: int) -> int:
+        """How the launch of the steps from k0 on begins."""
+        return self.begins if k0 == self.grid.first else 0
+
+    def is_tick(self, k: int) -> bool:
+        """Whether the controller has a tick after k steps."""
+        return self.every is not None and k % self.every == 0
 
     @functools.cached_property
     def gathered(self) -> TimeGrid | None:
         """The controller's ticks, where samples are taken at all of them; None without a controller or without `ticks`."""
-        return self.grid.ticks(self.every) if self.ticks and self.every is not None else None
+        return self.grid.ticks(self.every, self.goes_on) if self.ticks and self.every is not None else None
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
@@ -62,6 +77,18 @@ class Launches:
         """Memory of what is gathered at a tick of a block of so many members [bytes]."""
         return self.bytes_at_tick * count
 
+    @functools.cached_property
+    def first_tick(self) -> int:
+        """The number of the first tick that the kernel gathers, which a function of the host may answer in this run alone."""
+        if self.every is None:
+            return 0
+        return -(-self.grid.first // self.every) if self.has_callback or not self.goes_on else self.grid.first // self.every + 1
+
+    def slot_of(self, tick: int, slots: int) -> int:
+        """Where the kernel gathers a tick of `gathered`, counted from its first one."""
+        assert self.gathered is not None and self.every is not None
+        return int(self.gathered.sample_steps[tick] // self.every - self.first_tick) % slots
+
     def ticks_held(self, count: int) -> int:
         """How many ticks of a block of so many members are gathered at once; 0 where none are."""
         if self.gathered is None:
@@ -75,9 +102,10 @@ class Launches:
         the next launch: those from step k0 on and before step k1, with that of the end.
         """
         assert self.gathered is not None
-        bounds = np.array([k0 + 1 if k0 else 0, k1 + 1])
+        starts = k0 == self.grid.first and not self.goes_on
+        bounds = np.array([k0 if starts else k0 + 1, k1 + 1])
         if self.has_callback:
-            bounds = np.array([k0, k1 if k1 < self.grid.steps else k1 + 1])
+            bounds = np.array([k0, k1 if k1 < self.grid.last else k1 + 1])
         first, stop = np.searchsorted(self.gathered.sample_steps, bounds)
         return slice(int(first), int(stop))
 
@@ -87,21 +115,25 @@ class Launches:
             yield from self._periods()
             return
         due, slots = self.grid.sample_steps, self.ticks_held(count)
-        every = int(self.gathered.sample_steps[1]) if self.gathered and len(self.gathered.times) > 1 else 0
+        every = (self.every or 0) if self.gathered and len(self.gathered.times) > 1 else 0
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(self.sample_bytes * count, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
-        k = 0
-        while k < self.grid.steps:
+        k = self.grid.first
+        while k < self.grid.last:
             last = self.samples_due(k, k)[1] + most_samples
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
             if every:
                 # Up to the last tick for which there is a slot before those of earlier ones are taken again.
-                k1 = min(k1, ((k // every + 1) // slots * slots + slots - 1) * every)
+                next_slot = k // every + 1 - self.first_tick
+                k1 = min(k1, (next_slot // slots * slots + slots - 1 + self.first_tick) * every)
             yield k, k1
             k = k1
 
     def _periods(self) -> Iterator[tuple[int, int]]:
         """The launches where a function of the host answers each tick: one a period."""
         assert self.every is not None
-        for k in range(0, self.grid.steps, self.every):
-            yield k, min(k + self.every, self.grid.steps)
+        k = self.grid.first
+        while k < self.grid.last:
+            stop = min((k // self.every + 1) * self.every, self.grid.last)
+            yield k, stop
+            k = stop

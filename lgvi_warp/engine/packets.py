@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from lgvi_kernels.advance.beginning import GOES_ON
 from lgvi_kernels.advance.events import FIRST
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
 from lgvi_kernels.advance.noting import NOTED
@@ -18,6 +19,7 @@ from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, 
 from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
+from lgvi_warp.engine import going_on
 from lgvi_warp.engine.arrays import Group, LawArrays, Structs
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.packing import Packing
@@ -33,6 +35,9 @@ from lgvi_warp.engine.step_warnings import (
     row_limits,
 )
 from lgvi_warp.sampling.members import Members
+
+# What the kernel notes of members that end.
+ENDS = ("status", "failed_step", "failed_size")
 
 
 class Packets:
@@ -58,11 +63,12 @@ class Packets:
         self.failed_size = wp.zeros(self.count, dtype=types.Lane, device="cpu")
         self.out: wp.array | None = None
         self.monitor = self._monitor()
-        self._noted = [array.numpy() for array in self._written_by_the_kernel()]
+        self._place_ticks(plan)
+        self.noted = {name: array.numpy() for name, array in self._written_by_the_kernel().items()}
         # The same memory as NumPy has it, by member: asking an array for it takes longer than what is done with it.
-        self._status, self._failed_step, self._failed_size = (view.reshape(-1) for view in self._noted[:3])
+        self._status, self._failed_step, self._failed_size = (self.noted[name].reshape(-1) for name in ENDS)
         self._launch: Any = None
-        self._launched = 0, 0, 0
+        self._launched, self._written = (0, 0, 0), False
         self.refill(members)
 
     @classmethod
@@ -74,9 +80,23 @@ class Packets:
             except IndexError:  # another thread took the last
                 break
             if packets.count == -(-members.count // plan.spec.width):
+                packets.serve(plan)
                 packets.refill(members)
                 return packets
         return cls(plan, members)
+
+    def serve(self, plan: Plan) -> None:
+        """Take another plan with the same kernel, which may begin at another step."""
+        if plan.launches is not self.plan.launches:
+            self._launch = None
+            self._place_ticks(plan)
+        self.plan = plan
+
+    def _place_ticks(self, plan: Plan) -> None:
+        """Tell the kernel at which step members start, and which tick is the first that it gathers."""
+        if self._controlled:
+            self.monitor.start = -1 if plan.launches.goes_on else plan.grid.first
+            self.monitor.first_tick = plan.launches.first_tick
 
     def leave(self) -> None:
         """Leave these packets to the next block; nothing of them may be used any more."""
@@ -87,7 +107,7 @@ class Packets:
         plan, self.members = self.plan, members
         packing = Packing(plan, members)
         self.frame, self.scale, self._packing = packing.frame, packing.scale, packing
-        shared, before = plan.shared.keeps, self._arrays() if self._launch else []
+        shared, before = plan.shared.keeps, self._arrays() if self._written else []
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
         each = {"law": packing.laws(), "part": packing.control(), "event": packing.events()}
         if not self._controlled:
@@ -102,12 +122,16 @@ class Packets:
             self.monitor.limits = self._limits.array
         self.state_lanes.write(packing.starts(), members.count)
         self._warned: tuple[np.ndarray, np.ndarray] | None = None
-        if self._launch is None:
-            return
-        for view in self._noted:
-            view.fill(0)
-        if any(new is not old for new, old in zip(self._arrays(), before, strict=True)):
-            self._launch = None
+        if self._written:
+            for view in self.noted.values():
+                view.fill(0)
+            if any(new is not old for new, old in zip(self._arrays(), before, strict=True)):
+                self._launch = None
+        self._written = True
+        if members.final is not None:
+            going_on.take(self, members.final)
+            if plan.launches.begins == GOES_ON:
+                self._warned = going_on.start_warnings(members.final, members.count)
 
     @property
     def state(self) -> Any:
@@ -125,12 +149,24 @@ class Packets:
         params, *loop, events = (structs.array for structs in laws.structs)
         return [self.inertia.array, params, events, laws.table.array, self.memory, limits, *loop]
 
-    def _written_by_the_kernel(self) -> list[Any]:
+    def _written_by_the_kernel(self) -> dict[str, Any]:
         monitor, spec = self.monitor, self.plan.spec
-        arrays = [self.status, self.failed_step, self.failed_size]
-        arrays += [monitor.warned, monitor.warned_step, monitor.warned_size] if spec.warning_rows else []
-        parts = ("energy", spec.energy), ("substeps", spec.substep), ("still", spec.still)
-        return arrays + [getattr(monitor, name) for name, present in parts if present]
+        arrays = dict(zip(ENDS, (self.status, self.failed_step, self.failed_size), strict=True))
+        parts = [(name, bool(spec.warning_rows)) for name in ("warned", "warned_step", "warned_size")]
+        parts += [("energy", spec.energy), ("substeps", spec.substep), ("still", spec.still)]
+        return arrays | {name: getattr(monitor, name) for name, present in parts if present}
+
+    @property
+    def bus_rows(self) -> int:
+        """Rows of the memory, the first ones, that are the controller's: its commands and what its ticks noted."""
+        return self._bus()[0]
+
+    @property
+    def warned_at_start(self) -> tuple[np.ndarray, np.ndarray]:
+        """(bits, value) of the warnings at the start; no value where there are none."""
+        if self._warned is None:
+            self._warned = self._warned_at_start()
+        return self._warned
 
     def _bus(self) -> tuple[int, int]:
         """Rows of the controller's bus, and the first of those where frozen lanes keep their signals."""
@@ -207,7 +243,7 @@ class Packets:
             self._launch = self._recorded(tolerances, k0, k1, s0)
         elif self._launched != (k0, k1, s0):
             # Replaying a launch costs a tenth of a new one.
-            for name, value in enumerate((k0, k1, s0), 7 + len(tolerances)):
+            for name, value in enumerate((k0, k1, s0, plan.launches.beginning(k0)), 7 + len(tolerances)):
                 self._launch.set_param_at_index(name, value)
         self._launched = k0, k1, s0
         self._launch.launch()
@@ -218,7 +254,7 @@ class Packets:
         plan = self.plan
         stage_h, lead_h, sample_step = plan.launches.times
         inputs = [*self._arrays()[:4], *(plan.spec.real(tolerance) for tolerance in tolerances)]
-        inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
+        inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, plan.launches.beginning(k0), sample_step]
         inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, self.monitor]
         inputs += [sum(plan.layout.sizes.values()), columns_of(plan.layout.sizes), self.out]
         with build_lock:
@@ -230,7 +266,7 @@ class Packets:
         Returns: (ticks, members, numbers of a sample), in memory that the next launch overwrites.
         """
         slots, numbers = self.monitor.slots, self.monitor.numbers
-        first = when.start % slots
+        first = self.plan.launches.slot_of(when.start, slots)
         rows = self.monitor.ticks.numpy()[first * numbers : (first + when.stop - when.start) * numbers]
         by_tick = rows.reshape(when.stop - when.start, numbers, math.prod(rows.shape[1:]))[..., : self.members.count]
         return by_tick.transpose(0, 2, 1)
@@ -287,9 +323,7 @@ class Packets:
 
         Step and value are those of the more serious of the two; of two equals, those of the start.
         """
-        if self._warned is None:
-            self._warned = self._warned_at_start()
-        bits, value = self._warned
+        bits, value = self.warned_at_start
         step = np.zeros(len(bits), np.int64)
         value = value if len(value) else np.full(len(bits), np.nan)
         if not self.plan.spec.warning_rows:

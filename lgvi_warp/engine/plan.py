@@ -21,6 +21,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.kernel import Kernel
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel
 from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of
+from lgvi_warp.engine.going_on import beginning, check_beginning
 from lgvi_warp.engine.launches import Launches
 from lgvi_warp.engine.packing import rows_shared
 from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, check_substep, check_ticks
@@ -107,6 +108,16 @@ class Plan:
         vars(plan).update(vars(self), ensemble=ensemble)
         return plan
 
+    def from_time(self, ensemble: Ensemble) -> Plan:
+        """The same plan, with the same kernel and as many steps, for members that start, or go on, at another time."""
+        grid = self.grid.shifted(ensemble.start_time)
+        check_noise_steps(self.kernel_choice, grid)
+        check_ticks(self.kernel_choice, grid, ensemble.final is not None)
+        plan = replace(self.for_members(ensemble), grid=grid, launches=replace(self.launches, grid=grid))
+        plan = replace(plan, launches=replace(plan.launches, begins=beginning(plan)))
+        check_beginning(plan)
+        return plan
+
     def subplan(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
         """The plan for some of the members, with all choices made for the whole ensemble.
 
@@ -183,7 +194,7 @@ def choose_plan(
     if on_failure == "substep":
         check_substep(choice, method)
     check_noise_steps(choice, grid)
-    check_ticks(choice, grid.h)
+    check_ticks(choice, grid, ensemble.final is not None)
     chosen = width is None
     if width is None:
         width, width_source = default_width(kind_of(method, choice), dtype)
@@ -216,7 +227,11 @@ def choose_plan(
         plan = replace(plan, spec=spec, kernel=Kernel(spec, choice))
     # A kernel's hash takes its source: only where some kernel was measured here.
     best = measured().get(plan.kernel.hash) if chosen and measured() else None
-    return plan if best is None else plan.of_width(best, "measured")
+    plan = plan if best is None else plan.of_width(best, "measured")
+    if ensemble.final is not None:
+        plan = replace(plan, launches=replace(plan.launches, begins=beginning(plan)))
+        check_beginning(plan)
+    return plan
 
 
 def _shared(ensemble: Ensemble, user_axes: bool) -> SharedResultsCache:

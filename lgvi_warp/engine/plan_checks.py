@@ -81,15 +81,23 @@ def check_noise_steps(choice: KernelChoice, grid: TimeGrid) -> None:
                 count = min(divisors(multiple), key=lambda count: abs(multiple / count * noise_step - h))
                 remedy = f"use a step of {multiple // count * noise_step:.9g} s"
             faults.add("step", h, problem, remedy)
-        elif grid.steps * draws >= 2**31:
-            problem = f"makes {grid.steps * draws:,} draws in this run"
+        elif grid.last * draws >= 2**31:
+            problem = f"makes {grid.last * draws:,} draws in this run"
             faults.add(f"{term.key}.noise_step", noise_step, problem, "there are 2,147,483,647: use a longer one")
     faults.raise_if_any()
 
 
-def check_ticks(choice: KernelChoice, h: float) -> None:
-    """Refuse a period or a delay of the controller that is no whole number of steps [s]."""
-    faults = Faults()
-    if choice.controller is not None:
-        choice.controller.check_step(faults, h)
+def check_ticks(choice: KernelChoice, grid: TimeGrid, goes_on: bool = False) -> None:
+    """Refuse a period or a delay of the controller that is no whole number of steps, and a start between two ticks.
+
+    goes_on: members bring the commands of their last tick.
+    """
+    faults, controller = Faults(), choice.controller
+    if controller is not None:
+        controller.check_step(faults, grid.h)
+        faults.raise_if_any()
+        every = controller.every(grid.h)
+        if grid.first % every and not goes_on:
+            problem = f"lies between two ticks of the controller, whose period is {every * grid.h:.9g} s"
+            faults.add("t0", grid.times[0], problem, "start at a tick, or go on from result.final, which knows the commands")
     faults.raise_if_any()

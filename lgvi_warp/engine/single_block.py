@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.engine.block import Block
+from lgvi_warp.engine.going_on import left_by
 from lgvi_warp.engine.keepers.memory import empty_samples
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.work import at_start, unpacked
+
+Rows = dict[str, np.ndarray]
 
 
 def fits(plan: Plan, blocks: Sequence[Block]) -> bool:
@@ -22,17 +25,19 @@ def fits(plan: Plan, blocks: Sequence[Block]) -> bool:
 
 
 def run_single_block(
-    plan: Plan, names: Sequence[str], warned: bool, advanced: Callable[[Block, int], None]
-) -> tuple[dict[str, np.ndarray], MemberStatus]:
-    """Advance all members; their samples (k, n, ...) by field, and their outcome.
+    plan: Plan, names: Sequence[str], warned: bool, advanced: Callable[[Block, int], None], final: bool = False
+) -> tuple[dict[str, np.ndarray], MemberStatus, Rows]:
+    """Advance all members; their samples (k, n, ...) by field, their outcome, and what their packets leave.
 
     names: of the samples to keep. warned: whether warnings are looked for. advanced: called with the steps of vehicles so far.
+    final: whether what the packets leave is wanted; else none of it is returned.
     """
     samples, packets = _advanced(plan, names, advanced)
     with np.errstate(invalid="ignore", over="ignore"):
         outcome = packets.outcome(warned)
+        rows = left_by(packets) if final else {}
     packets.leave()
-    return samples, outcome
+    return samples, outcome, rows
 
 
 def run_for_samples(
@@ -63,7 +68,7 @@ def _advanced(
             when = slice(*plan.launches.samples_due(k0, k1))
             if when.start < when.stop and names:
                 _keep(samples, when, unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table))
-            advanced(block, n * k1)
+            advanced(block, n * (k1 - plan.grid.first))
     return samples, packets
 
 

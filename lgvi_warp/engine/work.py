@@ -16,7 +16,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.control.signals import SIGNALS
 from lgvi_warp.engine.block import Block
-from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
+from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper, PacketsKeeper
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import TABLE, Field
 from lgvi_warp.physics.inertia import Frame
@@ -138,15 +138,16 @@ def run_block(
 
         if not plan.layout.signals:
             keep_start()
-        if plan.launches.has_callback:
-            packets.advance(0, 0)
+        first, callback = plan.grid.first, plan.launches.has_callback
+        if callback and not plan.launches.goes_on:
+            packets.advance(first, first)
         for k0, k1 in plan.launches.segments(block.count):
             if halted():
                 return None
-            if plan.launches.has_callback:
+            if callback and plan.launches.is_tick(k0):
                 call_host(packets, k0 * plan.grid.h)
             raw = packets.advance(k0, k1)[:, : block.count]
-            if k0 == 0 and plan.layout.signals:
+            if k0 == first and plan.layout.signals:
                 # The first tick of a controller is a part of the first launch.
                 keep_start()
             if plan.launches.gathered and (ticks := plan.launches.ticks_of(k0, k1)).start < ticks.stop:
@@ -157,6 +158,9 @@ def run_block(
                 keep(when, {name: values[name] for name in plan.fields}, packets.ended)
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome(warned)
+        for block_keeper in block_keepers:
+            if isinstance(block_keeper, PacketsKeeper):
+                block_keeper.take_packets(packets)
         results = tuple(block_keeper.close(outcome) for block_keeper in block_keepers)
         packets.leave()
         return results

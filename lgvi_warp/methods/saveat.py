@@ -22,14 +22,16 @@ MOST_SAMPLES = 10_000_000
 
 @dataclass(frozen=True)
 class SaveAt:
-    """Which samples a run keeps; t = 0 and the end are always kept.
+    """Which samples a run keeps; the start and the end are always kept.
 
     Args:
-        every: Interval of samples [s]; default None, the end only.
+        every: Interval of samples [s], from the start on; default None, the end only.
         at: Rising times of samples [s], >= 0; default None. Give `every` or `at`, not both.
         fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. A field that is left out
             takes no memory. In a scene with a controller also its signals: "command", "actuator", "demand", "unmet",
             "measured_..." and "reference_..." (see lw.Result).
+        final: Whether `result.final` is kept, from which a run can go on: the states at the end, and what forces, actuators
+            and controllers remember. Default: where the samples of all members are kept, of fewer than 100,000.
 
     Raises:
         SceneError: A setting is wrong; the message names every fault.
@@ -47,9 +49,12 @@ class SaveAt:
     every: float | None = None
     at: Sequence[float] | None = None
     fields: tuple[str, ...] = FIELDS
+    final: bool | None = None
 
     def __post_init__(self) -> None:
         faults = Faults()
+        if self.final not in (None, True, False):
+            faults.add("save.final", self.final, "is neither True nor False", "give one of them, or leave it out")
         if self.every is not None and self.at is not None:
             faults.add("save", "every and at", "are both given", "give one of them")
         if self.every is not None:
@@ -64,9 +69,10 @@ class SaveAt:
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """Uniform steps of h [s] from 0 to the end of a run, and those after which a sample is kept.
+    """Uniform steps of h [s] from the start to the end of a run, and those after which a sample is kept.
 
-    sample_steps: Numbers of steps before each sample, int64, (k,), from 0. times: Those of the samples, (k,) [s], from 0.
+    sample_steps: Numbers of steps from t = 0 to each sample, int64, (k,); the first is 0, unless the run starts later.
+    times: Those of the samples, (k,) [s].
     """
 
     h: float
@@ -77,11 +83,36 @@ class TimeGrid:
     @property
     def steps(self) -> int:
         """Number of steps from the start to the end."""
+        return self.last - self.first
+
+    @property
+    def first(self) -> int:
+        """Number of steps from t = 0 to the start."""
+        return int(self.sample_steps[0])
+
+    @property
+    def last(self) -> int:
+        """Number of steps from t = 0 to the end."""
         return int(self.sample_steps[-1])
 
-    def ticks(self, every: int) -> TimeGrid:
-        """The same steps with samples at the ticks of a controller alone."""
-        step, steps = exact(self.h), np.arange(0, self.steps + 1, every)
+    def shifted(self, t0: float) -> TimeGrid:
+        """The same steps and samples from another start t0 [s] on, a whole number of steps from t = 0."""
+        step, begin, faults = exact(self.h), exact(t0), Faults()
+        first = begin / step
+        if first.denominator != 1 or first < 0:
+            near = max(0, round(first)) * self.h
+            faults.add("t0", t0, f"is no whole number of steps of {self.h:.9g} s", f"give {near:.9g}")
+        elif first + self.steps >= 2**31 - 1:
+            faults.add("t0", t0, "is too many steps from t = 0", "at most 2,147,483,646 can be counted")
+        faults.raise_if_any()
+        steps = self.sample_steps - self.first + int(first)
+        times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
+        return TimeGrid(self.h, steps, times, self.messages)
+
+    def ticks(self, every: int, goes_on: bool = False) -> TimeGrid:
+        """The same steps with samples at the ticks of a controller alone; where the run goes on, the first one was made."""
+        first = self.first + 1 if goes_on else self.first
+        step, steps = exact(self.h), np.arange(-(-first // every) * every, self.last + 1, every)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
         return TimeGrid(self.h, steps, times, self.messages)
 
@@ -96,23 +127,31 @@ def exact(x: float) -> Fraction:
     return simple if abs(float(simple) - x) <= 1e-15 * abs(x) else Fraction(f"{x:.15g}")
 
 
-def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
-    """The steps and samples of a run to t1 [s]: steps of h [s], shortened until they divide every sample time and t1."""
+def time_grid(h: float, t1: float, save: SaveAt, t0: float = 0.0) -> TimeGrid:
+    """The steps and samples of a run from t0 to t1 [s].
+
+    Steps of h [s] are shortened until they divide t0, every sample time and t1.
+    """
     faults = Faults()
     faults.positive("step", h)
     faults.positive("duration", t1)
+    length = t1 - t0
+    if t1 > 0 and not length > 0.0:
+        faults.add("t1", t1, f"is not after the start, {t0:.9g} s", "give the time of the end, counted from t = 0")
     if save.at is not None and len(save.at) and t1 > 0 and max(save.at) > t1 * (1 + 1e-12):
         faults.add("save.at", max(save.at), f"lies beyond the end, {t1} s", "drop it or run longer")
-    if save.every is not None and t1 > 0 and save.every > t1 * (1 + 1e-12):
-        faults.add("save.every", save.every, f"is longer than the run, {t1} s", "save more often or run longer")
-    if save.every is not None and t1 > 0 and 0 < save.every < t1 / MOST_SAMPLES:
+    if save.at is not None and len(save.at) and min(save.at) < t0 * (1 - 1e-12):
+        faults.add("save.at", min(save.at), f"lies before the start, {t0:.9g} s", "drop it")
+    if save.every is not None and length > 0 and save.every > length * (1 + 1e-12):
+        faults.add("save.every", save.every, f"is longer than the run, {length} s", "save more often or run longer")
+    if save.every is not None and length > 0 and 0 < save.every < length / MOST_SAMPLES:
         fault = f"asks for more than {MOST_SAMPLES} samples"
         faults.add("save.every", save.every, fault, "save less often, or run in parts")
     faults.raise_if_any()
-    end, meant = exact(t1), exact(h)
-    every = end if save.every is None else exact(save.every)
-    regular = int(end / every)
-    sample_times = sorted({exact(t) for t in save.at or ()} | {Fraction(0), end})
+    begin, end, meant = exact(t0), exact(t1), exact(h)
+    every = end - begin if save.every is None else exact(save.every)
+    regular = int((end - begin) / every)
+    sample_times = sorted({exact(t) for t in save.at or ()} | {begin, end})
     spacing = every
     for t in sample_times:
         shared = math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator)
@@ -128,7 +167,8 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
     messages: tuple[str, ...] = ()
     if step != meant:
         messages = (f"step shortened from {h} s to {float(step):.9g} s, so that it divides every sample time",)
-    steps = np.union1d(np.arange(regular + 1) * int(every / step), [int(t / step) for t in sample_times])
+    regular_steps = int(begin / step) + np.arange(regular + 1) * int(every / step)
+    steps = np.union1d(regular_steps, [int(t / step) for t in sample_times])
     # A quotient of whole numbers is the float nearest to each time; a sum of steps would not be.
     times = [k * step.numerator / step.denominator for k in steps.tolist()]
     return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages)

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_kernels.advance.beginning import GOES_ON
 from lgvi_warp.common import machine
 from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.plan import Plan
+from lgvi_warp.sampling.final import NUMBERS
 from lgvi_warp.scene import plausibility
 from lgvi_warp.scene.ensemble import SURVEYED
 from lgvi_warp.scene.functions import functions_of, identities
@@ -51,10 +53,20 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
     content |= {"functions": functions} if functions else {}
     if plan.ensemble.scene.source:
         content["source"] = dict(plan.ensemble.scene.source)
+    content |= starts_at(plan)
     if observed is not None and observed != Observation():
         kept = {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
         content["observed"] = observed.to_dict() | kept
     return content
+
+
+def starts_at(plan: Plan) -> dict[str, Any]:
+    """Where a run starts, in its provenance: nothing where that is at t = 0."""
+    final, time = plan.ensemble.final, float(plan.grid.times[0])
+    if final is None:
+        return {"start": {"time": time}} if plan.grid.first else {}
+    numbers = {name: getattr(final, name) for name in NUMBERS}
+    return {"start": {"time": time, "goes_on": "exactly" if plan.launches.begins == GOES_ON else "from states"} | {"end": numbers}}
 
 
 def at_end(content: dict[str, Any], values: Mapping[str, np.ndarray], members: int, planned: int) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import functools
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,9 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, TABLE, dims_of
 from lgvi_warp.physics.terms.base import Term, own
+from lgvi_warp.results import final as final_files
 from lgvi_warp.results import member_fields, result_file
+from lgvi_warp.sampling.final import Final
 from lgvi_warp.statistics.estimates.estimate import Estimates
 from lgvi_warp.statistics.values.quantity import KNOWN
 
@@ -85,6 +87,7 @@ class Result(Summarized):
         kept: Samples of the members in kept_members, where not those of all members were kept; else None.
         kept_members: Indices of these members, shape (m,).
         store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
+        end: What `final` returns, or a function without arguments that reads it; None where it was not kept.
         compile_seconds: Time to load the kernel [s].
         compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
         run_seconds: Time of the run without that [s].
@@ -118,6 +121,7 @@ class Result(Summarized):
     kept: Result | None = None
     kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     store: Path | None = None
+    end: Final | Callable[[], Final] | None = field(default=None, compare=False)
     compile_seconds: float = field(default=0.0, compare=False)
     compile_phases: Phases = field(default=Phases(), compare=False)
     run_seconds: float = field(default=0.0, compare=False)
@@ -224,6 +228,17 @@ class Result(Summarized):
         return invariants.energy(self)
 
     @property
+    def final(self) -> Final:
+        """Where the members ended, from which a run can go on: lw.solve(..., start=result.final).
+
+        Raises:
+            AttributeError: If it was not kept.
+        """
+        if self.end is None:
+            raise AttributeError("the end of the run was not kept: give SaveAt(final=True)")
+        return self.end() if callable(self.end) else self.end
+
+    @property
     def end_time(self) -> np.ndarray:
         """Time up to which each member ran [s], shape (n,): its event, its failure, or the end of the run.
 
@@ -254,7 +269,8 @@ class Result(Summarized):
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
         of_members = {item.name: getattr(self, item.name)[places] for item in member_fields.EVERY}
-        return replace(self, samples=samples, parameters=parameters, **of_members)
+        end = None if self.end is None else self.final.part(places)
+        return replace(self, samples=samples, parameters=parameters, end=end, **of_members)
 
     @property
     def members(self) -> int:
@@ -309,6 +325,9 @@ class Result(Summarized):
         if self.samples:
             arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
+        if self.samples and self.end is not None:
+            of_end, texts["final"] = final_files.to_file(self.final)
+            arrays |= of_end
         if self.statistics:
             estimates, texts["statistics"] = self.statistics.to_arrays()
             arrays |= {f"statistics/{name}": value for name, value in estimates.items()}
@@ -371,11 +390,12 @@ class Result(Summarized):
             terms=terms_of(provenance["scene"]),
             statistics=estimates,
         )
+        result = replace(result, end=final_files.from_file(content, result.samples, result.parameters))
         kept = _below("kept/", content)
         if not kept:
             return result
         members = kept["members"]
-        few = replace(result.part(members), parameters=_below("parameters/", kept), statistics=Estimates())
+        few = replace(result.part(members), parameters=_below("parameters/", kept), statistics=Estimates(), end=None)
         few = replace(few, samples={name: kept[name] for name in kept if name in IN_FILES})
         return replace(result, kept=few, kept_members=members)
 
@@ -383,32 +403,3 @@ class Result(Summarized):
 def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The arrays whose names begin with a prefix, under their names without it."""
     return {name.removeprefix(prefix): value for name, value in content.items() if name.startswith(prefix)}
-
-
-class DrawnParameters(Mapping[str, np.ndarray]):
-    """Parameters of members of an ensemble that follow each other, drawn when they are first read.
-
-    Before that they take no memory.
-
-    Args:
-        ensemble: The ensemble.
-        stop: Index after the last member.
-        first: Index of the first member; default 0.
-    """
-
-    def __init__(self, ensemble: Ensemble, stop: int, first: int = 0):
-        self._ensemble, self._first, self._stop = ensemble, first, stop
-
-    @functools.cached_property
-    def _drawn(self) -> dict[str, np.ndarray]:
-        parameters = self._ensemble.parameters(self._first, self._stop)
-        return {name: values.copy() for name, values in parameters.items()}
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        return self._drawn[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._drawn)
-
-    def __len__(self) -> int:
-        return len(self._drawn)

@@ -12,7 +12,7 @@ from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.control.signals import IN_FILES, has_shape
 from lgvi_warp.results import member_fields
 
-TEXTS = ("messages", "provenance", "statistics")
+TEXTS = ("messages", "provenance", "statistics", "final")
 
 
 def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
@@ -33,6 +33,10 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
             good = array.shape == (k,) and array.dtype == np.float64
         elif name in of_members:
             good = array.shape == (n,) and array.dtype == of_members[name]
+        elif name in ("final.indices", "final.status"):
+            good = array.shape == (n,) and array.dtype == np.int64
+        elif name.startswith("final.lanes."):
+            good = array.ndim == 2 and len(array) == n and array.dtype.kind in "fi"
         elif name == "kept/members":
             good = array.shape == (m,) and array.dtype.kind == "i" and (not m or 0 <= array.min() <= array.max() < n)
         elif name.startswith(("parameters/", "kept/parameters/")):
@@ -46,7 +50,20 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
     if not isinstance(texts["messages"], list) or not all(isinstance(item, str) for item in texts["messages"]):
         raise ValueError("its messages are no texts")
     _provenance(texts["provenance"])
+    _final(content)
     return texts
+
+
+def _final(content: Mapping[str, np.ndarray]) -> None:
+    """Check the numbers of the end of a run. Raises ValueError."""
+    if "final" not in content:
+        return
+    table = parsed(str(content["final"]))
+    whole = isinstance(table, dict) and all(isinstance(table.get(name), int) for name in ("steps", "seed"))
+    real = whole and all(isinstance(table.get(name), int | float) for name in ("time", "step"))
+    arrays = {"final.indices", "final.status"} <= set(content)
+    if not real or not arrays or not isinstance(table.get("settings"), dict):
+        raise ValueError("its end tells no time, step or settings")
 
 
 def _provenance(table: Any) -> None:

@@ -28,6 +28,8 @@ from lgvi_warp.scene.settings import check_device
 
 # With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.
 MOST_FIXED = 4
+# From so many members on, a result holds what another run needs to go on only where SaveAt says so.
+MOST_FINALS = 100_000
 # What a run keeps that says nothing of it.
 ALL_SAMPLES = Observation()
 
@@ -90,6 +92,13 @@ class Request:
         named = self.fleet.scene.run.save_fields
         return FIELDS if named is None else tuple(named)
 
+    @property
+    def keeps_final(self) -> bool:
+        """Whether the result is to hold what another run needs to go on."""
+        if self.save is not None and self.save.final is not None:
+            return self.save.final
+        return self.observed.samples and self.fleet.members < MOST_FINALS
+
     def count(self, plan: Plan) -> int:
         """The number of threads of a plan's run."""
         return self.threads or threads_for(plan)
@@ -98,8 +107,10 @@ class Request:
         """Choose the steps and the sample times."""
         if self.settled is not None:
             return self.settled
-        run, faults = self.fleet.scene.run, Faults()
-        h = _seconds(faults, "h", self.h, run.step, "give the step in seconds: solve(..., h=0.01) or [run] step")
+        run, faults, t0 = self.fleet.scene.run, Faults(), self.fleet.start_time
+        before = None if self.fleet.final is None else self.fleet.final.step
+        step = before if run.step is None else run.step
+        h = _seconds(faults, "h", self.h, step, "give the step in seconds: solve(..., h=0.01) or [run] step")
         end = "give the end in seconds: solve(..., t1=150.0) or [run] duration"
         t1 = _seconds(faults, "t1", self.t1, run.duration, end)
         if self.save is not None and not isinstance(self.save, SaveAt):
@@ -110,14 +121,14 @@ class Request:
         )
         faults.raise_if_any()
         if self.save is not None:
-            return time_grid(h, t1, self.save)
-        if run.save_every is None or run.save_every <= t1:
-            return time_grid(h, t1, SaveAt(every=run.save_every))
+            return time_grid(h, t1, self.save, t0)
+        if run.save_every is None or run.save_every <= t1 - t0:
+            return time_grid(h, t1, SaveAt(every=run.save_every), t0)
         # The scene's save_every is meant for its own duration; a shorter run ignores it.
         remark = (
-            f"run.save_every = {run.save_every} s is longer than the run, {t1} s: only the start and the end are kept"
+            f"run.save_every = {run.save_every} s is longer than the run, {t1 - t0} s: only the start and the end are kept"
         )
-        return time_grid(h, t1, SaveAt()).telling(remark)
+        return time_grid(h, t1, SaveAt(), t0).telling(remark)
 
     def plan(self, survey_all: bool = True) -> Plan:
         """Settle the run: its steps, its method and its kernel.

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from lgvi_warp.engine import single_block
 from lgvi_warp.engine.block import Block, parts
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.executors.threads import Threads
+from lgvi_warp.engine.keepers.final import Finals, Rows
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
 from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.loop import Merged, RunProgress, run_blocks
@@ -23,9 +24,12 @@ from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.results import member_fields
+from lgvi_warp.results.drawn import DrawnParameters
+from lgvi_warp.results.final import final_of
 from lgvi_warp.results.outcomes import begun_beyond, failure_text
 from lgvi_warp.results.provenance import at_end, messages, provenance
-from lgvi_warp.results.result import DrawnParameters, Result
+from lgvi_warp.results.result import Result
+from lgvi_warp.sampling.final import Final
 from lgvi_warp.scene import plausibility
 from lgvi_warp.statistics.estimates.estimate import Estimates
 
@@ -52,16 +56,18 @@ def run_plan(
     known: Known | None = None,
     warned: bool = True,
     on_block: Callable[[Result], None] | None = None,
+    final: bool = False,
 ) -> Result:
     """Run the blocks of a plan, all or as many as its statistics need, and gather the result in memory.
 
     fields: Names of the samples to keep; None: all of the plan.
     known: Function from the plan to provenance and messages, where many runs share them; by default they are made for this
         run.
+    final: Whether the result holds what another run needs to go on.
     """
     total, runner, merged = plan.ensemble.members, executor or Threads(threads), Merged()
     compile_seconds = plan.compile()
-    gathered = _Gathered(plan, observed or Observation(), fields, known)
+    gathered = _Gathered(plan, observed or Observation(), fields, known, final)
     overall = RunProgress(total * plan.grid.steps, progress)
     start = time.perf_counter()
 
@@ -75,7 +81,7 @@ def run_plan(
     joined = bool(gathered.observing.keepers) or not isinstance(runner, Threads)
     runs = parts(total, plan.grid.steps, threads, joined)
     if not joined and on_block is None and single_block.fits(plan, runs):
-        gathered.take_all(*single_block.run_single_block(plan, gathered.names, warned, overall.at))
+        gathered.take_all(*single_block.run_single_block(plan, gathered.names, warned, overall.at, final))
         return ended(total)
     work = Work(plan, gathered.keepers, warned=warned)
     try:
@@ -97,10 +103,13 @@ def run_plan(
 class _Gathered:
     """What a run in memory gathers, and the results that are made of it."""
 
-    def __init__(self, plan: Plan, observed: Observation, fields: Sequence[str] | None, known: Known | None):
+    def __init__(
+        self, plan: Plan, observed: Observation, fields: Sequence[str] | None, known: Known | None, final: bool
+    ):
         self.plan, self.observed, self.fields, self.known = plan, observed, fields, known
+        self._finals = Finals() if final else None
         self.observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
-        self._whole: tuple[dict[str, np.ndarray], MemberStatus] | None = None
+        self._whole: tuple[dict[str, np.ndarray], MemberStatus, Rows] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -113,11 +122,12 @@ class _Gathered:
     def keepers(self) -> tuple[Any, ...]:
         """The keepers of a run by blocks: of outcomes, of samples where these are kept, and of statistics."""
         samples = (Samples(self.plan, self.fields),) if self.observed.samples else ()
-        return (Outcomes(self.plan), *samples, *self.observing.keepers)
+        finals = (self._finals,) if self._finals is not None else ()
+        return (Outcomes(self.plan), *samples, *self.observing.keepers, *finals)
 
-    def take_all(self, samples: dict[str, np.ndarray], outcome: MemberStatus) -> None:
-        """Take what was gathered without keepers: the samples and the outcome of all members."""
-        self._whole = samples, outcome
+    def take_all(self, samples: dict[str, np.ndarray], outcome: MemberStatus, rows: Rows) -> None:
+        """Take what was gathered without keepers: the samples and the outcome of all members, and what they left."""
+        self._whole = samples, outcome, rows
 
     @property
     def outcome(self) -> MemberStatus:
@@ -130,6 +140,13 @@ class _Gathered:
             return self._whole[0]
         kept = self.keepers[1].fields if self.observed.samples else None
         return {name: values[:, at] for name, values in (kept or {}).items()}
+
+    def final(self, n: int, states: Mapping[str, np.ndarray], status: np.ndarray) -> Final | None:
+        """Where the first n members ended; None where it is not wanted, and where none is complete."""
+        if self._finals is None or not n:
+            return None
+        rows = {name: each[:n] for name, each in (self._whole[2] if self._whole else self._finals.rows(n)).items()}
+        return final_of(self.plan, n, {name: values[-1] for name, values in states.items()}, status, rows)
 
     def of_block(self, block: Block) -> Result:
         """The result of a block's members: their samples and outcomes, without statistics and messages.
@@ -173,6 +190,7 @@ class _Gathered:
             provenance=at_end(content, of_members, n, plan.ensemble.members),
             terms=tuple(scene.terms),
             statistics=estimates,
+            end=self.final(n, histories, of_members["status"]),
             compile_seconds=compile_seconds,
             compile_phases=plan.phases,
             run_seconds=run_seconds,

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lgvi_warp.sampling.final import Final
+
 
 @dataclass(frozen=True, eq=False)
 class Members:
@@ -14,6 +16,7 @@ class Members:
 
     Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
     angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole.
+    final: where they ended in the run that they go on from; None where they start.
     """
 
     parameters: dict[str, np.ndarray]
@@ -23,6 +26,7 @@ class Members:
     angular_velocity: np.ndarray
     indices: np.ndarray
     seed: int
+    final: Final | None = None
 
     @property
     def count(self) -> int:

@@ -18,6 +18,7 @@ from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics.terms import base
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
+from lgvi_warp.sampling.final import Final
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.draws import SceneNumbers, counted, draws_of
@@ -68,6 +69,11 @@ class Ensemble(Summarized):
         >>> fleet.parameters(0, 1000)["vehicle.buoyancy"].shape
         (1000,)
     """
+
+    # Where these members ended in the run that they go on from; None where they start.
+    final: Final | None
+    # The time at which they start, or go on [s].
+    start_time: float
 
     def __init__(
         self,
@@ -185,6 +191,7 @@ class Ensemble(Summarized):
         self._draws = draws_of(scene, settings, explicit)
         # What keys the members' noise; None: their positions in the whole ensemble.
         self._indices: np.ndarray | None = None
+        self.final, self.start_time = None, 0.0
         self._check_physical(checked)
 
     @property
@@ -300,7 +307,43 @@ class Ensemble(Summarized):
         """
         if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
             raise IndexError(f"members {first} to {stop} of {self.members}")
-        return self._draws.members_of(self._values(first, stop), self.indices_of(first, stop), self.seed)
+        members = self._draws.members_of(self._values(first, stop), self.indices_of(first, stop), self.seed)
+        if self.final is None:
+            return members
+        everyone = (first, stop) == (0, self.members)
+        final = self.final if everyone else self.final.part(np.arange(first, stop))
+        return replace(members, final=final, **final.states)
+
+    def from_zero(self) -> Ensemble:
+        """Return these members as they start at t = 0.
+
+        Returns:
+            The ensemble, without the end of another run.
+        """
+        ensemble = copy.copy(self)
+        ensemble.final, ensemble.start_time = None, 0.0
+        return ensemble
+
+    def going_on(self, final: Final) -> Ensemble:
+        """Return these members as they go on from where a run of them ended.
+
+        Args:
+            final: The end of that run, of as many members.
+
+        Returns:
+            The ensemble, which starts at the time and in the states of that end.
+
+        Raises:
+            SceneError: If it is no end of a run, or of another number of members.
+        """
+        if not isinstance(final, Final):
+            raise refusal("start", final, "is no end of a run", "give result.final of the run before")
+        if final.members != self.members:
+            problem = f"is the end of {final.members:,} members, and there are {self.members:,}"
+            raise refusal("start", "...", problem, "give the members of the run before, or final.part(places) of some")
+        ensemble = copy.copy(self)
+        ensemble.final, ensemble.start_time = final, final.time
+        return ensemble
 
     def varied(self) -> list[str]:
         """Return the names of the parameters that vary from member to member.
@@ -342,6 +385,7 @@ class Ensemble(Summarized):
         places = chosen if self._draws.places is None else self._draws.places[chosen]
         ensemble = self._drawing(places=places)
         ensemble._indices = None if self._indices is None else self._indices[chosen]
+        ensemble.final = None if self.final is None else self.final.part(chosen)
         # Some of these may lie beyond the members that were checked.
         ensemble.checked = len(chosen) if self.checked == self.members else 0
         return ensemble
@@ -367,6 +411,7 @@ class Ensemble(Summarized):
         pairs = [(target, columns[target.label]) for target, _ in self._draws.columns]
         ensemble = copy.copy(self)
         ensemble._draws, ensemble._indices = self._draws.with_columns(pairs), None
+        ensemble.final, ensemble.start_time = None, 0.0
         ensemble._check_physical()
         return ensemble
 
@@ -445,11 +490,13 @@ class Ensemble(Summarized):
 
         Returns:
             Arrays by name, (members of the whole, ...): given states and parameters, the values that the sampling
-            holds, and "indices" if they were set. Empty if there are none of these.
+            holds, "indices" if they were set, and what `Final.to_arrays` gives where they go on. Empty if there are none of
+            these.
         """
         indices = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
         sampled = {name: values[: self._draws.total] for name, values in self.sampling.arrays().items()}
-        return dict(self._draws.explicit) | sampled | indices
+        final = {} if self.final is None else self.final.to_arrays()
+        return dict(self._draws.explicit) | sampled | indices | final
 
     def to_dict(self) -> dict[str, Any]:
         """Return the section [ensemble] of a scene file.

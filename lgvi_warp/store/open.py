@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +26,7 @@ from lgvi_warp.results.provenance import at_end
 from lgvi_warp.results.result import END_TIME, Result
 from lgvi_warp.scene.functions import functions_of, identities
 from lgvi_warp.statistics.estimates.estimate import Estimates
-from lgvi_warp.store.block_files import damaged, name_of
+from lgvi_warp.store.final import check_parts, end_of, has_end
 from lgvi_warp.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.store.kept import keep_of, members_kept
 from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER
@@ -169,24 +170,11 @@ def gathered(folder: Folder, observed: Observation) -> Observing:
     observing = Observing(observed, folder.times(), int(folder.recipe["members"]), replicates)
     block_files = folder.block_files
     for block in folder.runs:
-        _check_parts(folder, block_files.sums(block), block)
+        check_parts(folder, block_files.sums(block), block)
         with corrupt_store_as_scene_error(folder.path / block_files.parts_key(block)):
             for keeper, part in zip(observing.keepers, block_files.parts(block, observing.keepers) or (), strict=True):
                 keeper.merge(block, part)
     return observing
-
-
-def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, block: Block) -> None:
-    """Check that a block's parts are those that were written. Raises SceneError."""
-    key = folder.block_files.parts_key(block)
-    if sums is None:
-        faults = [f"blocks/{name_of(block)}.json is missing or damaged"]
-    elif key in sums:
-        faults = [f"{key} {text}" for key, text in damaged(folder.path, {key: sums[key]}).items()]
-    else:
-        faults = [f"{key} is not in the marker of its block"] if folder.recipe["keepers"] else []
-    if faults:
-        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in faults)
 
 
 def result_of(
@@ -220,11 +208,12 @@ def result_of(
     with corrupt_store_as_scene_error(folder.path / ROOT):
         of_scene = tuple(terms_of(provenance["scene"]) if terms is None else terms)
     indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
+    parameters = Arrays(group, varied, 0, at, shared)
     return Result(
         time=time,
         samples=Arrays(group, fields, 1, at),
         **Result.per_member(small),
-        parameters=Arrays(group, varied, 0, at, shared),
+        parameters=parameters,
         messages=messages + remarks + begun_beyond(small["status"], small["failure_time"]),
         provenance=provenance,
         statistics=estimates,
@@ -232,6 +221,7 @@ def result_of(
         kept=kept,
         kept_members=indices,
         store=folder.path,
+        end=functools.partial(end_of, folder.path, at, parameters) if has_end(folder) else None,
     )
 
 

@@ -16,7 +16,9 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.identity import UNKNOWN, comparable
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.results.drawn import DrawnParameters
 from lgvi_warp.sampling.designs.table import Table, moved
+from lgvi_warp.sampling.final import PREFIX, Final
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
@@ -70,7 +72,7 @@ def _checksum(arrays: Mapping[str, np.ndarray]) -> str:
 def stored_ensemble(provenance: Mapping[str, Any], arrays: Mapping[str, np.ndarray], store: Path) -> Ensemble:
     """Build the ensemble that provenance describes, with the arrays that it was given."""
     scene, settings = provenance["scene"], provenance["ensemble"]
-    explicit = {name: values for name, values in arrays.items() if name != "indices"}
+    explicit = {name: rows for name, rows in arrays.items() if name != "indices" and not name.startswith(PREFIX)}
     _check_table(_table_in(settings))
     settings = {key: value for key, value in settings.items() if key != ARRAYS}
     table = _table(settings, explicit, store)
@@ -94,7 +96,17 @@ def stored_ensemble(provenance: Mapping[str, Any], arrays: Mapping[str, np.ndarr
         ensemble.scene = bare_scene
     if "indices" in arrays:
         ensemble.indices = arrays["indices"]
-    return ensemble
+    return _gone_on(ensemble, provenance.get("start", {}), arrays)
+
+
+def _gone_on(ensemble: Ensemble, start: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Ensemble:
+    """The ensemble as it goes on from where another run ended, where the run of the store did."""
+    if "end" not in start:
+        return ensemble
+    # With the numbers that the members had then, or with others, as the run itself found.
+    exactly = start.get("goes_on") == "exactly"
+    parameters: Mapping[str, np.ndarray] = DrawnParameters(ensemble, ensemble.members) if exactly else {}
+    return ensemble.going_on(Final.from_arrays(arrays, start["end"], parameters))
 
 
 def _table_in(ensemble: Mapping[str, Any]) -> Mapping[str, Any]:

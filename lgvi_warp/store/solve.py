@@ -13,6 +13,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.executors.base import Executor
+from lgvi_warp.engine.keepers.final import FINAL, Finals
 from lgvi_warp.engine.keepers.observation import Observing, observation_of
 from lgvi_warp.engine.keepers.protocol import Keeper
 from lgvi_warp.engine.plan import Plan
@@ -54,7 +55,8 @@ def run_stored(
         on_block(result_of(Folder(into.folder), members, terms=plan.ensemble.scene.terms))
 
     content = of_store(provenance(plan, request.observed, kept_fields), plan.ensemble)
-    run = StoredRun(plan, into, content, messages(plan), only=only, after=on_block and after)
+    finals = (Finals(in_store=True),) if request.keeps_final else ()
+    run = StoredRun(plan, into, content, messages(plan), finals, only, after=on_block and after)
     result, remarks = _observed(run, request, kept_fields, progress)
     if not remarks:  # else what was measured is not the whole run
         seconds = time.perf_counter() - start
@@ -97,7 +99,8 @@ def resume_stored(
     now = of_store(provenance(plan, request.observed), plan.ensemble)
     now |= {} if observed_before is None else {"observed": observed_before}
     noted = refuse_another(folder.path, folder.provenance, now, force)
-    run = StoredRun(plan, store_of(folder, force), folder.provenance, folder.messages, tuple(keepers))
+    finals = (Finals(in_store=True),) if FINAL in folder.recipe["keepers"] else ()
+    run = StoredRun(plan, store_of(folder, force), folder.provenance, folder.messages, (*finals, *keepers))
     kept_fields = tuple((observed_before or {}).get("fields", ()))
     return refuse_failed(_observed(run, request, kept_fields, progress, noted)[0], plan)
 

@@ -80,6 +80,8 @@ def check_texts(attributes: Mapping[str, Any], provenance: Any, recipe: Any, mes
         _rules(name, table, rules, required=True)
     if not _of_texts(provenance.get("functions", {})):
         raise NotOursError("provenance.functions is no table of texts")
+    if not isinstance(provenance.get("start", {}), dict):
+        raise NotOursError("provenance.start is no table")
     if "observed" in provenance:
         _rules("observed", provenance["observed"], OBSERVED, required=False)
     if not _texts(messages) or not isinstance(shared, dict) or not all(is_text(name) for name in shared):

@@ -98,7 +98,7 @@ def make_stopped(spec):
     at_step, held, one_step, arrival = stepping.at_step, stepping.held, stepping.one_step, make_retry(spec).arrival
     watched, stills, remembers, controlled = spec.watched, spec.still, spec.memory, spec.control is not None
     fail, keep = make_fail(width), make_resting(spec)[0]
-    keep_signals, _ = make_signals(types)
+    keep_signals, _, _ = make_signals(types)
     _, _, back_up = make_rows(Lane, State, spec.paced, spec.compensated)
 
     @wp.func(inline=True)

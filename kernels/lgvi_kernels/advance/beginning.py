@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a launch does before its first step: looks at the start, the controller's first commands, lanes that end there."""
+"""What a launch does before its first step: looks at the start, the controller's first commands, lanes that end there.
+
+A run begins with its first launch, from states that start, or that go on from where another run ended. What goes on has its
+memory, in which the last tick of its controller has been made.
+"""
 
 import warp as wp
 
@@ -10,6 +14,12 @@ from lgvi_kernels.advance.stepping import make_stepping
 from lgvi_kernels.advance.watching import make_watching
 from lgvi_kernels.lanes.arithmetic import add, any_positive, mul, neg, ones, positive, sub  # noqa: F401
 from lgvi_kernels.lanes.packet import failures
+
+# How a launch begins: as the one before ended (0); with members that start; with states that go on without the lead of their
+# first step, since somebody changed them; with states that go on as they were.
+STARTS = 1
+GOES_ON_WITHOUT_LEAD = 2
+GOES_ON = 3
 
 
 def make_constants(spec):
@@ -68,38 +78,40 @@ def make_reached(spec):
 
 
 def make_opening(spec):
-    """(x, c, monitor, k0, k1, h, opening, frozen): x gets the lead of its first step, after the looks at the start."""
+    """(x, c, monitor, k0, k1, begins, ...): x gets the lead of its first step, after the looks at the start."""
     types, stepping, watching = make_types(spec), make_stepping(spec), make_watching(spec)
     State, Constants, Monitor, Alarm, Lane = types.State, types.Constants, types.Monitor, types.Alarm, types.Lane
     feed, respond, opened, begin = stepping.feed, stepping.respond, stepping.opened, watching.begin
     real, looking, controlled = spec.real, bool(spec.warning_rows) or spec.energy, spec.control is not None
     asked, reports = controlled and spec.control.asked, controlled and spec.control.reports
     note_actuators = make_note_actuators(spec, types, stepping.at_step)
+    _, _, first_signals = make_signals(types)
 
     @wp.func(inline=True)
-    def opening_of(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int, h: wp.float64,
-                   opening: real, frozen: Lane):  # fmt: skip
-        if k0 == 0:
+    def opening_of(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int, begins: int,
+                   h: wp.float64, opening: real, frozen: Lane):  # fmt: skip
+        if begins == wp.static(STARTS) or begins == wp.static(GOES_ON_WITHOUT_LEAD):
             if wp.static(looking):
-                begin(x, c, monitor, h, frozen)
+                begin(x, c, monitor, k0, h, frozen)
             if wp.static(controlled):
                 x.alarm = Alarm()
                 if wp.static(not asked):
-                    feed(x, c, monitor, 0, h, real(0.0))
+                    if begins == wp.static(STARTS):
+                        feed(x, c, monitor, k0, h, real(0.0))
             x = opened(x, c, opening)
         if wp.static(asked):
             # A launch without steps measures alone: so the host sees the start. Such a kernel has no lead.
             x.alarm = Alarm()
             if k1 > k0:
-                respond(x, c, monitor, k0, h)
+                if k0 % monitor.every == 0:
+                    respond(x, c, monitor, k0, h)
             else:
                 feed(x, c, monitor, k0, h, real(0.0))
         if wp.static(controlled):
-            if k0 == 0:
+            if begins > 0:
                 if wp.static(reports):
-                    note_actuators(x, c, h, 0)
-                for j in range(monitor.signals.shape[0]):
-                    monitor.first_signals[c.packet, j] = c.memory[c.packet, monitor.signals[j]]
+                    note_actuators(x, c, h, k0)
+                first_signals(c, monitor, frozen)
 
     return opening_of
 
@@ -112,11 +124,11 @@ def make_begun(spec):
     asked, opening_of, fail = controlled and spec.control.asked, make_opening(spec), make_fail(width)
     keep, _, rest = make_resting(spec)
     reached = make_reached(spec) if watched else stepping.method.step
-    keep_signals, _ = make_signals(types)
+    keep_signals, _, _ = make_signals(types)
 
     @wp.func(inline=True)
     def begun(x: wp.ref[State], frozen: wp.ref[Lane], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int,
-              h: wp.float64, opening: real, state: wp.array2d(dtype=Lane), status: wp.array(dtype=Ints),
+              begins: int, h: wp.float64, opening: real, state: wp.array2d(dtype=Lane), status: wp.array(dtype=Ints),
               failed_step: wp.array(dtype=Ints)):  # fmt: skip
         """Frozen lanes rest at the origin."""
         if wp.static(checked):
@@ -126,12 +138,17 @@ def make_begun(spec):
                 rest(x, frozen)
         # Lanes that end before their first step, by their code.
         early = ones(frozen) - ones(frozen)
+        if wp.static(spec.timed):
+            # The state is that of the time k0 h, before the lead of its step.
+            if begins > 0:
+                x.time = wp.float64(k0) * h
+                x.step = k0
         if wp.static(watched):
-            if k0 == 0:
+            if begins == wp.static(STARTS) or begins == wp.static(GOES_ON_WITHOUT_LEAD):
                 early = reached(x, c, monitor, h, frozen)
-        opening_of(x, c, monitor, k0, k1, h, opening, frozen)
+        opening_of(x, c, monitor, k0, k1, begins, h, opening, frozen)
         if wp.static(controlled and checked):
-            if wp.static(asked) or k0 == 0:
+            if wp.static(asked) or begins == wp.static(STARTS):
                 failed = failures(x, frozen)
                 early = positive(failed, failed, early)
         if wp.static(watched or (controlled and checked)):

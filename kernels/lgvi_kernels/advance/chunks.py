@@ -47,7 +47,7 @@ def make_sampled(spec):
     reports = controlled and spec.control.reports
     sample = make_sample(Lane, spec.compensated, stepping.method, superpose(spec.laws, "flow") is not None, spec.still)
     note_actuators = make_note_actuators(spec, types, at_step)
-    _, sample_signals = make_signals(types)
+    _, sample_signals, _ = make_signals(types)
 
     @wp.func(inline=False)
     def sampled(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real,
@@ -121,14 +121,15 @@ def make_chunks(spec):
     begun, (read, write, _) = make_begun(spec), make_rows(Lane, State, spec.paced, spec.compensated)
 
     @wp.func(inline=True)
-    def chunks(c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int, s0: int, sample_step: wp.array(dtype=int),
-               h: wp.float64, stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), first_h: real, opening: real,
-               state: wp.array2d(dtype=Lane), status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints),
-               failed_size: wp.array(dtype=Lane), numbers: int, columns: wp.vec4i, out: wp.array2d(dtype=Lane)):  # fmt: skip
+    def chunks(c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int, s0: int, begins: int,
+               sample_step: wp.array(dtype=int), h: wp.float64, stage_h: wp.array(dtype=real),
+               lead_h: wp.array(dtype=real), first_h: real, opening: real, state: wp.array2d(dtype=Lane),
+               status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints), failed_size: wp.array(dtype=Lane),
+               numbers: int, columns: wp.vec4i, out: wp.array2d(dtype=Lane)):  # fmt: skip
         x = State()
         read(x, state, c.packet)
         frozen = Lane()
-        begun(x, frozen, c, monitor, k0, k1, h, opening, state, status, failed_step)
+        begun(x, frozen, c, monitor, k0, k1, begins, h, opening, state, status, failed_step)
         k = k0
         s = s0
         suspects = ones(frozen) - ones(frozen)

@@ -113,6 +113,7 @@ def make_truth(spec, types, method):
         y.period = real(wp.float64(monitor.every) * h)
         y.step = k
         y.tick = k // monitor.every
+        y.start = monitor.start
         y.table = c.table
         y.memory = c.memory
         y.packet = c.packet

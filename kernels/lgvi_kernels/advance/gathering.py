@@ -27,7 +27,7 @@ def make_gather_motion(compensated, moved):
 
     @wp.func
     def gather_motion(y: Any, x: Any, c: Any, monitor: Any):
-        start = (y.tick % monitor.slots) * monitor.numbers
+        start = ((y.tick - monitor.first_tick) % monitor.slots) * monitor.numbers
         put_tick(monitor, start, 0, c.packet, y.position)
         if wp.static(compensated):
             low = (x.b - y.position) + x.b_low
@@ -53,7 +53,7 @@ def make_gather(spec, types, at_step):
     def gather_signals(c: wp.ref[Constants], monitor: wp.ref[Monitor], tick: int):
         """Write the signals at a tick behind its motion."""
         count = monitor.signals.shape[0]
-        start = (tick % monitor.slots + 1) * monitor.numbers - count
+        start = ((tick - monitor.first_tick) % monitor.slots + 1) * monitor.numbers - count
         for j in range(count):
             monitor.ticks[start + j, c.packet] = c.memory[c.packet, monitor.signals[j]]
 
@@ -84,7 +84,7 @@ def make_note_actuators(spec, types, at_step):
 
 @functools.cache
 def make_signals(types):
-    """(keep_signals, sample_signals): of lanes that freeze the signals are kept, and samples write them."""
+    """(keep_signals, sample_signals, first_signals): of lanes that freeze the signals are kept, and samples write them."""
     Constants, Monitor, Lane = types.Constants, types.Monitor, types.Lane
 
     @wp.func(inline=False)
@@ -104,4 +104,12 @@ def make_signals(types):
             live = c.memory[c.packet, monitor.signals[j]]
             out[c.packet, end - count + j] = positive(frozen, c.memory[c.packet, monitor.kept + j], live)
 
-    return keep_signals, sample_signals
+    @wp.func(inline=False)
+    def first_signals(c: wp.ref[Constants], monitor: wp.ref[Monitor], frozen: Lane):
+        """Write the signals of the first sample of a run."""
+        for j in range(monitor.signals.shape[0]):
+            live = c.memory[c.packet, monitor.signals[j]]
+            held = c.memory[c.packet, monitor.kept + j]
+            monitor.first_signals[c.packet, j] = positive(frozen, held, live)
+
+    return keep_signals, sample_signals, first_signals

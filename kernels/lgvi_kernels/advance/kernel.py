@@ -48,10 +48,12 @@ def make_advance(spec):
         h: wp.float64,
         stage_h: wp.array(dtype=real),
         lead_h: wp.array(dtype=real),
-        # time: this launch makes the steps k0 to k1, and writes the samples due after the steps sample_step[s0:]
+        # time: this launch makes the steps k0 to k1, and writes the samples due after the steps sample_step[s0:]; how it
+        # begins (see beginning.py)
         k0: int,
         k1: int,
         s0: int,
+        begins: int,
         sample_step: wp.array(dtype=int),
         # in and out
         state: wp.array2d(dtype=Lane),
@@ -76,7 +78,7 @@ def make_advance(spec):
         if wp.static(not composed):
             # Computed from first_h, the compiler keeps one number in a register for the stage and its leads.
             opening = real(wp.static(lead_coefficient)) * first_h
-        chunks(c, monitor, k0, k1, s0, sample_step, h, stage_h, lead_h, first_h, opening, state, status, failed_step,
+        chunks(c, monitor, k0, k1, s0, begins, sample_step, h, stage_h, lead_h, first_h, opening, state, status, failed_step,
                failed_size, numbers, columns, out)  # fmt: skip
         put_back(mode)
 

@@ -82,12 +82,12 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
     warned: bits; warned_step and warned_size: steps made at the first crossing of the most serious row, and its square.
     energy: rows of ENERGY_FIELDS. backward: the part of h that stages go back at once. substeps: steps that were divided.
     still: R^T u where and when a lane was frozen, three rows.
-    loop: of a controller, the struct given, one entry or one a packet; every: steps between its ticks; commands: how many are
-    in the first rows of the memory; bus: the first row of what ticks note; noting: bits of what they do. signals: rows of the
-    memory that are saved with a sample; kept: the first of as many rows, what frozen lanes save; first_signals: what they are
-    at the start.
+    loop: of a controller, the struct given, one entry or one a packet; every: steps between its ticks; start: the step of the
+    first one; commands: how many are in the first rows of the memory; bus: the first row of what ticks note; noting: bits of
+    what they do. signals: rows of the memory that are saved with a sample; kept: the first of as many rows, what frozen lanes
+    save; first_signals: what they are at the first sample.
     ticks: what is gathered at ticks, (slots times numbers, packets), `numbers` rows for each; slots: how many ticks it holds,
-    0 for none gathered; columns: for each number of SAMPLE_FIELDS in turn its row of a tick, -1 if it is not gathered.
+    0 for none gathered; first_tick: the number of the one in the first slot; columns: for each number of SAMPLE_FIELDS in turn its row of a tick, -1 if it is not gathered.
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}
@@ -105,9 +105,9 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
         fields["still"] = wp.array2d(dtype=Lane)
     if loop is not None:
         fields |= {"loop": wp.array(dtype=loop), "every": wp.int32, "commands": wp.int32, "bus": wp.int32}
-        fields |= {"noting": wp.int32, "kept": wp.int32}
+        fields |= {"noting": wp.int32, "kept": wp.int32, "start": wp.int32}
         fields |= {"signals": wp.array(dtype=wp.int32), "first_signals": wp.array2d(dtype=Lane)}
-        fields |= {"ticks": wp.array2d(dtype=Lane), "slots": wp.int32, "numbers": wp.int32}
+        fields |= {"ticks": wp.array2d(dtype=Lane), "slots": wp.int32, "first_tick": wp.int32, "numbers": wp.int32}
         fields["columns"] = wp.array(dtype=wp.int32)
     return struct("Monitor", **fields) if fields else struct("NoMonitor", unused=wp.uint8)
 

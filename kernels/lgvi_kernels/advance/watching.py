@@ -82,7 +82,7 @@ def make_watching(spec):
                 monitor.warned[c.packet][j] = old | new
 
     @wp.func(inline=False)
-    def begin(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], h: wp.float64, frozen: Lane):
+    def begin(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, frozen: Lane):
         """Look at the start, whose energy later ones are compared with."""
         y = x
         if wp.static(momentum is not None):
@@ -93,7 +93,7 @@ def make_watching(spec):
             monitor.energy[c.packet, 1] = U
             monitor.energy[c.packet, 2] = supplies(y, c, T)
         if wp.static(warned):
-            warn(y, c, monitor, 0, h, frozen)
+            warn(y, c, monitor, k, h, frozen)
 
     @wp.func(inline=False)
     def note(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real,

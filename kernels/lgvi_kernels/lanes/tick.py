@@ -18,13 +18,14 @@ def measurement_struct(width, real, shared=False):
 
     north, east, down: the inertial axes in body axes, as in a View; position [m], inertial; velocity over ground and
     water_velocity through the water [m/s], angular_velocity [rad/s], body axes.
-    t, period, h [s]: time of this tick, time between ticks, step. step, tick: number of the step that begins, of this tick.
+    t, period, h [s]: time of this tick, time between ticks, step. step, tick: number of the step that begins, of this tick;
+    start: the step of the first tick.
     table, memory, packet, entry: as in a View, shared too; b, the true position, is there for functions of a View.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
     directions = {"north": Lane3, "east": Lane3, "down": Lane3, "position": Lane3, "b": Lane3}
     rates = {"velocity": Lane3, "water_velocity": Lane3, "angular_velocity": Lane3}
-    times = {"t": real, "period": real, "h": real, "step": wp.int32, "tick": wp.int32}
+    times = {"t": real, "period": real, "h": real, "step": wp.int32, "tick": wp.int32, "start": wp.int32}
     table = wp.array2d(dtype=table_number(width, real, shared))
     rows = {"table": table, "memory": wp.array2d(dtype=Lane), "packet": wp.int32, "entry": wp.int32}
     return struct("Measurement", **directions, **rates, **times, **rows)

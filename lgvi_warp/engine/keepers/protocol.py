@@ -14,6 +14,7 @@ from lgvi_warp.statistics.values.samples import Fields
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.outcome import MemberStatus
+    from lgvi_warp.engine.packets import Packets
     from lgvi_warp.engine.plan import Plan
     from lgvi_warp.sampling.members import Members
 
@@ -28,6 +29,14 @@ class BlockKeeper(Protocol):
 
     def close(self, outcome: MemberStatus) -> Any:
         """Return the block's result, small and picklable."""
+
+
+@runtime_checkable
+class PacketsKeeper(Protocol):
+    """A keeper of one block that looks at its packets as well, after the last step and before it closes."""
+
+    def take_packets(self, packets: Packets) -> None:
+        """Take what is wanted of them; copies, since the next block uses them."""
 
 
 class Keeper(Protocol):

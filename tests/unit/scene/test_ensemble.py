@@ -9,7 +9,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.distributions import LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.physics import notation
-from lgvi_warp.results.result import DrawnParameters
+from lgvi_warp.results.drawn import DrawnParameters
 from lgvi_warp.scene import draws
 from tests.support.refusals import faults, says
 

@@ -38,7 +38,7 @@ def orthonormal(y: Any):
 @wp.func
 def measure(y: Any, p: Any):
     """R <- R exp(T (Om_old + Om) / 2), then the part 1 - exp(-T / time constant) of the turn to the measured attitude."""
-    if y.tick > 0:
+    if y.step > y.start:
         z = taken_attitude(y, p.memory)
         mean = (y.h.dtype(0.5) * y.period) * (remembered3(y, p.memory + 9) + y.angular_velocity)
         z = turned(z, mean)

@@ -27,7 +27,7 @@ def measure(y: Any, p: Any):
     if p.through_water > 0:
         v = to_inertial(y, y.water_velocity)
     b = y.position + p.start_error
-    if y.tick > 0:
+    if y.step > y.start:
         last = remembered3(y, p.memory + 3)
         b = remembered3(y, p.memory) + (y.period * p.weight) * last + (y.period * p.weight_now) * v
     remember3(y, p.memory, b)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way of commands to the actuators takes time: a ring of the commands of the last ticks."""
+"""The way of commands to the actuators takes time: the commands of the last ticks, the latest first."""
 
 import functools
 from typing import Any
@@ -11,7 +11,7 @@ from lgvi_kernels.law import *
 
 @functools.cache
 def params(width, real):
-    """Params: delay = periods * period + steps * h of each lane; the ring's first row; sets in it; commands in a set.
+    """Params: delay = periods * period + steps * h of each lane; first row of the sets; how many; commands in a set.
 
     fresh, acting, before, begin: first row of the new commands, of those that act from a step on and before, of that step.
     """
@@ -22,19 +22,22 @@ def params(width, real):
 
 @wp.func
 def send(y: Any, p: Any):
-    """Put the new commands into the ring; those of `periods` ticks ago act from `steps` steps on, those before until then."""
-    newest = y.tick % p.sets
+    """Put the new commands before the others; those of `periods` ticks ago act from `steps` on, those before until then."""
     unity = ones(p.periods)
     half = y.h.dtype(0.5) * unity
     for i in range(p.count):
-        remember(y, p.memory + newest * p.count + i, remembered(y, p.fresh + i))
         acting = unity - unity
         before = acting
-        for j in range(p.sets):
-            age = y.h.dtype((newest - j + p.sets) % p.sets) * unity
-            value = remembered(y, p.memory + j * p.count + i)
-            acting = positive(half - absolute(age - p.periods), value, acting)
-            before = positive(half - absolute(age - p.periods - unity), value, before)
+        value = remembered(y, p.fresh + i)
+        for age in range(p.sets):
+            # Members may remember more sets than they need: none depends on how many there are.
+            at = p.memory + age * p.count + i
+            older = remembered(y, at)
+            remember(y, at, value)
+            apart = y.h.dtype(age) * unity - p.periods
+            acting = positive(half - absolute(apart), value, acting)
+            before = positive(half - absolute(apart - unity), value, before)
+            value = older
         remember(y, p.acting + i, acting)
         remember(y, p.before + i, before)
     remember(y, p.begin, y.h.dtype(y.step) * unity + p.steps)

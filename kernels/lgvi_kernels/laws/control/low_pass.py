@@ -50,7 +50,7 @@ def made(features):
     @wp.func
     def measure(y: Any, p: Any):
         """x <- x + (1 - exp(-T / time constant)) (measured - x), from the first reading on."""
-        if y.tick > 0:
+        if y.step > y.start:
             y = towards(y, taken(y, p.memory), share(y, p.time_constant))
         put(y, p.memory)
         return y

@@ -23,7 +23,7 @@ def params(width, real):
 def led(y: Any, p: Any, i: int, start: Any, rate: Any):
     """x, x' and x'' of number i; at the first tick those of the measured state."""
     z = remembered3(y, p.memory + 3 * i)
-    if y.tick == 0:
+    if y.step == y.start:
         z = vec3(start, rate, ones(start) - ones(start))
     return z
 

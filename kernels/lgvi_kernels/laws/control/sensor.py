@@ -47,31 +47,35 @@ def make_kept(reading, drifting, rare, late):
             at += wp.static(count)
         unity = ones(y.position.x)
         half = y.h.dtype(0.5) * unity
-        fresh = at + p.sets * wp.static(rows)
-        newest = y.tick % p.sets
-        last = (y.tick + p.sets - 1) % p.sets
+        age = at
+        fresh = at + 1
+        kept_sets = fresh + wp.static(rows)
         put(y, fresh)
         hold = lost
         if wp.static(rare):
-            age = remembered(y, fresh + wp.static(rows))
-            waiting = p.every - half - unity - age
+            ticks = remembered(y, age)
+            waiting = p.every - half - unity - ticks
             hold = positive(waiting, unity, hold)
-            remember(y, fresh + wp.static(rows), positive(waiting, age + unity, unity - unity))
-        if y.tick == 0:
+            remember(y, age, positive(waiting, ticks + unity, unity - unity))
+        first = y.step == y.start
+        if first:
             hold = unity - unity
             if wp.static(rare):
-                remember(y, fresh + wp.static(rows), unity - unity)
+                remember(y, age, unity - unity)
         for j in range(wp.static(rows)):
-            old = remembered(y, at + last * wp.static(rows) + j)
-            value = positive(hold, old, remembered(y, fresh + j))
-            remember(y, at + newest * wp.static(rows) + j, value)
-            if wp.static(late):
-                for s in range(p.sets):
-                    age_of = (newest - s + p.sets) % p.sets
-                    wanted = least(p.latency, y.h.dtype(y.tick) * unity)
-                    apart = absolute(y.h.dtype(age_of) * unity - wanted)
-                    value = positive(half - apart, remembered(y, at + s * wp.static(rows) + j), value)
-            remember(y, fresh + j, value)
+            value = positive(hold, remembered(y, kept_sets + j), remembered(y, fresh + j))
+            arrived = value
+            for s in range(p.sets):
+                # Members may keep more readings than they need: none depends on how many there are.
+                older = remembered(y, kept_sets + s * wp.static(rows) + j)
+                if first:
+                    # What has not arrived at the start is the first reading.
+                    older = value
+                remember(y, kept_sets + s * wp.static(rows) + j, value)
+                if wp.static(late):
+                    arrived = positive(half - absolute(y.h.dtype(s) * unity - p.latency), value, arrived)
+                value = older
+            remember(y, fresh + j, arrived)
         return taken(y, fresh)
 
     return kept
@@ -93,7 +97,7 @@ def made(features):
     def params(width, real):
         """Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings that it keeps.
 
-        Its rows: the walk; `sets` readings as they arrive; that of this tick; how many ticks the last one is old.
+        Its rows: the walk; how many ticks the last reading is old; that of this tick; `sets` readings, the latest first.
         """
         Lane, Lane3 = lane(width, real), lane3(width, real)
         vectors = {name: Lane3 for name in others if name in ("bias", "noise", "drift", "quantum")}

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a run goes on from where another ended: what its packets leave, and what those of the next take."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_kernels.advance.beginning import GOES_ON, GOES_ON_WITHOUT_LEAD, STARTS
+from lgvi_kernels.advance.spec import Spec
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.engine.arrays import put_rows
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.sampling.final import MEMORY, Final
+
+if TYPE_CHECKING:
+    from lgvi_warp.engine.packets import Packets
+    from lgvi_warp.engine.plan import Plan
+
+# Parts of a Spec that change no state and nothing that is remembered.
+BESIDE = {"width", "shared_rows", "checked", "warning_rows", "energy", "backward", "substep", "control"}
+
+
+def settings_of(plan: Plan) -> dict[str, Any]:
+    """What the states of a plan's packets, and what they remember, depend on beside the members' numbers."""
+    spec: Spec = plan.spec
+    parts = [getattr(spec, name) for name in Spec._fields if name not in BESIDE]
+    parts.append((spec.control.parts, spec.control.numbers, spec.control.asked) if spec.control else ())
+    method = {name: value for name, value in dataclasses.asdict(plan.method).items() if name != "reason"}
+    digest = hashlib.sha256(repr((_named(parts), sorted(method.items(), key=str))).encode()).hexdigest()
+    return {"method": plan.method.name, "step": plan.grid.h, "dtype": plan.dtype, "kernel": digest}
+
+
+def known_settings(plan: Plan) -> dict[str, Any]:
+    """What states and memory of a plan's runs depend on; computed once."""
+    settings: dict[str, Any] = plan.shared("settings of states", {}, lambda numbers: settings_of(plan))
+    return settings
+
+
+def _named(value: Any) -> Any:
+    """A part of a Spec with names in place of modules, whose text would have the place of their files."""
+    if isinstance(value, tuple | list):
+        return tuple(_named(entry) for entry in value)
+    return getattr(value, "__name__", value)
+
+
+def beginning(plan: Plan) -> int:
+    """How the first launch of a plan begins (see lgvi_kernels.advance.beginning).
+
+    Members go on exactly where neither their numbers nor what decides their states is another; else from their states.
+    """
+    final = plan.ensemble.final
+    if final is None:
+        return STARTS
+    same = "state" in final.lanes and final.settings == known_settings(plan) and _same_numbers(plan, final)
+    return GOES_ON if same else GOES_ON_WITHOUT_LEAD
+
+
+def _same_numbers(plan: Plan, final: Final) -> bool:
+    """Whether the members have the parameters that they had."""
+    now = plan.ensemble.parameters(0, plan.ensemble.members)
+    if now.keys() != final.parameters.keys():
+        return False
+    return all(np.array_equal(np.broadcast_to(before, now[name].shape) if len(before) == 1 else before,
+                              np.broadcast_to(now[name], before.shape) if len(before) > 1 else now[name])
+               for name, before in final.parameters.items())  # fmt: skip
+
+
+def check_beginning(plan: Plan) -> None:
+    """Refuse what cannot go on: states that were not kept, and memory of other forces and controllers. Raises SceneError."""
+    final, faults = plan.ensemble.final, Faults("start.")
+    if final is None:
+        return
+    needed = FIELDS if plan.launches.begins == GOES_ON_WITHOUT_LEAD else plan.fields
+    for name in FIELDS:
+        if name in needed and name not in final.states:
+            faults.add(name, "...", "was not kept by the run before", f"add {name!r} to its SaveAt(fields=...)")
+    faults.raise_if_any()
+
+
+def left_by(packets: Packets) -> dict[str, np.ndarray]:
+    """Rows (m, rows) by name of what a block's packets hold at the end of a run."""
+    laws, m = packets.laws, packets.members.count
+    memory, half = laws.memory.view, laws.memory.view.shape[1] // 2
+    rows = {"state": _by_member(packets.state_lanes.view, m)}
+    for name, place in places_of(packets).items():
+        if place.stop > place.start:
+            rows[MEMORY + name] = _by_member(memory[:, place], m)
+    scratch = slice(laws.scratch, half)
+    if scratch.stop > scratch.start:
+        rows["scratch"] = _by_member(memory[:, scratch], m)
+    for name, view in packets.noted.items():
+        if view.any():
+            rows[name] = _by_member(view if view.ndim == 3 else view[:, None, :], m)
+    bits, values = packets.warned_at_start
+    if bits.any():
+        rows |= {"start_warnings": bits[:, None], "start_values": values[:, None]}
+    return rows
+
+
+def places_of(packets: Packets) -> dict[str, slice]:
+    """Where in the memory of some packets each law, part and event has what it remembers; "signals" are of the controller."""
+    choice, laws = packets.plan.kernel_choice, packets.laws
+    kinds = ("law", choice.laws), ("part", choice.parts_of_control), ("event", choice.events)
+    names = [f"{kind} {term.key} {type(term).__name__}" for kind, each in kinds for term, _ in each]
+    places = dict(zip(names, laws.remembered, strict=True))
+    return {"signals": slice(0, packets.bus_rows), **places}
+
+
+def take(packets: Packets, final: Final) -> None:
+    """Put what members ended with into their packets, which hold those members from their starts on."""
+    exact, memory = packets.plan.launches.begins == GOES_ON, packets.laws.memory.view
+    half = memory.shape[1] // 2
+    lanes = final.lanes
+    if exact:
+        put_rows(packets.state_lanes.view, lanes["state"])
+        if "scratch" in lanes:
+            put_rows(memory[:, packets.laws.scratch : half], lanes["scratch"])
+    for name, place in places_of(packets).items():
+        rows = lanes.get(MEMORY + name)
+        if rows is not None:
+            count = min(place.stop - place.start, rows.shape[1])
+            put_rows(memory[:, place.start : place.start + count], rows[:, :count])
+    memory[:, half:] = memory[:, :half]
+    for name, view in packets.noted.items():
+        if name in lanes and (exact or name in ENDED):
+            put_rows(view if view.ndim == 3 else view[:, None, :], lanes[name])
+
+
+# What is noted of members that ended, which stay so whatever else changes.
+ENDED = ("status", "failed_step", "failed_size", "still", "substeps")
+
+
+def start_warnings(final: Final, members: int) -> tuple[np.ndarray, np.ndarray]:
+    """The warnings that the start of a run gave, whose end this is: (bits, value)."""
+    if "start_warnings" not in final.lanes:
+        return np.zeros(members, np.uint16), np.zeros(0)
+    return final.lanes["start_warnings"][:, 0].astype(np.uint16), final.lanes["start_values"][:, 0]
+
+
+def _by_member(view: np.ndarray, members: int) -> np.ndarray:
+    """Rows (members, rows) of lanes (packets, rows, width), a copy."""
+    packets, rows, width = view.shape
+    return np.array(view.transpose(0, 2, 1), order="C").reshape(packets * width, rows)[:members]
+
+
+def joined(parts: Mapping[int, Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """The rows of blocks, by their first member, one after the other; those that are shorter, or absent, end in zeros."""
+    ordered = [parts[first] for first in sorted(parts)]
+    if len(ordered) == 1:
+        return dict(ordered[0])
+    rows: dict[str, np.ndarray] = {}
+    for name in dict.fromkeys(name for part in ordered for name in part):
+        pieces = [part.get(name) for part in ordered]
+        like = next(piece for piece in pieces if piece is not None)
+        longest = max(piece.shape[1] for piece in pieces if piece is not None)
+        whole = np.zeros((sum(len(part["state"]) for part in ordered), longest), like.dtype)
+        at = 0
+        for part, piece in zip(ordered, pieces, strict=True):
+            count = len(part["state"])
+            if piece is not None:
+                whole[at : at + count, : piece.shape[1]] = piece
+            at += count
+        rows[name] = whole
+    return rows

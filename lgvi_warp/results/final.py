@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The end of a run as its result has it, and as a result's file holds it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import numpy as np
+
+from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.engine.going_on import known_settings
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.results.drawn import DrawnParameters
+from lgvi_warp.sampling.final import NUMBERS, PREFIX, Final
+
+
+def final_of(
+    plan: Plan, members: int, states: Mapping[str, np.ndarray], status: np.ndarray, rows: Mapping[str, np.ndarray]
+) -> Final:
+    """The end of the first members of a plan's run.
+
+    states: (n, ...), by field. status: (n,). rows: what their packets left (see engine/going_on.py).
+    """
+    fleet = plan.ensemble
+    return Final(
+        time=float(plan.grid.times[-1]),
+        step=plan.grid.h,
+        steps=plan.grid.last,
+        states={name: states[name] for name in FIELDS if name in states},
+        status=np.asarray(status),
+        indices=fleet.indices_of(0, members),
+        seed=fleet.seed,
+        parameters=DrawnParameters(fleet, members),
+        lanes=rows,
+        settings=known_settings(plan),
+    )
+
+
+def to_file(final: Final) -> tuple[dict[str, np.ndarray], str]:
+    """An end as arrays and a text, without states, status and parameters, which are the result's."""
+    arrays = {name: rows for name, rows in final.to_arrays().items() if not name.startswith(f"{PREFIX}states.")}
+    return arrays, json.dumps({name: getattr(final, name) for name in NUMBERS})
+
+
+def from_file(
+    content: Mapping[str, np.ndarray], samples: Mapping[str, np.ndarray], parameters: Mapping[str, np.ndarray]
+) -> Final | None:
+    """The end in a file that was checked; None where it has none."""
+    if "final" not in content:
+        return None
+    states = {f"{PREFIX}states.{name}": samples[name][-1] for name in FIELDS if name in samples}
+    return Final.from_arrays({**content, **states}, parsed(str(content["final"])), parameters)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from lgvi_kernels.advance.beginning import GOES_ON, GOES_ON_WITHOUT_LEAD, STARTS
 from lgvi_kernels.advance.spec import Spec
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.engine.arrays import put_rows
+from lgvi_warp.engine.packing import name_of
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.sampling.final import MEMORY, Final
 
@@ -60,6 +62,14 @@ def beginning(plan: Plan) -> int:
     return GOES_ON if same else GOES_ON_WITHOUT_LEAD
 
 
+def recalls(plan: Plan) -> bool:
+    """Whether members go on from a tick of which the run before noted all that this one gathers."""
+    final, launches = plan.ensemble.final, plan.launches
+    if final is None or not launches.is_tick(plan.grid.first) or "noted" not in final.lanes:
+        return False
+    return not plan.layout.noted_bits & ~int(final.lanes["noted"][0, 0])
+
+
 def _same_numbers(plan: Plan, final: Final) -> bool:
     """Whether the members have the parameters that they had."""
     now = plan.ensemble.parameters(0, plan.ensemble.members)
@@ -70,16 +80,21 @@ def _same_numbers(plan: Plan, final: Final) -> bool:
                for name, before in final.parameters.items())  # fmt: skip
 
 
-def check_beginning(plan: Plan) -> None:
-    """Refuse what cannot go on: states that were not kept, and memory of other forces and controllers. Raises SceneError."""
+def begun(plan: Plan) -> Plan:
+    """The plan with how it begins settled: from t = 0, or from where its members ended in another run.
+
+    Raises SceneError where that run did not keep what is needed.
+    """
     final, faults = plan.ensemble.final, Faults("start.")
     if final is None:
-        return
+        return plan
+    plan = replace(plan, launches=replace(plan.launches, begins=beginning(plan), recalls=recalls(plan)))
     needed = FIELDS if plan.launches.begins == GOES_ON_WITHOUT_LEAD else plan.fields
     for name in FIELDS:
         if name in needed and name not in final.states:
             faults.add(name, "...", "was not kept by the run before", f"add {name!r} to its SaveAt(fields=...)")
     faults.raise_if_any()
+    return plan
 
 
 def left_by(packets: Packets) -> dict[str, np.ndarray]:
@@ -89,13 +104,15 @@ def left_by(packets: Packets) -> dict[str, np.ndarray]:
     rows = {"state": _by_member(packets.state_lanes.view, m)}
     for name, place in places_of(packets).items():
         if place.stop > place.start:
-            rows[MEMORY + name] = _by_member(memory[:, place], m)
+            rows[name] = _by_member(memory[:, place], m)
     scratch = slice(laws.scratch, half)
     if scratch.stop > scratch.start:
         rows["scratch"] = _by_member(memory[:, scratch], m)
     for name, view in packets.noted.items():
         if view.any():
             rows[name] = _by_member(view if view.ndim == 3 else view[:, None, :], m)
+    if packets.bus_rows:
+        rows["noted"] = np.full((m, 1), packets.plan.layout.noted_bits)
     bits, values = packets.warned_at_start
     if bits.any():
         rows |= {"start_warnings": bits[:, None], "start_values": values[:, None]}
@@ -106,9 +123,9 @@ def places_of(packets: Packets) -> dict[str, slice]:
     """Where in the memory of some packets each law, part and event has what it remembers; "signals" are of the controller."""
     choice, laws = packets.plan.kernel_choice, packets.laws
     kinds = ("law", choice.laws), ("part", choice.parts_of_control), ("event", choice.events)
-    names = [f"{kind} {term.key} {type(term).__name__}" for kind, each in kinds for term, _ in each]
+    names = [name_of(kind, term) for kind, each in kinds for term, _ in each]
     places = dict(zip(names, laws.remembered, strict=True))
-    return {"signals": slice(0, packets.bus_rows), **places}
+    return {f"{MEMORY}signals": slice(0, packets.bus_rows), **places}
 
 
 def take(packets: Packets, final: Final) -> None:
@@ -121,7 +138,7 @@ def take(packets: Packets, final: Final) -> None:
         if "scratch" in lanes:
             put_rows(memory[:, packets.laws.scratch : half], lanes["scratch"])
     for name, place in places_of(packets).items():
-        rows = lanes.get(MEMORY + name)
+        rows = lanes.get(name)
         if rows is not None:
             count = min(place.stop - place.start, rows.shape[1])
             put_rows(memory[:, place.start : place.start + count], rows[:, :count])

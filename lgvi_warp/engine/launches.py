@@ -35,6 +35,7 @@ class Launches:
     has_callback: bool  # a function of the host answers each tick
     ticks: bool  # samples are gathered at all ticks
     begins: int = STARTS  # how the first launch begins (see lgvi_kernels.advance.beginning)
+    recalls: bool = False  # members go on from a tick, which is gathered again from what is remembered of it
 
     @property
     def goes_on(self) -> bool:
@@ -52,7 +53,9 @@ class Launches:
     @functools.cached_property
     def gathered(self) -> TimeGrid | None:
         """The controller's ticks, where samples are taken at all of them; None without a controller or without `ticks`."""
-        return self.grid.ticks(self.every, self.goes_on) if self.ticks and self.every is not None else None
+        if not self.ticks or self.every is None:
+            return None
+        return self.grid.ticks(self.every, self.goes_on and not self.recalls)
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
@@ -82,11 +85,14 @@ class Launches:
         """The number of the first tick that the kernel gathers, which a function of the host may answer in this run alone."""
         if self.every is None:
             return 0
-        return -(-self.grid.first // self.every) if self.has_callback or not self.goes_on else self.grid.first // self.every + 1
+        if self.has_callback or self.recalls or not self.goes_on:
+            return -(-self.grid.first // self.every)
+        return self.grid.first // self.every + 1
 
     def slot_of(self, tick: int, slots: int) -> int:
         """Where the kernel gathers a tick of `gathered`, counted from its first one."""
-        assert self.gathered is not None and self.every is not None
+        assert self.gathered is not None
+        assert self.every is not None
         return int(self.gathered.sample_steps[tick] // self.every - self.first_tick) % slots
 
     def ticks_held(self, count: int) -> int:
@@ -102,7 +108,7 @@ class Launches:
         the next launch: those from step k0 on and before step k1, with that of the end.
         """
         assert self.gathered is not None
-        starts = k0 == self.grid.first and not self.goes_on
+        starts = k0 == self.grid.first and (self.recalls or not self.goes_on)
         bounds = np.array([k0 if starts else k0 + 1, k1 + 1])
         if self.has_callback:
             bounds = np.array([k0, k1 if k1 < self.grid.last else k1 + 1])

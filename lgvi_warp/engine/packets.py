@@ -79,7 +79,7 @@ class Packets:
                 packets = plan.free_packets.pop()
             except IndexError:  # another thread took the last
                 break
-            if packets.count == -(-members.count // plan.spec.width):
+            if packets.count == -(-members.count // plan.spec.width) and packets.plan.shared is plan.shared:
                 packets.serve(plan)
                 packets.refill(members)
                 return packets

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from lgvi_warp.methods import modified_inertia
 from lgvi_warp.physics import inertia, notation, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
+from lgvi_warp.sampling.final import MEMORY, Final
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.draws import KEPT
 from lgvi_warp.scene.ensemble import Ensemble
@@ -54,7 +56,8 @@ class Packing:
 
     def _context(self, numbers: Mapping[str, np.ndarray]) -> PackingContext:
         m, plan = self.members, self.plan
-        return context(numbers, self.frame, m.indices, m.seed, plan.grid.h, plan.kernel_choice.aligned)
+        start = float(plan.grid.times[0])
+        return context(numbers, self.frame, m.indices, m.seed, plan.grid.h, plan.kernel_choice.aligned, start)
 
     def inertia(self) -> Fields:
         """The fields of the kernel's Inertia."""
@@ -178,7 +181,8 @@ class Packing:
             kind = type(term)
             if kind.water is Term.water and kind.water_at_start is Term.water_at_start:
                 continue
-            flow = term.water_at_start(Ensemble.own(term, m.parameters), m.position, self._context(m.parameters))
+            known = replace(self._context(m.parameters), remembered=remembered_by("law", term, m.final))
+            flow = term.water_at_start(Ensemble.own(term, m.parameters), m.position, known)
             total = flow if total is None else total + flow
         return None if total is None else notation.rotate_into(m.attitude, total)
 
@@ -199,6 +203,16 @@ def rows_shared(plan: Plan) -> bool:
     sizes = {(kind, i): row_count(law) for kind, packed in each for i, law in enumerate(packed) if law.rows is not None}
     number = 8 if plan.spec.real == wp.float64 else 4
     return sum(sizes.values()) * plan.spec.width * number > LARGE_TABLE and all(map(plan.shared.keeps, sizes))
+
+
+def name_of(kind: str, term: Term) -> str:
+    """The name by which the end of a run knows what a law, a part of the controller or an event remembers."""
+    return f"{MEMORY}{kind} {term.key} {type(term).__name__}"
+
+
+def remembered_by(kind: str, term: Term, final: Final | None) -> np.ndarray | None:
+    """What a law, part or event remembers of the run that members go on from, (m, rows); None for nothing."""
+    return None if final is None else final.lanes.get(name_of(kind, term))
 
 
 def _once(values: np.ndarray) -> np.ndarray:

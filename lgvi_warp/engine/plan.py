@@ -18,10 +18,10 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.control.signals import check_signals, ordered
 from lgvi_warp.engine.block import Block
+from lgvi_warp.engine.going_on import begun
 from lgvi_warp.engine.kernel import Kernel
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel
 from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of
-from lgvi_warp.engine.going_on import beginning, check_beginning
 from lgvi_warp.engine.launches import Launches
 from lgvi_warp.engine.packing import rows_shared
 from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, check_substep, check_ticks
@@ -113,10 +113,10 @@ class Plan:
         grid = self.grid.shifted(ensemble.start_time)
         check_noise_steps(self.kernel_choice, grid)
         check_ticks(self.kernel_choice, grid, ensemble.final is not None)
-        plan = replace(self.for_members(ensemble), grid=grid, launches=replace(self.launches, grid=grid))
-        plan = replace(plan, launches=replace(plan.launches, begins=beginning(plan)))
-        check_beginning(plan)
-        return plan
+        # What is packed of members that start depends on the time; what goes on brings that with it.
+        shared = self.shared if ensemble.final is not None else _shared(ensemble, self.shared.user_axes)
+        plan = replace(self.for_members(ensemble), grid=grid, launches=replace(self.launches, grid=grid), shared=shared)
+        return begun(plan)
 
     def subplan(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
         """The plan for some of the members, with all choices made for the whole ensemble.
@@ -228,10 +228,7 @@ def choose_plan(
     # A kernel's hash takes its source: only where some kernel was measured here.
     best = measured().get(plan.kernel.hash) if chosen and measured() else None
     plan = plan if best is None else plan.of_width(best, "measured")
-    if ensemble.final is not None:
-        plan = replace(plan, launches=replace(plan.launches, begins=beginning(plan)))
-        check_beginning(plan)
-    return plan
+    return begun(plan)
 
 
 def _shared(ensemble: Ensemble, user_axes: bool) -> SharedResultsCache:

@@ -99,5 +99,7 @@ def check_ticks(choice: KernelChoice, grid: TimeGrid, goes_on: bool = False) -> 
         every = controller.every(grid.h)
         if grid.first % every and not goes_on:
             problem = f"lies between two ticks of the controller, whose period is {every * grid.h:.9g} s"
-            faults.add("t0", grid.times[0], problem, "start at a tick, or go on from result.final, which knows the commands")
+            faults.add(
+                "t0", grid.times[0], problem, "start at a tick, or go on from result.final, which knows the commands"
+            )
     faults.raise_if_any()

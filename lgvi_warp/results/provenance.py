@@ -66,7 +66,10 @@ def starts_at(plan: Plan) -> dict[str, Any]:
     if final is None:
         return {"start": {"time": time}} if plan.grid.first else {}
     numbers = {name: getattr(final, name) for name in NUMBERS}
-    return {"start": {"time": time, "goes_on": "exactly" if plan.launches.begins == GOES_ON else "from states"} | {"end": numbers}}
+    return {
+        "start": {"time": time, "goes_on": "exactly" if plan.launches.begins == GOES_ON else "from states"}
+        | {"end": numbers}
+    }
 
 
 def at_end(content: dict[str, Any], values: Mapping[str, np.ndarray], members: int, planned: int) -> dict[str, Any]:

@@ -34,7 +34,6 @@ from lgvi_warp.statistics.values.quantity import KNOWN
 if TYPE_CHECKING:
     import xarray
 
-    from lgvi_warp.scene.ensemble import Ensemble
 
 TIME = {"units": "s", "long_name": "time since the start"}
 END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a member, or the end of the run"}

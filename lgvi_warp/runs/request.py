@@ -125,10 +125,8 @@ class Request:
         if run.save_every is None or run.save_every <= t1 - t0:
             return time_grid(h, t1, SaveAt(every=run.save_every), t0)
         # The scene's save_every is meant for its own duration; a shorter run ignores it.
-        remark = (
-            f"run.save_every = {run.save_every} s is longer than the run, {t1 - t0} s: only the start and the end are kept"
-        )
-        return time_grid(h, t1, SaveAt(), t0).telling(remark)
+        problem = f"run.save_every = {run.save_every} s is longer than the run, {t1 - t0} s"
+        return time_grid(h, t1, SaveAt(), t0).telling(f"{problem}: only the start and the end are kept")
 
     def plan(self, survey_all: bool = True) -> Plan:
         """Settle the run: its steps, its method and its kernel.

@@ -140,10 +140,11 @@ class Final(Summarized):
         R = arrays.get("attitude")
         if R is not None and not notation.rotations(R).all():
             bad = int(np.argmin(notation.rotations(R)))
-            raise SceneError([f"attitude of member {bad} = {R[bad].tolist()}: is not a rotation; give R^T R = I, det R = 1"])
+            raise SceneError(
+                [f"attitude of member {bad} = {R[bad].tolist()}: is not a rotation; give R^T R = I, det R = 1"]
+            )
         lanes = {name: rows for name, rows in self.lanes.items() if name not in EXACT}
         return replace(self, states={**self.states, **arrays}, lanes=lanes)
-
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Write what `from_arrays` reads, but for numbers and parameters, as arrays.

@@ -312,7 +312,8 @@ class Ensemble(Summarized):
             return members
         everyone = (first, stop) == (0, self.members)
         final = self.final if everyone else self.final.part(np.arange(first, stop))
-        return replace(members, final=final, **final.states)
+        states: dict[str, Any] = {name: np.asarray(rows, dtype=np.float64) for name, rows in final.states.items()}
+        return replace(members, final=final, **states)
 
     def from_zero(self) -> Ensemble:
         """Return these members as they start at t = 0.

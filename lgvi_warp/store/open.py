@@ -18,7 +18,6 @@ from lgvi_warp.common.status import Status
 from lgvi_warp.common.write_lock import writer_of
 from lgvi_warp.control.controller import terms_of
 from lgvi_warp.control.signals import IN_FILES
-from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.results.outcomes import begun_beyond

@@ -2,8 +2,8 @@
 """Runs that go on from where another ended: pieces have the bits of one run, whatever acts, remembers or draws."""
 
 import pickle
+import re
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -146,8 +146,8 @@ def test_a_controller(pieces, length):
 
 
 def test_way_points():
-    guidance = [{"type": "waypoints", "points": [[0, 0, 5], [0.5, 0, 5], [0.5, 5, 6], [9, 9, 9]], "speed": 1.5, "look_ahead": 3.0,
-                 "radius": 0.3, "method": "ilos"}]  # fmt: skip
+    points = [[0, 0, 5], [0.5, 0, 5], [0.5, 5, 6], [9, 9, 9]]
+    guidance = [dict(type="waypoints", points=points, speed=1.5, look_ahead=3.0, radius=0.3, method="ilos")]
     check(autopilot(guidance=guidance, sensors=[]), "psi_x", h=0.01, length=0.3)
 
 
@@ -213,3 +213,122 @@ def test_a_stored_run_that_was_stopped(tmp_path):
     assert differences(lw.solve(fleet, **how, t1=0.5), third) == []
     few = lw.open_run(store, members=[300, 2, 599]).final
     assert equal(few.lanes["state"], last.final.lanes["state"][[300, 2, 599]])
+
+
+@pytest.mark.parametrize("callback", [False, True])
+def test_metrics_of_pieces_add_up(callback):
+    # Integrals over the ticks: what a period adds belongs to the piece in which it lies.
+    each = lw.statistics.MemberValues()
+    if callback:
+        controller = lw.Controller(
+            period=0.1, guidance=[lw.control.SetPoint(heading=0.8)], laws=[lw.control.Callback(law)]
+        )
+        scene = lw.Scene(lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0)), terms=[lw.terms.ControlWrench(limit=2.0)],
+                         controller=controller)  # fmt: skip
+        fleet = lw.Ensemble(scene, 20, 3)
+        statistics = [lw.metrics.IAE("heading", then=each), lw.metrics.ISE("heading", then=each)]
+    else:
+        fleet = autopilot()
+        statistics = [kind("depth", then=each) for kind in (lw.metrics.IAE, lw.metrics.ISE)]
+        statistics += [lw.metrics.Effort(then=each)]
+    how = dict(h=0.02, statistics=statistics, method="psi_s" if callback else "psi_x")
+    whole, result, total = lw.solve(fleet, t1=1.0, **how), None, 0.0
+    for t1 in (0.1, 0.4, 1.0):
+        result = lw.solve(fleet, t1=t1, **how, start=None if result is None else result.final)
+        total = total + np.array([estimate.value[-1] for estimate in result.statistics.values()])
+    expected = np.array([estimate.value[-1] for estimate in whole.statistics.values()])
+    np.testing.assert_allclose(total, expected, rtol=1e-12)
+
+
+def test_other_numbers_and_states():
+    # With other numbers, or after a change, a run goes on from the states: to round-off where these are the same.
+    fleet = fleet_of("torpedo", terms=list(CASES["waves"].terms))
+    whole, first = one_run(fleet, "psi_x", length=0.1, pieces=4), one_run(fleet, "psi_x", length=0.1, pieces=2)
+    same = first.final.changed(position=first.final.position)
+    again = lw.solve(fleet, "psi_x", h=STEPS, t1=0.4, start=same)
+    assert again.provenance["start"]["goes_on"] == "from states"
+    np.testing.assert_allclose(again.position[-1], whole.position[-1], rtol=1e-13)
+    np.testing.assert_allclose(again.velocity[-1], whole.velocity[-1], rtol=1e-11)
+    # Other methods, steps and number types, too.
+    for method, h, dtype, close in (("rk8", 0.01, "float64", 2e-4), ("psi_x", 0.02, "float32", 1e-5)):
+        other = lw.solve(fleet, method, h=h, t1=0.4, dtype=dtype, start=first.final)
+        np.testing.assert_allclose(other.position[-1], whole.position[-1], atol=close)
+    moved = first.final.changed(position=first.final.position + [1.0, 0.0, 0.0])
+    calm = fleet_of("torpedo", terms=[])
+    far = lw.solve(calm, "psi_x", h=STEPS, t1=0.4, start=moved).position[-1]
+    near = lw.solve(calm, "psi_x", h=STEPS, t1=0.4, start=first.final).position[-1]
+    np.testing.assert_allclose(far - near, np.broadcast_to([1.0, 0.0, 0.0], far.shape), atol=1e-13)
+
+
+def test_a_fall_goes_on_in_closed_form():
+    # v(t) = v_inf tanh(t / tau) against quadratic drag; then it goes on with more drag.
+    mass, k, g = 10.0, 30.0, 9.81
+    vehicle = lw.Vehicle(mass, inertia=(1.0, 1.0, 1.0), buoyancy=0.0)
+    drag = lw.terms.Drag(linear=(0.0,) * 6, quadratic=(k, k, k, 0.0, 0.0, 0.0))
+    fleet = lw.Ensemble(lw.Scene(vehicle, lw.Environment(gravity=g), terms=[drag]))
+    first = lw.solve(fleet, "rk8", h=0.01, t1=0.5)
+    terminal = np.sqrt(mass * g / k)
+    v = terminal * np.tanh(0.5 * g / terminal)
+    assert first.velocity[-1, 0, 2] == pytest.approx(v, rel=1e-10)
+    # With four times the drag it slows down: v = v_inf coth(...), above its new terminal speed.
+    heavy = fleet.scene.with_numbers({"drag.quadratic": [4.0 * k] * 3 + [0.0] * 3})
+    second = lw.solve(heavy, "rk8", h=0.005, t1=0.7, start=first.final)
+    terminal = np.sqrt(mass * g / (4.0 * k))
+    v = terminal / np.tanh(np.arctanh(terminal / v) + 0.2 * g / terminal)
+    assert second.velocity[-1, 0, 2] == pytest.approx(v, rel=1e-9)
+
+
+def test_states_at_a_time():
+    # Waves, a schedule and noise are those of the time: from states alone to round-off, where nothing is remembered.
+    fleet = fleet_of("torpedo", terms=list(CASES["waves"].terms + CASES["wrench schedule"].terms))
+    whole = one_run(fleet, "psi_x", pieces=4)
+    run = lw.prepare(fleet.scene, method="psi_x", h=STEPS, t1=0.2)
+    states = [getattr(whole, name)[2] for name in MOTION]
+    numbers = {"vehicle.buoyancy": fleet.parameters(0, 20)["vehicle.buoyancy"]}
+    late = run.states(*states, numbers, t0=0.2)
+    assert late.time.tolist() == [0.2, 0.4]
+    np.testing.assert_allclose(late.position[-1], whole.position[-1], rtol=1e-13)
+    early = run.states(*states, numbers)
+    assert np.abs(early.position[-1] - whole.position[-1]).max() > 1e-6
+
+
+def test_what_is_refused():
+    fleet = fleet_of("torpedo", terms=[])
+    final = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2).final
+    few = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, save=lw.SaveAt(fields=("position",))).final
+    for message, call in {
+        "t1 = 0.2: is not after the start, 0.2 s": lambda: lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, start=final),
+        "is the end of 20 members, and there are 3": lambda: lw.solve(
+            fleet.subset([1, 2, 3]), t1=1.0, h=0.1, start=final
+        ),
+        "is no end of a run": lambda: lw.solve(fleet, t1=1.0, h=0.1, start="final"),
+        "save.at = 0.1: lies before the start": lambda: lw.solve(
+            fleet, t1=1.0, h=0.02, start=final, save=lw.SaveAt(at=[0.1])
+        ),
+        "start.attitude = '...': was not kept": lambda: lw.solve(fleet, "rk4", t1=1.0, h=STEPS, start=few),
+        "t0 = 0.05: is no whole number of steps": lambda: lw.prepare(
+            fleet.scene, method="psi_x", h=STEPS, t1=0.2
+        ).states(final, t0=0.05),
+        "lies between two ticks": lambda: lw.prepare(autopilot().scene, method="psi_x", h=0.01, t1=0.2).states(
+            *(getattr(final, name) for name in MOTION), t0=0.05
+        ),
+    }.items():
+        with pytest.raises(lw.SceneError, match=re.escape(message)):
+            call()
+    kept = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, keep="none", statistics=[lw.statistics.Mean("depth")])
+    with pytest.raises(AttributeError, match=re.escape("give SaveAt(final=True)")):
+        _ = kept.final
+    asked = lw.SaveAt(final=True, fields=("position",))
+    kept = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, keep="none", statistics=[lw.statistics.Mean("depth")], save=asked)
+    assert kept.final.members == 20
+
+
+@pytest.mark.parametrize("method", ["psi_x", "rk4"])
+def test_what_is_remembered_stays(method):
+    # From states that somebody set anew, to what they were: the current and the thrusters go on with what they remember.
+    fleet = fleet_of("torpedo", terms=list(CASES["Gauss-Markov current"].terms + CASES["thrusters"].terms))
+    whole, first = one_run(fleet, method, pieces=4), one_run(fleet, method, pieces=2)
+    states = {name: np.asarray(rows) for name, rows in first.final.states.items() if name != "attitude"}
+    again = lw.solve(fleet, method, h=STEPS, t1=0.4, start=first.final.changed(**states))
+    np.testing.assert_allclose(again.velocity[-1], whole.velocity[-1], atol=1e-12)
+    np.testing.assert_allclose(again.position[-1], whole.position[-1], atol=1e-12)

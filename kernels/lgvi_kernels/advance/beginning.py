@@ -81,7 +81,8 @@ def make_opening(spec):
     """(x, c, monitor, k0, k1, begins, ...): x gets the lead of its first step, after the looks at the start."""
     types, stepping, watching = make_types(spec), make_stepping(spec), make_watching(spec)
     State, Constants, Monitor, Alarm, Lane = types.State, types.Constants, types.Monitor, types.Alarm, types.Lane
-    feed, respond, opened, begin = stepping.feed, stepping.respond, stepping.opened, watching.begin
+    feed, respond, recall = stepping.feed, stepping.respond, stepping.recall
+    opened, begin = stepping.opened, watching.begin
     real, looking, controlled = spec.real, bool(spec.warning_rows) or spec.energy, spec.control is not None
     asked, reports = controlled and spec.control.asked, controlled and spec.control.reports
     note_actuators = make_note_actuators(spec, types, stepping.at_step)
@@ -112,6 +113,9 @@ def make_opening(spec):
                 if wp.static(reports):
                     note_actuators(x, c, h, k0)
                 first_signals(c, monitor, frozen)
+                if monitor.slots > 0:
+                    if begins != wp.static(STARTS) and k0 == monitor.first_tick * monitor.every:
+                        recall(x, c, monitor, k0, h, opening)
 
     return opening_of
 

@@ -34,10 +34,11 @@ CONTROL_NON_FINITE = 8
 
 
 def make_feed(spec, types, method, at_step, opened):
-    """(feed, respond): a tick at the state after k steps, which gets its alarm.
+    """(feed, respond, recall): a tick at the state after k steps, which gets its alarm.
 
     Where the host is asked, feed only measures and guides; respond, at the start of the next launch, does the rest with what
-    the host has written into the memory. method: see Step; at_step, opened: see Stepping.
+    the host has written into the memory. recall gathers the tick at which a run goes on, and which was made before.
+    method: see Step; at_step, opened: see Stepping.
     """
     State, Constants, Monitor = types.State, types.Constants, types.Monitor
     Reference, truth = reference_struct(spec.width, spec.real), make_truth(spec, types, method)
@@ -69,7 +70,21 @@ def make_feed(spec, types, method, at_step, opened):
         acted(x, y, r, c, monitor)
         gather(x, c, monitor, k, h)
 
-    return (ask, respond) if spec.control.asked else (feed, method.step)
+    gather_motion = make_gather_motion(spec.compensated, "origin" in spec.parts)
+    momentum = method.momentum
+
+    @wp.func(inline=False)
+    def recall(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
+    ):
+        """Gather the motion at this tick, and what the memory has of it."""
+        z = opened(at_step(x, k, h), c, -opening)
+        if wp.static(momentum is not None):
+            z.p = momentum(z)
+        gather_motion(truth(z, c, monitor, k, h), z, c, monitor)
+        gather(x, c, monitor, k, h)
+
+    return (ask, respond, recall) if spec.control.asked else (feed, method.step, recall)
 
 
 def make_truth(spec, types, method):

@@ -87,7 +87,8 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
     what they do. signals: rows of the memory that are saved with a sample; kept: the first of as many rows, what frozen lanes
     save; first_signals: what they are at the first sample.
     ticks: what is gathered at ticks, (slots times numbers, packets), `numbers` rows for each; slots: how many ticks it holds,
-    0 for none gathered; first_tick: the number of the one in the first slot; columns: for each number of SAMPLE_FIELDS in turn its row of a tick, -1 if it is not gathered.
+    0 for none gathered; first_tick: the number of the one in the first slot; columns: for each number of SAMPLE_FIELDS in turn
+    its row of a tick, -1 if it is not gathered.
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}

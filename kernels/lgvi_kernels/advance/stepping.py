@@ -20,8 +20,8 @@ class Stepping(NamedTuple):
 
     method: see Step; watch: see Watch, None without events. at_step: (x, k, h) -> x with the number and the time of step k;
     opened: (x, c, length) -> x moved by the lead; one_step, stepped: one step, and a number of steps.
-    feed, respond: a controller's tick (see make_feed); held: a number of steps and the ticks between them; all three are
-    `step` where there is no controller.
+    feed, respond, recall: a controller's tick (see make_feed); held: a number of steps and the ticks between them; all of
+    these are `step` where there is no controller.
     """
 
     method: Step
@@ -32,6 +32,7 @@ class Stepping(NamedTuple):
     stepped: Any
     feed: Any
     respond: Any
+    recall: Any
     held: Any
 
 
@@ -106,15 +107,15 @@ def make_stepping(spec):
             y = one_step(y, own, limits, k + j, h, stage_h, lead_h, first_h, opening)
         x = y
 
-    feed, respond = step, step
+    feed, respond, recall = step, step, step
     if spec.control:
         # A tick's code takes as long to load as all the rest: here, where a scene has one.
         from lgvi_kernels.advance.feeding import make_feed
 
-        feed, respond = make_feed(spec, types, method, at_step, opened)
+        feed, respond, recall = make_feed(spec, types, method, at_step, opened)
 
     held = make_held(types, real, one_step, feed) if spec.control else step
-    return Stepping(method, watch, at_step, opened, one_step, stepped, feed, respond, held)
+    return Stepping(method, watch, at_step, opened, one_step, stepped, feed, respond, recall, held)
 
 
 def make_held(types, real, one_step, feed):

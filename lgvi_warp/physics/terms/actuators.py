@@ -107,13 +107,13 @@ def refuse_unread(term: Any, numbers: Numbers) -> None:
 
 def packed_following(
     term: Any, numbers: Numbers, blocks: np.ndarray, shared: np.ndarray | None = None, size: int = 0, work: int = 0,
-    words: Mapping[str, int] | None = None,
+    words: Mapping[str, int] | None = None, start: float = 0.0,
 ) -> Packed:  # fmt: skip
     """Pack an actuator whose device code is made by lgvi_kernels.laws.driven or .scheduled.
 
     numbers: (m, ...) by field: `limit`, where it has them `time_constant` and `rate_limit`, and if not driven the schedule.
     blocks: Other rows of each channel, (m, channels, rows). shared: Rows behind those of all channels, (m, rows).
-    words: Further whole numbers of the device struct.
+    words: Further whole numbers of the device struct. start: When members start [s].
     Returns: Rows of each channel: the blocks, limit, 1 / lag and limit of the rate; its schedule; the shared rows; and the
         memory of places, where they move: 0 of a driven actuator, else the command at the start.
     """
@@ -128,12 +128,12 @@ def packed_following(
     rows = [channels.reshape(len(channels), -1)]
     values = {"count": count, "moving": int(term.memory), "alike": int(np.all(lag == lag[:, :1])), **(words or {})}
     values |= {} if work else {"work": 0}
-    start = np.zeros((1, count))
+    places = np.zeros((1, count))
     if term.driver is not None:
         values |= term.driver.values_of(term.key)
     else:
         times, schedule = commands(numbers)
-        start = np.clip(at_start(times, schedule), -limit, limit)
+        places = np.clip(at_start(times, schedule, start), -limit, limit)
         times, schedule = within_limits(times, schedule, limit)
         rows.append(pieces(times, schedule))
         values |= {"knots": times.shape[1] - 1}
@@ -141,7 +141,7 @@ def packed_following(
     rows += [] if shared is None else [shared]
     if not term.memory:
         return Packed(values | {"memory": 0}, side_by_side(*rows), work=work)
-    return Packed(values, side_by_side(*rows), start, work)
+    return Packed(values, side_by_side(*rows), places, work)
 
 
 def within_limits(times: np.ndarray, schedule: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

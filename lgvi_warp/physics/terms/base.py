@@ -39,6 +39,8 @@ class PackingContext:
         h: Step [s].
         aligned: Whether, for every member of the run, the kernel's axes are the user's up to their order and sense, and the
             origin of the forces is the user's; False by default.
+        time: When the members start, or go on [s]; 0 by default.
+        remembered: What the term remembers where they go on, (n, rows) as in `Packed.memory`; None, the default, for nothing.
     """
 
     parameters: Numbers
@@ -47,6 +49,8 @@ class PackingContext:
     seed: int
     h: float
     aligned: bool = False
+    time: float = 0.0
+    remembered: np.ndarray | None = None
 
     def own(self, term: Term) -> dict[str, np.ndarray]:
         """The numbers of one term.
@@ -417,7 +421,7 @@ class Term:
         return None
 
     def water_at_start(self, numbers: Numbers, position: np.ndarray, context: PackingContext) -> np.ndarray:
-        """Velocity of the water where members start; by default that of `water` at t = 0.
+        """Velocity of the water where members start, or go on; by default that of `water` at that time.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -427,7 +431,7 @@ class Term:
         Returns:
             Velocity (n, 3) [m/s] in inertial axes.
         """
-        still = self.water(numbers, position[None], np.zeros(1), context.parameters)
+        still = self.water(numbers, position[None], np.array([context.time]), context.parameters)
         return np.zeros_like(position) if still is None else still[0]
 
     def braking(self, numbers: Numbers, speeds: Array, water_density: Array) -> Array:

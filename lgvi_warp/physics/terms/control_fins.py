@@ -183,7 +183,7 @@ class ControlFins(Commanded, Fins):
             if self.lift_angles is not None:
                 angles, lifts = numbers["lift_angles"], numbers["lift_coefficients"]
                 table, size = knots(angles, lifts[..., None]), angles.shape[1] - 1
-            return packed_following(self, numbers, blocks, table, size, 2 * self.channels)
+            return packed_following(self, numbers, blocks, table, size, 2 * self.channels, start=context.time)
         fins = side_by_side(fin_rows(numbers, context), numbers["limit"][..., None], numbers["rate_limit"][..., None])
         times, schedule = commands(numbers)
         count = schedule.shape[2]
@@ -192,5 +192,5 @@ class ControlFins(Commanded, Fins):
         values = {"count": count, "knots": times.shape[1] - 1, "limited": int(self.memory), "memory": 0}
         if not self.memory:
             return Packed(values, rows, work=2 * count)
-        start = np.clip(at_start(times, schedule), -numbers["limit"], numbers["limit"])
+        start = np.clip(at_start(times, schedule, context.time), -numbers["limit"], numbers["limit"])
         return Packed(values, rows, start, 2 * count)

@@ -65,7 +65,8 @@ class ControlWrench(Term):
         # The wrench of each channel in the kernel's axes, and its limits.
         force, torque = (np.eye(6)[None, :, i : i + 3] for i in (0, 3))
         blocks = [context.frame.vector(force), context.frame.torque(torque, force)]
-        return packed_following(self, numbers, np.concatenate(np.broadcast_arrays(*blocks), axis=-1))
+        blocks_of_channels = np.concatenate(np.broadcast_arrays(*blocks), axis=-1)
+        return packed_following(self, numbers, blocks_of_channels, start=context.time)
 
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
         # The wrench of a unit of effort of each channel, about the body's origin.

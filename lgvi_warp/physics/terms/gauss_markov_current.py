@@ -50,6 +50,8 @@ class GaussMarkovCurrent(NoisyTerm):
         return Packed(values, memory=np.concatenate([first, first, np.zeros_like(first)], axis=1))
 
     def water_at_start(self, numbers: Numbers, position: np.ndarray, context: PackingContext) -> np.ndarray:
+        if context.remembered is not None:
+            return np.asarray(context.remembered[:, :3], dtype=np.float64)
         return np.broadcast_to(self._first(numbers, context), position.shape)
 
     def _first(self, numbers: Numbers, context: PackingContext) -> np.ndarray:

@@ -318,7 +318,8 @@ class Thrusters(Commanded):
         words = {"plain": int(odd and alike)}
         # Where nothing is remembered, commands are looked up in rows to work with.
         work = 0 if self.memory or self.driver is not None else self.channels
-        return packed_following(self, numbers, side_by_side(force, torque, *blocks), curves, size, work, words)
+        each = side_by_side(force, torque, *blocks)
+        return packed_following(self, numbers, each, curves, size, work, words, context.time)
 
     def _packed_push(
         self, numbers: Numbers, context: PackingContext, direction: np.ndarray, arms: np.ndarray

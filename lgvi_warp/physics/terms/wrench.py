@@ -94,7 +94,7 @@ def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
 
 
-def at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
-    """Commands (n, columns) at t = 0 of schedules (1 or n, k, columns) with times (1 or n, k) [s]."""
+def at_start(times: np.ndarray, schedule: np.ndarray, start: float = 0.0) -> np.ndarray:
+    """Commands (n, columns) at the start [s] of schedules (1 or n, k, columns) with times (1 or n, k) [s]."""
     members = zip(*repeated(times, schedule), strict=True)
-    return np.array([[np.interp(0.0, at, column) for column in commands.T] for at, commands in members])
+    return np.array([[np.interp(start, at, column) for column in commands.T] for at, commands in members])

@@ -165,12 +165,15 @@ class Record:
     def kernels(self):
         """(line of def, line) of device code, as texts -> kernels compiled from it."""
         found = defaultdict(set)
-        for kernel in {name for test in self.tests.values() for name in test["kernels"]}:
-            for path in (CACHE / kernel).glob("*.cpp"):
+        # Warp's cache has a folder for each of its versions.
+        folders = {path.name: path for path in (*CACHE.glob("wp_*"), *CACHE.glob("*/wp_*"))}
+        for kernel in {name for test in self.tests.values() for name in test["kernels"]} & folders.keys():
+            for path in folders[kernel].glob("*.cpp"):
                 definition = ""
                 for text in re.findall(r"^ *// (.*\S) +<L \d+>$", path.read_text(), re.MULTILINE):
                     definition = text if text.startswith("def ") else definition
                     found[definition, text].add(kernel)
+        assert found or not any(test["kernels"] for test in self.tests.values()), f"no source of a kernel in {CACHE}"
         return found
 
     @functools.cached_property

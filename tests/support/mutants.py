@@ -218,9 +218,13 @@ def tests_for(records, path, mutant):
         names = set()
         for record, found in zip(records, levels):
             names |= {n for n in found[level] if n in known and known[n][0] is record} if level < len(found) else set()
-        names = {name for name in names - seen if not known[name][1]["failed"]}
-        seen |= names
-        chosen += in_order([known[name][1] | {"test": now(name)} for name in names if now(name)], device)
+        # What a fixture of a module runs is recorded of the first test that asks for it, and others of the file look at it.
+        files = {known[name][1]["path"] for name in names}
+        beside = {name for name, (_, test) in known.items() if test["path"] in files} - names
+        for group in (names, beside):
+            group = {name for name in group - seen if not known[name][1]["failed"]}
+            seen |= group
+            chosen += in_order([known[name][1] | {"test": now(name)} for name in group if now(name)], device)
         if chosen and level == 0 and not device and inside_function(path, mutant.line):
             break  # a line of a function: other tests of the file do not run it
     return chosen

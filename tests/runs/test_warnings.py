@@ -98,6 +98,19 @@ def test_rotation(method):
     assert result.warning_value[1] == pytest.approx(ABOVE * limit)
 
 
+def test_rotation_on_the_way():
+    # A steady moment about a principal axis: |Omega| = moment t / J. Looks are every 128 steps; the second is too late by 0.2.
+    h, J, seen, limit = 0.01, 2.5, 256, limits.TURNS
+    moment = np.array([1.2, 0.6]) * limit / h * J / (seen * h)
+    scene = scene_of(**PLAIN)
+    scene = lw.Scene(scene.vehicle, scene.environment, [terms.Wrench(torque=(0.0, 0.0, 1.0))])
+    fleet = one(scene, parameters={"wrench.torque": np.outer(moment, [0.0, 0.0, 1.0])})
+    result = lw.solve(fleet, "psi_x", h=h, t1=seen * h, checks="all")
+    assert warned(result, Warnings.ROTATION) == [True, False]
+    assert result.warning_time[0] == seen * h
+    assert result.warning_value[0] == pytest.approx(1.2 * limit, rel=1e-12)
+
+
 def test_explicit_methods_have_their_limits_on_the_imaginary_axis():
     # Orders 3 and 4 with as many stages have the exponential's series: sqrt(3) and 2 sqrt(2).
     known = {"cg3": np.sqrt(3.0), "rk4": 2.0 * np.sqrt(2.0), "rkmk4": 2.0 * np.sqrt(2.0)}

@@ -165,12 +165,15 @@ class Record:
     def kernels(self):
         """(line of def, line) of device code, as texts -> kernels compiled from it."""
         found = defaultdict(set)
-        for kernel in {name for test in self.tests.values() for name in test["kernels"]}:
-            for path in (CACHE / kernel).glob("*.cpp"):
+        # Warp's cache has a folder for each of its versions.
+        folders = {path.name: path for path in (*CACHE.glob("wp_*"), *CACHE.glob("*/wp_*"))}
+        for kernel in {name for test in self.tests.values() for name in test["kernels"]} & folders.keys():
+            for path in folders[kernel].glob("*.cpp"):
                 definition = ""
                 for text in re.findall(r"^ *// (.*\S) +<L \d+>$", path.read_text(), re.MULTILINE):
                     definition = text if text.startswith("def ") else definition
                     found[definition, text].add(kernel)
+        assert found or not any(test["kernels"] for test in self.tests.values()), f"no source of a kernel in {CACHE}"
         return found
 
     @functools.cached_property
@@ -215,9 +218,13 @@ def tests_for(records, path, mutant):
         names = set()
         for record, found in zip(records, levels):
             names |= {n for n in found[level] if n in known and known[n][0] is record} if level < len(found) else set()
-        names = {name for name in names - seen if not known[name][1]["failed"]}
-        seen |= names
-        chosen += in_order([known[name][1] | {"test": now(name)} for name in names if now(name)], device)
+        # What a fixture of a module runs is recorded of the first test that asks for it, and others of the file look at it.
+        files = {known[name][1]["path"] for name in names}
+        beside = {name for name, (_, test) in known.items() if test["path"] in files} - names
+        for group in (names, beside):
+            group = {name for name in group - seen if not known[name][1]["failed"]}
+            seen |= group
+            chosen += in_order([known[name][1] | {"test": now(name)} for name in group if now(name)], device)
         if chosen and level == 0 and not device and inside_function(path, mutant.line):
             break  # a line of a function: other tests of the file do not run it
     return chosen

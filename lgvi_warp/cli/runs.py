@@ -31,6 +31,8 @@ def run_arguments(verb: Any) -> None:
     add_shared(verb, "scene")
     fleet = verb.add_argument_group("what runs")
     add_shared(fleet, "--duration --members --seed --set")
+    fleet.add_argument("--start", metavar="DIR", type=Path,
+                       help="go on from the end of the run in this folder, store or result.npz; --duration counts from t = 0")  # fmt: skip
     _how(verb.add_argument_group("method, step and precision"))
     _solves(verb.add_argument_group("solves and checks"))
     files = verb.add_argument_group("files")
@@ -106,6 +108,7 @@ def run(
     warm = import_in_background()
     from lgvi_warp.calls.solve import solve
 
+    start = end_of_run(chosen)
     suggested = suggestion(scene, chosen, suggest)
     settings = suggested.settings if suggested else {}
     failures = []
@@ -114,7 +117,7 @@ def run(
             result = (simulate or solve)(
                 scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store,
                 executor=chosen.executor, scheduler=chosen.scheduler, only=only,
-                on_block=live_view(scene, address, live), **settings,
+                on_block=live_view(scene, address, live), start=start, **settings,
             )  # fmt: skip
         except MembersFailed as error:
             result, failures = error.result, [str(error)]
@@ -129,6 +132,26 @@ def run(
             raise  # already saved
         raise Ended(rescued(result, out)) from error
     return 1 if print_faults(faults) or all_failed(result) else 0
+
+
+def end_of_run(chosen: argparse.Namespace) -> Any:
+    """Read where the run of --start ended; None without one."""
+    if chosen.start is None:
+        return None
+    if chosen.error is not None:
+        raise SceneError(
+            [f"--start {chosen.start}: does not go with --error, which looks at whole runs; give the step"]
+        )
+    from lgvi_warp.results.result import Result
+    from lgvi_warp.views.pages.report import run_in
+
+    path = chosen.start
+    held = (Result.load(path), path) if path.suffix == ".npz" else run_in(path)
+    if held is None:
+        raise SceneError([f"--start {path}: holds no run; give a folder that lgvi-warp run wrote"])
+    if held[0].end is None:
+        raise SceneError([f"--start {path}: did not keep its end; run it again with the samples of all members"])
+    return held[0].final
 
 
 def live_address(scene: Any, chosen: argparse.Namespace, viewer: Part = None) -> str | None:

@@ -89,7 +89,7 @@ def begun(plan: Plan) -> Plan:
     if final is None:
         return plan
     plan = replace(plan, launches=replace(plan.launches, begins=beginning(plan), recalls=recalls(plan)))
-    needed = FIELDS if plan.launches.begins == GOES_ON_WITHOUT_LEAD else plan.fields
+    needed = FIELDS if not plan.launches.goes_on_exactly else plan.fields
     for name in FIELDS:
         if name in needed and name not in final.states:
             faults.add(name, "...", "was not kept by the run before", f"add {name!r} to its SaveAt(fields=...)")
@@ -130,7 +130,7 @@ def places_of(packets: Packets) -> dict[str, slice]:
 
 def take(packets: Packets, final: Final) -> None:
     """Put what members ended with into their packets, which hold those members from their starts on."""
-    exact, memory = packets.plan.launches.begins == GOES_ON, packets.laws.memory.view
+    exact, memory = packets.plan.launches.goes_on_exactly, packets.laws.memory.view
     half = memory.shape[1] // 2
     lanes = final.lanes
     if exact:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance.beginning import STARTS
+from lgvi_kernels.advance.beginning import GOES_ON, STARTS
 from lgvi_kernels.advance.spec import CHUNK
 from lgvi_warp.methods.saveat import TimeGrid
 
@@ -41,6 +41,11 @@ class Launches:
     def goes_on(self) -> bool:
         """Whether members go on from where another run ended; the tick there was its last one."""
         return self.begins != STARTS
+
+    @property
+    def goes_on_exactly(self) -> bool:
+        """Whether they do so with the states that the kernel had, and so with the bits of one run."""
+        return self.begins == GOES_ON
 
     def beginning(self, k0: int) -> int:
         """How the launch of the steps from k0 on begins."""

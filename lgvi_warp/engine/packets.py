@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.advance.beginning import GOES_ON
 from lgvi_kernels.advance.events import FIRST
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
 from lgvi_kernels.advance.noting import NOTED
@@ -130,7 +129,7 @@ class Packets:
         self._written = True
         if members.final is not None:
             going_on.take(self, members.final)
-            if plan.launches.begins == GOES_ON:
+            if plan.launches.goes_on_exactly:
                 self._warned = going_on.start_warnings(members.final, members.count)
 
     @property

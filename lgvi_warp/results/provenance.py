@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_kernels.advance.beginning import GOES_ON
 from lgvi_warp.common import machine
 from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.plan import Plan
@@ -67,7 +66,7 @@ def starts_at(plan: Plan) -> dict[str, Any]:
         return {"start": {"time": time}} if plan.grid.first else {}
     numbers = {name: getattr(final, name) for name in NUMBERS}
     return {
-        "start": {"time": time, "goes_on": "exactly" if plan.launches.begins == GOES_ON else "from states"}
+        "start": {"time": time, "goes_on": "exactly" if plan.launches.goes_on_exactly else "from states"}
         | {"end": numbers}
     }
 

@@ -2,6 +2,7 @@
 # The public names of this door, one a line.
 
 from lgvi_warp.calls.predict import Prediction as Prediction
+from lgvi_warp.sampling.final import Final as Final
 from lgvi_warp.studies.comparison import Candidate as Candidate
 from lgvi_warp.studies.files import Saved as Saved
 from lgvi_warp.studies.reference import Growth as Growth

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parts of a controller that are wrong: each says key, value and remedy. No kernel is needed."""
 
+import dataclasses
 import pickle
 import re
 import zipfile
@@ -26,6 +27,8 @@ THREE = (1.0, 1.0, 1.0)
     (lambda: lw.control.Trajectory(times=(0.0, 2.0, 1.0), positions=[THREE] * 3), "trajectory.times.*not rising"),
     (lambda: lw.control.Trajectory(times=(0.0, 2.0), positions=[THREE] * 3), "trajectory.positions.*give 2 x 3 numbers"),
     (lambda: lw.control.Trajectory(times=(0.0,), positions=[THREE]), "trajectory.times.*less than two"),
+    (lambda: lw.control.Trajectory(times=(0.0, 1e-200, 1.0), positions=[(0, 0, 0), (1, 0, 0), (2, 0, 0)]),
+     "trajectory.positions.*change by more than 1e\\+15"),
     (lambda: lw.control.ReferenceModel(natural_frequency=THREE),
      "natural_frequency.*has 3 numbers.*2 numbers, of depth and heading"),
     (lambda: lw.control.ReferenceModel(natural_frequency=(1.0, 0.0)), "natural_frequency.*not positive"),
@@ -136,3 +139,12 @@ def test_what_wiring_sets_is_not_given():
     for name, value in {"bus": None, "actuators": {}}.items():
         with pytest.raises(TypeError, match=name):
             lw.Controller(period=0.1, laws=[lw.control.HeadingPID(kp=1.0)], **{name: value})
+
+
+@pytest.mark.parametrize("law", [lw.control.HeavePID, lw.control.SpeedPID, lw.control.HeadingPID, lw.control.DepthPID,
+                                 lw.control.PosePID])  # fmt: skip
+def test_gains_that_are_left_out_are_zero(law):
+    fields = [field for field in dataclasses.fields(law) if field.name.startswith("k")]
+    gains = [field for field in fields if field.default is not dataclasses.MISSING]
+    assert gains
+    assert all(field.default is None or not np.any(field.default) for field in gains), gains

@@ -30,6 +30,7 @@ from lgvi_warp.statistics.base import TYPES, from_list
 from lgvi_warp.statistics.estimates import intervals, sketch
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
 from lgvi_warp.statistics.estimates.tree import Tree
+from lgvi_warp.statistics.passages import PassageCurve
 from lgvi_warp.statistics.until import watch
 from lgvi_warp.statistics.values.values import Values, dealt
 
@@ -199,6 +200,13 @@ def test_first_passage_is_kaplan_and_meiers():
     time = found["passage_time"][1]
     assert found.value[int(np.ceil(time))] >= 0.5 > found.value[int(np.ceil(time)) - 1]
     assert found["passage_time_lower"][1] <= time <= found["passage_time_upper"][1]
+
+
+def test_a_passage_after_a_loss_is_jeffreys():
+    # One of n + 1 is lost before anybody passes: of the n others m pass, which are Beta(m + 1/2, n - m + 1/2).
+    for n, m in ((3, 1), (8, 0), (40, 17)):
+        curve = PassageCurve(np.array([[m]]), np.zeros((1, 1)), np.array([1]), n + 1)
+        assert curve.members[0, 0] == pytest.approx(n, rel=1e-12)
 
 
 def test_a_passage_of_nobody_is_not_known():

@@ -870,6 +870,10 @@ def test_the_largest_error_of_a_fresh_fleet_is_foreseen(law, members):
 
 def test_a_tail_of_few_or_of_equal_errors():
     assert suggest.largest_in_fleet(np.array([1.0, 3.0, 2.0]), 10**6) == 3.0
+    # The quantiles of a power law of their rank: of a fleet one in ten exceeds (members / CHANCE)^a.
+    for a in (0.2, 0.5):
+        errors = (np.arange(1, 4001) / 4000.0) ** -a
+        assert suggest.largest_in_fleet(errors, 10**6) == pytest.approx((10**6 / suggest.CHANCE) ** a, rel=0.5)
     assert suggest.largest_in_fleet(np.full(1000, 2.0), 10**6) == 2.0
     assert suggest.largest_in_fleet(np.zeros(1000), 10**6) == 0.0
 

@@ -7,7 +7,7 @@ import dataclasses
 import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,19 +19,22 @@ from lgvi_warp.engine.packing import name_of
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.sampling.final import MEMORY, Final
 
-if TYPE_CHECKING:
-    from lgvi_warp.engine.packets import Packets
-    from lgvi_warp.engine.plan import Plan
+# A Plan and Packets, whose modules import this one.
+Plan = Any
+Packets = Any
 
 # Parts of a Spec that change no state and nothing that is remembered.
-BESIDE = {"width", "shared_rows", "checked", "warning_rows", "energy", "backward", "substep", "control"}
+BESIDE: dict[str, Any] = dict(
+    width=0, shared_rows=False, checked=True, warning_rows=(), energy=False, backward=False, substep=False, control=None
+)
 
 
 def settings_of(plan: Plan) -> dict[str, Any]:
     """What the states of a plan's packets, and what they remember, depend on beside the members' numbers."""
     spec: Spec = plan.spec
-    parts = [getattr(spec, name) for name in Spec._fields if name not in BESIDE]
-    parts.append((spec.control.parts, spec.control.numbers, spec.control.asked) if spec.control else ())
+    control = spec.control
+    parts = list(spec._replace(**BESIDE))
+    parts.append((control.parts, control.numbers, control.asked) if control else ())
     method = {name: value for name, value in dataclasses.asdict(plan.method).items() if name != "reason"}
     digest = hashlib.sha256(repr((_named(parts), sorted(method.items(), key=str))).encode()).hexdigest()
     return {"method": plan.method.name, "step": plan.grid.h, "dtype": plan.dtype, "kernel": digest}

@@ -6,7 +6,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics.terms import base
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
-from lgvi_warp.sampling.final import Final
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.draws import SceneNumbers, counted, draws_of
@@ -27,6 +26,9 @@ from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.physical_checks import PhysicalChecks
 from lgvi_warp.scene.settings import EnsembleSettings, section
 from lgvi_warp.scene.variations import Target, Variation
+
+if TYPE_CHECKING:
+    from lgvi_warp.sampling.final import Final
 
 
 class Ensemble(Summarized):
@@ -337,6 +339,8 @@ class Ensemble(Summarized):
         Raises:
             SceneError: If it is no end of a run, or of another number of members.
         """
+        from lgvi_warp.sampling.final import Final
+
         if not isinstance(final, Final):
             raise refusal("start", final, "is no end of a run", "give result.final of the run before")
         if final.members != self.members:

@@ -253,7 +253,7 @@ def test_other_numbers_and_states():
     for method, h, dtype, close in (("rk8", 0.01, "float64", 2e-4), ("psi_x", 0.02, "float32", 1e-5)):
         other = lw.solve(fleet, method, h=h, t1=0.4, dtype=dtype, start=first.final)
         np.testing.assert_allclose(other.position[-1], whole.position[-1], atol=close)
-    moved = first.final.changed(position=first.final.position + [1.0, 0.0, 0.0])
+    moved = first.final.changed(position=first.final.position + np.array([1.0, 0.0, 0.0]))
     calm = fleet_of("torpedo", terms=[])
     far = lw.solve(calm, "psi_x", h=STEPS, t1=0.4, start=moved).position[-1]
     near = lw.solve(calm, "psi_x", h=STEPS, t1=0.4, start=first.final).position[-1]

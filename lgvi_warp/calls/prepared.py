@@ -146,6 +146,12 @@ class Prepared:
             fleet = Ensemble.from_states(scene, position, attitude, velocity, angular_velocity, parameters)
             fleet.seed = int(EnsembleSettings(fleet.members, 0 if seed is None else seed).seed)
         else:
+            others = {"attitude": attitude, "velocity": velocity, "angular_velocity": angular_velocity}
+            for name in (name for name, values in others.items() if values is not None):
+                problem = "is given beside the end of a run, which has it"
+                raise refusal(
+                    name, "...", problem, "give parameters=, indices=, seed= or t0= by name, or final.changed(...)"
+                )
             fleet = members_at(scene, final, parameters)
             fleet.seed = final.seed if seed is None else int(EnsembleSettings(fleet.members, seed).seed)
             fleet.indices = final.indices

@@ -32,7 +32,7 @@ def run_arguments(verb: Any) -> None:
     fleet = verb.add_argument_group("what runs")
     add_shared(fleet, "--duration --members --seed --set")
     fleet.add_argument("--start", metavar="DIR", type=Path,
-                       help="go on from the end of the run in this folder, store or result.npz (--duration: from t = 0)")  # fmt: skip
+                       help="go on from the end of the run in this folder, store or result.npz")  # fmt: skip
     _how(verb.add_argument_group("method, step and precision"))
     _solves(verb.add_argument_group("solves and checks"))
     files = verb.add_argument_group("files")

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a measurement makes of an ensemble, on arrays: ensemble Kalman filters, and weights of particles.
+
+An ensemble is (d, n), numbers by member; what it predicts of the measurements is (m, n). Measurements are (m,), their errors
+independent with standard deviations (m,).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def etkf(ensemble: np.ndarray, predicted: np.ndarray, measured: np.ndarray, std: np.ndarray) -> np.ndarray:
+    """The ensemble transform filter: mean and covariance of Kalman's update, without draws.
+
+    Source: Bishop, Etherton & Majumdar (2001), Mon. Wea. Rev. 129; the symmetric root of Wang, Bishop & Julier (2004), which
+    keeps the mean. With S = R^-1/2 Y' / sqrt(n - 1) = U s V^T it costs d n m.
+    """
+    n = ensemble.shape[1]
+    mean, centre = ensemble.mean(axis=1, keepdims=True), predicted.mean(axis=1)
+    A = ensemble - mean
+    S = (predicted - centre[:, None]) / (std[:, None] * np.sqrt(n - 1.0))
+    U, s, V = np.linalg.svd(S, full_matrices=False)
+    B = A @ V.T
+    shift = B @ (s / (1.0 + s * s) * (U.T @ ((measured - centre) / std))) / np.sqrt(n - 1.0)
+    return np.asarray(mean + shift[:, None] + A + B @ ((1.0 / np.sqrt(1.0 + s * s) - 1.0)[:, None] * V))
+
+
+def enkf(
+    ensemble: np.ndarray, predicted: np.ndarray, measured: np.ndarray, std: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """The stochastic filter: every member is moved by Kalman's gain to a measurement with an error of its own.
+
+    Source: Burgers, van Leeuwen & Evensen (1998), Mon. Wea. Rev. 126. The errors drawn have the mean zero.
+    """
+    n = ensemble.shape[1]
+    Y = predicted - predicted.mean(axis=1, keepdims=True)
+    A = ensemble - ensemble.mean(axis=1, keepdims=True)
+    errors = std[:, None] * rng.standard_normal(predicted.shape)
+    errors -= errors.mean(axis=1, keepdims=True)
+    C = Y @ Y.T / (n - 1.0) + np.diag(std * std)
+    return np.asarray(ensemble + A @ Y.T @ np.linalg.solve(C, measured[:, None] + errors - predicted) / (n - 1.0))
+
+
+def log_likelihood(predicted: np.ndarray, measured: np.ndarray, std: np.ndarray) -> np.ndarray:
+    """Logarithm of the density of the measurements given each member, (n,), but for a constant; -inf where it is not known."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = -0.5 * np.sum(((measured[:, None] - predicted) / std[:, None]) ** 2, axis=0)
+    return np.where(np.isfinite(total), total, -np.inf)
+
+
+def normalised(log_weights: np.ndarray) -> np.ndarray:
+    """Weights (n,) with the sum 1 from their logarithms; equal ones where all are zero."""
+    most = log_weights.max()
+    if not np.isfinite(most):
+        return np.full(len(log_weights), 1.0 / len(log_weights))
+    weights = np.exp(log_weights - most)
+    return np.asarray(weights / weights.sum())
+
+
+def effective_number(weights: np.ndarray) -> float:
+    """1 / sum w^2 of weights (n,) with the sum 1: as many members of equal weight would say as much (Kish 1965)."""
+    return float(1.0 / np.sum(weights * weights))
+
+
+def resampled(weights: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Systematic resampling (Kitagawa 1996): indices (n,), i about n w_i times, in rising order."""
+    n = len(weights)
+    places = (rng.uniform() + np.arange(n)) / n
+    steps = np.cumsum(weights)
+    steps[-1] = 1.0
+    return np.searchsorted(steps, places)
+
+
+def jittered(numbers: np.ndarray, discount: float, rng: np.random.Generator) -> np.ndarray:
+    """Numbers (d, n) drawn to their mean and spread anew, with the mean and the covariance that they have.
+
+    Source: Liu & West (2001), Combined parameter and state estimation in simulation-based filtering.
+    """
+    a = (3.0 * discount - 1.0) / (2.0 * discount)
+    mean = numbers.mean(axis=1, keepdims=True)
+    values, axes = np.linalg.eigh(np.atleast_2d(np.cov(numbers)))
+    root = axes * np.sqrt(np.maximum(values, 0.0))
+    draws = root @ rng.standard_normal(numbers.shape)
+    return np.asarray(a * numbers + (1.0 - a) * mean + np.sqrt(1.0 - a * a) * draws)

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Members as columns of numbers that a filter moves: states, attitudes about their mean, and the numbers to learn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.physics import notation
+from lgvi_warp.physics.notation import matrix_from_rotation_vector
+from lgvi_warp.scene.variations import Target
+
+VECTORS = ("position", "velocity", "angular_velocity")
+
+
+def mean_attitude(attitude: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The rotation (3, 3) nearest to the weighted mean of rotations (n, 3, 3)."""
+    U, _, V = np.linalg.svd(np.einsum("n,nij->ij", weights, attitude))
+    return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V)
+
+
+def rotation_vectors(attitude: np.ndarray) -> np.ndarray:
+    """Axes times angles (n, 3) of rotations (n, 3, 3)."""
+    q = notation.quaternion_from_matrix(attitude)
+    size = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
+    angle = 2.0 * np.arctan2(size, q[:, :1])
+    return np.asarray(np.divide(angle, size, out=np.full_like(size, 2.0), where=size > 1e-12) * q[:, 1:])
+
+
+def rows_of(
+    states: Mapping[str, np.ndarray], learned: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(ensemble (d, n), mean attitude): position, velocity, angular velocity, turn from the mean attitude, learned numbers."""
+    centre = mean_attitude(states["attitude"], weights)
+    turns = rotation_vectors(np.einsum("ji,njk->nik", centre, states["attitude"]))
+    return np.concatenate([*(states[name].T for name in VECTORS), turns.T, learned]), centre
+
+
+def states_of(ensemble: np.ndarray, centre: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """(states (n, ...) by field, learned numbers (p, n)) of an ensemble (d, n)."""
+    states = {name: ensemble[3 * i : 3 * i + 3].T.copy() for i, name in enumerate(VECTORS)}
+    attitude = centre @ matrix_from_rotation_vector(ensemble[9:12].T)
+    # Products of rotations, but for round-off, which a run would refuse after many updates.
+    U, _, V = np.linalg.svd(attitude)
+    states["attitude"] = U @ V
+    return states, ensemble[12:]
+
+
+def learned_rows(targets: Sequence[Target], parameters: Mapping[str, np.ndarray], members: int) -> np.ndarray:
+    """The numbers to learn, (p, n), out of the members' parameters by name."""
+    rows = [np.empty((0, members))]
+    for target in targets:
+        values = np.broadcast_to(parameters[target.name], (members, *parameters[target.name].shape[1:]))
+        rows.append(np.stack([np.asarray(target.of(value), float).reshape(-1) for value in values], axis=1))
+    return np.concatenate(rows)
+
+
+def as_columns(targets: Sequence[Target], rows: np.ndarray, parameters: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """The numbers to learn by label, (n, ...), as `run.states` takes them."""
+    columns: dict[str, Any] = {}
+    first = 0
+    for target in targets:
+        shape = np.shape(target.of(parameters[target.name][0]))
+        count = int(np.prod(shape, dtype=int))
+        columns[target.label] = rows[first : first + count].T.reshape(-1, *shape)
+        first += count
+    return columns

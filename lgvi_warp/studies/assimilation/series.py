@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What was measured: one instrument's values at its times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.results.quantities import OfResult, quantities
+
+# Quantities that are angles: a measurement differs from a prediction by less than half a turn.
+ANGLES = ("euler[0]", "euler[1]", "euler[2]", "heading")
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Values that an instrument measured, with independent normal errors.
+
+    Args:
+        of: What it measures: "position", "depth", "velocity", "euler[2]", a Quantity or a function, as of `lw.prepare`.
+        time: Rising times (k,) [s], from 0.
+        values: Measured values, (k,) or (k, m) of m numbers; NaN for one that is missing.
+        std: Standard deviation of the errors, a number or (m,), in the unit of the values.
+
+    Raises:
+        SceneError: If an argument is at fault; the message names every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fixes = lw.studies.Series("position", [10.0, 20.0], [[15.0, 0.2, 3.0], [30.1, 0.3, 3.1]], std=[0.5, 0.5, 0.1])
+        >>> fixes.values.shape
+        (2, 3)
+    """
+
+    of: Any
+    time: Any
+    values: Any
+    std: Any
+
+    def __post_init__(self) -> None:
+        faults = Faults("series.")
+        time, values, std = (faults.real(name, getattr(self, name)) for name in ("time", "values", "std"))
+        if time is not None and (time.ndim != 1 or not len(time) or np.any(np.diff(time) <= 0.0) or time[0] < 0.0):
+            faults.add("time", self.time, "is no rising list of times >= 0", "sort it and drop repetitions")
+        if values is not None and time is not None and (values.ndim not in (1, 2) or len(values) != time.size):
+            faults.add("values", self.values, f"has shape {values.shape}", f"give {time.size} rows, one for each time")
+        if std is not None and (std.ndim > 1 or not np.all(std > 0.0)):
+            faults.add("std", self.std, "is not positive", "give the standard deviation of the error")
+        with faults.including():
+            if len(quantities(self.of)) != 1:
+                faults.add("of", self.of, "names several quantities", "give a Series for each instrument")
+        faults.raise_if_any()
+        assert time is not None
+        assert values is not None
+        assert std is not None
+        columns = values.reshape(len(values), -1)
+        if std.ndim and len(std) != columns.shape[1]:
+            faults.add("std", self.std, f"has {len(std)} numbers", f"give one, or {columns.shape[1]}")
+            faults.raise_if_any()
+        for name, array in (("time", time), ("values", columns), ("std", np.broadcast_to(std, columns.shape[1]))):
+            object.__setattr__(self, name, np.array(array))
+
+    @property
+    def quantity(self) -> OfResult:
+        """What it measures, as a quantity of a result."""
+        return quantities(self.of)[0]
+
+    @property
+    def label(self) -> str:
+        """Its name."""
+        return self.quantity.label
+
+    def at(self, time: float) -> np.ndarray | None:
+        """The values (m,) that were measured at a time [s]; None for none."""
+        rows = np.flatnonzero(np.abs(self.time - time) <= 1e-9 * max(1.0, time))
+        return np.asarray(self.values[rows[0]]) if len(rows) else None
+
+    def near(self, measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
+        """Predictions (m, n) of the measured values (m,): of angles those within half a turn of them."""
+        if self.label not in ANGLES:
+            return predicted
+        apart = predicted - measured[:, None]
+        return np.asarray(predicted - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)))

@@ -79,12 +79,7 @@ class Assimilated(Summarized):
         Returns:
             A table with a column for each number.
         """
-        columns = dict[str, np.ndarray]()
-        for name, values in self.parameters.items():
-            for index in np.ndindex(values.shape[1:]):
-                label = f"{name}[{','.join(map(str, index))}]" if index else name
-                columns[label] = values[(slice(None), *index)]
-        return Table(columns)
+        return Table(values=dict(self.parameters))
 
 
 def _text(values: Any) -> str:

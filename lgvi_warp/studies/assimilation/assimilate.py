@@ -195,7 +195,7 @@ class _Track:
         self.log_weights = np.zeros(n)
         self.indices, self.fresh = np.array(members.indices), int(np.max(members.indices)) + 1
         self.time = 0.0
-        self.states = {name: np.array(getattr(members, name)) for name in FIELDS}
+        self.states: dict[str, Any] = {name: np.array(getattr(members, name)) for name in FIELDS}
         self.learned = learned_rows(self.targets, members.parameters, n)
         # Set by the first run.
         self.final: Final | None = None
@@ -207,9 +207,8 @@ class _Track:
         columns = as_columns(self.targets, self.learned, self.parameters)
         if self.final is None:
             varied = {name: values for name, values in self.parameters.items() if len(values) > 1}
-            states = [self.states[name] for name in FIELDS]
-            numbers = _merged(varied, columns)
-            result = run.states(*states, numbers or None, indices=self.indices, seed=self.fleet.seed)
+            numbers = _merged(varied, columns) or None
+            result = run.states(**self.states, parameters=numbers, indices=self.indices, seed=self.fleet.seed)
         else:
             result = run.states(self.final, parameters=columns or None, indices=self.indices, seed=self.fleet.seed)
         self.result, self.final, self.time = result, result.final, time

@@ -192,3 +192,22 @@ def test_what_is_refused():
     }.items():
         with pytest.raises(lw.SceneError, match=re.escape(message)):
             call()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("filter", ["etkf", "enkf"])
+def test_vehicles_are_as_sure_as_they_should_be(filter):
+    """500 vehicles from the members' own distributions: e^T P^-1 e of place and current is chi squared with two degrees."""
+    rng, n, nees = np.random.default_rng(17), 400, []
+    for seed in range(500):
+        truth = np.array([rng.normal(), 0.3 * rng.normal(), 0.2 + 0.2 * rng.normal()])
+        y = design(TIMES) @ truth + 0.2 * rng.normal(size=3)
+        fleet = drifting(n).with_seed(seed)
+        fixes = lw.studies.Series("position[0]", TIMES, y, 0.2)
+        answer = lw.assimilate(fleet, fixes, ["current.velocity[0]"], filter=filter, method="rk4", h=0.1, seed=seed)
+        z = np.stack([answer.final.position[:, 0], answer.parameters["current.velocity[0]"]])
+        e = np.array([design(TIMES[-1])[0] @ truth, truth[2]]) - z.mean(axis=1)
+        nees.append(e @ np.linalg.solve(np.cov(z), e))
+    low, high = stats.chi2.ppf([0.001, 0.999], 2 * len(nees)) / len(nees)
+    # Of n members the inverse of a covariance is too large by (n - 1) / (n - 4), and its mean by as much again.
+    assert low < np.mean(nees) / ((n - 1.0) / (n - 4.0)) ** 2 < high

@@ -289,6 +289,16 @@ def test_damaged_times_are_mended_by_the_same_run(copy, whole):
     assert differing(whole, copy) == []
 
 
+def test_metadata_of_the_root_are_mended(copy, whole):
+    # The root repeats what each array says of itself: xarray would believe the root.
+    content = json.loads((copy / "zarr.json").read_text())
+    content["consolidated_metadata"]["metadata"]["position"]["attributes"]["units"] = "km"
+    (copy / "zarr.json").write_text(json.dumps(content))
+    lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
+    assert differing(whole, copy) == []
+    assert lw.open_run(copy).dataset.position.attrs["units"] == "m"
+
+
 def test_lost_times_are_not_taken_for_nan(copy, whole):
     """A missing chunk reads as NaN: a run that went on with that would write it down as right."""
     for name in ("time/c.0", "step/c.0"):

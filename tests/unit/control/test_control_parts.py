@@ -45,7 +45,7 @@ def test_what_is_wrong_is_said(make, said):
 
 
 def test_lambda_is_a_key_of_scenes_and_of_members():
-    law = lw.control.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0)
+    law = lw.control.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=0.2, nomoto_gain=1.0)
     assert law.to_dict()["lambda"] == 0.4
     assert "lambda" in law.parameters()
     assert "lambda_" not in law.to_dict()

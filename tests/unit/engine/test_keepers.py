@@ -7,6 +7,7 @@ import numpy as np
 
 import lgvi_warp as lw
 from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.keepers.statistics import Gathered
 
 
@@ -21,3 +22,10 @@ def test_statistics_are_sent_without_what_they_gathered():
     received = pickle.loads(sent)
     assert received.statistics[0].key == statistics[0].key
     assert received.time.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_members_beyond_those_that_ran_are_not_run_again():
+    status = np.zeros(5, np.uint8)
+    assert Observation(keep=(2, 5, 7)).again(status).tolist() == [2]
+    assert Observation(keep="failed").again(np.array([0, 3, 0])).tolist() == [1]
+    assert Observation(keep="none").again(status).tolist() == []

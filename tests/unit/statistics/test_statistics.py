@@ -962,3 +962,17 @@ def test_an_interval_of_replicates_has_the_dimensions_of_its_value():
     assert {name: values.dims for name, values in found.dataset.items()} == dict.fromkeys(
         ("value", "lower", "upper"), ("time", "x")
     )
+
+
+def test_parts_wait_in_the_order_of_their_blocks():
+    # Block 3 is still to come: the parts cover 0 and 1, 2, and 4 to 7.
+    tree = Tree(lambda first, second, place: {"n": np.concatenate([first["n"], second["n"]])})
+    for block in (5, 0, 7, 2, 4, 1, 6):
+        tree.add(block, {"n": np.array([block])})
+    assert [part["n"].tolist() for part in tree.parts()] == [[0, 1], [2], [4, 5, 6, 7]]
+
+
+def test_a_member_with_a_missing_component_is_not_counted():
+    x = np.array([[[1.0, np.nan], [2.0, 3.0], [np.nan, np.nan]]])
+    found = of(MemberValues, x)
+    assert found["count"].tolist() == [1]

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lgvi_warp.physics.given_draws import GivenDraws
+
 
 @dataclass(frozen=True, eq=False)
 class Members:
     """Parameters by name, with a leading dimension of 1 (shared) or m (varied), and initial states of m members.
 
     Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
-    angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole.
+    angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole,
+    unless its normals are given.
     """
 
     parameters: dict[str, np.ndarray]
@@ -23,6 +26,7 @@ class Members:
     angular_velocity: np.ndarray
     indices: np.ndarray
     seed: int
+    given: GivenDraws | None = None
 
     @property
     def count(self) -> int:

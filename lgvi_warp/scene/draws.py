@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, cut
 from lgvi_warp.physics import notation
+from lgvi_warp.physics.given_draws import GivenDraws
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.sampling.members import Members
@@ -142,8 +143,10 @@ class Draws:
                 own.add(target.name)
         return values
 
-    def members_of(self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int) -> Members:
-        """Members from all their numbers by name, which loses those of the start."""
+    def members_of(
+        self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int, given: GivenDraws | None = None
+    ) -> Members:
+        """Members from all their numbers by name, which loses those of the start; given: their noise, None for counters'."""
         m = len(indices)
         start = {key.removeprefix("start."): values.pop(key) for key in self._start_names}
         # In one memory layout, on which the order of the sums of a matrix product depends.
@@ -155,7 +158,7 @@ class Draws:
         else:
             nu = start["velocity"]
         R, position, nu, Om = (_of_each(x, m) for x in (R, start["position"], nu, start["angular_velocity"]))
-        return Members(values, position, R, nu, Om, indices, seed)
+        return Members(values, position, R, nu, Om, indices, seed, given)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
         """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""

@@ -15,6 +15,7 @@ from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import Faults, brief, ragged, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.summaries import Summarized
+from lgvi_warp.physics.given_draws import GivenDraws
 from lgvi_warp.physics.terms import base
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
@@ -185,6 +186,8 @@ class Ensemble(Summarized):
         self._draws = draws_of(scene, settings, explicit)
         # What keys the members' noise; None: their positions in the whole ensemble.
         self._indices: np.ndarray | None = None
+        # Standard normals of the members' noise, in place of those that counters give; None for these.
+        self.given: GivenDraws | None = None
         self._check_physical(checked)
 
     @property
@@ -300,7 +303,8 @@ class Ensemble(Summarized):
         """
         if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
             raise IndexError(f"members {first} to {stop} of {self.members}")
-        return self._draws.members_of(self._values(first, stop), self.indices_of(first, stop), self.seed)
+        given = None if self.given is None else self.given.of_members(slice(first, stop))
+        return self._draws.members_of(self._values(first, stop), self.indices_of(first, stop), self.seed, given)
 
     def varied(self) -> list[str]:
         """Return the names of the parameters that vary from member to member.
@@ -342,6 +346,7 @@ class Ensemble(Summarized):
         places = chosen if self._draws.places is None else self._draws.places[chosen]
         ensemble = self._drawing(places=places)
         ensemble._indices = None if self._indices is None else self._indices[chosen]
+        ensemble.given = None if self.given is None else self.given.of_members(chosen)
         # Some of these may lie beyond the members that were checked.
         ensemble.checked = len(chosen) if self.checked == self.members else 0
         return ensemble
@@ -350,6 +355,19 @@ class Ensemble(Summarized):
         """Return a copy whose numbers are drawn in another way."""
         ensemble = copy.copy(self)
         ensemble._draws = replace(self._draws, **changes)
+        return ensemble
+
+    def with_given(self, given: GivenDraws | None) -> Ensemble:
+        """Return the same members with other noise.
+
+        Args:
+            given: Standard normals of each, or one row of them for all; None for those of counters.
+
+        Returns:
+            The ensemble.
+        """
+        ensemble = copy.copy(self)
+        ensemble.given = given
         return ensemble
 
     def with_columns(self, columns: Mapping[str, np.ndarray]) -> Ensemble:

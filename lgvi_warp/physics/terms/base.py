@@ -16,6 +16,7 @@ import numpy as np
 from lgvi_warp.common import names, registry
 from lgvi_warp.common.declared import read
 from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
+from lgvi_warp.physics.given_draws import GivenDraws
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.notation import repeated
 
@@ -39,6 +40,7 @@ class PackingContext:
         h: Step [s].
         aligned: Whether, for every member of the run, the kernel's axes are the user's up to their order and sense, and the
             origin of the forces is the user's; False by default.
+        given: The standard normals of these members, where the call gives them; None, the default, for those of counters.
     """
 
     parameters: Numbers
@@ -47,6 +49,7 @@ class PackingContext:
     seed: int
     h: float
     aligned: bool = False
+    given: GivenDraws | None = None
 
     def own(self, term: Term) -> dict[str, np.ndarray]:
         """The numbers of one term.
@@ -70,12 +73,15 @@ class Packed(NamedTuple):
             with an n of its own; None for none.
         memory: What the term remembers from step to step, at the start, shape (n, rows); None for none.
         work: Number of scratch rows that the device code may overwrite during one call.
+        normals: Standard normals that the call gives it, shape (n, rows): more rows of the table, behind its own, where the
+            field `key` of the struct finds them; None for none.
     """
 
     values: dict[str, Any]
     rows: np.ndarray | tuple[np.ndarray, ...] | None = None
     memory: np.ndarray | None = None
     work: int = 0
+    normals: np.ndarray | None = None
 
 
 def number(

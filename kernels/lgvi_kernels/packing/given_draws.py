@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Standard normals that a call gives in place of those of counters: rows of a law in the table, and the keys that find them.
+
+Only a kernel whose run is given its draws imports this file. A family's overloads do not count in a kernel's hash (see
+lanes/overloads.py): so the names of the keys have this file's text in them.
+"""
+
+import functools
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes import overloads
+from lgvi_kernels.lanes.arithmetic import add, div, mul, ones, struct, vec3  # noqa: F401
+from lgvi_kernels.lanes.functions import root
+from lgvi_kernels.lanes.noise import normals_over, wandered  # noqa: F811
+from lgvi_kernels.lanes.view import row1, row3
+
+_DIGEST = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
+
+
+@functools.cache
+def given_key():
+    """The struct of a law's key, in place of those of lanes/noise.py.
+
+    row: of its first normal; apart: rows from there to those of stream 1; draws: how many a step of the run takes.
+    """
+    return struct(f"GivenKey_{_DIGEST}", row=wp.int32, apart=wp.int32, draws=wp.int32)
+
+
+@functools.cache
+def given_ticks():
+    """The struct of a sensor's key. row: of its first normal; noise, drift, dropout: rows from there to those of each."""
+    return struct(f"GivenTicks_{_DIGEST}", **dict.fromkeys(("row", "noise", "drift", "dropout"), wp.int32))
+
+
+@wp.func
+def normals_of_draw(view: Any, key: Any, stream: int, draw: int):
+    """Three standard normals of one draw."""
+    return row3(view, key.row + stream * key.apart + 3 * draw)
+
+
+GivenKey = given_key()
+
+
+# One draw a step is divided by the root of 1: the bits of a key without a grid.
+@overloads.func
+def normals_over(view: Any, key: GivenKey, stream: int):  # noqa: F811
+    first = view.step * key.draws
+    total = normals_of_draw(view, key, stream, first)
+    for j in range(1, key.draws):
+        total = total + normals_of_draw(view, key, stream, first + j)
+    unity = ones(view.b.x)
+    return (unity / root(view.h.dtype(key.draws) * unity)) * total
+
+
+@overloads.func
+def wandered(view: Any, key: GivenKey, stream: int, u: Any, decay: Any, spread: Any):  # noqa: F811
+    first = view.step * key.draws
+    for j in range(key.draws):
+        u = decay * u + spread * normals_of_draw(view, key, stream, first + j)
+    return u
+
+
+@wp.func
+def scalar_of_tick(y: Any, first: int):
+    """The one normal of this tick, of those from row `first` on."""
+    return row1(y, first + y.tick)
+
+
+@wp.func
+def vector_of_tick(y: Any, first: int):
+    """The three normals of this tick."""
+    return row3(y, first + 3 * y.tick)
+
+
+@wp.func
+def first_of_tick(y: Any, first: int):
+    """The one normal of this tick as a 3-vector."""
+    x = row1(y, first + y.tick)
+    zero = ones(x) - ones(x)
+    return vec3(x, zero, zero)

@@ -13,9 +13,8 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes import overloads
-from lgvi_kernels.lanes.arithmetic import add, div, mul, ones, struct, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import root
-from lgvi_kernels.lanes.noise import normals_over, wandered  # noqa: F811
+from lgvi_kernels.lanes.arithmetic import ones, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.noise import declare_gridded, normals_of
 from lgvi_kernels.lanes.view import row1, row3
 
 _DIGEST = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
@@ -36,32 +35,16 @@ def given_ticks():
     return struct(f"GivenTicks_{_DIGEST}", **dict.fromkeys(("row", "noise", "drift", "dropout"), wp.int32))
 
 
-@wp.func
-def normals_of_draw(view: Any, key: Any, stream: int, draw: int):
-    """Three standard normals of one draw."""
-    return row3(view, key.row + stream * key.apart + 3 * draw)
-
-
 GivenKey = given_key()
 
 
-# One draw a step is divided by the root of 1: the bits of a key without a grid.
 @overloads.func
-def normals_over(view: Any, key: GivenKey, stream: int):  # noqa: F811
-    first = view.step * key.draws
-    total = normals_of_draw(view, key, stream, first)
-    for j in range(1, key.draws):
-        total = total + normals_of_draw(view, key, stream, first + j)
-    unity = ones(view.b.x)
-    return (unity / root(view.h.dtype(key.draws) * unity)) * total
+def normals_of(view: Any, key: GivenKey, stream: int, draw: int):  # noqa: F811
+    return row3(view, key.row + stream * key.apart + 3 * draw)
 
 
-@overloads.func
-def wandered(view: Any, key: GivenKey, stream: int, u: Any, decay: Any, spread: Any):  # noqa: F811
-    first = view.step * key.draws
-    for j in range(key.draws):
-        u = decay * u + spread * normals_of_draw(view, key, stream, first + j)
-    return u
+# Without a grid a step takes one draw: 1 times it over the root of 1.
+declare_gridded(GivenKey)
 
 
 @wp.func

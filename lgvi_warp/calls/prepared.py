@@ -184,7 +184,7 @@ class Prepared:
         more = fleet.varied_names - self.noise.varied
         if more and draw_layout(fleet.scene, fleet.varied_names, self.noise.grid) != given.layout:
             remedy = "name what varies as the run is prepared: prepare(scene, vary=[...])"
-            named = ", ".join(sorted(more))
+            named = ", ".join(sorted(name for name in more if not name.startswith("start.")))
             raise refusal("parameters", named, "make something draw that run.draws does not list", remedy)
         return fleet.with_given(given)
 

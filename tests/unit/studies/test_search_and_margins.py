@@ -155,7 +155,9 @@ def test_numbers_of_quantities_and_of_metrics(monkeypatch):
         (((scene, names, interest), settings),) = told.asked
         assert (scene, names, settings) == (SCENE, None, {"failed": "nan", "h": 0.1})
         assert (interest.label, interest.fields, interest.may_be_infinite) == ("iae depth", ("position",), True)
-        assert [(name, metric.key) for name, metric in interest.gathered(()).items()] == [("each iae depth", "iae depth")]
+        assert [(name, metric.key) for name, metric in interest.gathered(()).items()] == [
+            ("each iae depth", "iae depth")
+        ]
         each = SimpleNamespace(value=np.array([[[1.0, 2.0, np.inf]]]))
         status = np.array([0, lw.Status.NON_FINITE, lw.Status.FLOOR], np.uint8)
         result = SimpleNamespace(status=status, statistics={"each iae depth": each})

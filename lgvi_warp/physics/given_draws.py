@@ -71,7 +71,7 @@ class DrawTimes(NamedTuple):
     """When a term or a sensor draws: time between two draws [s], and their number."""
 
     spacing: float
-    count: int
+    draws: int
 
 
 class DrawLayout:
@@ -85,7 +85,7 @@ class DrawLayout:
         draws, self._by_key, column = list[Draws](), dict[str, dict[str, Draws]](), 0
         for key, each, times in streams:
             for source in sorted(each, key=lambda stream: stream.at_start):
-                count = 1 if source.at_start else times.count
+                count = 1 if source.at_start else times.draws
                 entry = Draws(key, source.name, 0.0, times.spacing, count, source.size, column, source)
                 column += entry.numbers
                 draws.append(entry)

@@ -70,7 +70,8 @@ def test_a_call_has_the_bits_of_the_counters():
 
 SETTINGS = [
     ("psi_x", "float32", None, "stationary"), ("psi_x", "float32_compensated", H / 2, "zero"),
-    ("psi_s", "float64", H / 2, "zero"), ("psi_s", "float64", None, "stationary"), ("psi_w", "float64", H / 4, "zero"), ("rk4", "float64", None, None),
+    ("psi_s", "float64", H / 2, "zero"), ("psi_s", "float64", None, "stationary"),
+    ("psi_w", "float64", H / 4, "zero"), ("rk4", "float64", None, None),
     ("rk8", "float64", H / 2, None), ("rkmk4", "float32", None, None),
 ]  # fmt: skip
 
@@ -98,7 +99,8 @@ def test_what_is_drawn_is_listed(both):
         ("wrench_noise", "force", 0.0, H, 10, 3), ("wrench_noise", "torque", 0.0, H, 10, 3),
         ("gauss_markov_current", "current", 0.0, H, 10, 3),
         ("compass", "noise", 0.0, 2 * H, 6, 1), ("compass", "drift", 0.0, 2 * H, 6, 1),
-        ("compass", "dropout", 0.0, 2 * H, 6, 1), ("gyro", "noise", 0.0, 2 * H, 6, 3), ("gyro", "drift", 0.0, 2 * H, 6, 3), ("gyro", "dropout", 0.0, 2 * H, 6, 1),
+        ("compass", "dropout", 0.0, 2 * H, 6, 1), ("gyro", "noise", 0.0, 2 * H, 6, 3),
+        ("gyro", "drift", 0.0, 2 * H, 6, 3), ("gyro", "dropout", 0.0, 2 * H, 6, 1),
     ]  # fmt: skip
     columns = np.concatenate([np.arange(150)[entry.columns] for entry in given.draws])
     np.testing.assert_array_equal(columns, np.arange(150))

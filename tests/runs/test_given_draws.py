@@ -3,12 +3,16 @@
 
 import pickle
 import re
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+import warp as wp
 from scipy import stats
 
 import lgvi_warp as lw
+from lgvi_kernels.law import add, div, mul, normals_over, ones, root  # noqa: F401
 
 pytestmark = pytest.mark.kernel
 
@@ -182,6 +186,40 @@ def test_a_current_starts_where_it_is_told():
     xi[:, -3:] = np.random.default_rng(2).normal(size=(300, 3))
     # After forty times the time constant of the drag the body moves with the water, which keeps its velocity.
     np.testing.assert_allclose(run(X, xi), xi[:, -3:] * [0.1, 0.2, 0.3], rtol=0.0, atol=1e-6)
+
+
+@wp.func
+def gust_law(w: Any, view: Any, p: Any):
+    unity = ones(view.b.x)
+    w.force = w.force + (unity / root(view.h * unity)) * (p.strength * normals_over(view, p.key, 1))
+    return w
+
+
+class Device:
+    NOISE = True
+    law = gust_law
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Gust(lw.laws.NoisyTerm):
+    type: ClassVar[str] = "gust_of_given_draws"
+    device: ClassVar[Any] = Device
+    strength: Any = lw.laws.number((3,), "N s^1/2", axes="vector")
+
+
+def test_a_law_of_a_user_takes_them_too():
+    """Between rows of others, held to its own: the sum of its second stream, as a force that is held over a step."""
+    scene = lw.Scene(
+        BODY, terms=[lw.terms.WrenchNoise(force=(1e-30, 0.0, 0.0)), Gust(strength=STRENGTH, noise_step=H / 2)]
+    )
+    given, drawn = pair(scene, of="velocity", method="rk4")
+    assert [(entry.of, entry.stream, entry.count) for entry in given.draws] == [
+        ("wrench_noise", "force", 10), ("gust_of_given_draws", "0", 20), ("gust_of_given_draws", "1", 20)]  # fmt: skip
+    xi = lw.uq.draws_of(given, INDICES)
+    found = given(X, xi)
+    np.testing.assert_array_equal(found, drawn(X, indices=INDICES))
+    impulse = np.sqrt(H / 2) * STRENGTH * xi[:, -60:].reshape(300, 20, 3).sum(axis=1)
+    np.testing.assert_allclose(found, X * [0.0, 0.0, 1.0] + impulse / MASS, rtol=0.0, atol=1e-13)
 
 
 # Calls of other kinds -----------------------------------------------------------------------------------------------------

@@ -309,8 +309,8 @@ def prepare(
     Args:
         fleet: A Scene or an Ensemble; its [ensemble] is used where `vary` is None.
         vary: Names of what varies, ["vehicle.mass", "start.position[2]"], or a mapping of names to distributions.
-        of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result. Default
-            None: calls return results.
+        of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result; "outcome
+            floor"; a metric as of `lw.sweep`, "iae depth", lw.metrics.ITAE("depth"). Default None: calls return results.
         method: As of `lw.solve`, but where it is left out, chosen once, for `fleet`. What else is left out, of h, t1, dtype,
             width, checks, on_failure, device, threads, executor and scheduler, is taken from the scene's [run].
         h: Step [s].
@@ -322,7 +322,7 @@ def prepare(
             joint distributions need it. Default False.
         failed: "refuse" (default) for an error where members fail, "nan" for NaN in their place; for `of` only.
         common_noise: Whether forces with noise act on every member alike. Default False.
-        draws: "drawn" (default): counters draw noise of forces and sensors; "given": each call gives the standard normals,
+        draws: "drawn" (default): counters draw the noise of forces and sensors; "given": each call gives the standard normals,
             run(X, xi), as `draws` of the run lists them.
         threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less than a
             million steps of vehicles).

@@ -17,7 +17,7 @@ from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.physics.given_draws import Draws, GivenDraws
+from lgvi_warp.physics.given_draws import GivenDraws, NoiseDraws
 from lgvi_warp.results.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.runs.request import ensemble_of, scene_of
 from lgvi_warp.sampling.designs.designs import salib_problem
@@ -74,7 +74,7 @@ class Prepared:
         self._levels, self._refuse, self.common_noise, self.noise = levels, refuse, common_noise, noise
 
     @property
-    def draws(self) -> tuple[Draws, ...]:
+    def draws(self) -> tuple[NoiseDraws, ...]:
         """What noise and sensors draw in a call: standard normals, the columns of xi in this order; none without noise."""
         return self.noise.layout.draws
 

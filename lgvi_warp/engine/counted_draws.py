@@ -14,7 +14,7 @@ from lgvi_kernels.packing.counted_draws import make_counted_draws
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.arrays import put
-from lgvi_warp.physics.given_draws import DrawLayout, Draws
+from lgvi_warp.physics.given_draws import DrawLayout, NoiseDraws
 from lgvi_warp.physics.terms.noisy import normals_at_start, words_of
 
 # Numbers that are drawn at once: what lies in lanes is turned into rows in pieces that stay in the caches.
@@ -42,7 +42,7 @@ def counted_draws(layout: DrawLayout, seed: int, members: np.ndarray, width: int
     return values
 
 
-def _of_stream(entry: Draws, seed: int, members: np.ndarray, width: int, real: Any) -> np.ndarray:
+def _of_stream(entry: NoiseDraws, seed: int, members: np.ndarray, width: int, real: Any) -> np.ndarray:
     """Normals (n, numbers) of one stream."""
     packets, words = -(-len(members) // width), words_of(seed, entry.of)
     keys = wp.zeros(packets, dtype=int_lane(width), device="cpu")

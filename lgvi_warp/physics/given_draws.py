@@ -27,7 +27,7 @@ class Stream(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Draws:
+class NoiseDraws:
     """Standard normals that one stream of a noisy term, or of a sensor, takes of a run.
 
     Attributes:
@@ -82,11 +82,11 @@ class DrawLayout:
     """
 
     def __init__(self, streams: Iterable[tuple[str, Sequence[Stream], DrawTimes]]):
-        draws, self._by_key, column = list[Draws](), dict[str, dict[str, Draws]](), 0
+        draws, self._by_key, column = list[NoiseDraws](), dict[str, dict[str, NoiseDraws]](), 0
         for key, each, times in streams:
             for source in sorted(each, key=lambda stream: stream.at_start):
                 count = 1 if source.at_start else times.draws
-                entry = Draws(key, source.name, 0.0, times.spacing, count, source.size, column, source)
+                entry = NoiseDraws(key, source.name, 0.0, times.spacing, count, source.size, column, source)
                 column += entry.numbers
                 draws.append(entry)
                 self._by_key.setdefault(key, {})[source.name] = entry
@@ -97,10 +97,10 @@ class DrawLayout:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def __iter__(self) -> Iterator[Draws]:
+    def __iter__(self) -> Iterator[NoiseDraws]:
         return iter(self.draws)
 
-    def of(self, key: str) -> Mapping[str, Draws]:
+    def of(self, key: str) -> Mapping[str, NoiseDraws]:
         """The draws of a term or a sensor by stream.
 
         Args:

@@ -25,7 +25,7 @@ from lgvi_warp.statistics.member_metrics import gathered_name, metric_of, names_
 from lgvi_warp.statistics.outcomes import EndTime
 from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values.functional import Functional, functional
-from lgvi_warp.statistics.values.quantity import Quantity
+from lgvi_warp.statistics.values.quantity import KNOWN, Quantity
 
 REMEDY = 'write "position[2]", "depth", "norm(velocity)", "max(depth)", "iae depth", or give a function of a Result'
 
@@ -322,8 +322,14 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
 
 
 def names_a_metric(request: Any) -> bool:
-    """Whether what is asked for is a metric; a text of how members ended is none."""
-    return names_a_statistic(request) and not (isinstance(request, str) and request.startswith(ENDS))
+    """Whether what is asked for is a metric: a text of how members ended is none, and "energy" is that at the end."""
+    a_quantity = isinstance(request, str) and request in KNOWN
+    return names_a_statistic(request) and not names_an_end(request) and not a_quantity
+
+
+def names_an_end(request: Any) -> bool:
+    """Whether what is asked for is how or when members ended."""
+    return isinstance(request, str) and request.startswith(ENDS)
 
 
 def _of_samples(function: Callable[..., Any]) -> bool:

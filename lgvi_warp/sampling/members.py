@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lgvi_warp.physics.given_draws import GivenDraws
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import GivenDraws
 
 
 @dataclass(frozen=True, eq=False)

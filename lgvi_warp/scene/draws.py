@@ -6,13 +6,12 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, cut
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.given_draws import GivenDraws
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.sampling.members import Members
@@ -22,6 +21,9 @@ from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
 from lgvi_warp.scene.start import ATTITUDES, resolve_attitude
 from lgvi_warp.scene.variations import Target, Variation
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import GivenDraws
 
 # Most members whose numbers an ensemble keeps once they are drawn.
 KEPT = 1024

@@ -6,7 +6,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import Faults, brief, ragged, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.summaries import Summarized
-from lgvi_warp.physics.given_draws import GivenDraws
 from lgvi_warp.physics.terms import base
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.space import Space
@@ -27,6 +26,9 @@ from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.physical_checks import PhysicalChecks
 from lgvi_warp.scene.settings import EnsembleSettings, section
 from lgvi_warp.scene.variations import Target, Variation
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import GivenDraws
 
 
 class Ensemble(Summarized):

@@ -45,7 +45,7 @@ def field_type(kind, width, real):
         return held_key() if kind == "held" else delayed_key()
     if kind == "given":
         # Its functions are there for runs that are given their draws alone.
-        from lgvi_kernels.packing.given_draws import given_key
+        from lgvi_kernels.lanes.given_draws import given_key
 
         return given_key()
     if kind in ("step", "grid"):

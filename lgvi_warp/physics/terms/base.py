@@ -9,16 +9,18 @@ import functools
 import keyword
 from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
 from lgvi_warp.common import names, registry
 from lgvi_warp.common.declared import read
 from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
-from lgvi_warp.physics.given_draws import GivenDraws
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.notation import repeated
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import GivenDraws
 
 # A term's own numbers, or all parameters of a scene, by name; leading dimension 1 (shared) or n (one per member).
 Array = np.ndarray

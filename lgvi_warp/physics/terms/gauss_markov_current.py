@@ -5,14 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.declared import word
-from lgvi_warp.physics.given_draws import Stream
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.noisy import NoisyTerm, normals_at_start
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import Stream
 
 STARTS = ("zero", "stationary")
 
@@ -43,6 +45,8 @@ class GaussMarkovCurrent(NoisyTerm):
         return True
 
     def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
+        from lgvi_warp.physics.given_draws import Stream
+
         if not any(name in acting for name in self.strengths):
             return ()
         start = (Stream("start", at_start=True),) if self.start == "stationary" else ()

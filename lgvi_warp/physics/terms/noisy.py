@@ -6,14 +6,16 @@ from __future__ import annotations
 import zlib
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.declared import positive
 from lgvi_warp.common.random import uniforms_of
-from lgvi_warp.physics.given_draws import Stream
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import Stream
 
 
 def channel(key: str) -> int:
@@ -80,8 +82,10 @@ class NoisyTerm(Term):
             acting: Names of its numbers that vary, or are not zero.
 
         Returns:
-            The streams, by the names that `Draws` shows.
+            The streams, by the names that `NoiseDraws` shows.
         """
+        from lgvi_warp.physics.given_draws import Stream
+
         idle = bool(self.strengths) and not any(name in acting for name in self.strengths)
         return () if idle else (Stream("0"), Stream("1", number=1))
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.given_draws import Stream
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.noisy import NoisyTerm
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import Stream
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,6 +34,8 @@ class WrenchNoise(NoisyTerm):
     torque: Any = number((3,), "N m s^1/2", (0.0, 0.0, 0.0), least=0.0)
 
     def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
+        from lgvi_warp.physics.given_draws import Stream
+
         return tuple(Stream(name, number=i) for i, name in enumerate(self.strengths) if name in acting)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

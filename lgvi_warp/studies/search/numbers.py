@@ -10,8 +10,9 @@ import numpy as np
 
 from lgvi_warp.calls.prepared import Prepared, prepare
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.results.quantities import MetricQuantity, names_a_metric
+from lgvi_warp.results.quantities import MetricQuantity, names_an_end
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.statistics.member_metrics import names_a_statistic
 
 
 class Numbers:
@@ -23,7 +24,8 @@ class Numbers:
     """
 
     def __init__(self, scene: Scene, names: list[str] | None, key: str, of: Any, settings: Mapping[str, Any]):
-        self.of_metric = names_a_metric(of)
+        # As of a sweep: "energy" is the metric here.
+        self.of_metric = names_a_statistic(of) and not names_an_end(of)
         if self.of_metric:
             of = MetricQuantity.named(key, of)
             self.label = of.label

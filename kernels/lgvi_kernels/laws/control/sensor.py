@@ -80,7 +80,7 @@ def make_kept(reading, drifting, rare, late):
 def make_given(count, noisy, drifting, lossy):
     """(y, p, e) -> e with walk and noise, and whether the reading is lost, by the normals that the call gives."""
     # Functions that this sensor needs alone; a kernel without given draws has none of them.
-    from lgvi_kernels.packing.given_draws import first_of_tick, scalar_of_tick, vector_of_tick
+    from lgvi_kernels.lanes.given_draws import first_of_tick, scalar_of_tick, vector_of_tick
 
     drawn_noise = first_of_tick if count == 1 else vector_of_tick
 
@@ -135,7 +135,7 @@ def made(features):
         lanes = {name: Lane for name in others if name in KEEPING}
         key = {"key": noise_key(width)} if draws else {}
         if listed:
-            from lgvi_kernels.packing.given_draws import given_ticks
+            from lgvi_kernels.lanes.given_draws import given_ticks
 
             key = {"key": given_ticks()}
         return struct("Sensor", **vectors, **lanes, **key, memory=wp.int32, sets=wp.int32)

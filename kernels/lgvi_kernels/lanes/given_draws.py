@@ -1,23 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Standard normals that a call gives in place of those of counters: rows of a law in the table, and the keys that find them.
 
-Only a kernel whose run is given its draws imports this file. A family's overloads do not count in a kernel's hash (see
-lanes/overloads.py): so the names of the keys have this file's text in them.
+Only a kernel whose run is given its draws imports this file.
 """
 
 import functools
-import hashlib
-from pathlib import Path
 from typing import Any
 
 import warp as wp
 
 from lgvi_kernels.lanes import overloads
-from lgvi_kernels.lanes.arithmetic import ones, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, mul, ones, struct, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.noise import declare_gridded, normals_of
 from lgvi_kernels.lanes.view import row1, row3
-
-_DIGEST = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
 
 
 @functools.cache
@@ -26,13 +21,13 @@ def given_key():
 
     row: of its first normal; apart: rows from there to those of stream 1; draws: how many a step of the run takes.
     """
-    return struct(f"GivenKey_{_DIGEST}", row=wp.int32, apart=wp.int32, draws=wp.int32)
+    return struct("GivenKey", row=wp.int32, apart=wp.int32, draws=wp.int32)
 
 
 @functools.cache
 def given_ticks():
     """The struct of a sensor's key. row: of its first normal; noise, drift, dropout: rows from there to those of each."""
-    return struct(f"GivenTicks_{_DIGEST}", **dict.fromkeys(("row", "noise", "drift", "dropout"), wp.int32))
+    return struct("GivenTicks", **dict.fromkeys(("row", "noise", "drift", "dropout"), wp.int32))
 
 
 GivenKey = given_key()

@@ -131,10 +131,11 @@ class Packing:
 
     def _with_normals(self, term: Term, numbers: Any, packed: Packed) -> Packed:
         """What a term packed, with its rows of the normals that the call gives."""
-        if not self.plan.kernel_choice.given:
-            return packed
+        if self.members.given is None or self.members.given.rows(term.key) is None:
+            return packed  # and stays shared, if it was
         given = self._context(numbers).given
-        return packed if given is None else packed._replace(normals=given.rows(term.key))
+        assert given is not None
+        return packed._replace(normals=given.rows(term.key))
 
     def control(self) -> list[Packed]:
         """The numbers of each part of the controller."""

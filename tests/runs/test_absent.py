@@ -134,7 +134,7 @@ def test_a_grid_of_noise_is_there_only_if_asked_for(tmp_path):
             terms.GaussMarkovCurrent(standard_deviation=(0.1, 0.1, 0.1), time_constant=2.0, noise_step=noise_step),
         ]
         text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=noise), tmp_path / str(there))
-        assert ("StepKey" in text, "GridKey" in text, "draws" in text) == (not there, there, there)
+        assert ("StepKey" in text, "GridKey" in text, "key.draws" in text) == (not there, there, there)
 
 
 def test_given_draws_are_there_only_if_asked_for(tmp_path):

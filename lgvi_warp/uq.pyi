@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # The public names of this door, one a line.
 
+from lgvi_warp.calls.noise import draws_of as draws_of
+from lgvi_warp.physics.given_draws import NoiseDraws as NoiseDraws
 from lgvi_warp.studies.sensitivity.adaptor import ScalarModel as ScalarModel
 from lgvi_warp.studies.sensitivity.adaptor import model as model
 from lgvi_warp.studies.sensitivity.analyses import morris as morris

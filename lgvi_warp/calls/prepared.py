@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.calls.noise import DRAWN, GIVEN, NoiseOfCalls, checked_indices
 from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, outputs, samples_for, statistics_for, values_of
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, SceneError, refusal
@@ -17,6 +18,7 @@ from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.physics.given_draws import GivenDraws, NoiseDraws
 from lgvi_warp.results.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.runs.request import ensemble_of, scene_of
 from lgvi_warp.sampling.designs.designs import salib_problem
@@ -25,9 +27,10 @@ from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.sampling.final import Final
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, whole_columns
+from lgvi_warp.scene.draw_layout import draw_layout
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
+from lgvi_warp.scene.settings import EnsembleSettings
 
 
 class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of the scene)
@@ -46,11 +49,13 @@ class Prepared:
         levels: columns of the cube, in the order of the names, where X holds levels; None where it holds values.
         refuse: whether a failed member is an error; else its quantities are NaN.
         common_noise: whether noise acts on every member alike.
+        noise: what is drawn, and from where.
         made_of: arguments of `prepare`, by position and by name, for a pickle.
 
     Attributes:
         names: names of the columns of X (d,).
         common_noise: whether noise acts on every member alike.
+        noise: what is drawn, and from where.
     """
 
     def __init__(
@@ -63,16 +68,23 @@ class Prepared:
         levels: Sequence[int] | None,
         refuse: bool,
         common_noise: bool,
+        noise: NoiseOfCalls,
         made_of: tuple[Any, ...],
     ):
         self._arguments = made_of
         self._fleet, self._table, self.names, self._of, self._runner = fleet, table, names, of, runner
-        self._levels, self._refuse, self.common_noise = levels, refuse, common_noise
+        self._levels, self._refuse, self.common_noise, self.noise = levels, refuse, common_noise, noise
+
+    @property
+    def draws(self) -> tuple[NoiseDraws, ...]:
+        """What noise and sensors draw in a call: standard normals, the columns of xi in this order; none without noise."""
+        return self.noise.layout.draws
 
     @shows_progress
     def __call__(
         self,
         X: Any = None,
+        xi: Any = None,
         *,
         seed: int | None = None,
         members: int | None = None,
@@ -87,6 +99,8 @@ class Prepared:
         X: (n, d), columns in the order of `names`; or by name, in any order: a mapping of columns, a data frame, a structured
             array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3). Without X the members
             are drawn from the distributions.
+        xi: (n, m), float32 or float64, of a run prepared with draws="given": the standard normals that noise and sensors take
+            in place of drawing them; `draws` lists the columns, and lw.uq.draws_of(run, indices) those that would be drawn.
         seed: seed of the noise of forces and sensors, and of the members that are drawn, a whole number from 0; default that
             of the ensemble.
         indices: (n,), beside X: whose noise each row has, that of the member with this index in an ensemble of this seed,
@@ -101,7 +115,7 @@ class Prepared:
             remedy = "give X, or draw the members of a seed: run(seed=..., members=...)"
             raise refusal("indices", indices, "name the noise of the rows of X, and there is no X", remedy)
         fleet = self._drawn(seed, members) if X is None else self._with_noise(self._members(X), seed, indices)
-        return self._answer(fleet, callback(progress))
+        return self._answer(self._given(fleet, xi, {"seed": seed, "indices": indices}), callback(progress))
 
     def states(
         self,
@@ -111,6 +125,7 @@ class Prepared:
         angular_velocity: Any = None,
         parameters: Any = None,
         *,
+        xi: Any = None,
         indices: Any = None,
         seed: int | None = None,
         t0: float | None = None,
@@ -127,6 +142,7 @@ class Prepared:
             angular_velocity: (n, 3) [rad/s], body axes.
             parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None, those of the scene, or of
                 `result.final`.
+            xi: as of a call.
             indices: (n,), whole numbers from 0 that key the noise of each member, such as its index in another ensemble;
                 members with the same index have the same noise. Default None for 0 to n - 1, or those of `result.final`.
             seed: the seed of the noise, a whole number from 0. Default None for 0, or that of `result.final`.
@@ -157,7 +173,8 @@ class Prepared:
             fleet.indices = final.indices
         if t0 is not None:
             fleet.start_time = Faults().number("t0", t0, "s", 0.0) or 0.0
-        return self._answer(self._with_noise(fleet, None, indices), None)
+        fleet = self._with_noise(fleet, None, indices)
+        return self._answer(self._given(fleet, xi, {"seed": seed, "indices": indices}), None)
 
     def __reduce__(self) -> tuple[Any, ...]:
         arguments, settings = self._arguments
@@ -175,17 +192,27 @@ class Prepared:
             fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
         if indices is None:
             return fleet
-        keys = np.asarray(indices)
-        one_each = keys.shape == (fleet.members,) and keys.dtype.kind in "iu"
-        if not one_each or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
-            problem = "are not one whole number from 0 for each member"
-            remedy = f"give an array of shape ({fleet.members},), of numbers below {MOST_MEMBERS}"
-            raise refusal("indices", indices, problem, remedy)
+        keys = checked_indices(indices, fleet.members)
         if self.common_noise:
             problem = "are given, where common_noise=True gives all members the noise of member 0"
             raise refusal("indices", indices, problem, "leave them out, or prepare the run without common_noise")
-        fleet.indices = keys.astype(np.int64)
+        fleet.indices = keys
         return fleet
+
+    def _given(self, fleet: Ensemble, xi: Any, keys: dict[str, Any]) -> Ensemble:
+        """Members with the standard normals of a call, or those that their counters draw."""
+        given = self.noise.of_call(xi, fleet.members, keys)
+        if given is None:
+            return fleet
+        if fleet.start_time or fleet.final is not None:
+            problem = "is not where members start whose draws are given: these are counted from t = 0"
+            raise refusal("t0", fleet.start_time, problem, "prepare the run without draws='given'")
+        more = fleet.varied_names - self.noise.varied
+        if more and draw_layout(fleet.scene, fleet.varied_names, self.noise.grid) != given.layout:
+            remedy = "name what varies as the run is prepared: prepare(scene, vary=[...])"
+            named = ", ".join(sorted(name for name in more if not name.startswith("start.")))
+            raise refusal("parameters", named, "make something draw that run.draws does not list", remedy)
+        return fleet.with_given(given)
 
     def _members(self, X: Any) -> Ensemble:
         """The ensemble of the members with these numbers."""
@@ -307,6 +334,7 @@ def prepare(
     levels: bool = False,
     failed: str = "refuse",
     common_noise: bool = False,
+    draws: str = DRAWN,
     threads: int | None = None,
     width: int | None = None,
     checks: str | None = None,
@@ -329,8 +357,8 @@ def prepare(
     Args:
         fleet: A Scene or an Ensemble; its [ensemble] is used where `vary` is None.
         vary: Names of what varies, ["vehicle.mass", "start.position[2]"], or a mapping of names to distributions.
-        of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result. Default
-            None: calls return results.
+        of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result; "outcome
+            floor"; a metric as of `lw.sweep`, "iae depth", lw.metrics.ITAE("depth"). Default None: calls return results.
         method: As of `lw.solve`, but where it is left out, chosen once, for `fleet`. What else is left out, of h, t1, dtype,
             width, checks, on_failure, device, threads, executor and scheduler, is taken from the scene's [run].
         h: Step [s].
@@ -342,6 +370,8 @@ def prepare(
             joint distributions need it. Default False.
         failed: "refuse" (default) for an error where members fail, "nan" for NaN in their place; for `of` only.
         common_noise: Whether forces with noise act on every member alike. Default False.
+        draws: "drawn" (default): counters draw the noise of forces and sensors; "given": each call gives the standard normals,
+            run(X, xi), as `draws` of the run lists them.
         threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less than a
             million steps of vehicles).
         width: Vehicles per packet; default from the CPU.
@@ -371,6 +401,11 @@ def prepare(
         with faults.including():
             interests = quantities(of)
     faults.choice("failed", failed, ("refuse", "nan"))
+    faults.choice("draws", draws, (DRAWN, GIVEN))
+    if draws == GIVEN and common_noise is True:
+        faults.add(
+            "common_noise", True, 'says whose noise each row has, where draws="given" takes it from xi', "leave it out"
+        )
     distributions = isinstance(vary, Mapping)
     listed = names_of(faults, vary) if vary is not None and not distributions else ()
     levels = flag("levels", levels)
@@ -393,11 +428,21 @@ def prepare(
     first = full if isinstance(table, str) else table
     how = dict(threads=threads, executor=executor, scheduler=scheduler)
     runner = Runner(first, [*statistics, *gathered] if gathered else statistics, **settings, **how)
-    known = settings | how | dict(statistics=statistics, levels=levels, failed=failed, common_noise=common_noise)
+    known = (
+        settings
+        | how
+        | dict(statistics=statistics, levels=levels, failed=failed, common_noise=common_noise, draws=draws)
+    )
     made_of = (fleet, vary, of), known
-    runner.plan(first)
+    grid, varied = runner.request.grid(), frozenset(first.varied_names)
+    layout = draw_layout(scene, varied, grid)
+    if draws == GIVEN:
+        # In place of what calls will give: what all of them share is settled here.
+        first = first.with_given(GivenDraws(layout, np.broadcast_to(0.0, (1, layout.count))))
+    plan = runner.plan(first)
     first.select(0, 1)  # which keeps what all members share
-    return Prepared(full, table, names, interests, runner, columns, failed == "refuse", common_noise, made_of)
+    noise = NoiseOfCalls(layout, draws == GIVEN, full.seed, full.members, plan, varied, grid)
+    return Prepared(full, table, names, interests, runner, columns, failed == "refuse", common_noise, noise, made_of)
 
 
 def _prepared_again(arguments: tuple[Any, ...], settings: dict[str, Any]) -> Prepared:

@@ -24,7 +24,7 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.drawn import DrawnParameters
 from lgvi_warp.results.provenance import provenance, starts_at
-from lgvi_warp.results.quantities import EndQuantity, OfResult
+from lgvi_warp.results.quantities import EndQuantity, MetricQuantity, OfResult
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.request import ALL_SAMPLES, Request, enough_iterations
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
@@ -190,11 +190,17 @@ def outputs(
     """
     labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
     values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
-    odd = ~np.isfinite(values).all(axis=1)
+    odd = np.concatenate([_not_numbers(of, group) for group in groups])
     codes = np.unique(status) if status.any() else [Status.OK]
     counts = {Status(int(code)).name.lower(): int((status == code).sum()) for code in codes}
     counts |= {"quantity not finite": int(odd.sum())} if odd.any() else {}
     return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
+
+
+def _not_numbers(of: Sequence[OfResult], numbers: Sequence[np.ndarray]) -> np.ndarray:
+    """Which members (n,) have a quantity that is no number, or infinite where it may not be."""
+    odd = [np.isnan(x) if each.may_be_infinite else ~np.isfinite(x) for each, x in zip(of, numbers, strict=True)]
+    return np.asarray(np.concatenate(odd, axis=1).any(axis=1))
 
 
 def values_of(result: Any, fleet: Ensemble, of: Sequence[OfResult]) -> list[np.ndarray]:
@@ -214,11 +220,15 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
         return save
     fields = ordered(name for each in of for name in each.fields)
     paths = [each.label for each in of if each.over_path]
-    if paths and scene.run.save_every is None:
-        problem = f"save = None: is missing, and {paths[0]} looks over the path"
+    of_samples = [each.label for each in of if isinstance(each, MetricQuantity) and each.of_samples]
+    every = scene.run.save_every
+    if every is None and of_samples and not paths and scene.controller is not None:
+        every = float(scene.controller.period)  # as of a sweep
+    if (paths or of_samples) and every is None:
+        problem = f"save = None: is missing, and {[*paths, *of_samples][0]} looks over the path"
         raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
-    if paths or any(each.is_function for each in of):
-        return SaveAt(every=scene.run.save_every, fields=fields)
+    if paths or of_samples or any(each.is_function for each in of):
+        return SaveAt(every=every, fields=fields)
     times = sorted({each.when for each in of if isinstance(each, EndQuantity) and each.when is not None})
     return SaveAt(at=times or None, fields=fields)
 
@@ -227,6 +237,5 @@ def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
     """The statistics that quantities need, beside samples."""
     gathered = dict[str, Statistic]()
     for each in of:
-        if isinstance(each, EndQuantity):
-            gathered |= each.gathered(scene.events)
+        gathered |= each.gathered(scene.events)
     return list(gathered.values())

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import Field, dataclass
 from typing import Any, ClassVar
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.control.base import READINGS, MeasuringPart
+from lgvi_warp.physics.given_draws import Stream
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.noisy import key_of
 
@@ -18,6 +20,8 @@ VECTORS = ("bias", "noise", "drift", "quantum")
 IDLE = dict.fromkeys(VECTORS, 0.0) | {"every": 1.0, "latency": 0.0, "dropout": 0.0}
 DRAWING = frozenset({"noise", "drift", "dropout"})
 KEEPING = frozenset({"every", "latency", "dropout"})
+# What its device code has where the call gives its normals.
+GIVEN = "given"
 MOST_TICKS = 1000.0
 
 
@@ -51,7 +55,7 @@ class Sensor(MeasuringPart):
     """
 
     type: ClassVar[str] = "sensor"
-    every_feature: ClassVar[tuple[str, ...]] = tuple(IDLE)
+    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, GIVEN)
 
     of: str = ""
     noise: Any = number((3,), "unit", 0.0, least=0.0)
@@ -91,6 +95,20 @@ class Sensor(MeasuringPart):
         # The names of the numbers that matter for some member.
         return tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
 
+    def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
+        """What it draws.
+
+        Args:
+            acting: Names of its numbers that vary, or are not zero.
+
+        Returns:
+            The streams, at each tick.
+        """
+        count = READINGS[self.of]
+        drift = Stream("drift", 1, 0, 1) if count == 1 else Stream("drift", 3, 1)
+        each = (Stream("noise", count), drift, Stream("dropout", 1, 0, 3))
+        return tuple(stream for stream in each if stream.name in acting)
+
     def device_in(self, aligned: bool) -> Any:
         return f"sensor:{','.join((self.of, *self.chosen))}"
 
@@ -104,7 +122,9 @@ class Sensor(MeasuringPart):
         if "dropout" in chosen:
             # A reading is lost where a standard normal is below this.
             values["dropout"] = np.clip(ndtri(numbers["dropout"]), -1e30, 1e30)
-        if chosen & DRAWING:
+        if chosen & DRAWING and context.given is not None:
+            values["key"] = {"row": 0, **dict.fromkeys(sorted(DRAWING), 0), **context.given.places(self.key)}
+        elif chosen & DRAWING:
             values["key"] = key_of(self.key, context)
         sets = 1 + (int(values["latency"].max()) if "latency" in chosen else 0)
         rows = 9 if self.of == "attitude" else count

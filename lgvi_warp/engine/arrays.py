@@ -192,7 +192,9 @@ class LawArrays:
             size, end = row_count(law), memory + memory_rows(law)
             work = end - law.work
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
-            row_fields = {name: place for name, place, part in wanted if part is not None}
+            row_fields: dict[str, Any] = {name: place for name, place, part in wanted if part is not None}
+            if law.normals is not None:
+                row_fields["key"] = law.values["key"] | {"row": row + size - law.normals.shape[1]}
             ends = (row, row + size - 1) if size else (0, 0)
             self.places.append((row_fields, (*ends, memory, end - 1, bus)))
             self.remembered.append(slice(memory, work))
@@ -251,10 +253,9 @@ def memory_count(law: Packed) -> int:
 
 
 def row_parts(law: Packed) -> tuple[np.ndarray, ...]:
-    """A law's rows of the table as arrays (1 or n, rows) side by side; none for a law without."""
-    if law.rows is None:
-        return ()
-    return law.rows if isinstance(law.rows, tuple) else (law.rows,)
+    """A law's rows of the table as arrays (1 or n, rows) side by side, given normals last; none for a law without."""
+    rows = law.rows if isinstance(law.rows, tuple) else () if law.rows is None else (law.rows,)
+    return rows if law.normals is None else (*rows, law.normals)
 
 
 def row_count(law: Packed) -> int:
@@ -263,7 +264,7 @@ def row_count(law: Packed) -> int:
 
 
 def _nested(
-    group: Group, bounded: Sequence[tuple[str, ...]], places: Sequence[tuple[dict[str, int], tuple[int, ...]]]
+    group: Group, bounded: Sequence[tuple[str, ...]], places: Sequence[tuple[dict[str, Any], tuple[int, ...]]]
 ) -> list[tuple[tuple[str, ...], Any, bool]]:
     """The numbers of a group as parts of the kernel's struct, which holds those of the first law, and the rest.
 

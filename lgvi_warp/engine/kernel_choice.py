@@ -50,6 +50,7 @@ class KernelChoice:
     odd: Oddities  # what the user should know about the members' numbers
     controller: Controller | None = None  # as it is for these members
     parts_of_control: tuple[tuple[Part, Any], ...] = ()  # with their device code, as they act
+    given: bool = False  # the call gives the standard normals that noise and sensors take
 
     @property
     def has_callback(self) -> bool:
@@ -71,7 +72,10 @@ def choose_kernel(
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
-    parts = [part.with_features(facts.features) for part in controller.acting_parts] if controller else []
+    parts, given = list[Part](), ensemble.given is not None
+    if controller:
+        words = {f"{part.key}.given" for part in controller.sensors} if given else frozenset[str]()
+        parts = [part.with_features(facts.features | words) for part in controller.acting_parts]
     control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
     acting = _acting(ensemble, facts, built_in, controller, user_axes)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
@@ -134,6 +138,7 @@ def choose_kernel(
         steady=not drag and flow in ("none", "steady") and all(_steady(module) for _, module in acting),
         controller=controller,
         parts_of_control=control,
+        given=given,
     )
 
 
@@ -272,16 +277,17 @@ def is_built_in(module: Any) -> bool:
     return str(getattr(module, "__name__", "")).startswith("lgvi_kernels.")
 
 
-def declared(term: Term, module: Any) -> tuple[tuple[str, Any], ...]:
+def declared(term: Term, module: Any, given: bool = False) -> tuple[tuple[str, Any], ...]:
     """The fields (name, kind) of a term's device struct that do not follow from its module.
 
-    Its numbers, unless the module defines `params`, and a noisy term's key (see lgvi_kernels.maps.compose).
+    Its numbers, unless the module defines `params`, and a noisy term's key (see lgvi_kernels.maps.compose). given: as of
+    KernelChoice.
     """
     numbers = (getattr(module, "params", None) is None and term.lanes()) or ()
     if term.driver is not None:
         return (*numbers, ("commands", "delayed" if term.driver.delayed else "held"))
     if isinstance(term, NoisyTerm):
-        return (*numbers, ("key", "step" if term.noise_step is None else "grid"))
+        return (*numbers, ("key", "given" if given else "step" if term.noise_step is None else "grid"))
     return numbers
 
 

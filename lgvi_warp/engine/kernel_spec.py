@@ -30,7 +30,7 @@ def spec_of(
         maps=choice.program,
         lead=choice.lead,
         laws=tuple(module for _, module in choice.laws),
-        numbers=tuple(declared(term, module) for term, module in (*choice.laws, *choice.events)),
+        numbers=tuple(declared(term, module, choice.given) for term, module in (*choice.laws, *choice.events)),
         mass=choice.mass,
         solver=method.solver,
         iterations=int(method.iterations or 0),

@@ -56,8 +56,8 @@ class Packing:
 
     def _context(self, numbers: Mapping[str, np.ndarray]) -> PackingContext:
         m, plan = self.members, self.plan
-        start = float(plan.grid.times[0])
-        return context(numbers, self.frame, m.indices, m.seed, plan.grid.h, plan.kernel_choice.aligned, start)
+        aligned, start = plan.kernel_choice.aligned, float(plan.grid.times[0])
+        return context(numbers, self.frame, m.indices, m.seed, plan.grid.h, aligned, start, None, m.given)
 
     def inertia(self) -> Fields:
         """The fields of the kernel's Inertia."""
@@ -124,13 +124,21 @@ class Packing:
         if term in terms.IMPLIED:  # packed when the kernel was chosen; neither depends on the step
             packed = self.plan.shared(("implied", term.key), numbers, lambda own: term.packed({}, self._context(own)))
         elif i > 0 or not self.plan.spec.drag:
-            packed = term.packed(parameters, self._context(numbers))
+            packed = self._with_normals(term, numbers, term.packed(parameters, self._context(numbers)))
         elif module is built_in("laws", term.exact_flow[0]):
             frame = numbers[FRAME][0]
             packed = term.packed_exact(parameters, frame, self._scale(frame))
         else:
             packed = term.packed_directions(parameters, self._context(numbers))
         return packed
+
+    def _with_normals(self, term: Term, numbers: Any, packed: Packed) -> Packed:
+        """What a term packed, with its rows of the normals that the call gives."""
+        if self.members.given is None or self.members.given.rows(term.key) is None:
+            return packed  # and stays shared, if it was
+        given = self._context(numbers).given
+        assert given is not None
+        return packed._replace(normals=given.rows(term.key))
 
     def control(self) -> list[Packed]:
         """The numbers of each part of the controller."""
@@ -142,7 +150,7 @@ class Packing:
 
     def _packed(self, kind: str, terms: Iterable[Term]) -> list[Packed]:
         def pack(term: Term, numbers: Any) -> Packed:
-            return term.packed(Ensemble.own(term, numbers), self._context(numbers))
+            return self._with_normals(term, numbers, term.packed(Ensemble.own(term, numbers), self._context(numbers)))
 
         return [self._shared((kind, i), functools.partial(pack, term)) for i, term in enumerate(terms)]
 
@@ -196,6 +204,8 @@ def rows_shared(plan: Plan) -> bool:
 
     Few rows have a copy for each lane, whoever shares them: so one kernel serves scenes in which other numbers vary.
     """
+    if plan.kernel_choice.given:  # rows that members own
+        return False
     # What few members need is packed once, here.
     members = plan.ensemble.members
     packing = Packing(plan, plan.ensemble.select(0, members if members <= KEPT else 1))

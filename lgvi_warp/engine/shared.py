@@ -18,6 +18,8 @@ Value = TypeVar("Value")
 # Names under which these are noted beside parameters, whose names all have a dot. AXES is the frame but for its mass matrix,
 # which alone changes with the mass of most vehicles.
 FRAME, AXES, MEMBERS, SEED = "frame", "axes", "members", "seed"
+# Normals that the call gives, which differ by member as what MEMBERS keys does.
+GIVEN = "given"
 
 
 class TrackedParameters(dict[str, np.ndarray]):
@@ -77,6 +79,8 @@ class TrackedContext(PackingContext):
         if name in (FRAME, MEMBERS, SEED, "__dict__"):
             parameters = super().__getattribute__("parameters")
             parameters.names.update((FRAME, MEMBERS, SEED) if name == "__dict__" else (name,))
+        elif name == GIVEN and value is not None:
+            super().__getattribute__("parameters").names.add(MEMBERS)
         return value
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
+from lgvi_warp.common.status import failed
 from lgvi_warp.control.signals import SAVED
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
@@ -20,14 +21,15 @@ from lgvi_warp.physics.terms.events import from_list as events_of
 from lgvi_warp.results.result import Result
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
+from lgvi_warp.statistics.member_metrics import gathered_name, metric_of, names_a_statistic, numbers_of_members
 from lgvi_warp.statistics.outcomes import EndTime
 from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values.functional import Functional, functional
-from lgvi_warp.statistics.values.quantity import Quantity
+from lgvi_warp.statistics.values.quantity import KNOWN, Quantity
 
-REMEDY = 'write "position[2]", "depth", "norm(velocity)", "max(depth)", or give a function of a Result'
+REMEDY = 'write "position[2]", "depth", "norm(velocity)", "max(depth)", "iae depth", or give a function of a Result'
 
-OfInterest = str | Quantity | Callable[..., Any]
+OfInterest = str | Quantity | Statistic | Mapping[str, Any] | Callable[..., Any]
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,15 @@ class OfResult:
         """Whether it reads samples and parameters of a Result alone."""
         return type(self) is OfResult and not self.is_function
 
+    @property
+    def may_be_infinite(self) -> bool:
+        """Whether an infinite number is an answer, and no failure."""
+        return False
+
+    def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
+        """What a run must gather for it, by the name of the estimate."""
+        return {}
+
     def values(self, result: Result, members: Any = None) -> np.ndarray:
         """Compute its numbers for each member.
 
@@ -97,6 +108,10 @@ class OfResult:
         if isinstance(self.of, Functional):
             return list(self.of.labels)
         return [self.label] if count == 1 else [f"{self.label}[{i}]" for i in range(count)]
+
+
+# How texts of how and when members ended begin.
+ENDS = ("outcome ", "end_time ")
 
 
 @dataclass(frozen=True)
@@ -177,10 +192,67 @@ class EndQuantity(OfResult):
         return [f"{label} at {end}" for label in super().labels(count)]
 
 
+@dataclass(frozen=True)
+class MetricQuantity(OfResult):
+    """A metric of a loop, one number of each member: infinite where it never gets there, NaN of a member that failed.
+
+    metric: The statistic, which keeps the numbers of all members.
+    """
+
+    metric: Any = None
+
+    @classmethod
+    def named(cls, key: str, entry: Any) -> MetricQuantity:
+        """The metric that an entry names, as a sweep names it; key: of the argument, for faults."""
+        label, metric = metric_of(key, entry)
+        return cls(label, functional(key, "position"), metric=metric)
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the samples it needs: what it gathers is beside them."""
+        return ("position",)
+
+    @property
+    def unit(self) -> str:
+        """Its unit; "" for a metric."""
+        return ""
+
+    @property
+    def of_samples(self) -> bool:
+        """Whether it sees the samples that are kept: else it comes to every tick."""
+        return not self.metric.ticks
+
+    @property
+    def may_be_infinite(self) -> bool:
+        """Yes, as a settling time is where a member never settles."""
+        return True
+
+    def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
+        """The metric."""
+        return {gathered_name(self.label): self.metric}
+
+    def values(self, result: Result, members: Any = None) -> np.ndarray:
+        """Look its numbers up, float64, (n, 1)."""
+        if gathered_name(self.label) not in result.statistics:
+            problem = "is a metric that the run has not gathered by member"
+            raise refusal(
+                "of",
+                self.label,
+                problem,
+                "ask lw.prepare or lw.uq for it, or gather it then=lw.statistics.MemberValues()",
+            )
+        numbers = numbers_of_members(result.statistics, self.label)
+        return np.where(failed(np.asarray(result.status)), np.nan, numbers)[:, None]
+
+    def labels(self, count: int) -> list[str]:
+        """Name it."""
+        return [self.label]
+
+
 def _of_ends(text: str) -> EndQuantity | None:
     """The quantity that a text names by an outcome or a time; None where it names neither. Raises SceneError."""
     kind, _, outcome = text.partition(" ")
-    if kind in ("outcome", "end_time") and outcome.strip():
+    if f"{kind} ".startswith(ENDS) and outcome.strip():
         return EndQuantity(text, functional("of", "position"), kind=kind, outcome=outcome.strip())
     name, _, end = (part.strip() for part in text.partition(" at "))
     if not end:
@@ -217,14 +289,19 @@ def samples_of(result: Result, when: slice = slice(None), members: Any = None) -
 def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
     """Read one or several quantities of interest.
 
-    of: A text such as "max(depth)", "outcome floor", "end_time floor" or "depth at 30", a Quantity, a function of a Result or
-        of (samples, members), or several of these.
+    of: A text such as "max(depth)", "outcome floor", "end_time floor", "depth at 30" or "iae depth", a Quantity, a metric, a
+        function of a Result or of (samples, members), one of these that was read before, or several of them.
     """
     requests = list(of) if isinstance(of, list | tuple) else [of]
     faults = Faults()
     results: list[OfResult] = []
     for request in requests:
-        if callable(request) and not isinstance(request, Quantity) and not _of_samples(request):
+        if isinstance(request, OfResult):
+            results.append(request)
+        elif names_a_metric(request):
+            with faults.including():
+                results.append(MetricQuantity.named("of", request))
+        elif callable(request) and not isinstance(request, Quantity) and not _of_samples(request):
             results.append(OfResult(getattr(request, "__name__", type(request).__name__), request))
         elif isinstance(request, str | Quantity) or callable(request):
             with faults.including():
@@ -235,10 +312,24 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
                 results.append(OfResult(function.label, function, not isinstance(request, str)))
         else:
             faults.add("of", request, "is no quantity", REMEDY)
+    metrics = [result.label for result in results if isinstance(result, MetricQuantity)]
+    for name in sorted({name for name in metrics if metrics.count(name) > 1}):
+        faults.add("of", name, "is the name of another metric", 'give it a name of its own: name="..."')
     if not requests:
         faults.add("of", of, "names nothing", REMEDY)
     faults.raise_if_any()
     return tuple(results)
+
+
+def names_a_metric(request: Any) -> bool:
+    """Whether what is asked for is a metric: a text of how members ended is none, and "energy" is that at the end."""
+    a_quantity = isinstance(request, str) and request in KNOWN
+    return names_a_statistic(request) and not names_an_end(request) and not a_quantity
+
+
+def names_an_end(request: Any) -> bool:
+    """Whether what is asked for is how or when members ended."""
+    return isinstance(request, str) and request.startswith(ENDS)
 
 
 def _of_samples(function: Callable[..., Any]) -> bool:

@@ -205,6 +205,7 @@ def enough_iterations(fleet: Ensemble, method: Method, h: float, dtype: str) -> 
     h: Step of the run [s].
     Returns: The number of Newton steps, or None if more than MOST_FIXED would be needed.
     """
+    fleet = fleet if fleet.given is None else fleet.with_given(None)  # a trial has steps of its own, and so draws
     for n in range(MOST_FIXED + 1):
         trial = Request(fleet, replace(method, iterations=n), 2.0 * h, 2.0 * h, SaveAt(), dtype)
         plan = trial.plan()

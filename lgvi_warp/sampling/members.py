@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import GivenDraws
     from lgvi_warp.sampling.final import Final
 
 
@@ -17,8 +18,8 @@ class Members:
     """Parameters by name, with a leading dimension of 1 (shared) or m (varied), and initial states of m members.
 
     Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
-    angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole.
-    final: where they ended in the run that they go on from; None where they start.
+    angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole,
+    unless its normals are given. final: where they ended in the run that they go on from; None where they start.
     """
 
     parameters: dict[str, np.ndarray]
@@ -29,6 +30,7 @@ class Members:
     indices: np.ndarray
     seed: int
     final: Final | None = None
+    given: GivenDraws | None = None
 
     @property
     def count(self) -> int:

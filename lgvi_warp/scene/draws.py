@@ -6,7 +6,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
 from lgvi_warp.scene.start import ATTITUDES, resolve_attitude
 from lgvi_warp.scene.variations import Target, Variation
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import GivenDraws
 
 # Most members whose numbers an ensemble keeps once they are drawn.
 KEPT = 1024
@@ -142,8 +145,10 @@ class Draws:
                 own.add(target.name)
         return values
 
-    def members_of(self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int) -> Members:
-        """Members from all their numbers by name, which loses those of the start."""
+    def members_of(
+        self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int, given: GivenDraws | None = None
+    ) -> Members:
+        """Members from all their numbers by name, which loses those of the start; given: their noise, None for counters'."""
         m = len(indices)
         start = {key.removeprefix("start."): values.pop(key) for key in self._start_names}
         # In one memory layout, on which the order of the sums of a matrix product depends.
@@ -155,7 +160,7 @@ class Draws:
         else:
             nu = start["velocity"]
         R, position, nu, Om = (_of_each(x, m) for x in (R, start["position"], nu, start["angular_velocity"]))
-        return Members(values, position, R, nu, Om, indices, seed)
+        return Members(values, position, R, nu, Om, indices, seed, given)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
         """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""

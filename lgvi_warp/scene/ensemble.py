@@ -28,6 +28,7 @@ from lgvi_warp.scene.settings import EnsembleSettings, section
 from lgvi_warp.scene.variations import Target, Variation
 
 if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import GivenDraws
     from lgvi_warp.sampling.final import Final
 
 
@@ -194,6 +195,8 @@ class Ensemble(Summarized):
         # What keys the members' noise; None: their positions in the whole ensemble.
         self._indices: np.ndarray | None = None
         self.final, self.start_time = None, 0.0
+        # Standard normals of the members' noise, in place of those that counters give; None for these.
+        self.given: GivenDraws | None = None
         self._check_physical(checked)
 
     @property
@@ -309,7 +312,8 @@ class Ensemble(Summarized):
         """
         if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
             raise IndexError(f"members {first} to {stop} of {self.members}")
-        members = self._draws.members_of(self._values(first, stop), self.indices_of(first, stop), self.seed)
+        given = None if self.given is None else self.given.of_members(slice(first, stop))
+        members = self._draws.members_of(self._values(first, stop), self.indices_of(first, stop), self.seed, given)
         if self.final is None:
             return members
         everyone = (first, stop) == (0, self.members)
@@ -391,6 +395,7 @@ class Ensemble(Summarized):
         ensemble = self._drawing(places=places)
         ensemble._indices = None if self._indices is None else self._indices[chosen]
         ensemble.final = None if self.final is None else self.final.part(chosen)
+        ensemble.given = None if self.given is None else self.given.of_members(chosen)
         # Some of these may lie beyond the members that were checked.
         ensemble.checked = len(chosen) if self.checked == self.members else 0
         return ensemble
@@ -399,6 +404,19 @@ class Ensemble(Summarized):
         """Return a copy whose numbers are drawn in another way."""
         ensemble = copy.copy(self)
         ensemble._draws = replace(self._draws, **changes)
+        return ensemble
+
+    def with_given(self, given: GivenDraws | None) -> Ensemble:
+        """Return the same members with other noise.
+
+        Args:
+            given: Standard normals of each, or one row of them for all; None for those of counters.
+
+        Returns:
+            The ensemble.
+        """
+        ensemble = copy.copy(self)
+        ensemble.given = given
         return ensemble
 
     def with_columns(self, columns: Mapping[str, np.ndarray]) -> Ensemble:

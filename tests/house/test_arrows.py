@@ -82,7 +82,8 @@ def test_the_product_imports_what_it_declares():
 
 def test_only_these_files_of_the_engine_know_the_kernels():
     those = {
-        "lgvi_warp.engine.going_on", "lgvi_warp.engine.kernel", "lgvi_warp.engine.kernel_spec", "lgvi_warp.engine.launches",
+        "lgvi_warp.engine.counted_draws", "lgvi_warp.engine.going_on", "lgvi_warp.engine.kernel",
+        "lgvi_warp.engine.kernel_spec", "lgvi_warp.engine.launches",
         "lgvi_warp.engine.packing", "lgvi_warp.engine.plan", "lgvi_warp.engine.plan_checks",
         "lgvi_warp.engine.sample_layout", "lgvi_warp.engine.packets", "lgvi_warp.engine.peak",
         "lgvi_warp.engine.state_lanes", "lgvi_warp.checks.bench",

@@ -99,7 +99,7 @@ def test_failed_members(monkeypatch, capsys):
 @pytest.mark.slow
 def test_many_calls(monkeypatch):
     monkeypatch.chdir(ROOT)
-    text, noise = blocks("docs/guide/many_calls.md", "python")
+    text, noise, given = blocks("docs/guide/many_calls.md", "python")
     exec(text, names := {})
     assert names["depths"].shape == (2,)
     assert np.all(names["depths"] > 9.0)
@@ -108,6 +108,10 @@ def test_many_calls(monkeypatch):
     # Same noise: the start's 0.1 m alone, to round-off; other noise: other depths.
     np.testing.assert_allclose(names["moved"] - still, 0.1, atol=1e-12)
     assert np.all(names["drawn"] != still)
+    before = names["run"](names["x"], seed=7, indices=names["index"] + 100)
+    exec(given, names)
+    assert [(draws.of, draws.stream, draws.count) for draws in names["run"].draws] == [("wrench_noise", "force", 40)]
+    assert np.all(names["depths"] != before)
 
 
 @pytest.mark.slow

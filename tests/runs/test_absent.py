@@ -10,6 +10,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_kernels.laws import current
 from lgvi_warp.physics import terms
+from lgvi_warp.physics.given_draws import DrawLayout, GivenDraws
 from lgvi_warp.runs.settle import make_plan
 from tests.laws.cases import CASES
 from tests.laws.test_parity import STATE, VEHICLE, scene_of
@@ -133,7 +134,21 @@ def test_a_grid_of_noise_is_there_only_if_asked_for(tmp_path):
             terms.GaussMarkovCurrent(standard_deviation=(0.1, 0.1, 0.1), time_constant=2.0, noise_step=noise_step),
         ]
         text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=noise), tmp_path / str(there))
-        assert ("StepKey" in text, "GridKey" in text, "draws" in text) == (not there, there, there)
+        assert ("StepKey" in text, "GridKey" in text, "key.draws" in text) == (not there, there, there)
+
+
+def test_given_draws_are_there_only_if_asked_for(tmp_path):
+    noise = [
+        terms.WrenchNoise(force=(1.0, 1.0, 1.0)),
+        terms.GaussMarkovCurrent(standard_deviation=(0.1, 0.1, 0.1), time_constant=2.0),
+    ]
+    scene = lw.Scene(BARE, lw.Environment(gravity=9.8), terms=noise)
+    for given in (None, GivenDraws(DrawLayout(()), np.empty((1, 0)))):
+        (tmp_path / str(given is None)).mkdir()
+        plan = make_plan(one(scene, **STATE).with_given(given), "psi_s", h=0.01, t1=0.1)
+        text = generated(plan, tmp_path / str(given is None))
+        marks = ("GivenKey", "StepKey", "normals3")
+        assert [mark in text for mark in marks] == [given is not None, given is None, given is None]
 
 
 def test_a_polynomial_is_there_only_if_asked_for(tmp_path):

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What surrounds the kernel: a call of a prepared run, a whole solve and the set-up of a member, beside the kernel alone."""
+"""What surrounds the kernel: a call of a prepared run, a whole solve and the set-up of a member, beside the kernel alone.
 
+And what noise that a call gives costs, beside noise that it draws.
+"""
+
+import dataclasses
 import itertools
 import time
 
@@ -9,6 +13,7 @@ import numpy as np
 import lgvi_warp as lw
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.terms import GaussMarkovCurrent, WrenchNoise
 
 # Varied numbers of each vehicle; of REMUS 100 twelve, six of its drag matrix among them.
 PAPER = {
@@ -63,10 +68,42 @@ def run(quick):
                 "same_bits": bool(np.array_equal(Y, result.position[-1])),
             }
         yield from set_up(name, scene, vary, method, 4096, 3 if quick else 20)
+    yield from given_draws(2 if quick else 20)
     begun = time.perf_counter()
     fleet = lw.Ensemble(lw.Scene.load("examples/paper.toml"), 10**8, 1, PAPER)
     make_plan(fleet, "psi_s", h=0.01, t1=0.2, survey_all=False)
     yield {"planned_members": 10**8, "s": round(time.perf_counter() - begun, 3)}
+
+
+def given_draws(rounds):
+    """A call that is given its draws beside one that draws: REMUS 100 in a random current, under white force and torque."""
+    quiet = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+    current = GaussMarkovCurrent(standard_deviation=(0.1,) * 3, time_constant=20.0)
+    noise = [current, WrenchNoise(force=(1.0,) * 3, torque=(0.1,) * 3)]
+    noisy = dataclasses.replace(quiet, terms=[*quiet.terms, *noise])
+    members = 1024
+    X, indices = np.linspace(305.0, 307.0, members)[:, None], np.arange(members)
+    for dtype, h in (("float64", 0.05), ("float64", 0.2), ("float32", 0.2)):
+        settings = dict(of="position[0]", method="psi_x", h=h, t1=60.0, dtype=dtype, threads=1)
+        drawing = lw.prepare(noisy, ["vehicle.buoyancy"], **settings)
+        given = lw.prepare(noisy, ["vehicle.buoyancy"], draws="given", **settings)
+        xi = lw.uq.draws_of(given, indices)
+        drawn, Y = least(lambda: drawing(X, indices=indices), rounds)  # noqa: B023
+        seconds = {"drawn": drawn}
+        for kind in ("float64", "float32"):
+            normals = xi.astype(kind)
+            seconds[kind], found = least(lambda: given(X, normals), rounds)  # noqa: B023
+            if normals.dtype == xi.dtype:
+                same = bool(np.array_equal(found, Y))
+        yield {
+            "vehicle": "remus_100 in noise",
+            "dtype": dtype,
+            "step": h,
+            "normals": xi.shape[1],
+            "us_per_member": {name: round(1e6 * value / members, 2) for name, value in seconds.items()},
+            "given_over_drawn": {name: round(seconds[name] / drawn, 3) for name in ("float64", "float32")},
+            "same_bits": same,
+        }
 
 
 def set_up(name, scene, vary, method, members, rounds):

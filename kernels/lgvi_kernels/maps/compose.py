@@ -38,10 +38,16 @@ def numbers_struct(law, numbers, width, real):
 def field_type(kind, width, real):
     """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step", "grid": the key of noise (see lanes/noise.py).
 
-    "held", "delayed": where an actuator finds the commands of a controller (see lanes/tick.py).
+    "given": that of noise whose normals a call gives; "held", "delayed": where an actuator finds the commands of a controller
+    (see lanes/tick.py).
     """
     if kind in ("held", "delayed"):
         return held_key() if kind == "held" else delayed_key()
+    if kind == "given":
+        # Its functions are there for runs that are given their draws alone.
+        from lgvi_kernels.lanes.given_draws import given_key
+
+        return given_key()
     if kind in ("step", "grid"):
         return noise_key(width, kind == "grid")
     return {1: lane, 3: lane3}[kind](width, real)

@@ -9,7 +9,7 @@ import functools
 import keyword
 from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from lgvi_warp.common.declared import read
 from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.notation import repeated
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import GivenDraws
 
 # A term's own numbers, or all parameters of a scene, by name; leading dimension 1 (shared) or n (one per member).
 Array = np.ndarray
@@ -41,6 +44,7 @@ class PackingContext:
             origin of the forces is the user's; False by default.
         time: When the members start, or go on [s]; 0 by default.
         remembered: What the term remembers where they go on, (n, rows) as in `Packed.memory`; None, the default, for nothing.
+        given: The standard normals of these members, where the call gives them; None, the default, for those of counters.
     """
 
     parameters: Numbers
@@ -51,6 +55,7 @@ class PackingContext:
     aligned: bool = False
     time: float = 0.0
     remembered: np.ndarray | None = None
+    given: GivenDraws | None = None
 
     def own(self, term: Term) -> dict[str, np.ndarray]:
         """The numbers of one term.
@@ -74,12 +79,15 @@ class Packed(NamedTuple):
             with an n of its own; None for none.
         memory: What the term remembers from step to step, at the start, shape (n, rows); None for none.
         work: Number of scratch rows that the device code may overwrite during one call.
+        normals: Standard normals that the call gives it, shape (n, rows): more rows of the table, behind its own, where the
+            field `key` of the struct finds them; None for none.
     """
 
     values: dict[str, Any]
     rows: np.ndarray | tuple[np.ndarray, ...] | None = None
     memory: np.ndarray | None = None
     work: int = 0
+    normals: np.ndarray | None = None
 
 
 def number(

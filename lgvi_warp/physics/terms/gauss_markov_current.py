@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.declared import word
-from lgvi_warp.common.random import uniforms_of
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
-from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.physics.terms.noisy import NoisyTerm, normals_at_start
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import Stream
 
 STARTS = ("zero", "stationary")
 
@@ -41,6 +44,14 @@ class GaussMarkovCurrent(NoisyTerm):
         # Always true: the current itself is remembered.
         return True
 
+    def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
+        from lgvi_warp.physics.given_draws import Stream
+
+        if not any(name in acting for name in self.strengths):
+            return ()
+        start = (Stream("start", at_start=True),) if self.start == "stationary" else ()
+        return (Stream("current"), *start)
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Decay and spread of the process over one draw, exact; the memory holds u twice and du/dt.
         steps = context.h / self.draws(context.h) / numbers["time_constant"]
@@ -56,9 +67,10 @@ class GaussMarkovCurrent(NoisyTerm):
 
     def _first(self, numbers: Numbers, context: PackingContext) -> np.ndarray:
         """u at t = 0, (1 or n, 3) [m/s], drawn by seed, member and the term's name, as every number that varies by member."""
-        from scipy.special import ndtri
-
         if self.start == "zero":
             return np.zeros((1, 3))
-        u = uniforms_of(context.seed, f"{self.key}.start", context.members, 3)
-        return np.asarray(numbers["standard_deviation"] * ndtri(u))
+        if context.given is not None:
+            xi = context.given.of_stream(self.key, "start")
+        else:
+            xi = normals_at_start(context.seed, self.key, context.members)
+        return np.asarray(numbers["standard_deviation"] * xi)

@@ -4,13 +4,18 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.declared import positive
+from lgvi_warp.common.random import uniforms_of
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import Stream
 
 
 def channel(key: str) -> int:
@@ -20,12 +25,19 @@ def channel(key: str) -> int:
 
 def key_of(name: str, context: PackingContext) -> dict[str, Any]:
     """What keys random numbers, besides the number of the draw: the low 64 bits of the seed, the member, who draws."""
-    return {
-        "member": context.members.astype(np.int32),
-        "seed0": _signed(context.seed),
-        "seed1": _signed(context.seed >> 32),
-        "channel": channel(name),
-    }
+    return {"member": context.members.astype(np.int32), **words_of(context.seed, name)}
+
+
+def words_of(seed: int, name: str) -> dict[str, int]:
+    """The words of a key that all members share."""
+    return {"seed0": _signed(seed), "seed1": _signed(seed >> 32), "channel": channel(name)}
+
+
+def normals_at_start(seed: int, name: str, members: np.ndarray) -> np.ndarray:
+    """Three standard normals (n, 3) of each of some members (n,) for where a term of this name starts, drawn by the host."""
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(uniforms_of(seed, f"{name}.start", members, 3)))
 
 
 def _signed(word: int) -> int:
@@ -63,6 +75,20 @@ class NoisyTerm(Term):
         """
         return 1 if self.noise_step is None else max(1, round(h / self.noise_step))
 
+    def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
+        """What it draws: by default two streams of three numbers each, where it acts.
+
+        Args:
+            acting: Names of its numbers that vary, or are not zero.
+
+        Returns:
+            The streams, by the names that `NoiseDraws` shows.
+        """
+        from lgvi_warp.physics.given_draws import Stream
+
+        idle = bool(self.strengths) and not any(name in acting for name in self.strengths)
+        return () if idle else (Stream("0"), Stream("1", number=1))
+
     def noise_key(self, context: PackingContext) -> dict[str, Any]:
         """What keys the random numbers of this term (see `key_of`).
 
@@ -72,6 +98,9 @@ class NoisyTerm(Term):
         Returns:
             The field `key` of the device struct, for `Packed`.
         """
+        if context.given is not None:
+            places = list(context.given.places(self.key).values())
+            return {"key": {"row": 0, "apart": places[-1], "draws": self.draws(context.h)}}
         key = key_of(self.key, context)
         return {"key": key if self.noise_step is None else key | {"draws": self.draws(context.h)}}
 

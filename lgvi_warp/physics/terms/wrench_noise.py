@@ -3,13 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.noisy import NoisyTerm
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.given_draws import Stream
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -28,6 +32,11 @@ class WrenchNoise(NoisyTerm):
 
     force: Any = number((3,), "N s^1/2", (0.0, 0.0, 0.0), least=0.0)
     torque: Any = number((3,), "N m s^1/2", (0.0, 0.0, 0.0), least=0.0)
+
+    def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
+        from lgvi_warp.physics.given_draws import Stream
+
+        return tuple(Stream(name, number=i) for i, name in enumerate(self.strengths) if name in acting)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The force and moment of each of the user's axes: drawn there, the numbers do not depend on the kernel's axes.

@@ -23,11 +23,9 @@ from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.functions import Own, ToldApart, functions_of
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.statistics.base import TYPES, Statistic, from_list
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.member_metrics import metric_of, numbers_of_members
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure
-from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
-from lgvi_warp.statistics.paths.member_values import MemberValues
-from lgvi_warp.statistics.values.functional import functional
 from lgvi_warp.statistics.values.tracking import check_wanted
 from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of
 from lgvi_warp.studies.sweeps.record import Record, key_of
@@ -108,7 +106,7 @@ class Setup:
         check_wanted(faults, "metrics", self.metrics, fleet.scene.controller)
         faults.raise_if_any()
         result = simulate(fleet, until=False, **self.kept(fleet), **self.settings, **more)
-        numbers = {name: result.statistics[f"each {name}"].value[0, 0] for name in self.metrics}
+        numbers = {name: numbers_of_members(result.statistics, name) for name in self.metrics}
         return Record(np.asarray(result.status), numbers, tuple(result.messages))
 
 
@@ -239,28 +237,6 @@ def metrics_of(entries: Any) -> dict[str, Statistic]:
             metrics.setdefault(name, metric)
     faults.raise_if_any()
     return metrics
-
-
-def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
-    """The name and the statistic of one metric."""
-    if isinstance(entry, str):
-        word, _, of = entry.partition(" ")
-        if word in TYPES:
-            entry = {"type": word, **({"of": of} if of else {})}
-        elif (quantity := functional(key, entry)).over_path:
-            return quantity.label, MemberValues(quantity.label)
-        else:
-            remedy = 'give "overshoot depth", "iae heading" or "max(depth)"'
-            raise refusal(key, entry, "is not one number of each member", remedy)
-    (statistic,) = from_list([entry], key, unique_names=False)
-    if not isinstance(statistic, MemberStatistic):
-        remedy = 'give a metric such as lw.metrics.Overshoot("depth"), or "max(depth)"'
-        raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)
-    if getattr(statistic, "of", None) is not None:
-        size = statistic.quantity.size
-        if size != 1 and len(statistic.then_of(np.array([0.0, 1.0]))[0].quantity.labels) != 1:
-            raise refusal(key, statistic.key, f"is {size} numbers of each member", "give one component")
-    return statistic.key, replace(statistic, then=(MemberValues(),))
 
 
 def rerun_members_of(

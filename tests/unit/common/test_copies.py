@@ -17,6 +17,7 @@ from lgvi_warp.common.errors import MissingExtra, NothingToDraw, NotReal
 from lgvi_warp.common.identity import UNKNOWN, identity
 from lgvi_warp.common.reading import UnreadableError
 from lgvi_warp.control.base import SECTIONS
+from lgvi_warp.physics.given_draws import Stream
 from tests.conftest import ROOT
 from tests.support.odd_calls import goods
 from tests.support.public import DOORS, NAMED
@@ -108,6 +109,7 @@ OTHERS = {
     "Candidate": lambda: lw.studies.Candidate("psi_s", 0.1), "Axis": lambda: lw.studies.Axis("h", 0.1, 1.0),
     "Line": lambda: lw.studies.Line("h", "step h", "s", True, np.ones(2)), "Cell": lambda: lw.studies.Cell.SILENT,
     "Growth": lambda: lw.studies.Growth(1.0, 0.7, None, 2.7, {"float64": 30.0}, np.arange(2.0), np.ones(2)),
+    "NoiseDraws": lambda: lw.uq.NoiseDraws("gusts", "force", 0.0, 0.1, 10, 3, 0, Stream("force")),
     "Measurement": lambda: lw.studies.Measurement(lw.studies.Candidate("psi_s", 0.1), 1.0, 2.0, {}, 0.0, {}, 2, {}),
 }  # fmt: skip
 

@@ -152,14 +152,16 @@ def test_numbers_of_quantities_and_of_metrics(monkeypatch):
         told.asked.clear()
         metric = numbers.Numbers(SCENE, None, "minimise", of, {"h": 0.1})
         assert (metric.label, metric.of_metric) == ("iae depth", True)
-        ((arguments, settings),) = told.asked
-        assert arguments == (SCENE, None, None)
-        assert (settings["h"], settings["save"].fields) == (0.1, ("position",))
-        assert [one.key for one in settings["statistics"]] == ["iae depth"]
+        (((scene, names, interest), settings),) = told.asked
+        assert (scene, names, settings) == (SCENE, None, {"failed": "nan", "h": 0.1})
+        assert (interest.label, interest.fields, interest.may_be_infinite) == ("iae depth", ("position",), True)
+        assert [(name, metric.key) for name, metric in interest.gathered(()).items()] == [
+            ("each iae depth", "iae depth")
+        ]
         each = SimpleNamespace(value=np.array([[[1.0, 2.0, np.inf]]]))
         status = np.array([0, lw.Status.NON_FINITE, lw.Status.FLOOR], np.uint8)
         result = SimpleNamespace(status=status, statistics={"each iae depth": each})
-        np.testing.assert_array_equal(metric(lambda run: result), [1.0, np.nan, np.inf])
+        np.testing.assert_array_equal(interest.values(result)[:, 0], [1.0, np.nan, np.inf])
 
 
 def test_the_worst_case_of_a_sum(monkeypatch):

@@ -81,18 +81,53 @@ def make_kept(reading, drifting, rare, late):
     return kept
 
 
+def make_given(count, noisy, drifting, lossy):
+    """(y, p, e) -> e with walk and noise, and whether the reading is lost, by the normals that the call gives."""
+    # Functions that this sensor needs alone; a kernel without given draws has none of them.
+    from lgvi_kernels.lanes.given_draws import first_of_tick, scalar_of_tick, vector_of_tick
+
+    drawn_noise = first_of_tick if count == 1 else vector_of_tick
+
+    @wp.func
+    def given(y: Any, p: Any, e: Any):
+        """As a tick that draws."""
+        lost = ones(y.position.x) - ones(y.position.x)
+        if wp.static(noisy):
+            e = e + p.noise * drawn_noise(y, p.key.row + p.key.noise)
+        if wp.static(lossy):
+            lost = p.dropout - scalar_of_tick(y, p.key.row + p.key.dropout)
+        if wp.static(drifting):
+            spread = root(y.period * ones(y.position.x))
+            if wp.static(count == 1):
+                walk = remembered(y, p.memory)
+                e.x = e.x + walk
+                remember(y, p.memory, walk + spread * p.drift.x * scalar_of_tick(y, p.key.row + p.key.drift))
+            else:
+                walks = remembered3(y, p.memory)
+                e = e + walks
+                remember3(y, p.memory, walks + spread * (p.drift * vector_of_tick(y, p.key.row + p.key.drift)))
+        return e, lost
+
+    return given
+
+
 @functools.cache
 def made(features):
-    """The device code of a sensor: features: what it reads (see readings.py), and its numbers that are not idle."""
+    """The device code of a sensor.
+
+    features: what it reads (see readings.py), its numbers that are not idle, and "given" where the call gives its normals.
+    """
     of, *others = features
     reading = make_reading(of)
     count, values, with_values, shifted = reading.count, reading.values, reading.with_values, reading.shifted
     biased, noisy, drifting, quantised, rare, late, lossy = (
         name in others for name in ("bias", "noise", "drift", "quantum", "every", "latency", "dropout")
     )
-    draws = any(name in others for name in DRAWING)
+    listed = "given" in others and any(name in others for name in DRAWING)
+    draws = not listed and any(name in others for name in DRAWING)
     keeps = any(name in others for name in KEEPING)
     kept = make_kept(reading, drifting, rare, late)
+    given = make_given(count, noisy, drifting, lossy) if listed else kept
 
     def params(width, real):
         """Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings that it keeps.
@@ -103,6 +138,10 @@ def made(features):
         vectors = {name: Lane3 for name in others if name in ("bias", "noise", "drift", "quantum")}
         lanes = {name: Lane for name in others if name in KEEPING}
         key = {"key": noise_key(width)} if draws else {}
+        if listed:
+            from lgvi_kernels.lanes.given_draws import given_ticks
+
+            key = {"key": given_ticks()}
         return struct("Sensor", **vectors, **lanes, **key, memory=wp.int32, sets=wp.int32)
 
     @wp.func
@@ -132,6 +171,8 @@ def made(features):
                     more = drawn(unity, p.key, y.tick, 1)
                     steps = vec3(quarter(more, 0), quarter(more, 1), quarter(more, 2))
                     remember3(y, p.memory, walks + spread * (p.drift * steps))
+        if wp.static(listed):
+            e, lost = given(y, p, e)
         if wp.static(biased or noisy or drifting):
             y = shifted(y, e)
         if wp.static(quantised):

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The noise of a prepared run's calls: whose counters draw it, or the standard normals that a call gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.engine.counted_draws import counted_draws, dtype_of
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.methods.saveat import TimeGrid
+from lgvi_warp.physics.given_draws import DrawLayout, GivenDraws
+from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
+
+# Most bytes of the normals of one call.
+MOST_BYTES = 1_000_000_000
+DRAWN, GIVEN = "drawn", "given"
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseOfCalls:
+    """What a run draws, and from where.
+
+    layout: what is drawn. given: whether calls give it. seed, members: of the ensemble. plan: of the members that the run was
+    prepared for, whose kernel says how normals are rounded. varied: names of what varies. grid: steps.
+    """
+
+    layout: DrawLayout
+    given: bool
+    seed: int
+    members: int
+    plan: Plan
+    varied: frozenset[str]
+    grid: TimeGrid
+
+    def of_call(self, xi: Any, members: int, keys: dict[str, Any]) -> GivenDraws | None:
+        """The normals that a call gives to so many members, None where it draws them.
+
+        keys: what else would say whose noise each row has, by name.
+        """
+        faults = Faults()
+        if xi is not None and not self.given:
+            remedy = 'prepare the run with draws="given", or leave it out'
+            faults.add("xi", "...", "is given to a run that draws its noise", remedy)
+        for name, value in keys.items():
+            if self.given and value is not None:
+                problem = 'says whose noise each row has, where draws="given" takes it from xi'
+                faults.add(name, value, problem, "give xi=lw.uq.draws_of(run, indices, seed=...)")
+        faults.raise_if_any()
+        if not self.given:
+            return None
+        if xi is None and self.layout.count == 0:
+            xi = np.empty((members, 0))
+        shape = f"give standard normals of shape ({members}, {self.layout.count}), such as lw.uq.draws_of(run, indices)"
+        if xi is None:
+            raise refusal("xi", None, 'is missing, since the run was prepared with draws="given"', shape)
+        return GivenDraws(self.layout, self._checked(xi, members, shape))
+
+    def _checked(self, xi: Any, members: int, shape: str) -> np.ndarray:
+        """Normals of a call as an array (members, m), float32 or float64."""
+        faults = Faults()
+        values = xi if type(xi) is np.ndarray and xi.dtype in (np.float32, np.float64) else faults.real("xi", xi, shape)
+        faults.raise_if_any()
+        assert values is not None
+        if values.shape != (members, self.layout.count):
+            raise refusal("xi", "...", f"has shape {values.shape}", shape)
+        check_size(members, self.layout.count, values.dtype.itemsize)
+        # NaN is the least of what it is among; two passes without an array of answers.
+        if values.size and not (np.isfinite(values.min()) and np.isfinite(values.max())):
+            row, column = (int(i) for i in np.argwhere(~np.isfinite(values))[0])
+            problem = f"is not finite in row {row}, column {column} ({self.layout.owner(column)})"
+            raise refusal("xi", float(values[row, column]), problem, "give standard normals")
+        return values
+
+
+def check_size(members: int, numbers: int, size: int) -> None:
+    """Refuse more normals than a call may hold, with the sum."""
+    if (total := members * numbers * size) > MOST_BYTES:
+        problem = f"would be {members:,} members times {numbers:,} normals of {size} bytes, {total / 1e9:,.1f} GB"
+        raise refusal(
+            "xi", "...", problem, f"call with fewer members at once, at most {MOST_BYTES // (numbers * size):,}"
+        )
+
+
+def checked_indices(indices: Any, members: int | None = None) -> np.ndarray:
+    """Whose noise is meant, int64 (members,); members: how many there must be, None for any number."""
+    keys = np.asarray(indices)
+    one_each = keys.ndim == 1 and len(keys) > 0 and members in (None, len(keys)) and keys.dtype.kind in "iu"
+    if not one_each or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
+        problem = "are not one whole number from 0 for each member"
+        shape = "(n,)" if members is None else f"({members},)"
+        raise refusal("indices", indices, problem, f"give an array of shape {shape}, of numbers below {MOST_MEMBERS}")
+    return keys.astype(np.int64)
+
+
+def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members: int | None = None) -> np.ndarray:
+    """Standard normals that the counters give: what a call draws that is not given its draws.
+
+    run(X, lw.uq.draws_of(run, indices)) has the bits of a call with these indices of the same run prepared without
+    draws="given". So what is to be changed may start from there: one gust, the leading draws, the noise of a chain.
+
+    Args:
+        run: A run made by `lw.prepare`.
+        indices: (n,), whose draws: those of the members with these indices in an ensemble of this seed, whole numbers from 0.
+            Default None for 0 to members - 1.
+        seed: Seed of the noise, a whole number from 0; default that of the ensemble.
+        members: How many, where there are no indices; default those of the ensemble.
+
+    Returns:
+        Standard normals (n, m), whose columns `run.draws` lists. They are of the type in which the kernel draws: float32 of a
+        run in float32, with or without compensation, else float64; and float64 where a term draws its start, as a stationary
+        current does.
+
+    Raises:
+        SceneError: For faulty arguments, and where the normals would take more than 1 GB.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> gusts = lw.terms.WrenchNoise(force=(0.0, 0.0, 1.0))
+        >>> scene = lw.Scene.named("sphere", terms=[gusts])
+        >>> run = lw.prepare(scene, ["start.position[2]"], of="depth", draws="given", method="psi_x", h=0.1, t1=1.0)
+        >>> xi = lw.uq.draws_of(run, [3, 4])
+        >>> xi.shape
+        (2, 30)
+        >>> bool((run([[0.0], [0.0]], xi) == run([[0.0], [0.0]], 0.0 * xi)).any())
+        False
+    """
+    noise = getattr(run, "noise", None)
+    if not isinstance(noise, NoiseOfCalls):
+        raise refusal("run", run, "is no prepared run", "give what lw.prepare returns")
+    if indices is not None and members is not None:
+        raise refusal("members", members, "is given beside indices, which say how many", "leave out one of them")
+    settings = EnsembleSettings(members, noise.seed if seed is None else seed)
+    keys = np.arange(settings.members or noise.members) if indices is None else checked_indices(indices)
+    spec = noise.plan.spec
+    check_size(len(keys), noise.layout.count, np.dtype(dtype_of(noise.layout, spec.real)).itemsize)
+    return counted_draws(noise.layout, int(settings.seed), keys, spec.width, spec.real)

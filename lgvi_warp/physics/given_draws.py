@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Standard normals that noise takes: streams of a term or a sensor, their places among all of a run, and those of a call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from lgvi_warp.common.errors import refusal
+
+
+class Stream(NamedTuple):
+    """Standard normals of one kind that a term or a sensor draws, and which of a counter's they are.
+
+    name: of what they drive. size: numbers of a draw. number: 0 or 1, the stream of the counters. place: of the first of a
+    counter's four normals. at_start: whether they are drawn once, by the host, for where members start.
+    """
+
+    name: str
+    size: int = 3
+    number: int = 0
+    place: int = 0
+    at_start: bool = False
+
+
+@dataclass(frozen=True)
+class NoiseDraws:
+    """Standard normals that one stream of a noisy term, or of a sensor, takes of a run.
+
+    Attributes:
+        of: key of the term or of the sensor.
+        stream: what they drive: "force" or "torque" of white noise; "current", and "start" for where it starts; "noise",
+            "drift" or "dropout" of a sensor; "0" or "1", the number of the stream, of a law of your own.
+        first: time of the first draw [s].
+        spacing: time from one draw to the next [s].
+        count: number of draws.
+        size: numbers of a draw, 3 for axes x, y, z, or 1.
+        column: first of their columns of xi: draw after draw, axis after axis.
+        source: which of the counters' normals they are.
+    """
+
+    of: str
+    stream: str
+    first: float
+    spacing: float
+    count: int
+    size: int
+    column: int
+    source: Stream
+
+    @property
+    def numbers(self) -> int:
+        """How many normals they are."""
+        return self.count * self.size
+
+    @property
+    def columns(self) -> slice:
+        """Their columns of xi."""
+        return slice(self.column, self.column + self.numbers)
+
+    @property
+    def times(self) -> np.ndarray:
+        """When they are drawn (count,) [s]."""
+        return self.first + self.spacing * np.arange(self.count)
+
+
+class DrawTimes(NamedTuple):
+    """When a term or a sensor draws: time between two draws [s], and their number."""
+
+    spacing: float
+    draws: int
+
+
+class DrawLayout:
+    """The draws of a run, one after the other, and of each term or sensor those of the start last.
+
+    Args:
+        streams: For each term or sensor its key, its streams and when it draws.
+    """
+
+    def __init__(self, streams: Iterable[tuple[str, Sequence[Stream], DrawTimes]]):
+        draws, self._by_key, column = list[NoiseDraws](), dict[str, dict[str, NoiseDraws]](), 0
+        for key, each, times in streams:
+            for source in sorted(each, key=lambda stream: stream.at_start):
+                count = 1 if source.at_start else times.draws
+                entry = NoiseDraws(key, source.name, 0.0, times.spacing, count, source.size, column, source)
+                column += entry.numbers
+                draws.append(entry)
+                self._by_key.setdefault(key, {})[source.name] = entry
+        self.draws, self.count = tuple(draws), column
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, DrawLayout) and self.draws == other.draws
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __iter__(self) -> Iterator[NoiseDraws]:
+        return iter(self.draws)
+
+    def of(self, key: str) -> Mapping[str, NoiseDraws]:
+        """The draws of a term or a sensor by stream.
+
+        Args:
+            key: Its key.
+
+        Returns:
+            Its draws, in the order of their columns.
+
+        Raises:
+            SceneError: Where it has none: it draws for some member by numbers that were not said to vary.
+        """
+        if key not in self._by_key:
+            remedy = "name what varies of it: prepare(scene, vary=[...], draws='given')"
+            raise refusal("xi", "...", f"has no draws for {key}, which acts on some member", remedy)
+        return self._by_key[key]
+
+    def owner(self, column: int) -> str:
+        """Say whose a column of xi is.
+
+        Args:
+            column: Its number.
+
+        Returns:
+            The stream and its owner, as text.
+        """
+        entry = next(entry for entry in self.draws if column < entry.columns.stop)
+        return f"{entry.of}, {entry.stream}"
+
+
+@dataclass(frozen=True, eq=False)
+class GivenDraws:
+    """Standard normals of members in place of those that counters would give.
+
+    Args:
+        layout: What they are.
+        values: Normals (n, m), columns as the layout has them; (1, m) where members share them.
+    """
+
+    layout: DrawLayout
+    values: np.ndarray
+
+    def of_members(self, chosen: slice | np.ndarray) -> GivenDraws:
+        """Choose members.
+
+        Args:
+            chosen: Their places.
+
+        Returns:
+            The normals of these.
+        """
+        return self if len(self.values) == 1 else replace(self, values=self.values[chosen])
+
+    def of_stream(self, key: str, stream: str) -> np.ndarray:
+        """Return the normals of one stream.
+
+        Args:
+            key: Key of the term or of the sensor.
+            stream: Name of the stream.
+
+        Returns:
+            Normals (1 or n, numbers).
+        """
+        return self.values[:, self.layout.of(key)[stream].columns]
+
+    def rows(self, key: str) -> np.ndarray | None:
+        """Return what the device code of a term or a sensor reads.
+
+        Args:
+            key: Its key.
+
+        Returns:
+            Normals (1 or n, rows); None where it draws nothing.
+        """
+        entries = [entry for entry in self.layout if entry.of == key and not entry.source.at_start]
+        if not entries:
+            return None
+        return self.values[:, entries[0].column : entries[-1].columns.stop]
+
+    def places(self, key: str) -> dict[str, int]:
+        """Find the streams that the device code of a term or a sensor reads.
+
+        Args:
+            key: Its key.
+
+        Returns:
+            The first row of each among those of `rows`, by name.
+        """
+        entries = [entry for entry in self.layout.of(key).values() if not entry.source.at_start]
+        return {entry.stream: entry.column - entries[0].column for entry in entries}

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A metric as one number of each member: read from a text, a table or the statistic, gathered, and looked up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import refusal
+from lgvi_warp.statistics.base import TYPES, Statistic, from_list
+from lgvi_warp.statistics.estimates.estimate import Estimate
+from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
+from lgvi_warp.statistics.paths.member_values import MemberValues
+from lgvi_warp.statistics.values.functional import functional
+
+
+def names_a_statistic(entry: Any) -> bool:
+    """Whether an entry is a statistic, a table of one, or a text that begins with its type, such as "overshoot depth"."""
+    return isinstance(entry, Statistic | Mapping) or (isinstance(entry, str) and entry.partition(" ")[0] in TYPES)
+
+
+def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
+    """The name and the statistic of one metric, whose numbers of all members are kept; "max(depth)" is one too."""
+    if isinstance(entry, str):
+        word, _, of = entry.partition(" ")
+        if names_a_statistic(entry):
+            entry = {"type": word, **({"of": of} if of else {})}
+        elif (quantity := functional(key, entry)).over_path:
+            return quantity.label, MemberValues(quantity.label)
+        else:
+            remedy = 'give "overshoot depth", "iae heading" or "max(depth)"'
+            raise refusal(key, entry, "is not one number of each member", remedy)
+    (statistic,) = from_list([entry], key, unique_names=False)
+    if not isinstance(statistic, MemberStatistic):
+        remedy = 'give a metric such as lw.metrics.Overshoot("depth"), or "max(depth)"'
+        raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)
+    if getattr(statistic, "of", None) is not None:
+        size = statistic.quantity.size
+        if size != 1 and len(statistic.then_of(np.array([0.0, 1.0]))[0].quantity.labels) != 1:
+            raise refusal(key, statistic.key, f"is {size} numbers of each member", "give one component")
+    return statistic.key, replace(statistic, then=(MemberValues(),))
+
+
+def gathered_name(name: str) -> str:
+    """The name under which a run has the numbers of a metric among its statistics."""
+    return f"each {name}"
+
+
+def numbers_of_members(statistics: Mapping[str, Estimate], name: str) -> np.ndarray:
+    """A metric's numbers (n,) out of the statistics of a run: of members that failed, too; infinite where it never ends."""
+    return np.asarray(statistics[gathered_name(name)].value[0, 0])

@@ -160,7 +160,7 @@ class Draws:
         else:
             nu = start["velocity"]
         R, position, nu, Om = (_of_each(x, m) for x in (R, start["position"], nu, start["angular_velocity"]))
-        return Members(values, position, R, nu, Om, indices, seed, given)
+        return Members(values, position, R, nu, Om, indices, seed, given=given)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
         """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""

@@ -32,6 +32,7 @@ from lgvi_warp.statistics.values.quantity import KNOWN
 if TYPE_CHECKING:
     import xarray
 
+    from lgvi_warp.sampling.members import Members
     from lgvi_warp.scene.ensemble import Ensemble
 
 TIME = {"units": "s", "long_name": "time since the start"}
@@ -77,6 +78,8 @@ class Result(Summarized):
             start, NaN without.
         warning_value: The value at that time, shape (n,); NaN without.
         substeps: Number of steps that were divided (on_failure="substep"), shape (n,).
+        event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None where `status` tells: where no
+            two events of the scene have the same.
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
         messages: What the user should know.
         provenance: Scene, ensemble with its seed, settings, versions and machine.
@@ -118,6 +121,7 @@ class Result(Summarized):
     kept: Result | None = None
     kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     store: Path | None = None
+    event: np.ndarray | None = None
     compile_seconds: float = field(default=0.0, compare=False)
     compile_phases: Phases = field(default=Phases(), compare=False)
     run_seconds: float = field(default=0.0, compare=False)
@@ -253,8 +257,13 @@ class Result(Summarized):
         """
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
-        of_members = {item.name: getattr(self, item.name)[places] for item in member_fields.EVERY}
+        of_members = {name: values[places] for name, values in self._of_members().items()}
         return replace(self, samples=samples, parameters=parameters, **of_members)
+
+    def _of_members(self) -> dict[str, np.ndarray]:
+        """What is recorded of each member, (n,) by name."""
+        names = [item.name for item in member_fields.EVERY] + (["event"] if self.event is not None else [])
+        return {name: getattr(self, name) for name in names}
 
     @property
     def members(self) -> int:
@@ -283,8 +292,9 @@ class Result(Summarized):
         for name in names:
             values = getattr(self, name)
             data[name] = (("time", "realization", *dims_of(name, values.shape[2:])), values, fields[name].attributes)
-        for item in member_fields.EVERY:
-            data[item.name] = (("realization",), np.asarray(getattr(self, item.name)), item.attributes)
+        about = {item.name: item.attributes for item in member_fields.FIELDS}
+        for name, values in self._of_members().items():
+            data[name] = (("realization",), np.asarray(values), about[name])
         data["end_time"] = (("realization",), self.end_time, END_TIME)
         coordinates = {"time": ("time", self.time, TIME)}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
@@ -305,7 +315,7 @@ class Result(Summarized):
             OSError: If the file cannot be written.
         """
         arrays = {"time": self.time, **self.samples}
-        arrays |= {item.name: np.asarray(getattr(self, item.name)) for item in member_fields.EVERY}
+        arrays |= {name: np.asarray(values) for name, values in self._of_members().items()}
         if self.samples:
             arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
@@ -328,7 +338,8 @@ class Result(Summarized):
         Returns:
             Arguments of Result, by name.
         """
-        values: dict[str, Any] = {item.name: arrays[item.name] for item in member_fields.EVERY if item.name in arrays}
+        names = [*(item.name for item in member_fields.EVERY), "event"]
+        values: dict[str, Any] = {name: arrays[name] for name in names if name in arrays}
         status, warnings = values["status"].view(StatusArray), values["warnings"].view(WarningArray)
         return values | {"status": status, "warnings": warnings}
 
@@ -397,11 +408,15 @@ class DrawnParameters(Mapping[str, np.ndarray]):
     """
 
     def __init__(self, ensemble: Ensemble, stop: int, first: int = 0):
-        self._ensemble, self._first, self._stop = ensemble, first, stop
+        self.ensemble, self._first, self._stop = ensemble, first, stop
+
+    def select(self, first: int, stop: int) -> Members:
+        """Return parameters and initial states of some of these members, counted from the first of them."""
+        return self.ensemble.select(self._first + first, self._first + stop)
 
     @functools.cached_property
     def _drawn(self) -> dict[str, np.ndarray]:
-        parameters = self._ensemble.parameters(self._first, self._stop)
+        parameters = self.ensemble.parameters(self._first, self._stop)
         return {name: values.copy() for name, values in parameters.items()}
 
     def __getitem__(self, name: str) -> np.ndarray:

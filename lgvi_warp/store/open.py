@@ -61,6 +61,11 @@ class Arrays(Mapping[str, np.ndarray]):
         array = self.group[name]
         return np.asarray(array[at] if isinstance(self.members, slice) else array.oindex[at])
 
+    def rows(self, name: str, when: slice | np.ndarray, places: slice) -> np.ndarray:
+        """Read samples at some of the times, of some of these members: only the chunks that hold them are read."""
+        few, array = self.part(places), self.group[name]
+        return np.asarray(array.oindex[when, few.members])
+
     def part(self, places: slice | np.ndarray) -> Arrays:
         """Select members of those that these arrays read."""
         if not isinstance(self.members, slice):

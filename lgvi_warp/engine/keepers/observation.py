@@ -100,16 +100,16 @@ class Observation:
         if self.statistics:
             content["statistics"] = [statistic.to_dict() for statistic in self.statistics]
         content |= {"until": self.until.to_dict()} if self.until else {}
-        function_keys = [statistic.key for statistic in self.statistics if _of_functions(statistic)]
+        function_keys = [statistic.key for statistic in self.statistics if of_functions(statistic)]
         return content | ({"functions": function_keys} if function_keys else {})
 
 
-def _of_functions(value: Any) -> bool:
+def of_functions(value: Any) -> bool:
     """Whether a statistic depends on the user's functions or quantities, which its table cannot hold."""
     if isinstance(value, Statistic):
-        return any(_of_functions(getattr(value, field.name)) for field in fields(value))
+        return any(of_functions(getattr(value, field.name)) for field in fields(value))
     if isinstance(value, list | tuple):
-        return any(_of_functions(entry) for entry in value)
+        return any(of_functions(entry) for entry in value)
     return isinstance(value, Quantity) or callable(value)
 
 

@@ -81,6 +81,7 @@ class Result(Summarized):
         event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None where `status` tells: where no
             two events of the scene have the same.
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
+        starts: Numbers of the start that varied, by name, (n, ...): "start.position", "start.euler_deg", ...
         messages: What the user should know.
         provenance: Scene, ensemble with its seed, settings, versions and machine.
         terms: The scene's terms.
@@ -122,6 +123,7 @@ class Result(Summarized):
     kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     store: Path | None = None
     event: np.ndarray | None = None
+    starts: Mapping[str, np.ndarray] = field(default_factory=dict)
     compile_seconds: float = field(default=0.0, compare=False)
     compile_phases: Phases = field(default=Phases(), compare=False)
     run_seconds: float = field(default=0.0, compare=False)
@@ -257,8 +259,9 @@ class Result(Summarized):
         """
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
+        starts = {name: values[places] for name, values in self.starts.items()}
         of_members = {name: values[places] for name, values in self._of_members().items()}
-        return replace(self, samples=samples, parameters=parameters, **of_members)
+        return replace(self, samples=samples, parameters=parameters, starts=starts, **of_members)
 
     def _of_members(self) -> dict[str, np.ndarray]:
         """What is recorded of each member, (n,) by name."""
@@ -318,6 +321,7 @@ class Result(Summarized):
         arrays |= {name: np.asarray(values) for name, values in self._of_members().items()}
         if self.samples:
             arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
+            arrays |= {f"starts/{name}": value for name, value in self.starts.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
         if self.statistics:
             estimates, texts["statistics"] = self.statistics.to_arrays()
@@ -377,6 +381,7 @@ class Result(Summarized):
             samples={name: content[name] for name in content if name in IN_FILES},
             **cls.per_member(content),
             parameters=_below("parameters/", content),
+            starts=_below("starts/", content),
             messages=tuple(texts["messages"]),
             provenance=provenance,
             terms=terms_of(provenance["scene"]),
@@ -416,8 +421,10 @@ class DrawnParameters(Mapping[str, np.ndarray]):
 
     @functools.cached_property
     def _drawn(self) -> dict[str, np.ndarray]:
-        parameters = self.ensemble.parameters(self._first, self._stop)
-        return {name: values.copy() for name, values in parameters.items()}
+        return {name: values.copy() for name, values in self._values().items()}
+
+    def _values(self) -> dict[str, np.ndarray]:
+        return self.ensemble.parameters(self._first, self._stop)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._drawn[name]
@@ -427,3 +434,16 @@ class DrawnParameters(Mapping[str, np.ndarray]):
 
     def __len__(self) -> int:
         return len(self._drawn)
+
+
+class DrawnStarts(DrawnParameters):
+    """Numbers of the start that vary, of members of an ensemble that follow each other, drawn when they are first read."""
+
+    def _values(self) -> dict[str, np.ndarray]:
+        return self.ensemble.starts(self._first, self._stop)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.ensemble.varied_starts())
+
+    def __len__(self) -> int:
+        return len(self.ensemble.varied_starts())

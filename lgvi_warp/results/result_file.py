@@ -35,6 +35,8 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
             good = array.shape == (n,) and array.dtype == of_members[name]
         elif name == "kept/members":
             good = array.shape == (m,) and array.dtype.kind == "i" and (not m or 0 <= array.min() <= array.max() < n)
+        elif name.startswith("starts/"):
+            good = array.dtype.kind == "f" and array.ndim > 0 and len(array) == n
         elif name.startswith(("parameters/", "kept/parameters/")):
             lengths = (1, m if name.startswith("kept/") else n)
             good = array.dtype.kind == "f" and array.ndim > 0 and len(array) in lengths

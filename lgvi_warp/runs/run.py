@@ -25,7 +25,7 @@ from lgvi_warp.engine.work import Work
 from lgvi_warp.results import member_fields
 from lgvi_warp.results.outcomes import begun_beyond, failure_text
 from lgvi_warp.results.provenance import at_end, messages, provenance
-from lgvi_warp.results.result import DrawnParameters, Result
+from lgvi_warp.results.result import DrawnParameters, DrawnStarts, Result
 from lgvi_warp.scene import plausibility
 from lgvi_warp.statistics.estimates.estimate import Estimates
 
@@ -145,6 +145,7 @@ class _Gathered:
             samples={name: values.copy() for name, values in self.histories(at).items()},
             **Result.per_member(of_members),
             parameters=DrawnParameters(plan.ensemble, block.stop, block.first),
+            starts=DrawnStarts(plan.ensemble, block.stop, block.first),
             messages=(),
             provenance=provenance(plan) | {"members": plan.ensemble.members},
             terms=tuple(plan.ensemble.scene.terms),
@@ -169,6 +170,7 @@ class _Gathered:
             samples=histories,
             **Result.per_member(of_members),
             parameters=DrawnParameters(plan.ensemble, n),
+            starts=DrawnStarts(plan.ensemble, n),
             messages=texts + remarks + on_the_way + begun_beyond(of_members["status"], of_members["failure_time"]),
             provenance=at_end(content, of_members, n, plan.ensemble.members),
             terms=tuple(scene.terms),

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,7 @@ class Members:
 
     Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
     angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole.
+    `starts` has the numbers of the start that vary, (m, ...) as the scene names them: "start.euler_deg".
     """
 
     parameters: dict[str, np.ndarray]
@@ -23,6 +24,7 @@ class Members:
     angular_velocity: np.ndarray
     indices: np.ndarray
     seed: int
+    starts: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def count(self) -> int:

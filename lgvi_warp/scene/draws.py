@@ -111,6 +111,11 @@ class Draws:
         """Names of what members have at the start."""
         return tuple(name for name in {**self.scene.start, **self.explicit} if name.startswith("start."))
 
+    @functools.cached_property
+    def varied_starts(self) -> tuple[str, ...]:
+        """Names of what members have of their own at the start."""
+        return tuple(name for name in self._start_names if name in self.varied_names)
+
     def with_columns(self, columns: Columns) -> Draws:
         """The draws of other members, of which a table's columns have other values; the targets are the same."""
         draws = replace(self, columns=columns, total=len(columns[0][1]), places=None)
@@ -145,6 +150,7 @@ class Draws:
     def members_of(self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int) -> Members:
         """Members from all their numbers by name, which loses those of the start."""
         m = len(indices)
+        own = {name: values[name] for name in self.varied_starts}
         start = {key.removeprefix("start."): values.pop(key) for key in self._start_names}
         # In one memory layout, on which the order of the sums of a matrix product depends.
         R = np.ascontiguousarray(self._attitude(start))
@@ -155,7 +161,7 @@ class Draws:
         else:
             nu = start["velocity"]
         R, position, nu, Om = (_of_each(x, m) for x in (R, start["position"], nu, start["angular_velocity"]))
-        return Members(values, position, R, nu, Om, indices, seed)
+        return Members(values, position, R, nu, Om, indices, seed, own)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
         """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""

@@ -311,6 +311,23 @@ class Ensemble(Summarized):
         varied = self.varied_names
         return [name for name in self._draws.scene.parameters if name in varied]
 
+    def varied_starts(self) -> list[str]:
+        """Return the names of the numbers of the start that vary from member to member, such as "start.position"."""
+        return list(self._draws.varied_starts)
+
+    def starts(self, first: int, stop: int) -> dict[str, np.ndarray]:
+        """Return the numbers of the start that vary, of some members.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            Values by name, (stop - first, ...): whole numbers, also where one entry varies.
+        """
+        values = self._values(first, stop) if self._draws.varied_starts else {}
+        return {name: values[name] for name in self._draws.varied_starts}
+
     @property
     def varied_names(self) -> set[str]:
         """Names of what members have of their own: drawn, from columns or explicit."""

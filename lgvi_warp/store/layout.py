@@ -14,6 +14,7 @@ from lgvi_warp.common import machine
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.physics.fields import dims_of
 from lgvi_warp.results import member_fields
+from lgvi_warp.scene.start import Start
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
@@ -132,6 +133,10 @@ def _parameters(plan: Plan, length: int) -> list[StoreArray]:
     for name in ensemble.varied():
         attributes = {"long_name": f"parameter {name}", "units": units[name]}
         arrays.append(StoreArray(name, first[name].shape[1:], "<f8", length, 0, attributes))
+    units = {f"start.{item.name}": item.metadata.get("unit") for item in dataclasses.fields(Start)}
+    for name, values in ensemble.starts(0, 1).items():
+        attributes = {"long_name": f"{name} of the member", "units": units.get(name) or "1"}
+        arrays.append(StoreArray(name, values.shape[1:], "<f8", length, 0, attributes))
     return arrays
 
 

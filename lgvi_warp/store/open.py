@@ -211,8 +211,9 @@ def result_of(
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
     fields = tuple(name for name in arrays if name in IN_FILES)
-    varied = tuple(name for name in arrays if "." in name)
-    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
+    varied = tuple(name for name in arrays if "." in name and not name.startswith("start."))
+    starts = tuple(name for name in arrays if name.startswith("start."))
+    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, *starts, "time", "step")), 0, at)
     with corrupt_store_as_scene_error(folder.path / ROOT):
         shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
     strange = np.setdiff1d(small["status"], np.array([int(code) for code in Status]))
@@ -237,6 +238,7 @@ def result_of(
         kept=kept,
         kept_members=indices,
         store=folder.path,
+        starts=Arrays(group, starts, 0, at),
     )
 
 
@@ -276,7 +278,8 @@ def _places(members: Any, n: int) -> slice | np.ndarray:
 def chosen(result: Result, members: Sequence[int]) -> Result:
     """Read some members of a run in a store into memory."""
     selection = result_of(Folder(Path(result.store or "")), members, result.messages, result.terms)
-    return replace(selection, samples=dict(selection.samples), parameters=dict(selection.parameters), store=None)
+    return replace(selection, samples=dict(selection.samples), parameters=dict(selection.parameters), store=None,
+                   starts=dict(selection.starts))  # fmt: skip
 
 
 def dataset(path: Path) -> xarray.Dataset:

@@ -70,7 +70,7 @@ class BlockWriter:
 
     def close(self, outcome: MemberStatus) -> Files:
         """Write the fields and parameters of the members."""
-        values = {MEMBER: self._members.indices} | self._members.parameters
+        values = {MEMBER: self._members.indices} | self._members.parameters | self._members.starts
         values |= member_fields.member_fields(self._plan, outcome)
         for column in self._of_members:
             chunk = np.full(column.chunk, column.fill, column.dtype)

@@ -29,7 +29,8 @@ from lgvi_warp.views.commands import faults
 from lgvi_warp.views.fleet import OUTCOME_STYLES, title
 from lgvi_warp.views.pages.run_again import how_to_run_again
 from lgvi_warp.views.plots.estimates import drawable
-from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
+from lgvi_warp.results.varied import varied
+from lgvi_warp.views.plots.inputs import inputs_by_outcome
 from lgvi_warp.views.plots.sweep_pictures import PICTURES
 
 if TYPE_CHECKING:

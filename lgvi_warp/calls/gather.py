@@ -16,6 +16,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.observation import Observation, Observing, of_functions
 from lgvi_warp.engine.keepers.statistics import BlockStatistics, Gathered
 from lgvi_warp.results.result import Result
+from lgvi_warp.sampling.designs.table import check_weights
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
 from lgvi_warp.statistics.estimates.estimate import Estimates
@@ -24,7 +25,7 @@ from lgvi_warp.statistics.values.tracking import check_wanted
 from lgvi_warp.store.open import open_run
 
 
-def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any]) -> Estimates:
+def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], weights: Any = None) -> Estimates:
     """Gather statistics of a run that is over, from the samples that it kept: in memory, or in a store block by block.
 
     The estimates are those that the run would have gathered on the way, with the same bits: blocks of members are reduced
@@ -38,6 +39,9 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any]) -
         result: What `lw.solve`, `lw.open_run` or `lw.Result.load` returned; or the path of a store. Of a store with 10^6
             members a few blocks' samples are in memory at a time.
         statistics: Statistics, as of `lw.solve`, or tables of a scene file.
+        weights: What each member counts for, numbers (n,) from 0 in any unit: the members then stand for another distribution
+            than the one that they were drawn from. By default the weights of the run (see lw.designs.Table), else all count
+            alike. Members of a Sobol sequence or another design are weighed as independent ones: their intervals are wide.
 
     Returns:
         The estimates by name, with `messages` on what the user should know.
@@ -58,7 +62,7 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any]) -
         result = open_run(result)
     if not isinstance(result, Result):
         raise refusal("result", result, "is no result", "give what lw.solve or lw.open_run returned, or a store's path")
-    kept = KeptSamples(result)
+    kept = KeptSamples(result, _weights(weights, result.members))
     asked = _checked(kept, from_list(statistics))
     ensemble = result.provenance.get("ensemble", {})
     observing = Observing(Observation(asked), result.time, kept.total, kept.replicates)
@@ -67,6 +71,23 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any]) -
             keeper.merge(block, _part_of_block(kept, keeper, block))
     estimates, messages = observing.read(ensemble, np.asarray(result.status))
     return Estimates(list(estimates.values()), messages)
+
+
+def _weights(weights: Any, members: int) -> np.ndarray | None:
+    """The weights (n,) of mean 1 that were asked for; None for none."""
+    if weights is None:
+        return None
+    faults = Faults()
+    numbers = faults.finite("weights", weights)
+    if numbers is not None:
+        check_weights(faults, "weights", numbers)
+    if numbers is not None and not faults and len(numbers) != members:
+        faults.add(
+            "weights", numbers, f"are {len(numbers):,} numbers for {members:,} members", "give one for each member"
+        )
+    faults.raise_if_any()
+    assert numbers is not None
+    return np.asarray(numbers / numbers.mean())
 
 
 def _checked(kept: KeptSamples, asked: tuple[Statistic, ...]) -> tuple[Statistic, ...]:
@@ -106,7 +127,8 @@ def _part_of_block(kept: KeptSamples, run: Gathered, block: Block) -> list[Part]
     over_time = any(not (statistic.at_end or (statistic.ticks and ticks is not None)) for statistic in asked)
     rows = np.arange(len(time)) if over_time else np.array([len(time) - 1])
     with np.errstate(invalid="ignore", over="ignore"):
-        gathers = BlockStatistics(run, block, kept.members(block, names), None if ticks is None else time[ticks])
+        members, weight = kept.members(block, names), kept.weights_of(block)
+        gathers = BlockStatistics(run, block, members, None if ticks is None else time[ticks], weight)
         if ticks is not None:
             for when, fields in kept.pieces(block, names, ticks, kept.scene.controller):
                 gathers.take_ticks(when, fields)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -68,18 +69,19 @@ class KeptSamples:
 
     Attributes:
         total: number of members of the whole run, by which blocks are divided.
+        weights: what the members count for (n,); None where all count alike.
         replicates: number of independent replicates of the design; 1 where the members are not those of a whole design.
         events: the events of the scene.
         ticks: (m,), the rows of samples at the ticks of the controller; None without a controller.
     """
 
-    def __init__(self, result: Result):
-        self.result = result
+    def __init__(self, result: Result, weights: np.ndarray | None = None):
+        self.result, self.weights = result, result.weights if weights is None else weights
         ensemble = result.provenance.get("ensemble", {})
         planned = len(ensemble["indices"]) if "indices" in ensemble else int(ensemble.get("members") or result.members)
         whole = result.members in (planned, result.provenance.get("members"))
         self.total = planned if whole else result.members
-        self.replicates = replicates_of(ensemble) if whole else 1
+        self.replicates = replicates_of(ensemble) if whole and weights is None else 1
         self.events: tuple[Event, ...] = events_of(result.provenance["scene"].get("events", ()))
 
     def blocks(self) -> Iterator[Block]:
@@ -87,6 +89,10 @@ class KeptSamples:
         for block in blocks(self.total):
             if block.first < self.result.members:
                 yield Block(block.first, min(block.stop, self.result.members))
+
+    def weights_of(self, block: Block) -> np.ndarray | None:
+        """What the members of a block count for; None where all count alike."""
+        return None if self.weights is None else np.asarray(self.weights[block.first : block.stop])
 
     @functools.cached_property
     def scene(self) -> Any:
@@ -112,7 +118,9 @@ class KeptSamples:
         rows = np.minimum(np.searchsorted(made, ticks), len(made) - 1)
         if not np.array_equal(made[rows], ticks):
             remedy = f"keep them: save=lw.SaveAt(every={self.period:g}, fields=...), or gather it on the way"
-            raise refusal(key, "...", f"is of every tick of the controller, and samples lack some of {len(ticks):,}", remedy)
+            raise refusal(
+                key, "...", f"is of every tick of the controller, and samples lack some of {len(ticks):,}", remedy
+            )
         return rows
 
     def ends(self, block: Block) -> Ends:
@@ -143,14 +151,16 @@ class KeptSamples:
     ) -> Iterator[tuple[slice, KeptFields]]:
         """Samples of a block at some of the times, a few at once: their places among `rows`, and the samples."""
         result, at = self.result, slice(block.first, block.stop)
-        status, at_once = np.asarray(result.status[at]), max(1, READ_AT_ONCE // (FIELD_BYTES * max(len(names), 1) * block.count))
+        status = np.asarray(result.status[at])
+        at_once = max(1, READ_AT_ONCE // (FIELD_BYTES * max(len(names), 1) * block.count))
         # A member's own samples are those up to its end, at which an event may have stopped it.
         last = np.searchsorted(result.time, result.end_time[at] * (1.0 + ROUNDING), side="right") - 1
-        for first in range(0, len(rows), at_once):
-            chosen = rows[first : first + at_once]
+        # The start comes by itself, as in a run.
+        for first, stop in itertools.pairwise([0, *range(1, len(rows), at_once), len(rows)]):
+            chosen = rows[first:stop]
             fields = {name: self._read(name, chosen, at) for name in names}
             others = (result.time[chosen], chosen, result.terms, lambda: (status, last), controller)
-            yield slice(first, first + len(chosen)), KeptFields(fields, *others)
+            yield slice(first, stop), KeptFields(fields, *others)
 
     def _read(self, name: str, rows: np.ndarray, at: slice) -> np.ndarray:
         follow = len(rows) == rows[-1] - rows[0] + 1

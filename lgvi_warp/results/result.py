@@ -78,10 +78,10 @@ class Result(Summarized):
             start, NaN without.
         warning_value: The value at that time, shape (n,); NaN without.
         substeps: Number of steps that were divided (on_failure="substep"), shape (n,).
-        event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None where `status` tells: where no
-            two events of the scene have the same.
+        event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None where `status` tells.
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
         starts: Numbers of the start that varied, by name, (n, ...): "start.position", "start.euler_deg", ...
+        weights: What each member counts for in statistics, (n,), of mean 1 (see lw.designs.Table); None: all alike.
         messages: What the user should know.
         provenance: Scene, ensemble with its seed, settings, versions and machine.
         terms: The scene's terms.
@@ -124,6 +124,7 @@ class Result(Summarized):
     store: Path | None = None
     event: np.ndarray | None = None
     starts: Mapping[str, np.ndarray] = field(default_factory=dict)
+    weights: np.ndarray | None = None
     compile_seconds: float = field(default=0.0, compare=False)
     compile_phases: Phases = field(default=Phases(), compare=False)
     run_seconds: float = field(default=0.0, compare=False)
@@ -265,7 +266,8 @@ class Result(Summarized):
 
     def _of_members(self) -> dict[str, np.ndarray]:
         """What is recorded of each member, (n,) by name."""
-        names = [item.name for item in member_fields.EVERY] + (["event"] if self.event is not None else [])
+        names = [item.name for item in member_fields.EVERY]
+        names += [name for name in ("event", "weights") if getattr(self, name) is not None]
         return {name: getattr(self, name) for name in names}
 
     @property
@@ -295,7 +297,7 @@ class Result(Summarized):
         for name in names:
             values = getattr(self, name)
             data[name] = (("time", "realization", *dims_of(name, values.shape[2:])), values, fields[name].attributes)
-        about = {item.name: item.attributes for item in member_fields.FIELDS}
+        about = {item.name: item.attributes for item in member_fields.FIELDS} | {"weights": {"units": "1"}}
         for name, values in self._of_members().items():
             data[name] = (("realization",), np.asarray(values), about[name])
         data["end_time"] = (("realization",), self.end_time, END_TIME)
@@ -342,7 +344,7 @@ class Result(Summarized):
         Returns:
             Arguments of Result, by name.
         """
-        names = [*(item.name for item in member_fields.EVERY), "event"]
+        names = [*(item.name for item in member_fields.EVERY), "event", "weights"]
         values: dict[str, Any] = {name: arrays[name] for name in names if name in arrays}
         status, warnings = values["status"].view(StatusArray), values["warnings"].view(WarningArray)
         return values | {"status": status, "warnings": warnings}

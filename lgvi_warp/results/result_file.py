@@ -20,6 +20,7 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
     if missing := [name for name in ("time", "status", *TEXTS[:2]) if name not in content]:
         raise ValueError(f"it has no {', '.join(missing)}")
     of_members = {item.name: np.dtype(item.dtype) for item in member_fields.FIELDS}
+    of_members["weights"] = np.dtype("<f8")
     k, n = content["time"].size, content["status"].size
     m = content["kept/members"].size if "kept/members" in content else 0
     for name, array in content.items():

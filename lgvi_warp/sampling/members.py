@@ -14,7 +14,8 @@ class Members:
 
     Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
     angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole.
-    `starts` has the numbers of the start that vary, (m, ...) as the scene names them: "start.euler_deg".
+    `starts` has the numbers of the start that vary, (m, ...) as the scene names them: "start.euler_deg"; `weight` (m,) what
+    each counts for in statistics, None where all count alike.
     """
 
     parameters: dict[str, np.ndarray]
@@ -25,6 +26,7 @@ class Members:
     indices: np.ndarray
     seed: int
     starts: dict[str, np.ndarray] = field(default_factory=dict)
+    weight: np.ndarray | None = None
 
     @property
     def count(self) -> int:

@@ -300,7 +300,20 @@ class Ensemble(Summarized):
         """
         if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
             raise IndexError(f"members {first} to {stop} of {self.members}")
-        return self._draws.members_of(self._values(first, stop), self.indices_of(first, stop), self.seed)
+        values, indices = self._values(first, stop), self.indices_of(first, stop)
+        return self._draws.members_of(values, indices, self.seed, self.weights(first, stop))
+
+    def weights(self, first: int, stop: int) -> np.ndarray | None:
+        """Return what some members count for in statistics.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            Weights (stop - first,), of mean 1 over the table that gives them; None where all members count alike.
+        """
+        return self._draws.weights_of(first, stop)
 
     def varied(self) -> list[str]:
         """Return the names of the parameters that vary from member to member.

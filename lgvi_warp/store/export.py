@@ -20,7 +20,7 @@ from lgvi_warp.control.signals import SAVED
 from lgvi_warp.engine.block import Block
 from lgvi_warp.results.result import END_TIME
 from lgvi_warp.store.folder import KEPT, Folder
-from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER
+from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER, WEIGHT
 from lgvi_warp.store.open import folder_of, open_run
 from lgvi_warp.store.state import state
 
@@ -200,6 +200,7 @@ def _rows(group: Any, run: Block) -> dict[str, tuple[str, np.ndarray]]:
     for name in (name for name, _ in group.arrays() if "." in name):
         columns |= _components(name, np.repeat(group[name].oindex[at], len(time), axis=0))
     ends = {name: group[name].oindex[at] for name in ("status", "event", "failure_time") if name in group}
+    ends |= {WEIGHT: group[WEIGHT].oindex[at]} if WEIGHT in group else {}
     ends["end_time"] = _end_time(ends["failure_time"], group)
     return columns | {name: ("failure_time" if name == "end_time" else name, np.repeat(values, len(time)))
                       for name, values in ends.items()}  # fmt: skip

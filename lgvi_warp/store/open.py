@@ -28,7 +28,7 @@ from lgvi_warp.statistics.estimates.estimate import Estimates
 from lgvi_warp.store.block_files import damaged, name_of
 from lgvi_warp.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.store.kept import keep_of, members_kept
-from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER
+from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER, WEIGHT
 from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
 from lgvi_warp.store.recipe import noted_functions
 
@@ -213,7 +213,9 @@ def result_of(
     fields = tuple(name for name in arrays if name in IN_FILES)
     varied = tuple(name for name in arrays if "." in name and not name.startswith("start."))
     starts = tuple(name for name in arrays if name.startswith("start."))
-    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, *starts, "time", "step")), 0, at)
+    small = Arrays(
+        group, tuple(name for name in arrays if name not in (*fields, *varied, *starts, "time", "step")), 0, at
+    )
     with corrupt_store_as_scene_error(folder.path / ROOT):
         shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
     strange = np.setdiff1d(small["status"], np.array([int(code) for code in Status]))
@@ -239,6 +241,7 @@ def result_of(
         kept_members=indices,
         store=folder.path,
         starts=Arrays(group, starts, 0, at),
+        weights=small.get(WEIGHT),
     )
 
 

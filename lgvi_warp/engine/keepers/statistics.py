@@ -36,7 +36,7 @@ class Gathered:
         self._asked, self.time, self.replicates = tuple(statistics), time, replicates
         self.statistics = tuple(map(followed, statistics))
         self._size = blocks(members)[0].count
-        self.trees = [Tree(statistic.join) for statistic in self.statistics]
+        self.trees = [Tree(statistic.join_any) for statistic in self.statistics]
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockOfRun:
         """The keeper of a block's statistics."""
@@ -106,12 +106,21 @@ class BlockStatistics:
     """Gathers the statistics of one block from its samples, in order, and from the ends of its members.
 
     members: what functions of (samples, members) see of the block's members.
+    weight: (n,), what the members count for; None: all alike.
     ticks: (m,) [s], the times of a controller's ticks, which come by `take_ticks`; None where samples serve for ticks.
     """
 
-    def __init__(self, run: Gathered, block: Block, members: Members, ticks: np.ndarray | None):
+    def __init__(
+        self,
+        run: Gathered,
+        block: Block,
+        members: Members,
+        ticks: np.ndarray | None,
+        weight: np.ndarray | None,
+    ):
         self._statistics, self._members, self._place = run.statistics, members, run.place(block)
         self._replicates, self._times = run.replicates, len(run.time)
+        self._weight = weight
         # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
         self._takes_ticks = ticks is not None
@@ -146,7 +155,7 @@ class BlockStatistics:
     def _values(self, x: np.ndarray, good: np.ndarray | None) -> Values:
         """The values of all members, or of each replicate's members."""
         if self._replicates == 1:
-            return Values(x, good, *self._place)
+            return Values(x, good, *self._place, weight=self._weight)
         return dealt(x, good, *self._place, self._replicates)
 
     def ended(self, ends: Ends) -> list[Part]:
@@ -163,7 +172,7 @@ class _BlockOfRun(BlockStatistics):
 
     def __init__(self, run: Gathered, plan: Plan, block: Block, members: Members):
         ticks = plan.launches.gathered
-        super().__init__(run, block, members, None if ticks is None else ticks.times)
+        super().__init__(run, block, members, None if ticks is None else ticks.times, members.weight)
         self._plan = plan
 
     def close(self, outcome: MemberStatus) -> list[Part]:

@@ -33,7 +33,8 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], w
     those of the rounded ones. Times are those of the samples.
 
     Metrics, which look at every tick of a controller, need samples at every tick: save=lw.SaveAt(every=period, fields=...)
-    with the signals that they read. Outcomes and end times need no samples.
+    with the signals that they read; they equal those of the run but for round-off, since a run moves ticks to the user's axes
+    in its kernel. Outcomes and end times need no samples.
 
     Args:
         result: What `lw.solve`, `lw.open_run` or `lw.Result.load` returned; or the path of a store. Of a store with 10^6

@@ -100,7 +100,8 @@ def test_weights_afterwards_are_those_of_a_table(result):
 TRUTHS = {
     "mean depth": 10.0 + 0.5 * DOWN, "exceedance depth above 12": norm.sf(12.0 - 0.5 * DOWN, 10.0, 1.0),
     "quantiles depth": norm.ppf([0.1, 0.5, 0.9], 10.0 + 0.5 * DOWN), "covariance depth": 1.0,
-    "outcome floor": norm.sf(FLOOR - T1 * DOWN, 10.0, 1.0), "first_passage depth above 14": norm.sf(14.0 - T1 * DOWN, 10.0, 1.0),
+    "outcome floor": norm.sf(FLOOR - T1 * DOWN, 10.0, 1.0),
+    "first_passage depth above 14": norm.sf(14.0 - T1 * DOWN, 10.0, 1.0),
     "exceedance path_maximum depth above 14": norm.sf(14.0 - T1 * DOWN, 10.0, 1.0),
 }  # fmt: skip
 COVERED = [

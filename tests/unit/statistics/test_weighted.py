@@ -12,8 +12,8 @@ from lgvi_warp.statistics.values.values import Values
 S = lw.statistics
 TWO = ["position[0]", "position[1]"]
 OF_TWO = [
-    S.Mean(TWO), S.Covariance(TWO), S.Histogram(TWO, bins=5, limits=(-2, 2)), S.Exceedance(TWO, above=0.5), S.CircularMean(TWO),
-    S.Extremes(TWO),
+    S.Mean(TWO), S.Covariance(TWO), S.Histogram(TWO, bins=5, limits=(-2, 2)), S.Exceedance(TWO, above=0.5),
+    S.CircularMean(TWO), S.Extremes(TWO),
 ]  # fmt: skip
 TIME = np.array([0.0, 1.0, 2.0])
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -145,6 +146,16 @@ class KeptSamples:
             parameters = {name: values[at] if len(values) > 1 else values for name, values in parameters.items()}
         start = next(self.pieces(block, names, np.zeros(1, np.int64)))[1] if names else None
         return KnownMembers(parameters, block.count, start)
+
+    def of_block(self, block: Block, names: tuple[str, ...]) -> Result:
+        """The members of a block as a result in memory, with some of their samples."""
+        result, at = self.result, slice(block.first, block.stop)
+        rows = np.arange(len(result.time))
+        known = result.parameters
+        parameters = known.part(at) if isinstance(known, Arrays) else known
+        bare = replace(result, samples={}, parameters={}, starts={}, store=None)
+        few = bare.part(np.arange(block.first, block.stop))
+        return replace(few, samples={name: self._read(name, rows, at) for name in names}, parameters=parameters)
 
     def pieces(
         self, block: Block, names: tuple[str, ...], rows: np.ndarray, controller: Any = None

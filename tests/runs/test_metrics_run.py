@@ -276,8 +276,10 @@ def test_a_metric_may_read_nothing_at_ticks(keep, fleet, coarse):
 
 
 def test_samples_at_all_ticks_give_the_metrics_of_the_run(paths, coarse):
-    """What was kept at every tick is what the run looked at, but for round-off: the kernel moves ticks to the user's origin, and
-    the host samples, by a sum of three products of 1 m, whose last digit counts as some 1e-16 in a number of ticks."""
+    """What was kept at every tick is what the run looked at, but for round-off.
+
+    The kernel moves ticks to the user's origin, and the host samples: by a sum of three products of some metres.
+    """
     gathered = lw.gather(paths, metrics())
     for name, estimate in paths.statistics.items():
         for key, values in estimate.arrays.items():

@@ -16,6 +16,7 @@ from lgvi_warp.common.identity import is_library
 from lgvi_warp.common.real_numbers import real_results
 from lgvi_warp.sampling.distributions.basic import Distribution
 from lgvi_warp.sampling.distributions.joint import CorrelatedNormal
+from lgvi_warp.sampling.distributions.openturns import OpenTURNSDistribution, is_openturns
 
 # Name in a scene file -> name in scipy.stats; shape parameters, loc and scale are named as there.
 SCIPY = {
@@ -223,6 +224,8 @@ def quantiles_of(distribution: Any) -> Any:
 
 
 KINDS = Distribution.kinds
+# Those of which a file has the text alone.
+IN_MEMORY = (UserDistribution.kind, OpenTURNSDistribution.kind, "derived")
 
 
 def is_frozen(value: Any) -> bool:
@@ -267,6 +270,8 @@ def as_distribution(key: str, value: Any) -> Any:
         return BinnedDistribution(np.diff(distribution.cdf(edges)).tolist(), np.asarray(edges).tolist())
     if is_frozen(value):
         return ScipyDistribution(value)
+    if is_openturns(value):
+        return OpenTURNSDistribution(value)
     if type(value).__name__ == "multivariate_normal_frozen":
         return CorrelatedNormal(covariance=np.asarray(value.cov).tolist(), mean=np.asarray(value.mean).tolist())
     try:
@@ -282,10 +287,11 @@ def from_dict(key: str, content: Any) -> Distribution:
     faults = Faults()
     kind, values = next(iter(content.items()))
     foreign = kind in SCIPY or kind == ScipyDistribution.kind
-    if kind == UserDistribution.kind:
-        faults.add(key, values, "is a distribution of your own, which a file does not hold", "give the ensemble again")
+    if kind in IN_MEMORY:
+        what = "holds functions" if kind == "derived" else "is a distribution of your own"
+        faults.add(key, values, f"{what}, which a file does not hold", "give the ensemble again")
     elif not foreign and kind not in KINDS:
-        faults.keys(key, [kind], [*(name for name in KINDS if name != UserDistribution.kind), *SCIPY])
+        faults.keys(key, [kind], [*(name for name in KINDS if name not in IN_MEMORY), *SCIPY])
     elif not isinstance(values, Mapping):
         faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
     elif not foreign:

@@ -97,6 +97,14 @@ def test_weights_afterwards_are_those_of_a_table(result):
     assert few["mean depth"].count[0] == pytest.approx(40.0)
 
 
+def test_studies_that_count_members_alike_refuse_weights():
+    fleet = fleet_of(8)
+    with pytest.raises(lw.SceneError, match="members with weights, and a sweep counts them alike"):
+        lw.sweep(fleet.scene, sampling=fleet.sampling, metrics=["max(depth)"], h=0.25, t1=1.0)
+    with pytest.raises(lw.SceneError, match="members with weights, and a risk counts them alike"):
+        lw.tune_gains(fleet, {"environment.gravity": (9.0, 10.0)}, "max(depth)", budget=16, h=0.25, t1=1.0)
+
+
 TRUTHS = {
     "mean depth": 10.0 + 0.5 * DOWN, "exceedance depth above 12": norm.sf(12.0 - 0.5 * DOWN, 10.0, 1.0),
     "quantiles depth": norm.ppf([0.1, 0.5, 0.9], 10.0 + 0.5 * DOWN), "covariance depth": 1.0,

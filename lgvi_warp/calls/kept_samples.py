@@ -36,12 +36,6 @@ class KeptFields(Fields):
     def __missing__(self, name: str) -> Any:
         raise not_kept("statistics", name, tuple(self))
 
-    def at(self, places: np.ndarray) -> KeptFields:
-        return KeptFields(dict(super().at(places)), *self._others(places))
-
-    def _others(self, places: np.ndarray) -> tuple[Any, ...]:
-        return self.time[places], self._steps[places], self.terms, self._when_ended, self.controller
-
 
 def not_kept(key: str, field: str, kept: tuple[str, ...]) -> SceneError:
     """The fault of a sample that is needed and was not kept."""

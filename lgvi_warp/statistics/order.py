@@ -236,7 +236,7 @@ class Quantiles(Statistic):
         arrays = {"value": empty_as_nan(value, some), "lower": empty_as_nan(lower, some)}
         arrays |= {"upper": empty_as_nan(upper, some)}
         dims = along(arrays, "time", "level", "component") | {"count": ("time",), "rank_error": ("time",)}
-        arrays |= {"rank_error": weighted.own["error"] / weighted.weight, "count": count}
+        arrays |= {"rank_error": weighted.own["rank_error"] / weighted.weight, "count": count}
         return estimate(self, "Woodruff: fractions below the value", dims, arrays, time, {"level": level})
 
     def _read_replicates(self, each: Sequence[Sequence[Part]], time: np.ndarray) -> Estimate:

@@ -16,7 +16,6 @@ from lgvi_warp.common.identity import is_library
 from lgvi_warp.common.real_numbers import real_results
 from lgvi_warp.sampling.distributions.basic import Distribution
 from lgvi_warp.sampling.distributions.joint import CorrelatedNormal
-from lgvi_warp.sampling.distributions.openturns import OpenTURNSDistribution, is_openturns
 
 # Name in a scene file -> name in scipy.stats; shape parameters, loc and scale are named as there.
 SCIPY = {
@@ -225,7 +224,9 @@ def quantiles_of(distribution: Any) -> Any:
 
 KINDS = Distribution.kinds
 # Those of which a file has the text alone.
-IN_MEMORY = (UserDistribution.kind, OpenTURNSDistribution.kind, "derived")
+IN_MEMORY = (UserDistribution.kind, "openturns", "derived")
+# Methods by which a distribution of OpenTURNS is known.
+OPENTURNS = ("computeQuantile", "getMarginal", "getDimension")
 
 
 def is_frozen(value: Any) -> bool:
@@ -270,7 +271,9 @@ def as_distribution(key: str, value: Any) -> Any:
         return BinnedDistribution(np.diff(distribution.cdf(edges)).tolist(), np.asarray(edges).tolist())
     if is_frozen(value):
         return ScipyDistribution(value)
-    if is_openturns(value):
+    if all(callable(getattr(value, name, None)) for name in OPENTURNS):
+        from lgvi_warp.sampling.distributions.openturns import OpenTURNSDistribution
+
         return OpenTURNSDistribution(value)
     if type(value).__name__ == "multivariate_normal_frozen":
         return CorrelatedNormal(covariance=np.asarray(value.cov).tolist(), mean=np.asarray(value.mean).tolist())

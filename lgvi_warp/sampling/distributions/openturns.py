@@ -13,15 +13,8 @@ import numpy as np
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.sampling.distributions.joint import JointLaw, components, split
 
-# Methods by which a distribution of OpenTURNS is known.
-METHODS = ("computeQuantile", "getMarginal", "getDimension")
 # A place in memory, in the text of an object that says nothing else of itself.
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
-
-
-def is_openturns(value: Any) -> bool:
-    """Whether an object is a distribution of OpenTURNS, or has its methods."""
-    return not isinstance(value, type) and all(callable(getattr(value, name, None)) for name in METHODS)
 
 
 @dataclass(frozen=True, eq=False)

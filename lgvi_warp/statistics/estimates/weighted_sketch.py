@@ -20,7 +20,7 @@ def sketch_of(x: np.ndarray, weights: np.ndarray, size: int) -> Part:
     mass = np.broadcast_to(weights[:, None], x.shape)
     order = np.argsort(x, axis=2, kind="stable")
     values, mass = np.take_along_axis(x, order, axis=2), np.take_along_axis(mass, order, axis=2)
-    return _thinned({"values": values, "mass": mass, "squares": mass**2, "error": np.zeros(len(x))}, size)
+    return _thinned({"values": values, "mass": mass, "squares": mass**2, "rank_error": np.zeros(len(x))}, size)
 
 
 def together(parts: Sequence[Part], size: int | None) -> Part:
@@ -28,12 +28,12 @@ def together(parts: Sequence[Part], size: int | None) -> Part:
     joined = {name: np.concatenate([part[name] for part in parts], axis=2) for name in ("values", "mass", "squares")}
     order = np.argsort(joined["values"], axis=2, kind="stable")
     joined = {name: np.take_along_axis(array, order, axis=2) for name, array in joined.items()}
-    joined["error"] = np.sum([part["error"] for part in parts], axis=0)
+    joined["rank_error"] = np.sum([part["rank_error"] for part in parts], axis=0)
     return joined if size is None else _thinned(joined, size)
 
 
 def _thinned(part: Part, size: int) -> Part:
-    """Keep `size` values of equal weight, where there are more; `error` (k,) bounds the weight by which ranks are off."""
+    """Keep `size` values of equal weight, where there are more; `rank_error` (k,) bounds the weight by which ranks are off."""
     values, mass, squares = part["values"], part["mass"], part["squares"]
     k, d, n = values.shape
     if n <= size:
@@ -51,7 +51,7 @@ def _thinned(part: Part, size: int) -> Part:
             kept["mass"][i, j] = total / size
             below = np.interp(ends * total, np.append(0.0, so_far), np.append(0.0, squared))
             kept["squares"][i, j] = np.diff(below, prepend=0.0)
-    return kept | {"error": part["error"] + 0.5 * mass.sum(axis=2).max(axis=1) / size}
+    return kept | {"rank_error": part["rank_error"] + 0.5 * mass.sum(axis=2).max(axis=1) / size}
 
 
 def sorted_values(part: Part, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -178,3 +178,10 @@ def test_a_table_keeps_its_weights(tmp_path):
         np.testing.assert_array_equal(lw.designs.Table(**settings).own_weights(), table.own_weights())
     with pytest.raises(lw.SceneError, match="name a column of the file"):
         lw.designs.Table(tmp_path / "draws.csv", weights=[1.0, 2.0, 3.0])
+
+
+def test_many_values_are_read_a_few_times_at_once():
+    """More than two million values are sorted in pieces of some sample times."""
+    x, weight = np.random.default_rng(8).normal(size=(3, 1, 700_000)), np.full(700_000, 2.0)
+    estimate = gathered(S.Quantiles("depth", levels=(0.5,), size=2**20), x, weight, size=700_000)
+    np.testing.assert_allclose(estimate.value[:, 0, 0], np.median(x[:, 0], axis=1), rtol=1e-9, atol=1e-12)

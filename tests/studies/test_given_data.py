@@ -78,3 +78,10 @@ def test_correlated_inputs_are_named():
     fleet = lw.Ensemble(fleet_of(2).scene, 500, 3, {"start.position[2], start.velocity[2]": both})
     found = lw.uq.given_data(lw.solve(fleet, **SETTINGS), "depth")
     assert "are correlated (0." in found.messages[0]
+
+
+def test_the_picture_has_a_bar_with_its_interval_for_each_input(result, tmp_path):
+    pytest.importorskip("matplotlib")
+    axes = lw.plots.sensitivity(lw.uq.given_data(result, "depth"), path=tmp_path / "bars.png")
+    assert len(axes[0].patches) == 3
+    assert axes[0].get_xlabel() == "part of the variance"

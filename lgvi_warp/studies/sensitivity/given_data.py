@@ -32,6 +32,7 @@ class GivenDataIndices(Indices):
 
     Attributes:
         first: the part (m, d) [1]; may come out just below 0.
+        first_confidence: the larger distance from it to an end of its interval (m, d).
         lower: lower end of its interval (m, d).
         upper: upper end of its interval (m, d).
         p: how likely so much would be seen by chance (m, d).
@@ -39,12 +40,15 @@ class GivenDataIndices(Indices):
     """
 
     first: np.ndarray
+    first_confidence: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
     p: np.ndarray
     slope: np.ndarray
     name: ClassVar[str] = "Indices from given data"
     columns: ClassVar[tuple[str, ...]] = ("first", "lower", "upper", "p", "slope")
+    intervals: ClassVar[dict[str, str]] = {"first": "first_confidence"}
+    drawn: ClassVar[tuple[str, ...]] = ("first",)
 
 
 def given_data(
@@ -101,6 +105,7 @@ def given_data(
         messages=_messages(result, inputs, columns, labels),
         provenance=result.provenance,
         first=arrays["first"],
+        first_confidence=np.fmax(arrays["upper"] - arrays["first"], arrays["first"] - arrays["lower"]),
         lower=arrays["lower"],
         upper=arrays["upper"],
         p=arrays["p"],

@@ -17,6 +17,7 @@ from lgvi_warp import studies as studies
 from lgvi_warp import terms as terms
 from lgvi_warp import uq as uq
 from lgvi_warp import vehicles as vehicles
+from lgvi_warp.calls.gather import gather as gather
 from lgvi_warp.calls.merge import merge as merge
 from lgvi_warp.calls.predict import predict as predict
 from lgvi_warp.calls.prepared import Prepared as Prepared

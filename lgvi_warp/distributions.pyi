@@ -6,6 +6,9 @@ from lgvi_warp.sampling.distributions.basic import LogNormal as LogNormal
 from lgvi_warp.sampling.distributions.basic import Normal as Normal
 from lgvi_warp.sampling.distributions.basic import TruncatedNormal as TruncatedNormal
 from lgvi_warp.sampling.distributions.basic import Uniform as Uniform
+from lgvi_warp.sampling.distributions.copula import Copula as Copula
+from lgvi_warp.sampling.distributions.density import KernelDensity as KernelDensity
+from lgvi_warp.sampling.distributions.derived import Derived as Derived
 from lgvi_warp.sampling.distributions.joint import CorrelatedNormal as CorrelatedNormal
 from lgvi_warp.sampling.distributions.joint import PhysicalInertia as PhysicalInertia
 from lgvi_warp.sampling.distributions.joint import PositiveDefinite as PositiveDefinite

@@ -9,6 +9,8 @@ from lgvi_warp.studies.sensitivity.analyses import morris as morris
 from lgvi_warp.studies.sensitivity.analyses import morris_of as morris_of
 from lgvi_warp.studies.sensitivity.analyses import sobol as sobol
 from lgvi_warp.studies.sensitivity.analyses import sobol_of as sobol_of
+from lgvi_warp.studies.sensitivity.given_data import GivenDataIndices as GivenDataIndices
+from lgvi_warp.studies.sensitivity.given_data import given_data as given_data
 from lgvi_warp.studies.sensitivity.indices import Indices as Indices
 from lgvi_warp.studies.sensitivity.indices import MorrisEffects as MorrisEffects
 from lgvi_warp.studies.sensitivity.indices import SobolIndices as SobolIndices

@@ -20,6 +20,7 @@ from lgvi_warp.physics.shape import Shape
 from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.terms.base import word_of
 from lgvi_warp.sampling.designs import KINDS as SAMPLINGS
+from lgvi_warp.sampling.distributions.named import IN_MEMORY
 from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.statistics.base import TYPES as STATISTICS
@@ -43,7 +44,8 @@ TYPES: dict[str, Mapping[str, Any]] = {
     "[[terms]]": terms.TYPES,
     "[[events]]": events.TYPES,
     **{f"[[controller.{section}]]": base.kinds for section, base in CONTROLLER.items()},
-    "[ensemble.vary]": DISTRIBUTIONS,
+    # But for those that no file may name.
+    "[ensemble.vary]": {word: kind for word, kind in DISTRIBUTIONS.items() if word not in IN_MEMORY},
     "[ensemble] sampling": SAMPLINGS,
     "[[run.statistics]]": STATISTICS,
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of members that are drawn when they are first read."""
+"""Numbers of members that are drawn when they are first read: parameters, and those of the start."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from lgvi_warp.sampling.members import Members
     from lgvi_warp.scene.ensemble import Ensemble
 
 
@@ -25,12 +26,18 @@ class DrawnParameters(Mapping[str, np.ndarray]):
     """
 
     def __init__(self, ensemble: Ensemble, stop: int, first: int = 0):
-        self._ensemble, self._first, self._stop = ensemble, first, stop
+        self.ensemble, self._first, self._stop = ensemble, first, stop
+
+    def select(self, first: int, stop: int) -> Members:
+        """Return parameters and initial states of some of these members, counted from the first of them."""
+        return self.ensemble.select(self._first + first, self._first + stop)
 
     @functools.cached_property
     def _drawn(self) -> dict[str, np.ndarray]:
-        parameters = self._ensemble.parameters(self._first, self._stop)
-        return {name: values.copy() for name, values in parameters.items()}
+        return {name: values.copy() for name, values in self._values().items()}
+
+    def _values(self) -> dict[str, np.ndarray]:
+        return self.ensemble.parameters(self._first, self._stop)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._drawn[name]
@@ -40,3 +47,16 @@ class DrawnParameters(Mapping[str, np.ndarray]):
 
     def __len__(self) -> int:
         return len(self._drawn)
+
+
+class DrawnStarts(DrawnParameters):
+    """Numbers of the start that vary, of members of an ensemble that follow each other, drawn when they are first read."""
+
+    def _values(self) -> dict[str, np.ndarray]:
+        return self.ensemble.starts(self._first, self._stop)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.ensemble.varied_starts())
+
+    def __len__(self) -> int:
+        return len(self.ensemble.varied_starts())

@@ -66,6 +66,12 @@ def _adaptive(plan: Plan) -> bool:
     return plan.method.adaptive
 
 
+def _alike(plan: Plan) -> bool:
+    """Whether several events of the scene have one status, which then does not tell them apart."""
+    statuses = [event.status for event in plan.ensemble.scene.events]
+    return len(set(statuses)) < len(statuses)
+
+
 STATUS = {
     "long_name": "outcome of the member",
     "flag_values": [int(status) for status in Status],
@@ -95,6 +101,8 @@ FIELDS = (
                 lambda plan, outcome: outcome.chosen[:, 0], _adaptive),
     MemberField("steps_tried", "<i8", {"long_name": "steps tried", "units": "1"},
                 lambda plan, outcome: outcome.chosen[:, 1], _adaptive),
+    MemberField("event", "|u1", {"long_name": "event of the scene that stopped the member, counted from 1; 0 for none",
+                                 "units": "1"}, lambda plan, outcome: outcome.event, _alike),
 )  # fmt: skip
 
 

@@ -170,6 +170,8 @@ class EndQuantity(OfResult):
         """Which members ended so, (n,)."""
         events = events_of(result.provenance["scene"].get("events", ()))
         status, named = np.asarray(result.status), {event.key: event.status for event in events}
+        if self.outcome in named and result.event is not None:
+            return np.asarray(result.event) == 1 + list(named).index(self.outcome)
         for name in self.gathered(events):
             if name in result.statistics:
                 return ~np.isnan(result.statistics[name].value[0, 0])

@@ -78,7 +78,10 @@ class Result(Summarized):
             start, NaN without.
         warning_value: The value at that time, shape (n,); NaN without.
         substeps: Number of steps that were divided (on_failure="substep"), shape (n,).
+        event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None where `status` tells.
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
+        starts: Numbers of the start that varied, by name, (n, ...): "start.position", "start.euler_deg", ...
+        weights: What each member counts for in statistics, (n,), of mean 1 (see lw.designs.Table); None: all alike.
         messages: What the user should know.
         provenance: Scene, ensemble with its seed, settings, versions and machine.
         terms: The scene's terms.
@@ -120,6 +123,9 @@ class Result(Summarized):
     kept: Result | None = None
     kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     store: Path | None = None
+    event: np.ndarray | None = None
+    starts: Mapping[str, np.ndarray] = field(default_factory=dict)
+    weights: np.ndarray | None = None
     end: Final | Callable[[], Final] | None = field(default=None, compare=False)
     compile_seconds: float = field(default=0.0, compare=False)
     compile_phases: Phases = field(default=Phases(), compare=False)
@@ -267,9 +273,16 @@ class Result(Summarized):
         """
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
-        of_members = {item.name: getattr(self, item.name)[places] for item in member_fields.EVERY}
+        starts = {name: values[places] for name, values in self.starts.items()}
+        of_members = {name: values[places] for name, values in self._of_members().items()}
         end = None if self.end is None else self.final.part(places)
-        return replace(self, samples=samples, parameters=parameters, end=end, **of_members)
+        return replace(self, samples=samples, parameters=parameters, starts=starts, end=end, **of_members)
+
+    def _of_members(self) -> dict[str, np.ndarray]:
+        """What is recorded of each member, (n,) by name."""
+        names = [item.name for item in member_fields.EVERY]
+        names += [name for name in ("event", "weights") if getattr(self, name) is not None]
+        return {name: getattr(self, name) for name in names}
 
     @property
     def members(self) -> int:
@@ -298,8 +311,9 @@ class Result(Summarized):
         for name in names:
             values = getattr(self, name)
             data[name] = (("time", "realization", *dims_of(name, values.shape[2:])), values, fields[name].attributes)
-        for item in member_fields.EVERY:
-            data[item.name] = (("realization",), np.asarray(getattr(self, item.name)), item.attributes)
+        about = {item.name: item.attributes for item in member_fields.FIELDS} | {"weights": {"units": "1"}}
+        for name, values in self._of_members().items():
+            data[name] = (("realization",), np.asarray(values), about[name])
         data["end_time"] = (("realization",), self.end_time, END_TIME)
         coordinates = {"time": ("time", self.time, TIME)}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
@@ -320,9 +334,10 @@ class Result(Summarized):
             OSError: If the file cannot be written.
         """
         arrays = {"time": self.time, **self.samples}
-        arrays |= {item.name: np.asarray(getattr(self, item.name)) for item in member_fields.EVERY}
+        arrays |= {name: np.asarray(values) for name, values in self._of_members().items()}
         if self.samples:
             arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
+            arrays |= {f"starts/{name}": value for name, value in self.starts.items()}
         texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
         if self.samples and self.end is not None:
             of_end, texts["final"] = final_files.to_file(self.final)
@@ -346,7 +361,8 @@ class Result(Summarized):
         Returns:
             Arguments of Result, by name.
         """
-        values: dict[str, Any] = {item.name: arrays[item.name] for item in member_fields.EVERY if item.name in arrays}
+        names = [*(item.name for item in member_fields.EVERY), "event", "weights"]
+        values: dict[str, Any] = {name: arrays[name] for name in names if name in arrays}
         status, warnings = values["status"].view(StatusArray), values["warnings"].view(WarningArray)
         return values | {"status": status, "warnings": warnings}
 
@@ -384,6 +400,7 @@ class Result(Summarized):
             samples={name: content[name] for name in content if name in IN_FILES},
             **cls.per_member(content),
             parameters=_below("parameters/", content),
+            starts=_below("starts/", content),
             messages=tuple(texts["messages"]),
             provenance=provenance,
             terms=terms_of(provenance["scene"]),

@@ -20,6 +20,7 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
     if missing := [name for name in ("time", "status", *TEXTS[:2]) if name not in content]:
         raise ValueError(f"it has no {', '.join(missing)}")
     of_members = {item.name: np.dtype(item.dtype) for item in member_fields.FIELDS}
+    of_members["weights"] = np.dtype("<f8")
     k, n = content["time"].size, content["status"].size
     m = content["kept/members"].size if "kept/members" in content else 0
     for name, array in content.items():
@@ -39,6 +40,8 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
             good = array.ndim == 2 and len(array) == n and array.dtype.kind in "fi"
         elif name == "kept/members":
             good = array.shape == (m,) and array.dtype.kind == "i" and (not m or 0 <= array.min() <= array.max() < n)
+        elif name.startswith("starts/"):
+            good = array.dtype.kind == "f" and array.ndim > 0 and len(array) == n
         elif name.startswith(("parameters/", "kept/parameters/")):
             lengths = (1, m if name.startswith("kept/") else n)
             good = array.dtype.kind == "f" and array.ndim > 0 and len(array) in lengths

@@ -24,7 +24,7 @@ from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.results import member_fields
-from lgvi_warp.results.drawn import DrawnParameters
+from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
 from lgvi_warp.results.final import final_of
 from lgvi_warp.results.outcomes import begun_beyond, failure_text
 from lgvi_warp.results.provenance import at_end, messages, provenance
@@ -162,6 +162,8 @@ class _Gathered:
             samples={name: values.copy() for name, values in self.histories(at).items()},
             **Result.per_member(of_members),
             parameters=DrawnParameters(plan.ensemble, block.stop, block.first),
+            starts=DrawnStarts(plan.ensemble, block.stop, block.first),
+            weights=plan.ensemble.weights(block.first, block.stop),
             messages=(),
             provenance=provenance(plan) | {"members": plan.ensemble.members},
             terms=tuple(plan.ensemble.scene.terms),
@@ -186,6 +188,8 @@ class _Gathered:
             samples=histories,
             **Result.per_member(of_members),
             parameters=DrawnParameters(plan.ensemble, n),
+            starts=DrawnStarts(plan.ensemble, n),
+            weights=plan.ensemble.weights(0, n),
             messages=texts + remarks + on_the_way + begun_beyond(of_members["status"], of_members["failure_time"]),
             provenance=at_end(content, of_members, n, plan.ensemble.members),
             terms=tuple(scene.terms),

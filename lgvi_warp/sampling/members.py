@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,9 @@ class Members:
 
     Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
     angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole,
-    unless its normals are given. final: where they ended in the run that they go on from; None where they start.
+    unless its normals are given. `starts` has the numbers of the start that vary, (m, ...) as the scene names them:
+    "start.euler_deg"; `weight` (m,) what each counts for in statistics, None where all count alike.
+    final: where they ended in the run that they go on from; None where they start.
     """
 
     parameters: dict[str, np.ndarray]
@@ -29,6 +31,8 @@ class Members:
     angular_velocity: np.ndarray
     indices: np.ndarray
     seed: int
+    starts: dict[str, np.ndarray] = field(default_factory=dict)
+    weight: np.ndarray | None = None
     final: Final | None = None
     given: GivenDraws | None = None
 

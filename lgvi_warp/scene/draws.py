@@ -55,6 +55,7 @@ class Draws:
     A member's numbers follow from its position in the whole ensemble alone.
 
     explicit: arrays (total, ...) by name; those of the start begin with "start.". columns: what a table sets, (total, ...).
+    weights: (total,), what each counts for in statistics; None: alike.
     total: number of members of the whole ensemble. places: (members,), where these members are in it; None for all in order.
     """
 
@@ -66,6 +67,7 @@ class Draws:
     space: Space
     total: int
     places: np.ndarray | None = None
+    weights: np.ndarray | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         # Another process draws the numbers itself: they are not sent.
@@ -114,9 +116,14 @@ class Draws:
         """Names of what members have at the start."""
         return tuple(name for name in {**self.scene.start, **self.explicit} if name.startswith("start."))
 
+    @functools.cached_property
+    def varied_starts(self) -> tuple[str, ...]:
+        """Names of what members have of their own at the start."""
+        return tuple(name for name in self._start_names if name in self.varied_names)
+
     def with_columns(self, columns: Columns) -> Draws:
         """The draws of other members, of which a table's columns have other values; the targets are the same."""
-        draws = replace(self, columns=columns, total=len(columns[0][1]), places=None)
+        draws = replace(self, columns=columns, total=len(columns[0][1]), places=None, weights=None)
         known = dict(drawn_names=self.drawn_names, varied_names=self.varied_names, _start_names=self._start_names)
         vars(draws).update(known)
         return draws
@@ -145,11 +152,23 @@ class Draws:
                 own.add(target.name)
         return values
 
+    def weights_of(self, first: int, stop: int) -> np.ndarray | None:
+        """What members first to stop - 1 count for in statistics, (stop - first,); None where all count alike."""
+        if self.weights is None:
+            return None
+        return self.weights[slice(first, stop) if self.places is None else self.places[first:stop]]
+
     def members_of(
-        self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int, given: GivenDraws | None = None
+        self,
+        values: dict[str, np.ndarray],
+        indices: np.ndarray,
+        seed: int,
+        weight: np.ndarray | None = None,
+        given: GivenDraws | None = None,
     ) -> Members:
         """Members from all their numbers by name, which loses those of the start; given: their noise, None for counters'."""
         m = len(indices)
+        own = {name: values[name] for name in self.varied_starts}
         start = {key.removeprefix("start."): values.pop(key) for key in self._start_names}
         # In one memory layout, on which the order of the sums of a matrix product depends.
         R = np.ascontiguousarray(self._attitude(start))
@@ -160,7 +179,7 @@ class Draws:
         else:
             nu = start["velocity"]
         R, position, nu, Om = (_of_each(x, m) for x in (R, start["position"], nu, start["angular_velocity"]))
-        return Members(values, position, R, nu, Om, indices, seed, given=given)
+        return Members(values, position, R, nu, Om, indices, seed, own, weight, given=given)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
         """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""
@@ -203,7 +222,8 @@ def draws_of(scene: SceneLike, settings: EnsembleSettings, explicit: Mapping[str
     space = variations.space(seed, drawing)
     total = counted(sampling, space, settings.members)
     numbers = SceneNumbers(base, start)
-    return Draws(numbers, explicit, [pair for pair in in_table.values() if pair], drawing, sampling, space, total)
+    given = [pair for pair in in_table.values() if pair]
+    return Draws(numbers, explicit, given, drawing, sampling, space, total, weights=sampling.own_weights())
 
 
 def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:

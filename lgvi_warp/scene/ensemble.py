@@ -313,7 +313,8 @@ class Ensemble(Summarized):
         if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
             raise IndexError(f"members {first} to {stop} of {self.members}")
         given = None if self.given is None else self.given.of_members(slice(first, stop))
-        members = self._draws.members_of(self._values(first, stop), self.indices_of(first, stop), self.seed, given)
+        values, indices = self._values(first, stop), self.indices_of(first, stop)
+        members = self._draws.members_of(values, indices, self.seed, self.weights(first, stop), given)
         if self.final is None:
             return members
         everyone = (first, stop) == (0, self.members)
@@ -354,6 +355,18 @@ class Ensemble(Summarized):
         ensemble.final, ensemble.start_time = final, final.time
         return ensemble
 
+    def weights(self, first: int, stop: int) -> np.ndarray | None:
+        """Return what some members count for in statistics.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            Weights (stop - first,), of mean 1 over the table that gives them; None where all members count alike.
+        """
+        return self._draws.weights_of(first, stop)
+
     def varied(self) -> list[str]:
         """Return the names of the parameters that vary from member to member.
 
@@ -362,6 +375,23 @@ class Ensemble(Summarized):
         """
         varied = self.varied_names
         return [name for name in self._draws.scene.parameters if name in varied]
+
+    def varied_starts(self) -> list[str]:
+        """Return the names of the numbers of the start that vary from member to member, such as "start.position"."""
+        return list(self._draws.varied_starts)
+
+    def starts(self, first: int, stop: int) -> dict[str, np.ndarray]:
+        """Return the numbers of the start that vary, of some members.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            Values by name, (stop - first, ...): whole numbers, also where one entry varies.
+        """
+        values = self._values(first, stop) if self._draws.varied_starts else {}
+        return {name: values[name] for name in self._draws.varied_starts}
 
     @property
     def varied_names(self) -> set[str]:

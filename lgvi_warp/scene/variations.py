@@ -19,7 +19,7 @@ from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.sampling.designs.space import Space
-from lgvi_warp.sampling.distributions.basic import Distribution, varies_nothing
+from lgvi_warp.sampling.distributions.basic import Distribution
 from lgvi_warp.sampling.distributions.joint import AttitudeDistribution, PhysicalInertia, PositiveDefinite
 from lgvi_warp.scene.start import NAMES
 
@@ -202,6 +202,8 @@ def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, n
         faults.add(f'"{key}"', distribution, "is not a distribution", remedy)
         return None
     named = targets(key)
+    with faults.including():
+        distribution = distribution.ordered_as([target.label for target in named])
     if not all([known_target(faults, key, distribution, target, known) for target in named]):
         return None
     described = Variation(key, distribution, named, tuple(known[target.name] for target in named))
@@ -217,7 +219,7 @@ def _misfit(variation: Variation) -> tuple[str, str] | None:
     distribution, named = variation.distribution, variation.targets
     turns = isinstance(distribution, AttitudeDistribution)
     chosen = distribution.kind == "choice" and distribution.joint
-    if len(named) > 1 and distribution.kind != "correlated_normal":
+    if len(named) > 1 and not distribution.several:
         return (
             "draws one quantity, several are named",
             "give lw.distributions.CorrelatedNormal, or a distribution to each",
@@ -233,7 +235,7 @@ def _misfit(variation: Variation) -> tuple[str, str] | None:
         if isinstance(distribution, PhysicalInertia) and named[0].name not in RIGID:
             return "is a distribution of a rigid body's inertia", "use PositiveDefinite for added mass"
     wrong: tuple[str, str] | None = distribution.fault([base.shape for base in variation.bases])
-    if wrong is None and (width := varies_nothing(distribution, variation.bases)):
+    if wrong is None and (width := distribution.nothing_of(variation.bases)):
         return f"is relative to the scene's value, 0, so that its {width} varies nothing", "give an absolute spread"
     if wrong is None and isinstance(distribution, PositiveDefinite):
         wrong = distribution.unusable(variation.wholes[0])

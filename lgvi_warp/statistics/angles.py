@@ -17,6 +17,7 @@ from lgvi_warp.statistics.estimates.estimate import Estimate, along
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate, joined_means, sums
 from lgvi_warp.statistics.values.values import Values
+from lgvi_warp.statistics.weighted import Weighted
 
 # The skew matrices of the axes; + 0.0 leaves no -0.
 HATS = notation.hat(np.eye(3)) + 0.0
@@ -51,11 +52,11 @@ class CircularMean(Statistic):
 
     def rows(self, values: Values) -> Part:
         d = values.x.shape[1]
-        both = Values(np.concatenate([np.cos(values.x), np.sin(values.x)], axis=1), values.good)
+        both = values.with_numbers(np.concatenate([np.cos(values.x), np.sin(values.x)], axis=1))
         c, s = both.centred[:, :d], both.centred[:, d:]
         moments = {"count": both.count, "mean": both.mean}
         pairs = {"cc": (c, c), "cs": (c, s), "ss": (s, s)}
-        return moments | {key: np.einsum("kdn,kdn->kd", *pair) for key, pair in pairs.items()}
+        return moments | {key: np.einsum("kdn,kdn->kd", a, both.weighed(b)) for key, (a, b) in pairs.items()}
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the moments about the common mean.
@@ -71,14 +72,31 @@ class CircularMean(Statistic):
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # Atan2 of the mean sine and cosine; its error follows from their covariance about that direction.
-        count, d = part["count"], part["cc"].shape[1]
-        n = count[:, None]
-        C, S = empty_as_nan(part["mean"], count)[:, :d], empty_as_nan(part["mean"], count)[:, d:]
+        n = part["count"][:, None]
+        scale = np.maximum(n - 1, 1) * np.maximum(n, 1)
+        variances = tuple(part[key] / scale for key in ("cc", "cs", "ss"))
+        return self._estimate(empty_as_nan(part["mean"], part["count"]), variances, part["count"], time)
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        # The covariance of the linearised means of cosine and sine.
+        mean, squares, d = weighted.own["mean"], weighted.squares, weighted.own["cc"].shape[1]
+        c, s = weighted.off(mean)[:, :d], weighted.off(mean)[:, d:]
+        total, scale = squares["count"][:, None], (weighted.unbiased / weighted.weight**2)[:, None]
+        scale = np.where(np.isfinite(scale), scale, 0.0)
+        pairs = {"cc": c * c, "cs": c * s, "ss": s * s}
+        variances = tuple(scale * (squares[key] + total * pair) for key, pair in pairs.items())
+        return self._estimate(empty_as_nan(mean, weighted.members), variances, weighted.effective, time)
+
+    def _estimate(
+        self, mean: np.ndarray, variances: tuple[np.ndarray, ...], count: np.ndarray, time: np.ndarray
+    ) -> Estimate:
+        """The estimate from the means (k, 2 d) of cosine and sine, their variances and covariance (k, d), and the number."""
+        n, d = count[:, None], mean.shape[1] // 2
+        C, S = mean[:, :d], mean[:, d:]
         length = np.hypot(C, S)
         safe = np.where(length > 0.0, length, 1.0)
         u, v = C / safe, S / safe
-        scale = np.maximum(n - 1, 1) * np.maximum(n, 1)
-        cc, cs, ss = (part[key] / scale for key in ("cc", "cs", "ss"))
+        cc, cs, ss = variances
         across = np.sqrt(np.maximum(v * v * cc - 2.0 * u * v * cs + u * u * ss, 0.0))
         along = np.sqrt(np.maximum(u * u * cc + 2.0 * u * v * cs + v * v * ss, 0.0))
         arrays = {"value": np.arctan2(S, C), "resultant_length": length}
@@ -156,7 +174,7 @@ class MeanAttitude(Statistic):
         return self.name or self.type
 
     def rows(self, values: Values) -> Part:
-        return {"count": values.count, "mean": values.mean, "m11": sums(values.centred, values.centred)}
+        return {"count": values.count, "mean": values.mean, "m11": sums(values.centred, values.weighed(values.centred))}
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the moments about the common mean.
@@ -168,8 +186,29 @@ class MeanAttitude(Statistic):
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # The polar part R of the mean M = R S; a change dM turns R by (tr(S) I - S)^-1 vee(R^T dM - dM^T R).
         count = part["count"]
-        few = (count < 1)[:, None, None]
-        M = np.where(few, np.eye(3), part["mean"].reshape(-1, 3, 3))
+        covariance = part["m11"] / np.maximum(count - 1, 1)[:, None, None]
+        return self._estimate(part["mean"], covariance, None, count, time)
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        # The same, with the covariance of the linearised mean.
+        mean, squares, unbiased = weighted.own["mean"], weighted.squares, weighted.unbiased[:, None, None]
+        unbiased, W, a = (
+            np.where(np.isfinite(unbiased), unbiased, 0.0),
+            weighted.weight[:, None, None],
+            weighted.off(mean),
+        )
+        turn = (squares["m11"] + squares["count"][:, None, None] * a[:, :, None] * a[:, None]) / W**2 * unbiased
+        return self._estimate(mean, weighted.own["m11"] / W * unbiased, turn, weighted.effective, time)
+
+    def _estimate(
+        self, mean: np.ndarray, spread: np.ndarray, of_mean: np.ndarray | None, count: np.ndarray, time: np.ndarray
+    ) -> Estimate:
+        """The estimate from the mean (k, 9) of the matrices, their covariance and that of the mean (k, 9, 9), and the number.
+
+        of_mean: None for that of independent members.
+        """
+        few = (count <= 0)[:, None, None]
+        M = np.where(few, np.eye(3), mean.reshape(-1, 3, 3))
         U, sigma, Vt = np.linalg.svd(M)
         flip = np.sign(np.linalg.det(U @ Vt))
         U[:, :, 2] *= flip[:, None]
@@ -177,18 +216,19 @@ class MeanAttitude(Statistic):
         R = U @ Vt
         S = np.swapaxes(R, 1, 2) @ M
         trace = np.einsum("kii->k", S)
-        spread = trace[:, None, None] * np.eye(3) - 0.5 * (S + np.swapaxes(S, 1, 2))
+        stiffness = trace[:, None, None] * np.eye(3) - 0.5 * (S + np.swapaxes(S, 1, 2))
         # Where attitudes spread over all of SO(3) the mean leaves some turns undetermined: their error is infinite.
-        known = np.linalg.eigvalsh(spread)[:, 0] > 1e-9
-        inverse = np.linalg.inv(np.where(known[:, None, None], spread, np.eye(3)))
+        known = np.linalg.eigvalsh(stiffness)[:, 0] > 1e-9
+        inverse = np.linalg.inv(np.where(known[:, None, None], stiffness, np.eye(3)))
         # q_i = sum of vee[i, j, k] (R^T X)_jk for an attitude X; `inverse` converts q to angles about the axes.
         to_angle = (inverse @ np.einsum("ijk,tlj->tilk", HATS, R).reshape(-1, 3, 9)).reshape(-1, 3, 9)
-        n = np.maximum(count - 1, 1)[:, None, None]
-        covariance = to_angle @ (part["m11"] / n) @ np.swapaxes(to_angle, 1, 2)
+        covariance = to_angle @ spread @ np.swapaxes(to_angle, 1, 2)
         # |R - X|^2 = 6 - 2 tr(R^T X), and the mean of X is M.
         dispersion = np.sqrt(np.maximum(3.0 - trace, 0.0))
         value = empty_as_nan(R, count)
         turn = covariance / np.maximum(count, 1)[:, None, None]
+        if of_mean is not None:
+            turn = to_angle @ of_mean @ np.swapaxes(to_angle, 1, 2)
         ends = self._ends(value, turn, known, intervals.student(count, self.confidence))
         arrays = {"value": value} | ends | {"covariance": empty_as_nan(covariance, count, 2), "dispersion": dispersion}
         dims = along(("value", "lower", "upper", "covariance"), "time", "row", "column")

@@ -25,6 +25,7 @@ from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.values.functional import Functional, over_path, quantity
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
+from lgvi_warp.statistics.weighted import Weighted, both_measures, is_weighted
 
 STOPPED = ("held", "left_out")
 
@@ -71,7 +72,7 @@ class RowGatherer(Gatherer):
         self._statistic, self._rows = statistic, list[Part]()
 
     def take(self, values: Values, when: slice) -> None:
-        self._rows.append(self._statistic.rows(values))
+        self._rows.append(self._statistic.rows_of_any(values))
 
     def close(self) -> Part:
         first = self._rows[0]
@@ -233,6 +234,39 @@ class Statistic:
         """Return the part of a block at some sample times: arrays with one row for each time."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
+    def rows_of_any(self, values: Values) -> Part:
+        """Return `rows`; of weighted members the sums under the weights, and under their squares (see Weighted)."""
+        if values.weight is None:
+            return self.rows(values)
+        return self.weighted_rows(values)
+
+    def weighted_rows(self, values: Values) -> Part:
+        """Return the part of weighted members."""
+        return both_measures(self.rows(values.under(1)), self.rows(values.under(2)), values.count)
+
+    def join_any(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        """Return `join`, also of weighted members."""
+        if not is_weighted(first):
+            return self.join(first, second, place)
+        return self.weighted_join(first, second, place)
+
+    def weighted_join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        """Return the part of two sets of weighted members together."""
+        a, b = Weighted.of(first), Weighted.of(second)
+        own, squares = self.join(a.own, b.own, place), self.join(a.squares, b.squares, place)
+        return both_measures(own, squares, a.members + b.members)
+
+    def read_any(self, part: Part, time: np.ndarray) -> Estimate:
+        """Return `read`, also of weighted members."""
+        if not is_weighted(part):
+            return self.read(part, time)
+        weighted = Weighted.of(part)
+        return weighted.told(self.weighted_read(weighted, time))
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        """Return the statistic of weighted members with its interval."""
+        raise TypeError(f"{type(self).__name__} is abstract")
+
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         """Return the part of two neighbouring sets of members together.
 
@@ -242,7 +276,7 @@ class Statistic:
 
     def whole(self, parts: Sequence[Part]) -> Part:
         """Return the part of all members from parts in the order of the blocks, the later ones of fewer members."""
-        return reduce(lambda second, first: self.join(first, second, (-1, 0)), reversed(parts))
+        return reduce(lambda second, first: self.join_any(first, second, (-1, 0)), reversed(parts))
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Return the statistic with its interval at each sample time (k,) [s], from the part of all members."""
@@ -250,7 +284,7 @@ class Statistic:
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
         """Return the estimates of `self.parts()` where members are independent, from parts in the order of the blocks."""
-        return [self.read(self.whole(parts), time)]
+        return [self.read_any(self.whole(parts), time)]
 
     # With R replicates each array of a part has R rows for each sample time, side by side.
 

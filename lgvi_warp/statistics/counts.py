@@ -18,6 +18,7 @@ from lgvi_warp.statistics.estimates.naming import spelled
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.values.values import Values
+from lgvi_warp.statistics.weighted import Weighted
 
 
 class Counted(Statistic):
@@ -111,18 +112,33 @@ class Histogram(Counted):
         at = np.where(values.x == edges[-1], len(edges) - 1, at)
         stream = np.arange(k * d).reshape(k, d, 1) * (len(edges) + 1)
         bin_of = at + stream
-        kept = bin_of.ravel() if values.good is None else bin_of[np.repeat(values.good[:, None], d, axis=1)]
-        counts = np.bincount(kept, minlength=k * d * (len(edges) + 1)).reshape(k, d, len(edges) + 1)
+        chosen = None if values.good is None else np.repeat(values.good[:, None], d, axis=1)
+        counts = values.counted(bin_of, chosen, k * d * (len(edges) + 1)).reshape(k, d, len(edges) + 1)
         return {"count": values.count, "counts": counts}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        edges: np.ndarray = self._edges  # type: ignore[attr-defined]
         count, counts = part["count"], part["counts"]
         n = count[:, None, None]
         inside = counts[..., 1:-1]
         value = empty_as_nan(inside / np.maximum(n, 1), count)
         lower, upper = intervals.wilson(inside / np.maximum(n, 1), n, self.confidence)
-        arrays = {"value": value, "lower": lower, "upper": upper, "counts": inside}
+        return self._estimate({"value": value, "lower": lower, "upper": upper}, counts, count, time)
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        # Wilson's interval with the number of members of each bin's variance; counts are of effective members.
+        share = weighted.own["counts"] / weighted.weight[:, None, None]
+        inside = share[..., 1:-1]
+        number = weighted.number_of(inside, weighted.squares["counts"][..., 1:-1])
+        lower, upper = intervals.wilson(inside, number, self.confidence)
+        arrays = {"value": empty_as_nan(inside, weighted.members), "lower": lower, "upper": upper}
+        return self._estimate(arrays, share * weighted.effective[:, None, None], weighted.effective, time)
+
+    def _estimate(
+        self, arrays: dict[str, np.ndarray], counts: np.ndarray, count: np.ndarray, time: np.ndarray
+    ) -> Estimate:
+        """The estimate from the fractions with their interval, and the counts (k, d, bins + 2) in and outside the bins."""
+        edges: np.ndarray = self._edges  # type: ignore[attr-defined]
+        arrays |= {"counts": counts[..., 1:-1]}
         dims = along(arrays, "time", "component", "bin")
         arrays |= {"below": counts[..., 0], "above": counts[..., -1]}
         dims |= {"below": ("time", "component"), "above": ("time", "component"), "count": ("time",), "edge": ("edge",)}
@@ -216,7 +232,7 @@ class Exceedance(Condition, Counted):
     type: ClassVar[str] = "exceedance"
 
     def rows(self, values: Values) -> Part:
-        return {"count": values.count, "hits": self.holds(values).sum(axis=2)}
+        return {"count": values.count, "hits": values.summed(self.holds(values))}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         count = part["count"]
@@ -224,4 +240,16 @@ class Exceedance(Condition, Counted):
         fraction = part["hits"] / np.maximum(n, 1)
         lower, upper = intervals.wilson(fraction, n, self.confidence)
         arrays = {"value": empty_as_nan(fraction, count), "lower": lower, "upper": upper, "count": count}
+        return self._estimate(arrays, time)
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        # Wilson's interval with the number of members of the fraction's variance.
+        fraction = weighted.own["hits"] / weighted.weight[:, None]
+        lower, upper = intervals.wilson(
+            fraction, weighted.number_of(fraction, weighted.squares["hits"]), self.confidence
+        )
+        arrays = {"value": empty_as_nan(fraction, weighted.members), "lower": lower, "upper": upper}
+        return self._estimate(arrays | {"count": weighted.effective}, time)
+
+    def _estimate(self, arrays: dict[str, np.ndarray], time: np.ndarray) -> Estimate:
         return estimate(self, "Wilson", component_dims("value", "lower", "upper"), arrays, time, unit="1")

@@ -14,6 +14,7 @@ from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.estimates.estimate import Dims, Estimate, along
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.values.values import Values
+from lgvi_warp.statistics.weighted import Weighted
 
 
 def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -28,7 +29,7 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def joined_means(first: Part, second: Part) -> tuple[Part, np.ndarray, np.ndarray]:
     """Return count (k,) and mean (k, d) of two sets of members, and how far the mean of each lies above it, (k, d) each."""
     n = first["count"] + second["count"]
-    share = (second["count"] / np.maximum(n, 1))[:, None]
+    share = (second["count"] / np.where(n > 0, n, 1))[:, None]
     delta = second["mean"] - first["mean"]
     none = (first["count"] == 0)[:, None]
     mean = np.where(none, second["mean"], first["mean"] + share * delta)
@@ -109,7 +110,7 @@ class Mean(Statistic):
 
     def rows(self, values: Values) -> Part:
         c = values.centred
-        return {"count": values.count, "mean": values.mean, "m2": np.einsum("kdn,kdn->kd", c, c)}
+        return {"count": values.count, "mean": values.mean, "m2": np.einsum("kdn,kdn->kd", c, values.weighed(c))}
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join as Chan, Golub & LeVeque (1979).
@@ -124,6 +125,22 @@ class Mean(Statistic):
         mean = empty_as_nan(part["mean"], count)
         deviation = empty_as_nan(np.sqrt(part["m2"] / np.maximum(n - 1, 1)), count, 2)
         error = deviation / np.sqrt(np.maximum(n, 1))
+        return self._estimate(mean, deviation, error, count, time)
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        # The deviation and the error of the linearised ratio.
+        own, squares, W, few = weighted.own, weighted.squares, weighted.weight[:, None], weighted.members
+        mean = own["mean"]
+        spread = squares["m2"] + squares["count"][:, None] * weighted.off(mean) ** 2
+        unbiased = np.where(np.isfinite(weighted.unbiased), weighted.unbiased, np.nan)[:, None]
+        deviation, error = np.sqrt(own["m2"] / W * unbiased), np.sqrt(spread * unbiased) / W
+        return self._estimate(empty_as_nan(mean, few), deviation, error, weighted.effective, time)
+
+    def _estimate(
+        self, mean: np.ndarray, deviation: np.ndarray, error: np.ndarray, count: np.ndarray, time: np.ndarray
+    ) -> Estimate:
+        """The estimate from the mean, the deviation of members and the error of the mean (k, d), and their number (k,)."""
+        n = count[:, None]
         lower, upper = intervals.about(mean, error, intervals.student(n, self.confidence))
         arrays = {"value": mean, "lower": lower, "upper": upper, "standard_error": error}
         arrays |= {"standard_deviation": deviation, "count": count}
@@ -160,8 +177,8 @@ class Covariance(Statistic):
     def rows(self, values: Values) -> Part:
         c = values.centred
         square = c * c
-        moments = {"count": values.count, "mean": values.mean, "m11": sums(c, c)}
-        return moments | {"m21": sums(square, c), "m22": sums(square, square)}
+        moments = {"count": values.count, "mean": values.mean, "m11": sums(c, values.weighed(c))}
+        return moments | {"m21": sums(square, values.weighed(c)), "m22": sums(square, values.weighed(square))}
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the moments about the common mean.
@@ -181,12 +198,33 @@ class Covariance(Statistic):
         squares = np.einsum("kii->ki", m11)
         spread = np.maximum(part["m22"] / some - m11**2, 0.0) + (outer(squares, squares) + 2.0 * m11**2) / some
         error = empty_as_nan(np.sqrt(spread / least) * (some / least), count, 2)
+        return self._estimate(value, error, empty_as_nan(part["mean"], count), count, time)
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        # The same, with the fourth moments under the squares about the weighted mean and covariance.
+        own, W, n = weighted.own, weighted.weight[:, None, None], weighted.effective[:, None, None]
+        unbiased = np.where(np.isfinite(weighted.unbiased), weighted.unbiased, np.nan)[:, None, None]
+        m11 = own["m11"] / W
+        about = moved(weighted.squares, weighted.off(own["mean"]))
+        squared = about["m22"] - 2.0 * m11 * about["m11"] + m11**2 * weighted.squares["count"][:, None, None]
+        squares = np.einsum("kii->ki", m11)
+        few = np.maximum(n, 1.0)
+        spread = np.maximum(squared, 0.0) / W**2 + (outer(squares, squares) + 2.0 * m11**2) / few**2
+        error = np.sqrt(spread * unbiased) * unbiased
+        mean = empty_as_nan(own["mean"], weighted.members)
+        return self._estimate(m11 * unbiased, error, mean, weighted.effective, time)
+
+    def _estimate(
+        self, value: np.ndarray, error: np.ndarray, mean: np.ndarray, count: np.ndarray, time: np.ndarray
+    ) -> Estimate:
+        """The estimate from the covariance and its error (k, d, d), the mean (k, d) and the number of members (k,)."""
+        n = count[:, None, None]
         lower, upper = self._ends(value, error, intervals.student(n - 1, self.confidence))
         deviation = np.sqrt(np.einsum("kii->ki", value))
         scale = outer(deviation, deviation)
         correlation = value / np.where(scale > 0.0, scale, np.inf)
         arrays = {"value": value, "lower": lower, "upper": upper, "standard_error": error, "correlation": correlation}
-        arrays |= {"mean": empty_as_nan(part["mean"], count), "count": count}
+        arrays |= {"mean": mean, "count": count}
         dims = along(arrays, "time", "component", "component_2")
         dims |= {"mean": ("time", "component"), "count": ("time",)}
         labels = {"component_2": np.array(self.quantity.labels)}

@@ -12,11 +12,12 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.statistics.base import Statistic, together
-from lgvi_warp.statistics.estimates import intervals, sketch
+from lgvi_warp.statistics.estimates import intervals, sketch, weighted_sketch
 from lgvi_warp.statistics.estimates.estimate import Estimate, along
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
 from lgvi_warp.statistics.values.values import Values
+from lgvi_warp.statistics.weighted import Weighted, both_measures, is_weighted
 
 # Values of sketches that are sorted together; each takes some 50 bytes.
 SORTED_AT_ONCE = 2_000_000
@@ -80,6 +81,19 @@ class Extremes(Statistic):
         beyond = np.where(count > 0, -np.expm1(np.log(1.0 - self.confidence) / np.maximum(count, 1)), 1.0)
         arrays = {"value": arrays["maximum"]} | arrays | {"beyond": beyond, "count": count}
         return estimate(self, "none: beyond bounds what lies outside", dims, arrays, time)
+
+    def weighted_rows(self, values: Values) -> Part:
+        # The members themselves; the sums of weights bound what lies outside.
+        squares = {"count": values.under(2).count}
+        return both_measures(self.rows(values) | {"count": values.under(1).count}, squares, values.count)
+
+    def weighted_join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        a, b = Weighted.of(first), Weighted.of(second)
+        squares = {"count": a.squares["count"] + b.squares["count"]}
+        return both_measures(self.join(a.own, b.own, place), squares, a.members + b.members)
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        return self.read(weighted.own | {"count": weighted.effective}, time)
 
     def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
         # The estimate as it is: extremes have no interval.
@@ -148,9 +162,28 @@ class Quantiles(Statistic):
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         return {"count": first["count"] + second["count"]} | sketch.join(first, second, self.size, place)
 
+    def weighted_rows(self, values: Values) -> Part:
+        # Values in order, each with its weight and its square, thinned where there are more than `size`.
+        kept = weighted_sketch.sketch_of(values.filled(np.inf), values.under(1).weights, self.size)
+        return both_measures({"count": values.under(1).count} | kept, {"count": values.under(2).count}, values.count)
+
+    def weighted_join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        return self._weighted_whole([first, second], self.size)
+
+    def _weighted_whole(self, parts: Sequence[Part], size: int | None) -> Part:
+        """The parts of weighted members as one, thinned to a size; None: not."""
+        each = [Weighted.of(part) for part in parts]
+        counts = [
+            np.sum([kind[i]["count"] for kind in ((one.own, one.squares) for one in each)], axis=0) for i in (0, 1)
+        ]
+        kept = weighted_sketch.together([one.own for one in each], size)
+        return both_measures(
+            {"count": counts[0]} | kept, {"count": counts[1]}, np.sum([one.members for one in each], axis=0)
+        )
+
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
         # The quantiles of all members, a few sample times at once to bound memory.
-        return self._in_pieces(parts, time, 1, lambda some, when: self.read(self.whole(some), when))
+        return self._in_pieces(parts, time, 1, lambda some, when: self.read_any(self.whole(some), when))
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
         # Quantiles with intervals between sorted values, at ranks that the replicates' spread gives.
@@ -174,6 +207,8 @@ class Quantiles(Statistic):
         return [replace(pieces[0], arrays=arrays, coordinates=pieces[0].coordinates | {"time": time})]
 
     def whole(self, parts: Sequence[Part]) -> Part:
+        if is_weighted(parts[0]):
+            return self._weighted_whole(parts, None)
         return {"count": np.sum([part["count"] for part in parts], axis=0)} | sketch.together(parts)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
@@ -185,6 +220,24 @@ class Quantiles(Statistic):
         more = intervals.normal(self.confidence) * (np.sqrt(binomial + part["variance"][0]) - np.sqrt(binomial))
         ends = ((low - more)[:, :, None], (high + more)[:, :, None])
         return self._read(part, time, lambda value: ends, "order statistics: binomial ranks")
+
+    def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
+        # The interval lies between the quantiles at the ends of that of the fraction below the value (Woodruff 1952).
+        count, level = weighted.effective, np.array(self.levels)
+        values, at, squares = weighted_sketch.sorted_values(weighted.own, weighted.weight)
+        value = weighted_sketch.at_fraction(values, at, level[:, None])
+        below = weighted_sketch.squares_below(values, squares, value)
+        fractions = np.broadcast_to(level[:, None], value.shape)
+        number = weighted.number_of(fractions, below)
+        low, high = intervals.wilson(fractions, number, self.confidence)
+        lower = np.where(number * low < 1.0, -np.inf, weighted_sketch.at_fraction(values, at, low))
+        upper = np.where(number * (1.0 - high) < 1.0, np.inf, weighted_sketch.at_fraction(values, at, high))
+        some = weighted.members
+        arrays = {"value": empty_as_nan(value, some), "lower": empty_as_nan(lower, some)}
+        arrays |= {"upper": empty_as_nan(upper, some)}
+        dims = along(arrays, "time", "level", "component") | {"count": ("time",), "rank_error": ("time",)}
+        arrays |= {"rank_error": weighted.own["rank_error"] / weighted.weight, "count": count}
+        return estimate(self, "Woodruff: fractions below the value", dims, arrays, time, {"level": level})
 
     def _read_replicates(self, each: Sequence[Sequence[Part]], time: np.ndarray) -> Estimate:
         """Take ranks from the spread of the replicates' fractions up to the quantile of all (Woodruff 1952)."""

@@ -19,10 +19,11 @@ from lgvi_warp.statistics.estimates.estimate import Estimate, along
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import Mean, estimate
 from lgvi_warp.statistics.order import Quantiles
-from lgvi_warp.statistics.passages import DIRICHLET, PassageCurve, check_levels
+from lgvi_warp.statistics.passages import DIRICHLET, PassageCurve, check_levels, design_effect
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
+from lgvi_warp.statistics.weighted import Weighted
 
 # How a member ended: not before the end of the run, by the outcome asked for, otherwise, or by a failure.
 NOT, SO, OTHERWISE, LOST = 0.0, 1.0, 2.0, 3.0
@@ -75,12 +76,17 @@ def _endings(values: Values) -> Part:
     """Members that ended before the run did, from x (replicates, 2, members), time [s] and kind of each end."""
     time, kind = values.x[:, 0], values.x[:, 1]
     replicate, member = np.nonzero(kind != NOT)
-    return {
+    ends = {
         "members": np.full(len(time), time.shape[1], np.int64),
         "time": time[replicate, member],
         "kind": kind[replicate, member].astype(np.uint8),
         "replicate": replicate.astype(np.int32),
     }
+    if values.weight is None:
+        return ends
+    sums = {"weight": np.sum(values.weight), "square": np.sum(values.weight**2)}
+    sums |= {"members": np.count_nonzero(values.weight)}
+    return ends | {"of_member": values.weight[member]} | {name: np.array([total]) for name, total in sums.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +146,9 @@ class Outcome(OfEnds):
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the ends of both sets of members, one after the other.
-        ends = {name: np.concatenate([first[name], second[name]]) for name in ("time", "kind", "replicate")}
-        return {"members": first["members"] + second["members"]} | ends
+        listed = first.keys() & {"time", "kind", "replicate", "of_member"}
+        ends = {name: np.concatenate([first[name], second[name]]) for name in first if name in listed}
+        return ends | {name: first[name] + second[name] for name in first if name not in listed}
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         # The ends of the members of one replicate.
@@ -152,8 +159,14 @@ class Outcome(OfEnds):
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # The estimate of Aalen & Johansen (1978), from the times of all ends.
         at = np.union1d(time, _steps_of(part))
-        curves = _curves(part, at)
-        ends = [intervals.wilson(curve.value, curve.members, self.confidence) for curve in curves]
+        curves, effect = _curves(part, at), np.ones(1)
+        if "weight" in part:
+            weighted, so = _weighted(part), part["kind"] == SO
+            share, squares = (
+                np.cumsum(_counted(at, part["time"][so], "left", part["of_member"][so] ** power)) for power in (1, 2)
+            )
+            effect = design_effect(weighted, share, squares)[:, None]
+        ends = [intervals.wilson(curve.value, curve.members * effect, self.confidence) for curve in curves]
         return self._estimate(part, at, curves, ends, time)
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
@@ -175,7 +188,7 @@ class Outcome(OfEnds):
         self, part: Part, at: np.ndarray, curves: Sequence[PassageCurve], ends: Sequence[Pair], time: np.ndarray
     ) -> Estimate:
         """The estimate from the curves at the times `at` (m,) [s], which contain the sample times."""
-        rows, members = np.searchsorted(at, time), int(part["members"].sum())
+        rows, members = np.searchsorted(at, time), _total(part)
         arrays: Part = {}
         for name, curve, interval in zip(("value", "alone"), curves, ends, strict=True):
             names = (name, *(f"{name}_{end}".removeprefix("value_") for end in ("lower", "upper")))
@@ -185,22 +198,51 @@ class Outcome(OfEnds):
         reached = {"end_time": arrays["value"], "end_time_lower": arrays["upper"], "end_time_upper": arrays["lower"]}
         times = {name: _reached(values, levels, at) for name, values in reached.items()}
         arrays = {name: values[rows] for name, values in arrays.items()}
-        ended, others, failed = (
-            np.searchsorted(np.sort(part["time"][part["kind"] == kind]), time, "right")
-            for kind in (SO, OTHERWISE, LOST)
-        )
-        fraction = ended / max(members, 1)
-        low, high = intervals.wilson(fraction, np.full(len(time), members), self.confidence)
+        ended, others, failed = (self._by(part, kind, time) for kind in (SO, OTHERWISE, LOST))
+        fraction, number = ended / (members or 1), np.full(len(time), members)
+        if "weight" in part:
+            squares = self._by(part, SO, time, 2)
+            number = _weighted(part).number_of(fraction[None], squares[None])[0]
+        low, high = intervals.wilson(fraction, number, self.confidence)
         arrays |= {"survival": 1.0 - arrays["value"]}
         arrays |= {"fraction": fraction, "fraction_lower": low, "fraction_upper": high}
         arrays |= {"ended": ended, "otherwise": others + failed, "failed": failed}
         arrays |= {"count": members - ended - others - failed}
+        how = DIRICHLET
+        if "weight" in part:
+            arrays, how = arrays | {"members": np.full(len(time), part["members"].sum())}, f"{how}, of weighted members"
         dims = along(arrays, "time")
         dims |= along(times, "level")
-        return estimate(self, DIRICHLET, dims, arrays | times, time, {"level": levels}, "1", labels=())
+        return estimate(self, how, dims, arrays | times, time, {"level": levels}, "1", labels=())
+
+    @staticmethod
+    def _by(part: Part, kind: float, time: np.ndarray, power: int = 1) -> np.ndarray:
+        """How many members have ended in a way by each time; of weighted ones effective members, or sums of squares."""
+        so = part["kind"] == kind
+        order = np.argsort(part["time"][so], kind="stable")
+        by = np.searchsorted(part["time"][so][order], time, "right")
+        if "weight" not in part:
+            return by
+        total = np.append(0.0, np.cumsum(part["of_member"][so][order] ** power))[by]
+        return total * _scale(part) if power == 1 else total
 
 
 Pair = tuple[np.ndarray, np.ndarray]
+
+
+def _weighted(part: Part) -> Weighted:
+    """The sums of the weights of all members, of a part of weighted ones."""
+    return Weighted({"count": part["weight"]}, {"count": part["square"]}, part["members"])
+
+
+def _scale(part: Part) -> float:
+    """What turns weights into effective members; 1 for members that count alike."""
+    return float((part["weight"] / part["square"])[0]) if "weight" in part else 1.0
+
+
+def _total(part: Part) -> Any:
+    """Number of members, or the effective number of weighted ones."""
+    return float(_weighted(part).effective[0]) if "weight" in part else int(part["members"].sum())
 
 
 def _steps_of(part: Part) -> np.ndarray:
@@ -211,16 +253,23 @@ def _steps_of(part: Part) -> np.ndarray:
 
 def _curves(part: Part, at: np.ndarray) -> tuple[PassageCurve, PassageCurve]:
     """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events censor too."""
-    so, others = (_counted(at, part["time"][part["kind"] == kind], "left")[:, None] for kind in (SO, OTHERWISE))
+    weights = part["of_member"] * _scale(part) if "weight" in part else None
+
+    def counted(which: np.ndarray, side: Literal["left", "right"]) -> np.ndarray:
+        return _counted(at, part["time"][which], side, None if weights is None else weights[which])
+
+    so, others = (counted(part["kind"] == kind, "left")[:, None] for kind in (SO, OTHERWISE))
     # A member that is censored at one of the times is at risk at that time, and at no later one.
-    lost, not_so = (_counted(at, part["time"][which], "right") for which in (part["kind"] == LOST, part["kind"] != SO))
-    members = int(part["members"].sum())
+    lost, not_so = (counted(which, "right") for which in (part["kind"] == LOST, part["kind"] != SO))
+    members = _total(part)
     return PassageCurve(so, others, lost, members), PassageCurve(so, np.zeros_like(so), not_so, members)
 
 
-def _counted(at: np.ndarray, times: np.ndarray, side: Literal["left", "right"]) -> np.ndarray:
-    """How many of the times [s] fall to each of `at`; those after the last one fall to none."""
-    return np.bincount(np.searchsorted(at, times, side), minlength=len(at))[: len(at)]
+def _counted(
+    at: np.ndarray, times: np.ndarray, side: Literal["left", "right"], weights: np.ndarray | None = None
+) -> np.ndarray:
+    """How many of the times [s] fall to each of `at`, or the sum of their weights; those after the last one fall to none."""
+    return np.bincount(np.searchsorted(at, times, side), weights, len(at))[: len(at)]
 
 
 def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar
 
@@ -19,12 +19,15 @@ from lgvi_warp.statistics.estimates.estimate import Estimate, along
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import estimate
 from lgvi_warp.statistics.values.values import Values
+from lgvi_warp.statistics.weighted import Weighted, both_measures, is_weighted
 
 # How intervals of probabilities by time are formed.
 DIRICHLET = "Wilson with the variance of the Dirichlet product"
 
 # Number of equal pieces of the time between two samples, in which passages are counted.
 PIECES = 8
+# Part of all that is taken for none.
+NOBODY = 1e-12
 
 
 class _Passages(Gatherer):
@@ -39,10 +42,11 @@ class _Passages(Gatherer):
         self._known = np.zeros(count, np.int64)
         self._before: np.ndarray | None = None
         self._replicates = 1
+        self._weight: np.ndarray | None = None
 
     def take(self, values: Values, when: slice) -> None:
         k = when.stop - when.start
-        self._replicates = values.replicates
+        self._replicates, self._weight = values.replicates, values.weight
         x = values.x.reshape(k, -1)
         holds = self._statistic.holds(values)[:, 0].reshape(k, -1)
         first = np.where(holds.any(axis=0), when.start + holds.argmax(axis=0), self._times)
@@ -82,15 +86,27 @@ class _Passages(Gatherer):
         self._share[now] *= np.clip((end[now] - before) / (at - before), 0.0, 1.0)
 
     def close(self) -> Part:
+        if self._weight is None:
+            return self._part(None)
+        counted = {"count": np.array([self._weight.sum()])}, {"count": np.array([np.sum(self._weight**2)])}
+        own, squares = (sums | self._part(self._weight**power) for power, sums in enumerate(counted, 1))
+        return both_measures(own, squares, np.array([np.count_nonzero(self._weight)]))
+
+    def _part(self, weights: np.ndarray | None) -> Part:
+        """How many members pass, are lost and stop by each time, or the sums of their weights."""
         R, length = self._replicates, self._times + 1
         row = np.repeat(np.arange(R), len(self._passed) // R) * length
         piece = np.clip(np.floor(self._share * PIECES), 0, PIECES - 1).astype(np.int64)
-        passed = np.bincount((row + self._passed) * PIECES + piece, minlength=R * length * PIECES)
+        passed = np.bincount((row + self._passed) * PIECES + piece, weights, R * length * PIECES)
         stopped = self._stopped < self._times
         open_ = (self._passed == self._times) & ~stopped
-        lost, over = (np.bincount((row + at)[which], minlength=R * length).reshape(R, length)
+        lost, over = (np.bincount((row + at)[which], _of(weights, which), R * length).reshape(R, length)
                       for at, which in ((self._known, open_), (self._stopped, stopped)))  # fmt: skip
         return {"passed": passed.reshape(R, length, PIECES), "lost": lost, "stopped": over}
+
+
+def _of(weights: np.ndarray | None, which: np.ndarray) -> np.ndarray | None:
+    return None if weights is None else weights[which]
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +163,26 @@ class FirstPassage(Condition, Counted):
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # The estimate of Aalen & Johansen (1978).
         curve = PassageCurve.of(part)
-        lower, upper = curve.ends(*intervals.wilson(curve.value, curve.members, self.confidence))
+        return self._estimate(part, curve, curve.members, time)
+
+    def read_any(self, part: Part, time: np.ndarray) -> Estimate:
+        if not is_weighted(part):
+            return self.read(part, time)
+        # The curve of effective members; the number behind a probability is that of its own variance.
+        weighted = Weighted.of(part)
+        scale = float((weighted.effective / weighted.weight)[0])
+        scaled = {key: array * scale for key, array in weighted.own.items()}
+        curve = PassageCurve.of(scaled)
+        share, squares = (_added(sums["passed"][0, :-1]) for sums in (weighted.own, weighted.squares))
+        number = curve.members * design_effect(weighted, share, squares)
+        estimate = self._estimate(scaled, curve, number, time)
+        arrays = estimate.arrays | {"members": np.full(len(time), weighted.members[0])}
+        interval, dims = f"{estimate.interval}, of weighted members", estimate.dims | {"members": ("time",)}
+        return replace(estimate, arrays=arrays, dims=dims, interval=interval)
+
+    def _estimate(self, part: Part, curve: PassageCurve, number: np.ndarray, time: np.ndarray) -> Estimate:
+        """The estimate from the curve, and the number (k, pieces) of members behind each probability."""
+        lower, upper = curve.ends(*intervals.wilson(curve.value, number, self.confidence))
         passed, lost, stopped = part["passed"][0, :-1].sum(axis=1), part["lost"][0], part["stopped"][0, :-1]
         arrays = {"value": curve.value[:, -1], "lower": lower[:, -1], "upper": upper[:, -1]}
         arrays |= {"survival": 1.0 - curve.value[:, -1], "passed": passed, "lost": lost[:-1], "stopped": stopped}
@@ -197,6 +232,13 @@ def check_levels(faults: Faults, levels: Any) -> None:
         faults.add("levels", levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
 
 
+def design_effect(weighted: Weighted, share: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """How many times the effective number is behind a fraction (...) of the weight; share, squares: sums of what it counts."""
+    fraction = (share / weighted.weight[0]).ravel()[None]
+    number = weighted.number_of(fraction, squares.ravel()[None]) / np.maximum(weighted.effective[0], 1e-300)
+    return np.asarray(number.reshape(share.shape))
+
+
 class PassageCurve:
     """Probability to have passed, by Aalen & Johansen (1978), at the end of each piece of the times before the samples.
 
@@ -221,18 +263,21 @@ class PassageCurve:
         others = np.zeros_like(passed)
         # They stop within the time before a sample: the last of its pieces counts them.
         others[:, -1] = part["stopped"][0, :-1]
-        return cls(passed, others, part["lost"][0, :-1], int(part["passed"][0].sum()))
+        return cls(passed, others, part["lost"][0, :-1], part["passed"][0].sum())
 
-    def __init__(self, passed: np.ndarray, others: np.ndarray, lost: np.ndarray, total: int):
+    def __init__(self, passed: np.ndarray, others: np.ndarray, lost: np.ndarray, total: float):
         now, so_far = (np.cumsum(counts, axis=1) for counts in (passed, passed + others))
-        self.risk = total - np.cumsum(lost) - _before(so_far[:, -1])
+        risk = total - np.cumsum(lost) - _before(so_far[:, -1])
+        # Of weights rounding leaves a little, which is nobody.
+        self.risk = np.where(risk > NOBODY * total, risk, 0)
         n = self.risk[:, None]
         self.left = n - so_far
-        stay = 1.0 - so_far / np.maximum(n, 1)
+        some = np.where(n > 0, n, 1)
+        stay = 1.0 - so_far / some
         under_way = np.concatenate([[1.0], np.cumprod(stay[:, -1])[:-1]])[:, None]
         # As long as none is lost, the sum is the fraction of all members, but for round-off.
         none_lost = np.cumsum(lost)[:, None] == 0
-        fraction, value = _added(passed) / max(total, 1), _added(under_way * passed / np.maximum(n, 1))
+        fraction, value = _added(passed) / (total or 1), _added(under_way * passed / some)
         self.value = np.where(self.risk[0] > 0, np.where(none_lost, fraction, value), np.nan)
         self.members = np.where(none_lost, float(total), self._members(n, now, so_far))
         self._otherwise = np.maximum(1.0 - under_way * stay - self.value, 0.0)

@@ -18,8 +18,9 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.control.signals import SAVED
 from lgvi_warp.engine.block import Block
+from lgvi_warp.results.result import END_TIME
 from lgvi_warp.store.folder import KEPT, Folder
-from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER
+from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER, WEIGHT
 from lgvi_warp.store.open import folder_of, open_run
 from lgvi_warp.store.state import state
 
@@ -124,6 +125,18 @@ def _netcdf_group(folder: Folder, file: Any) -> None:
             variable.setncattr(key, np.asarray(value, array.dtype) if key in ("flag_values", "flag_masks") else value)
         for at in _pieces(array, folder.runs):
             variable[at] = array[at]
+        if name == "failure_time":
+            _netcdf_end_time(folder, file, variable, group)
+
+
+def _netcdf_end_time(folder: Folder, file: Any, failures: Any, group: Any) -> None:
+    """Write when members ended beside when they failed."""
+    ends = file.createVariable("end_time", "f8", failures.dimensions, chunksizes=failures.chunking(), fill_value=False)
+    for key, value in END_TIME.items():
+        ends.setncattr(key, value)
+    for run in folder.runs:
+        at = slice(run.first, run.stop)
+        ends[at] = _end_time(group["failure_time"][at], group)
 
 
 def _pieces(array: zarr.Array[Any], runs: list[Block]) -> Iterator[tuple[slice, ...]]:
@@ -186,7 +199,16 @@ def _rows(group: Any, run: Block) -> dict[str, tuple[str, np.ndarray]]:
         columns |= _components(name, np.swapaxes(group[name].oindex[:, at], 0, 1).reshape(-1, *group[name].shape[2:]))
     for name in (name for name, _ in group.arrays() if "." in name):
         columns |= _components(name, np.repeat(group[name].oindex[at], len(time), axis=0))
-    return columns | {name: (name, np.repeat(group[name].oindex[at], len(time))) for name in ("status", "failure_time")}
+    ends = {name: group[name].oindex[at] for name in ("status", "event", "failure_time") if name in group}
+    ends |= {WEIGHT: group[WEIGHT].oindex[at]} if WEIGHT in group else {}
+    ends["end_time"] = _end_time(ends["failure_time"], group)
+    return columns | {name: ("failure_time" if name == "end_time" else name, np.repeat(values, len(time)))
+                      for name, values in ends.items()}  # fmt: skip
+
+
+def _end_time(failure_time: np.ndarray, group: Any) -> np.ndarray:
+    """When members ended [s]: at their event, at their failure, or at the end of the run."""
+    return np.where(np.isnan(failure_time), group["time"][-1], failure_time)
 
 
 def _components(name: str, values: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:

@@ -14,12 +14,16 @@ from lgvi_warp.common import machine
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.physics.fields import dims_of
 from lgvi_warp.results import member_fields
+from lgvi_warp.scene.start import Start
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.plan import Plan
 
 # Dimension of the members of a run, and that of kept members, whose coordinate is their index in the run.
 MEMBER, KEPT_MEMBER = "realization", "member"
+
+# Array of the members' weights.
+WEIGHT = "weight"
 
 
 class Chunking(Protocol):
@@ -105,6 +109,9 @@ def columns(plan: Plan, store: Chunking) -> tuple[StoreArray, ...]:
         *(StoreArray(item.name, (), item.dtype, length, 0, item.attributes) for item in member_fields.present(plan)),
         *_parameters(plan, length),
     )
+    if plan.ensemble.weights(0, 1) is not None:
+        about = {"long_name": "what the member counts for in statistics", "units": "1"}
+        arrays = (*arrays, StoreArray(WEIGHT, (), "<f8", length, 0, about))
     return tuple(dataclasses.replace(column, along=store.along) for column in arrays)
 
 
@@ -132,6 +139,10 @@ def _parameters(plan: Plan, length: int) -> list[StoreArray]:
     for name in ensemble.varied():
         attributes = {"long_name": f"parameter {name}", "units": units[name]}
         arrays.append(StoreArray(name, first[name].shape[1:], "<f8", length, 0, attributes))
+    units |= {f"start.{item.name}": item.metadata.get("unit", "1") for item in dataclasses.fields(Start)}
+    for name, values in ensemble.starts(0, 1).items():
+        attributes = {"long_name": f"{name} of the member", "units": units[name]}
+        arrays.append(StoreArray(name, values.shape[1:], "<f8", length, 0, attributes))
     return arrays
 
 

@@ -23,7 +23,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.control.signals import SAVED, has_shape
 from lgvi_warp.engine.block import block_size
 from lgvi_warp.results import member_fields
-from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER, StoreArray
+from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER, WEIGHT, StoreArray
 
 # Types of arrays: NumPy's type strings by zarr's names.
 TYPES = {"float64": "<f8", "float32": "<f4", "int64": "<i8", "uint16": "<u2", "uint8": "|u1"}
@@ -230,7 +230,7 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
     along = KEPT_MEMBER if KEPT_MEMBER in arrays else MEMBER
     fixed = {"time": ("<f8", (k,)), "step": ("<i8", (k,))}
     fixed |= {KEPT_MEMBER: ("<i8", (members,)), "chosen": ("|u1", (members,))}
-    of_members = {member_field.name: member_field.dtype for member_field in member_fields.FIELDS} | {MEMBER: "<i8"}
+    of_members = {item.name: item.dtype for item in member_fields.FIELDS} | {MEMBER: "<i8", WEIGHT: "<f8"}
     columns = []
     for name, array in arrays.items():
         timed = name in SAVED

@@ -28,7 +28,7 @@ from lgvi_warp.statistics.estimates.estimate import Estimates
 from lgvi_warp.store.final import check_parts, end_of, has_end
 from lgvi_warp.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.store.kept import keep_of, members_kept
-from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER
+from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER, WEIGHT
 from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
 from lgvi_warp.store.recipe import noted_functions
 
@@ -60,6 +60,11 @@ class Arrays(Mapping[str, np.ndarray]):
         at = (*(slice(None),) * self.axis, self.members)
         array = self.group[name]
         return np.asarray(array[at] if isinstance(self.members, slice) else array.oindex[at])
+
+    def rows(self, name: str, when: slice | np.ndarray, places: slice) -> np.ndarray:
+        """Read samples at some of the times, of some of these members: only the chunks that hold them are read."""
+        few, array = self.part(places), self.group[name]
+        return np.asarray(array.oindex[when, few.members])
 
     def part(self, places: slice | np.ndarray) -> Arrays:
         """Select members of those that these arrays read."""
@@ -193,8 +198,11 @@ def result_of(
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
     fields = tuple(name for name in arrays if name in IN_FILES)
-    varied = tuple(name for name in arrays if "." in name)
-    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
+    varied = tuple(name for name in arrays if "." in name and not name.startswith("start."))
+    starts = tuple(name for name in arrays if name.startswith("start."))
+    small = Arrays(
+        group, tuple(name for name in arrays if name not in (*fields, *varied, *starts, "time", "step")), 0, at
+    )
     with corrupt_store_as_scene_error(folder.path / ROOT):
         shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
     strange = np.setdiff1d(small["status"], np.array([int(code) for code in Status]))
@@ -221,6 +229,8 @@ def result_of(
         kept_members=indices,
         store=folder.path,
         end=functools.partial(end_of, folder.path, at, parameters) if has_end(folder) else None,
+        starts=Arrays(group, starts, 0, at),
+        weights=small.get(WEIGHT),
     )
 
 
@@ -260,7 +270,8 @@ def _places(members: Any, n: int) -> slice | np.ndarray:
 def chosen(result: Result, members: Sequence[int]) -> Result:
     """Read some members of a run in a store into memory."""
     selection = result_of(Folder(Path(result.store or "")), members, result.messages, result.terms)
-    return replace(selection, samples=dict(selection.samples), parameters=dict(selection.parameters), store=None)
+    return replace(selection, samples=dict(selection.samples), parameters=dict(selection.parameters), store=None,
+                   starts=dict(selection.starts))  # fmt: skip
 
 
 def dataset(path: Path) -> xarray.Dataset:

@@ -56,7 +56,9 @@ def of_store(provenance: Mapping[str, Any], ensemble: Ensemble) -> dict[str, Any
         explicit = {name: values for name, values in explicit.items() if name not in arrays}
     elif arrays:
         settings = {name: value for name, value in sampling.to_dict()[sampling.kind].items() if name not in arrays}
-        content["sampling"] = {sampling.kind: {"columns": sorted(arrays)} if sampling.kind == "table" else settings}
+        weights = {"weights": settings["weights"]} if "weights" in settings else {}
+        of_table = {"columns": sorted(arrays)} | weights
+        content["sampling"] = {sampling.kind: of_table if sampling.kind == "table" else settings}
     return {**provenance, "ensemble": content | ({ARRAYS: _checksum(explicit)} if explicit else {})}
 
 
@@ -91,7 +93,9 @@ def stored_ensemble(provenance: Mapping[str, Any], arrays: Mapping[str, np.ndarr
     else:
         if explicit and table is None:
             ((kind, arguments),) = settings["sampling"].items()
-            settings["sampling"] = {kind: {"values": explicit} if kind == "table" else {**arguments, **explicit}}
+            weights = {"weights": arguments["weights"]} if "weights" in arguments else {}
+            of_table = {"values": explicit} | weights
+            settings["sampling"] = {kind: of_table if kind == "table" else {**arguments, **explicit}}
         ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": settings}))
         ensemble.scene = bare_scene
     if "indices" in arrays:

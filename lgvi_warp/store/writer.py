@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.common.files import Files
 from lgvi_warp.engine.block import Block
 from lgvi_warp.results import member_fields
-from lgvi_warp.store.layout import MEMBER, StoreArray
+from lgvi_warp.store.layout import MEMBER, WEIGHT, StoreArray
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.outcome import MemberStatus
@@ -70,7 +70,8 @@ class BlockWriter:
 
     def close(self, outcome: MemberStatus) -> Files:
         """Write the fields and parameters of the members."""
-        values = {MEMBER: self._members.indices} | self._members.parameters
+        values = {MEMBER: self._members.indices} | self._members.parameters | self._members.starts
+        values |= {} if self._members.weight is None else {WEIGHT: self._members.weight}
         values |= member_fields.member_fields(self._plan, outcome)
         for column in self._of_members:
             chunk = np.full(column.chunk, column.fill, column.dtype)

@@ -53,7 +53,7 @@ def test_python(text, scene, tmp_path, monkeypatch, capsys):
 def test_there_are_snippets():
     assert len(TOML) >= 6
     assert len(PYTHON) >= 12
-    assert len(blocks("docs/guide/statistics.md", "python")) == 6
+    assert len(blocks("docs/guide/statistics.md", "python")) == 8
 
 
 REMUS = '[vehicle]\nname = "remus_100"\n'

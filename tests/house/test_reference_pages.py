@@ -23,7 +23,7 @@ one holds. A test writes this page.
 # What the root is for, and its names.
 ROOT_NAMES = {
     "Describe": "Scene Vehicle Environment Start Ensemble Controller Method SaveAt Store Until",
-    "Run": "solve prepare predict resume open_run merge export",
+    "Run": "solve prepare predict resume open_run gather merge export",
     "Ask": "suggest tradeoff stability_map sweep worst_case tune_gains",
     "See": "show record report select_members",
     "Get back": "Result Prepared Sweep Status Warnings SceneError MembersFailed Interrupted",

@@ -40,7 +40,7 @@ KINDS = {
 }
 
 # Types that the page treats in its text, and those that no file may name.
-IN_WORDS = ("scipy", "own", "weight", "restoring")
+IN_WORDS = ("scipy", "own", "openturns", "derived", "weight", "restoring")
 
 
 def rows(start):

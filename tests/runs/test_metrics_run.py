@@ -273,3 +273,16 @@ def test_a_metric_may_read_nothing_at_ticks(keep, fleet, coarse):
     alone = lw.solve(fleet, **COARSE, statistics=[lw.metrics.TimeToFailure()], keep=keep)
     name = "each time_to_failure"
     np.testing.assert_array_equal(alone.statistics[name].value, coarse.statistics[name].value)
+
+
+def test_samples_at_all_ticks_give_the_metrics_of_the_run(paths, coarse):
+    """What was kept at every tick is what the run looked at, but for round-off.
+
+    The kernel moves ticks to the user's origin, and the host samples: by a sum of three products of some metres.
+    """
+    gathered = lw.gather(paths, metrics())
+    for name, estimate in paths.statistics.items():
+        for key, values in estimate.arrays.items():
+            np.testing.assert_allclose(gathered[name][key], values, rtol=1e-13, atol=1e-13, err_msg=f"{name}: {key}")
+    with pytest.raises(lw.SceneError, match=r"every tick of the controller.*save=lw.SaveAt\(every=0.1"):
+        lw.gather(coarse, [lw.metrics.IAE("depth")])

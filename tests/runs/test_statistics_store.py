@@ -58,7 +58,8 @@ def test_it_is_exported_with_its_statistics(whole, memory, tmp_path):
     with xarray.open_dataset(lw.export(whole, "netcdf", tmp_path / "run.nc"), group="statistics") as found:
         np.testing.assert_array_equal(found.mean_position.values, memory.statistics["mean position"].value)
     table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
-    assert table.column_names == ["realization", "vehicle.mass", "status", "failure_time"]
+    starts = [f"start.angular_velocity_{i}" for i in range(3)]
+    assert table.column_names == ["realization", *starts, "vehicle.mass", "status", "failure_time", "end_time"]
     assert table.num_rows == 1003
 
 

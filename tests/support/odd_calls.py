@@ -60,6 +60,9 @@ def goods(scene, fleet, result, folder):
         "LogNormal": {"sigma": 0.1}, "TruncatedNormal": {"std": 1.0}, "Choice": {"values": [1.0, 2.0]},
         "Quantity": {"name": "depth2"}, "solve": {"h": 0.1, "t1": 0.2}, "predict": {"h": 0.1, "t1": 0.2},
         "prepare": {"h": 0.1, "t1": 0.2}, "Ensemble": {"members": 4}, "Case": {"name": "a"},
+        "KernelDensity": {"draws": [1.0, 2.0, 4.0]}, "gather": {"statistics": [lw.statistics.Mean("depth")]},
+        "Copula": {"correlation": np.eye(1), "marginals": [lw.distributions.Normal(std=1.0)]},
+        "Derived": {"functions": {"vehicle.mass": lambda k: k}, "k": lw.distributions.Normal(std=1.0)},
         "Tether": {"anchor": [0.0] * 3, "stiffness": 1.0},
         "from_fossen": {"mass": 20.0, "inertia": [1.5, 4.0, 4.5]},
     }  # fmt: skip

@@ -23,6 +23,8 @@ from lgvi_warp.statistics.until import StoppingRule, Until, from_dict, watch
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.tracking import check_wanted
 
+# Effective members below which intervals of weighted members are not to be relied on.
+FEW = 100
 # Samplings whose means are at least as close as those of independent members.
 EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")
 
@@ -100,16 +102,16 @@ class Observation:
         if self.statistics:
             content["statistics"] = [statistic.to_dict() for statistic in self.statistics]
         content |= {"until": self.until.to_dict()} if self.until else {}
-        function_keys = [statistic.key for statistic in self.statistics if _of_functions(statistic)]
+        function_keys = [statistic.key for statistic in self.statistics if of_functions(statistic)]
         return content | ({"functions": function_keys} if function_keys else {})
 
 
-def _of_functions(value: Any) -> bool:
+def of_functions(value: Any) -> bool:
     """Whether a statistic depends on the user's functions or quantities, which its table cannot hold."""
     if isinstance(value, Statistic):
-        return any(_of_functions(getattr(value, field.name)) for field in fields(value))
+        return any(of_functions(getattr(value, field.name)) for field in fields(value))
     if isinstance(value, list | tuple):
-        return any(_of_functions(entry) for entry in value)
+        return any(of_functions(entry) for entry in value)
     return isinstance(value, Quantity) or callable(value)
 
 
@@ -202,7 +204,7 @@ def messages_about(
     """Messages about statistics: members left out by status (m,), and intervals that do not fit the sampling."""
     if not estimates:
         return ()
-    members, messages = len(status), _left_out(estimates, status, apart)
+    members, messages = len(status), _left_out(estimates, status, apart) + _few_effective(estimates, apart)
     sampling, R = ensemble.get("sampling", "random"), replicates_of(ensemble)
     kind = sampling if isinstance(sampling, str) else next(iter(sampling))
     if R > 1:
@@ -216,17 +218,38 @@ def messages_about(
         text = f"intervals are those of independent members, wider than need be for sampling {kind!r}"
         better = f"with replicates, {{ {kind} = {{ replicates = 16 }} }}, they are those of its own spread"
         messages += (f"{text}: {better}",)
-    elif kind != "random":
+    elif kind != "random" and not any("members" in estimate.arrays for estimate in estimates.values()):
         text = f"intervals are those of independent members, which a {kind} does not give"
         messages += (f"{text}: do not rely on them",)
     return messages
+
+
+def _few_effective(estimates: Mapping[str, Estimate], apart: Collection[str]) -> tuple[str, ...]:
+    """A message that the weights leave few effective members, of those that estimates of all members are of."""
+    numbers = [
+        (float(estimate.count.min()), int(estimate["members"].max()))
+        for name, estimate in estimates.items()
+        if "members" in estimate.arrays and name not in apart and estimate.settings["type"] != "first_passage"
+    ]
+    numbers += [
+        (float(estimate.count[0] + (estimate["ended"] + estimate["otherwise"])[0]), int(estimate["members"][0]))
+        for estimate in estimates.values()
+        if "members" in estimate.arrays and estimate.settings["type"] == "outcome"
+    ]
+    if not numbers or min(numbers)[0] >= FEW:
+        return ()
+    effective, members = min(numbers)
+    text = (
+        f"the weights leave an effective number of {effective:.3g} of {members:,} members: intervals hold from {FEW} on"
+    )
+    return (f"{text}; run more members, or draw them nearer to where the weights are large",)
 
 
 def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Collection[str]) -> tuple[str, ...]:
     """A message that some members do not count, and why; first passages report theirs as lost, and those `apart` mean to."""
     members = len(status)
     count = {
-        estimate: int(estimate.count.min())
+        estimate: int(estimate.arrays.get("members", estimate.count).min())
         for estimate in estimates.values()
         if estimate.name not in apart and estimate.settings["type"] != "first_passage"
     }
@@ -239,6 +262,8 @@ def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Coll
     if any(stopped_early.values()):
         why += [f'{ended} members from the event on that stopped them (stopped = "left_out")']
     if any(count[estimate] < members - failures - stopped_early[estimate] for estimate in fewer):
-        why += ["members where a number of theirs is not finite"]
+        weighted = any("members" in estimate.arrays for estimate in fewer)
+        why += ["members of no weight, or where" if weighted else "members where"]
+        why[-1] += " a number of theirs is not finite"
     text = f"statistics leave out {', and '.join(why)}: {min(count.values())} of {members} count where fewest do"
     return (f"{text} (count of each statistic)",)

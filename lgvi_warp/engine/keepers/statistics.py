@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
 from lgvi_warp.statistics.estimates.tree import Part, Tree
 from lgvi_warp.statistics.paths.path import followed
@@ -35,12 +36,15 @@ class Gathered:
         self._asked, self.time, self.replicates = tuple(statistics), time, replicates
         self.statistics = tuple(map(followed, statistics))
         self._size = blocks(members)[0].count
-        self.trees = [Tree(statistic.join) for statistic in self.statistics]
+        self.trees = [Tree(statistic.join_any) for statistic in self.statistics]
 
-    def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
+    def open(self, plan: Plan, block: Block, members: Members) -> _BlockOfRun:
         """The keeper of a block's statistics."""
-        place = (block.first, block.first // self._size, self._size)
-        return _BlockStatistics(self, plan, members, place)
+        return _BlockOfRun(self, plan, block, members)
+
+    def place(self, block: Block) -> tuple[int, int, int]:
+        """The first member of a block, the block's number, and the size of all blocks but the last."""
+        return block.first, block.first // self._size, self._size
 
     def merge(self, block: Block, part: list[Part]) -> None:
         """Add a block's parts to the trees."""
@@ -98,18 +102,31 @@ class Gathered:
         return [{name.removeprefix(p): array for name, array in arrays.items() if name.startswith(p)} for p in prefixes]
 
 
-class _BlockStatistics:
-    def __init__(self, run: Gathered, plan: Plan, members: Members, place: tuple[int, int, int]):
-        self._statistics, self._members, self._place = run.statistics, members, place
-        self._plan, self._replicates, self._times = plan, run.replicates, len(run.time)
+class BlockStatistics:
+    """Gathers the statistics of one block from its samples, in order, and from the ends of its members.
+
+    members: what functions of (samples, members) see of the block's members.
+    weight: (n,), what the members count for; None: all alike.
+    ticks: (m,) [s], the times of a controller's ticks, which come by `take_ticks`; None where samples serve for ticks.
+    """
+
+    def __init__(
+        self,
+        run: Gathered,
+        block: Block,
+        members: Members,
+        ticks: np.ndarray | None,
+        weight: np.ndarray | None,
+    ):
+        self._statistics, self._members, self._place = run.statistics, members, run.place(block)
+        self._replicates, self._times = run.replicates, len(run.time)
+        self._weight = weight
         # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
-        self._takes_ticks = plan.launches.gathered is not None
-        of_ticks = plan.launches.gathered.times if plan.launches.gathered else run.time
+        self._takes_ticks = ticks is not None
+        of_ticks = run.time if ticks is None else ticks
         times = (of_ticks if statistic.ticks else run.times_of(statistic) for statistic in run.statistics)
-        self._open = [
-            statistic.open(time, members.count) for statistic, time in zip(run.statistics, times, strict=True)
-        ]
+        self._open = [statistic.open(time, block.count) for statistic, time in zip(run.statistics, times, strict=True)]
 
     def take(self, when: slice, samples: Fields) -> None:
         """Pass to each statistic the values of its quantity; statistics of the same quantity share them."""
@@ -138,14 +155,26 @@ class _BlockStatistics:
     def _values(self, x: np.ndarray, good: np.ndarray | None) -> Values:
         """The values of all members, or of each replicate's members."""
         if self._replicates == 1:
-            return Values(x, good, *self._place)
+            return Values(x, good, *self._place, weight=self._weight)
         return dealt(x, good, *self._place, self._replicates)
 
-    def close(self, outcome: MemberStatus) -> list[Part]:
+    def ended(self, ends: Ends) -> list[Part]:
         """Return, for each statistic, arrays by name."""
-        ends = outcome.ends(self._plan)
         for statistic, gathers in zip(self._statistics, self._open, strict=True):
             if statistic.at_end:
                 gathers.take(self._values(*statistic.at_ends(ends, self._last.get(statistic))), slice(0, 1))
             gathers.end(ends, self._replicates)
         return [gathers.close() for gathers in self._open]
+
+
+class _BlockOfRun(BlockStatistics):
+    """The statistics of a block that is advanced."""
+
+    def __init__(self, run: Gathered, plan: Plan, block: Block, members: Members):
+        ticks = plan.launches.gathered
+        super().__init__(run, block, members, None if ticks is None else ticks.times, members.weight)
+        self._plan = plan
+
+    def close(self, outcome: MemberStatus) -> list[Part]:
+        """Return, for each statistic, arrays by name."""
+        return self.ended(outcome.ends(self._plan))

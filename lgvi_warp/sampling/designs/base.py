@@ -63,6 +63,10 @@ class Sampling:
         """Values (members, ...) that the sampling itself brings, by the name of what they set."""
         return {}
 
+    def own_weights(self) -> np.ndarray | None:
+        """What the members (members,) count for in statistics, of mean 1; None: all count alike."""
+        return None
+
     def arrays(self) -> dict[str, np.ndarray]:
         """The arrays that the sampling was given, with a row for each member, which a store keeps as arrays."""
         return {}

@@ -22,6 +22,8 @@ from lgvi_warp.sampling.designs.csv_file import columns_of
 from lgvi_warp.sampling.designs.random import Random
 from lgvi_warp.sampling.designs.space import Space
 
+# Name of the column of weights that are given as numbers.
+WEIGHTS = "weights"
 # First bytes of files of numpy.save and numpy.savez, and of archives. They are not opened, since they could hold code.
 BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
 
@@ -42,6 +44,9 @@ class Table(Sampling):
         sha256: Checksum that the file must have, written by `to_dict`; any by default.
         columns: Names of the columns to take; all by default.
         ignore: Names of the columns to leave out, such as an id; none by default.
+        weights: What each member counts for in statistics: the name of a column, or numbers (n,) from 0, in any unit. So the
+            members stand for another distribution than the one that they were drawn from: the weight of a member is the
+            ratio of the two densities (importance sampling), or that of a draw of a posterior. By default all count alike.
 
     Raises:
         SceneError: Where the file cannot be read, or a cell is no number. The message lists every fault.
@@ -59,6 +64,7 @@ class Table(Sampling):
     sha256: str | None = None
     columns: Sequence[str] | None = None
     ignore: Sequence[str] | None = None
+    weights: Any = None
     kind: ClassVar[str] = "table"
     fewer: ClassVar[bool] = True
 
@@ -72,7 +78,10 @@ class Table(Sampling):
             faults.add("file", self.file, fault, "give one of file and values")
         self._check_options(faults)
         faults.raise_if_any()
+        self._take_weights(faults)
         read = self._from_file(faults) if self.file is not None else self._from_values(faults)
+        if isinstance(self.weights, str) and self.weights in read:
+            check_weights(faults, "weights", read[self.weights])
         lengths = {len(column) for column in read.values()}
         if not faults and (len(lengths) != 1 or 0 in lengths):
             faults.add("values", sorted(lengths), "are the columns' lengths", "give columns of one length, 1 or more")
@@ -93,7 +102,7 @@ class Table(Sampling):
         Raises:
             SceneError: Where the values are no columns of one length.
         """
-        table = cls(values=values)
+        table = cls(values=values, weights=settings.get("weights"))
         for item in fields(cls):
             object.__setattr__(table, item.name, settings.get(item.name))
         return table
@@ -111,6 +120,21 @@ class Table(Sampling):
         if self.columns is not None and self.ignore is not None:
             faults.add("ignore", self.ignore, "is given beside columns", "keep one of them")
 
+    def _take_weights(self, faults: Faults) -> None:
+        """Make a column of weights that are given as numbers, which a store and a scene file can hold."""
+        if self.weights is None or isinstance(self.weights, str):
+            return
+        if self.file is not None:
+            faults.add("weights", self.weights, "are numbers beside a file", 'name a column of the file: weights = "w"')
+        elif is_labelled(self.values):
+            table = columns_by_name(Faults(), "values", self.values) or {}
+            if WEIGHTS in table:
+                faults.add(
+                    "weights", self.weights, f"are given beside a column {WEIGHTS!r}", f'give weights="{WEIGHTS}"'
+                )
+            object.__setattr__(self, "values", {**table, WEIGHTS: self.weights})
+            object.__setattr__(self, "weights", WEIGHTS)
+
     def _chosen(self, faults: Faults, names: Sequence[str]) -> list[str]:
         """The names of the columns to take."""
         known = set(names)
@@ -119,7 +143,11 @@ class Table(Sampling):
                 if name not in known:
                     remedy = functools.partial(closest, name, names)
                     faults.add(option, name, "is no column of the table", remedy)
-        wanted, unwanted = set(self.columns or names), set(self.ignore or ())
+        if self.weights is not None and self.weights not in known:
+            faults.add(
+                "weights", self.weights, "is no column of the table", functools.partial(closest, self.weights, names)
+            )
+        wanted, unwanted = {*(self.columns or names), self.weights}, set(self.ignore or ()) - {self.weights}
         chosen = [name for name in names if name in wanted and name not in unwanted]
         if not chosen and not faults:
             faults.add("ignore", self.ignore, "leaves no column", "keep one or more")
@@ -163,23 +191,32 @@ class Table(Sampling):
             return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
-        return dict(self._own)  # type: ignore[attr-defined]
+        return {name: column for name, column in self.arrays().items() if name != self.weights}
+
+    def own_weights(self) -> np.ndarray | None:
+        if self.weights is None:
+            return None
+        weights = self.arrays()[self.weights]
+        return np.asarray(weights / weights.mean())
 
     def arrays(self) -> dict[str, np.ndarray]:
         # The columns, also those of a file, since that may be moved or changed.
-        return self.own_values()
+        return dict(self._own)  # type: ignore[attr-defined]
 
     def own_members(self, space: Space) -> int:
-        return len(next(iter(self.own_values().values())))
+        return len(next(iter(self.arrays().values())))
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         # Random levels for the names that the table does not contain.
         return Random().draw(space, members)
 
     def to_dict(self) -> Any:
+        named = {} if self.weights is None else {"weights": self.weights}
         if self.file is None:
-            return {self.kind: {"values": {name: column.tolist() for name, column in self.own_values().items()}}}
-        chosen = {name: getattr(self, name) for name in ("columns", "ignore") if getattr(self, name) is not None}
+            return {self.kind: {"values": {name: column.tolist() for name, column in self.arrays().items()}} | named}
+        chosen = {
+            name: getattr(self, name) for name in ("columns", "ignore") if getattr(self, name) is not None
+        } | named
         return {self.kind: {"file": os.path.abspath(self.file), "sha256": self.sha256, **chosen}}
 
 
@@ -195,6 +232,17 @@ def moved(file: str, sha256: str | None, beside: Path) -> str:
                 if path.is_file() and hashlib.sha256(file_bytes(str(path), "CSV file")).hexdigest() == sha256:
                     return str(path)
     return file
+
+
+def check_weights(faults: Faults, key: str, weights: np.ndarray) -> None:
+    """Add a fault where numbers are no weights of members: (n,), none below 0, some above."""
+    if weights.ndim != 1:
+        faults.add(key, weights, f"has shape {weights.shape}", "give one number for each member")
+    elif (weights < 0.0).any():
+        worst = int(np.argmin(weights))
+        faults.add(key, float(weights[worst]), f"is below 0, of member {worst}", "give numbers from 0")
+    elif not (weights > 0.0).any():
+        faults.add(key, weights, "are all 0", "give numbers from 0, of which some are above")
 
 
 def _column(faults: Faults, key: str, column: Any) -> np.ndarray | None:

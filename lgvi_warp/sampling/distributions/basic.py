@@ -6,7 +6,7 @@ Every distribution maps uniform numbers in (0, 1) to values, so that any samplin
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
@@ -33,10 +33,26 @@ class Distribution:
 
     kind: ClassVar[str] = ""
     # Classes by their kind in a scene file.
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[MutableMapping[str, Any]] = registry.Kinds(
+        "lgvi_warp.sampling.distributions",
+        {
+            "basic": ("normal", "truncated_normal", "uniform", "lognormal", "choice"),
+            "joint": (
+                *("correlated_normal", "rotation_normal", "uniform_rotation"),
+                *("positive_definite", "physical_inertia"),
+            ),
+            "named": ("scipy", "histogram", "own"),
+            "density": ("kernel_density",),
+            "copula": ("copula",),
+            "derived": ("derived",),
+            "openturns": ("openturns",),
+        },
+    )
     widths: ClassVar[tuple[str, ...]] = ()
     # Whether its numbers may be one for each component of what it varies.
     by_component: ClassVar[bool] = True
+    # Whether it may draw several quantities together, named "a, b".
+    several: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -87,6 +103,14 @@ class Distribution:
             return None
         wanted = f"one number or {' x '.join(map(str, shape))}, one per component" if shape else "one number"
         return f"does not fit a quantity of shape {shape}", f"give {wanted}"
+
+    def ordered_as(self, labels: Sequence[str]) -> Distribution:
+        """The distribution with its numbers in the order of the labels of what varies, where it names them itself."""
+        return self
+
+    def nothing_of(self, bases: Sequence[np.ndarray]) -> str | None:
+        """The width, relative to a scene's value of 0, by which it varies nothing; None where it does vary it."""
+        return varies_nothing(self, bases)
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values (n, *shape) at levels u in (0, 1), (n, *shape). Every distribution of single numbers must define this."""

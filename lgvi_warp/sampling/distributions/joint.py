@@ -62,7 +62,7 @@ def root(matrix: np.ndarray) -> np.ndarray:
         return np.asarray((axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T)
 
 
-def _covariance(faults: Faults, distribution: Any, size: int | None) -> np.ndarray | None:
+def covariance_of(faults: Faults, distribution: Any, size: int | None) -> np.ndarray | None:
     """The covariance that was given, or that follows from std and correlation; None after adding a fault."""
     arguments = {name for name in ("covariance", "std", "correlation") if getattr(distribution, name, None) is not None}
     if ("covariance" in arguments) == ("std" in arguments) or arguments == {"covariance", "correlation"}:
@@ -109,6 +109,12 @@ def _covariance(faults: Faults, distribution: Any, size: int | None) -> np.ndarr
 def components(shapes: Sequence[tuple[int, ...]]) -> int:
     """The number of entries in quantities of these shapes."""
     return sum(int(np.prod(shape)) for shape in shapes)
+
+
+def split(drawn: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Entries (n, d) as the quantities that they are of, (n, *shape) each."""
+    parts = np.split(drawn, np.cumsum([base.size for base in bases])[:-1], axis=1)
+    return [entries.reshape(len(drawn), *base.shape) for entries, base in zip(parts, bases, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -159,10 +165,11 @@ class CorrelatedNormal(JointLaw):
     correlation: Any = None
     mean: Spread | None = None
     kind: ClassVar[str] = "correlated_normal"
+    several: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.kind}.")
-        matrix = _covariance(faults, self, None)
+        matrix = covariance_of(faults, self, None)
         if self.mean is not None:
             faults.finite("mean", self.mean)
         faults.raise_if_any()
@@ -188,8 +195,7 @@ class CorrelatedNormal(JointLaw):
             L = L[0, 0] * np.eye(u.shape[1])
         scene = np.concatenate([np.reshape(base, -1) for base in bases])
         drawn = (scene if self.mean is None else floats(self.mean)) + combined(L, normals(u))
-        parts = np.split(drawn, np.cumsum([base.size for base in bases])[:-1], axis=1)
-        return [entries.reshape(len(u), *base.shape) for entries, base in zip(parts, bases, strict=True)]
+        return split(drawn, bases)
 
 
 @dataclass(frozen=True)
@@ -225,7 +231,7 @@ class RotationNormal(AttitudeDistribution):
 
     def __post_init__(self) -> None:
         faults = Faults(f"{self.kind}.")
-        matrix = _covariance(faults, self, 3)
+        matrix = covariance_of(faults, self, 3)
         if matrix is not None and matrix.shape != (3, 3):
             faults.add("covariance", self.covariance, "is not 3 x 3", "give 3 x 3 numbers [rad^2], body axes")
         faults.raise_if_any()

@@ -223,6 +223,10 @@ def quantiles_of(distribution: Any) -> Any:
 
 
 KINDS = Distribution.kinds
+# Those of which a file has the text alone.
+IN_MEMORY = (UserDistribution.kind, "openturns", "derived")
+# Methods by which a distribution of OpenTURNS is known.
+OPENTURNS = ("computeQuantile", "getMarginal", "getDimension")
 
 
 def is_frozen(value: Any) -> bool:
@@ -267,6 +271,10 @@ def as_distribution(key: str, value: Any) -> Any:
         return BinnedDistribution(np.diff(distribution.cdf(edges)).tolist(), np.asarray(edges).tolist())
     if is_frozen(value):
         return ScipyDistribution(value)
+    if all(callable(getattr(value, name, None)) for name in OPENTURNS):
+        from lgvi_warp.sampling.distributions.openturns import OpenTURNSDistribution
+
+        return OpenTURNSDistribution(value)
     if type(value).__name__ == "multivariate_normal_frozen":
         return CorrelatedNormal(covariance=np.asarray(value.cov).tolist(), mean=np.asarray(value.mean).tolist())
     try:
@@ -282,10 +290,11 @@ def from_dict(key: str, content: Any) -> Distribution:
     faults = Faults()
     kind, values = next(iter(content.items()))
     foreign = kind in SCIPY or kind == ScipyDistribution.kind
-    if kind == UserDistribution.kind:
-        faults.add(key, values, "is a distribution of your own, which a file does not hold", "give the ensemble again")
+    if kind in IN_MEMORY:
+        what = "holds functions" if kind == "derived" else "is a distribution of your own"
+        faults.add(key, values, f"{what}, which a file does not hold", "give the ensemble again")
     elif not foreign and kind not in KINDS:
-        faults.keys(key, [kind], [*(name for name in KINDS if name != UserDistribution.kind), *SCIPY])
+        faults.keys(key, [kind], [*(name for name in KINDS if name not in IN_MEMORY), *SCIPY])
     elif not isinstance(values, Mapping):
         faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
     elif not foreign:

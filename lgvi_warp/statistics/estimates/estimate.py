@@ -137,9 +137,14 @@ class Estimate(Summarized):
 
 
 class Estimates(Summarized, Mapping[str, Estimate]):
-    """The estimates of a run by name, in the order of the statistics; "above 10.0" in a name is found as "above 10"."""
+    """The estimates of a run by name, in the order of the statistics; "above 10.0" in a name is found as "above 10".
 
-    def __init__(self, estimates: Sequence[Estimate] = ()):
+    Attributes:
+        messages: what the user should know of them; of the statistics of a run its result has that.
+    """
+
+    def __init__(self, estimates: Sequence[Estimate] = (), messages: tuple[str, ...] = ()):
+        self.messages = messages
         self._found = {estimate.name: estimate for estimate in estimates}
         self._spelled = {canonical(name): name for name in self._found}
 
@@ -159,9 +164,8 @@ class Estimates(Summarized, Mapping[str, Estimate]):
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         end = max((estimate.time[-1] for estimate in self.values()), default=0.0)
-        return f"Estimates of {len(self)} statistics at {end:g} s", [
-            row for estimate in self.values() for row in _shown(estimate)
-        ]
+        rows = [row for estimate in self.values() for row in _shown(estimate)]
+        return f"Estimates of {len(self)} statistics at {end:g} s", rows + [("message", text) for text in self.messages]
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:

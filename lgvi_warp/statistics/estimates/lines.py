@@ -22,7 +22,8 @@ def texts_of(estimate: Any) -> list[tuple[str, str, str, str]]:
     rows = []
     for label, unit, value, lower, upper, members in entries_of(estimate):
         ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
-        rows.append((label, f"{value:.6g} {unit}".rstrip(), ends, f"{members:,} members"))
+        kind = "effective members" if "members" in estimate.arrays else "members"
+        rows.append((label, f"{value:.6g} {unit}".rstrip(), ends, f"{members:,} {kind}"))
     return rows
 
 

@@ -24,6 +24,7 @@ from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values.values import Values
 
 State = dict[str, np.ndarray]
+Place = tuple[int, int, int, int, np.ndarray | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,7 @@ class _Follow(Gatherer):
         self._metric, self._time = metric, time
         self._state: State = {}
         self._last: np.ndarray | None = None
-        self._place = (0, 0, 0, 1)
+        self._place: Place = (0, 0, 0, 1, None)
 
     def take(self, values: Values, when: slice) -> None:
         R = values.replicates
@@ -82,7 +83,7 @@ class _Follow(Gatherer):
             self._state |= self._metric.follow(self._state, ticks)
             self._state["until"] = np.maximum(self._state["until"], ticks.of_living(ticks.t[:, None], 0.0).max(axis=0))
         self._last = x[-1].copy()
-        self._place = (values.first, values.block, values.size, R)
+        self._place = (values.first, values.block, values.size, R, values.weight)
 
     def end(self, ends: Ends, replicates: int) -> None:
 
@@ -144,10 +145,10 @@ class Metric(MemberStatistic):
         """
         raise TypeError(f"{type(self).__name__} is abstract")
 
-    def gathered(self, x: np.ndarray, lost: np.ndarray, place: tuple[int, int, int, int], time: np.ndarray) -> Part:
+    def gathered(self, x: np.ndarray, lost: np.ndarray, place: Place, time: np.ndarray) -> Part:
         """Return the part of a block: the parts of all statistics of `then`, of the numbers (replicates, 1, members).
 
-        place: first member, block, its size, and number of replicates.
+        place: first member, block, its size, number of replicates, and weights of the members.
         """
         surviving = Values(x, ~lost, *place)
         return numbered(

@@ -81,7 +81,7 @@ class MemberStatistic(Statistic):
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         pairs = ((arrays_under(first, f"{i}/"), arrays_under(second, f"{i}/")) for i in range(len(self.then)))
-        return numbered(statistic.join(*pair, place) for statistic, pair in zip(self.then, pairs, strict=True))
+        return numbered(statistic.join_any(*pair, place) for statistic, pair in zip(self.then, pairs, strict=True))
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
         estimates: list[Estimate] = []

@@ -50,6 +50,10 @@ class MemberValues(Statistic):
     def rows(self, values: Values) -> Part:
         return self.rows_of(values.filled(np.nan), values.replicates)
 
+    def weighted_rows(self, values: Values) -> Part:
+        # Numbers are the same, whatever their members weigh.
+        return self.rows(values)
+
     def rows_of(self, x: np.ndarray, replicates: int) -> Part:
         """Return the numbers of a block, (k, d, n), in the order of its members.
 

@@ -28,7 +28,8 @@ class _Walk(Gatherer):
         self._state: np.ndarray | None = None
         self._last = np.empty(0)
         self._whole: np.ndarray | None = None
-        self._place, self._single = (0, 0, 0, 1), False
+        self._place: tuple[int, int, int, int, np.ndarray | None] = (0, 0, 0, 1, None)
+        self._single = False
 
     def take(self, values: Values, when: slice) -> None:
         rows = (-1, values.replicates)
@@ -41,7 +42,7 @@ class _Walk(Gatherer):
         if values.good is not None:
             complete = values.good.reshape(*rows, values.good.shape[1]).all(axis=0)
             self._whole = complete if self._whole is None else self._whole & complete
-        self._place = (values.first, values.block, values.size, values.replicates)
+        self._place = (values.first, values.block, values.size, values.replicates, values.weight)
         self._single = values.single and self._reduction.of_samples
 
     def _stepped(self, state: np.ndarray, t: int, x: np.ndarray) -> np.ndarray:

@@ -42,7 +42,8 @@ class Fields(dict[str, np.ndarray]):
     def at(self, places: np.ndarray) -> Fields:
         """Return the samples at some of these times, by their indices (m,)."""
         values = {name: values[places] for name, values in self.items()}
-        return Fields(values, self.time[places], self._steps[places], self.terms, self._when_ended, self.controller)
+        others = self.time[places], self._steps[places], self.terms, self._when_ended, self.controller
+        return type(self)(values, *others)
 
     @functools.cached_property
     def _ends(self) -> tuple[np.ndarray, np.ndarray] | None:

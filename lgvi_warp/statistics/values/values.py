@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 
 import numpy as np
@@ -16,11 +17,12 @@ class Values:
 
     x: (k, d, n), the numbers.
     good: (k, n), which members had not failed; None (the default) if none had.
+    weight: (n,), what each member weighs; None (the default): all the same. One of weight 0 does not count.
 
     Attributes:
         x: (k, d, n), float64; 0 where a member does not count.
         good: (k, n), which members count; None if all do.
-        count: (k,), number of members that count.
+        count: (k,), number of members that count; under weights (see `under`) their sum.
         single: whether the numbers came as float32, so that sorting them in float32 loses nothing.
     """
 
@@ -32,10 +34,16 @@ class Values:
         block: int = 0,
         size: int = 0,
         replicates: int = 1,
+        weight: np.ndarray | None = None,
     ):
         self.first, self.block, self.size = first, block, max(size, x.shape[2])
         self.replicates = replicates
         self.single = x.dtype == np.float32
+        self.weight = weight
+        # What sums weigh each member by, (k, n); None: by 1.
+        self._measure: np.ndarray | None = None
+        if weight is not None and not weight.all():
+            good = np.broadcast_to(weight > 0.0, (len(x), x.shape[2])) if good is None else good & (weight > 0.0)
         x = x.astype(np.float64, copy=False)
         if good is None and np.isfinite(x.sum(axis=2)).all():
             self.x, self.good = x, None
@@ -45,6 +53,45 @@ class Values:
             self.good = finite if good is None else finite & good
             self.x = np.where(self.good[:, None], x, 0.0)
             self.count = self.good.sum(axis=1)
+
+    def under(self, power: int) -> Values:
+        """Return these values under a measure: sums weigh each member by a power of its weight, and `count` is their sum."""
+        assert self.weight is not None
+        measure = np.broadcast_to(self.weight**power, (len(self.x), self.x.shape[2]))
+        return self._under(measure if self.good is None else np.where(self.good, measure, 0.0))
+
+    def _under(self, measure: np.ndarray) -> Values:
+        other = copy.copy(self)
+        for name in ("mean", "centred"):
+            vars(other).pop(name, None)
+        other._measure, other.count = measure, measure.sum(axis=1)
+        return other
+
+    @property
+    def weights(self) -> np.ndarray:
+        """What each member weighs at each time, (k, n); 0 where it does not count."""
+        return np.ones((len(self.x), self.x.shape[2])) if self._measure is None else self._measure
+
+    def with_numbers(self, x: np.ndarray) -> Values:
+        """Return other numbers (k, d, n) of the same members, under the same measure."""
+        other = Values(x, self.good)
+        return other if self._measure is None else other._under(self._measure)
+
+    def weighed(self, a: np.ndarray) -> np.ndarray:
+        """Return numbers a (k, d, n), times what each member weighs."""
+        return a if self._measure is None else a * self._measure[:, None]
+
+    def summed(self, mask: np.ndarray) -> np.ndarray:
+        """Return the sum (k, d) over the members of a mask (k, d, n)."""
+        return np.asarray(mask.sum(axis=2) if self._measure is None else self.weighed(mask).sum(axis=2))
+
+    def counted(self, places: np.ndarray, chosen: np.ndarray | None, length: int) -> np.ndarray:
+        """Return the sums (length,) over the members at each of the places (k, d, n), of those chosen (k, d, n), or of all."""
+        weights = None
+        if self._measure is not None:
+            weights = np.broadcast_to(self._measure[:, None], places.shape)
+            weights = weights.ravel() if chosen is None else weights[chosen]
+        return np.bincount(places.ravel() if chosen is None else places[chosen], weights, length)
 
     def members(self, at: np.ndarray) -> np.ndarray:
         """Return the indices in the run of members at places (k, d) along the last axis of `x`."""
@@ -57,7 +104,9 @@ class Values:
     @functools.cached_property
     def mean(self) -> np.ndarray:
         """Mean over the members that count, (k, d); 0 where none counts."""
-        return self.x.sum(axis=2) / np.maximum(self.count, 1)[:, None]
+        if self._measure is None:
+            return self.x.sum(axis=2) / np.maximum(self.count, 1)[:, None]
+        return self.weighed(self.x).sum(axis=2) / np.where(self.count > 0.0, self.count, 1.0)[:, None]
 
     @functools.cached_property
     def centred(self) -> np.ndarray:

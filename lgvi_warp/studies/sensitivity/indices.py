@@ -45,6 +45,8 @@ class Indices(Saved):
     columns: ClassVar[tuple[str, ...]] = ()
     # Column -> field with the half width of its interval.
     intervals: ClassVar[dict[str, str]] = {}
+    # Columns that a picture shows; empty: all.
+    drawn: ClassVar[tuple[str, ...]] = ()
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """List one record for each quantity, factor and index.

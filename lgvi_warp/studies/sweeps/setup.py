@@ -144,6 +144,11 @@ def setup_of(
     faults.raise_if_any()
     assert isinstance(base.scene, Scene)
     fleet = _fleet(base, members, seed, sampling, together, parts["cases"])
+    if fleet.weights(0, 1) is not None:
+        problem = "has members with weights, and a sweep counts them alike"
+        raise refusal(
+            "sampling", fleet.sampling.kind, problem, "leave weights out, or ask lw.solve for statistics of a case"
+        )
     setup = Setup(base.scene, members=fleet, settings=dict(settings), vary=together, **parts)
     count = len(setup.cases) * math.prod(len(values) for values in setup.axes.values())
     if count > MOST_CELLS:

@@ -25,7 +25,7 @@ def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = N
     """Draw the indices of each factor as bars with their confidence intervals, a panel for each quantity.
 
     Args:
-        found: Indices of `lw.uq.sobol` or `lw.uq.morris`; the first 12 quantities that vary are drawn.
+        found: Indices of `lw.uq.sobol`, `lw.uq.morris` or `lw.uq.given_data`; the first 12 quantities that vary are drawn.
 
     Returns:
         The axes, shape (quantities,).
@@ -65,15 +65,15 @@ def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = N
 
 def _bars(axes: Any, indices: Indices, q: int, shown: np.ndarray) -> None:
     """Draw the bars of one quantity, the columns of a factor side by side; shown: indices of the factors."""
-    places = np.arange(len(shown))
-    width = 0.8 / len(indices.columns)
-    for i, column in enumerate(indices.columns):
+    places, columns = np.arange(len(shown)), indices.drawn or indices.columns
+    width = 0.8 / len(columns)
+    for i, column in enumerate(columns):
         name = indices.intervals.get(column)
         half = getattr(indices, name)[q][shown] if name else None
-        at = places + (i - 0.5 * (len(indices.columns) - 1)) * width
+        at = places + (i - 0.5 * (len(columns) - 1)) * width
         axes.barh(at, getattr(indices, column)[q][shown], width, xerr=half, label=column, color=COLORS[i], hatch=hatch(i),
                   edgecolor="white", linewidth=0.0, error_kw={"capsize": 2.0})  # fmt: skip
     axes.axvline(0.0, color="black", linewidth=0.5)
-    of_variance = indices.name.startswith("Sobol")
+    of_variance = "first" in indices.columns
     axes.set(title=in_words(indices.quantities[q]), xlabel="part of the variance" if of_variance else "effect")
     axes.grid(True, axis="x", alpha=0.3)

@@ -9,6 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.results.outcomes import outcomes
+from lgvi_warp.results.varied import varied
 from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.views.choice import mixed
 from lgvi_warp.views.plots.canvas import legend_below, mark, panel, widen, wrapped
@@ -45,21 +46,3 @@ def inputs_by_outcome(result: Result, *, ax: Any = None, path: FilePath | None =
         widen(axes.xaxis)
         legend_below(axes, ncols=3)
     return axes
-
-
-def varied(result: Result) -> dict[str, np.ndarray]:
-    """Collect the parameters (n,) that differ between members, and what was kept of the start, by name and component."""
-    inputs = {}
-    starts = {f"start.{name}": values[0] for name, values in result.samples.items() if name in STARTS}
-    for name, values in (*result.parameters.items(), *starts.items()):
-        if len(values) != result.members:
-            continue
-        columns = values.reshape(len(values), -1)
-        # What differs by round-off alone does not vary.
-        for i in np.flatnonzero(np.ptp(columns, axis=0) > 1e-12 * np.abs(columns).max(initial=0.0)):
-            place = "" if values.ndim == 1 else [int(k) for k in np.unravel_index(i, values.shape[1:])]
-            inputs[f"{name}{place}"] = columns[:, i]
-    return inputs
-
-
-STARTS = ("position", "velocity", "angular_velocity")

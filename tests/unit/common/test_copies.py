@@ -38,6 +38,11 @@ def demand(t, y, r, members):
     return np.zeros((len(members), 6))
 
 
+def scaled(k):
+    """A number that follows from a factor."""
+    return 20.0 * k
+
+
 ERRORS = {
     "SceneError": lambda: lw.SceneError(["mass = -1: is negative; give more"] * 30, 2),
     "MembersFailed": lambda: lw.MembersFailed("2 of 3 members failed", {"status": np.arange(3)}),
@@ -100,6 +105,7 @@ OTHERS = {
     "PositiveDefinite": lambda: lw.distributions.PositiveDefinite(sigma=0.1),
     "RotationNormal": lambda: lw.distributions.RotationNormal(std=0.1),
     "Histogram": lambda: lw.statistics.Histogram("depth", edges=[0.0, 1.0]),
+    "Derived": lambda: lw.distributions.Derived({"vehicle.mass": scaled}, k=lw.distributions.Normal(std=0.1)),
     "CorrelatedNormal": lambda: lw.distributions.CorrelatedNormal(covariance=np.eye(2)),
     "ScipyDistribution": lambda: lw.distributions.ScipyDistribution(stats.norm()),
     "Ticks": lambda: lw.control.CallbackInput(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
@@ -119,7 +125,7 @@ APART = {"Indices", "Saved", "Policy"}
 # Classes of which a run makes one, and a study.
 OF_RUNS = {"Result", "Prepared", "Sweep", "Outputs", "ScalarModel"}
 OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned", "StabilityMap", "SobolIndices",
-              "MorrisEffects", "Suggestion", "Tradeoff"}  # fmt: skip
+              "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff"}  # fmt: skip
 
 
 def classes():

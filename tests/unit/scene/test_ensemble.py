@@ -29,8 +29,9 @@ EVERYTHING = {"vehicle.mass": Normal(relative=0.01),
 
 def numbers(m):
     """Everything in a Members, by name."""
-    names = [f.name for f in dataclasses.fields(m) if f.name not in ("parameters", "indices", "seed")]
-    return m.parameters | {name: getattr(m, name) for name in names}
+    others = ("parameters", "indices", "seed", "starts", "weight")
+    names = [f.name for f in dataclasses.fields(m) if f.name not in others]
+    return m.parameters | m.starts | {name: getattr(m, name) for name in names}
 
 
 def assert_same(m, whole, indices):

@@ -15,8 +15,9 @@ from PIL import Image
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.results.varied import varied
 from lgvi_warp.views.pages.run_again import how_to_run_again, shortened
-from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
+from lgvi_warp.views.plots.inputs import inputs_by_outcome
 from tests.conftest import ROOT
 from tests.unit.views import test_recording
 

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The samples of a result block by block, as a run would pass them on: from memory, or from the chunks of a store."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.common.status import ROUNDING
+from lgvi_warp.control.signals import SAVED
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.engine.keepers.observation import replicates_of
+from lgvi_warp.physics.terms.events import Event
+from lgvi_warp.physics.terms.events import from_list as events_of
+from lgvi_warp.results.drawn import DrawnParameters
+from lgvi_warp.results.result import Result
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.statistics.ends import Ends
+from lgvi_warp.statistics.values.samples import Fields
+from lgvi_warp.store.open import Arrays
+
+# Memory of the samples that are read at once [bytes].
+READ_AT_ONCE = 128_000_000
+# Memory of a field of one member at one time, at most: a matrix.
+FIELD_BYTES = 72
+
+
+class KeptFields(Fields):
+    """Samples of a block that were kept; one that was not is named with what keeps it."""
+
+    def __missing__(self, name: str) -> Any:
+        raise not_kept("statistics", name, tuple(self))
+
+
+def not_kept(key: str, field: str, kept: tuple[str, ...]) -> SceneError:
+    """The fault of a sample that is needed and was not kept."""
+    if not kept:
+        remedy = 'run with keep="all", or gather it on the way: solve(..., statistics=[...])'
+        return refusal(key, field, "is needed of every member, and no samples of all were kept", remedy)
+    names = ", ".join(map(repr, (*kept, field)))
+    remedy = f"keep it: save=lw.SaveAt(fields=({names})), or gather it on the way: solve(..., statistics=[...])"
+    return refusal(key, field, "is needed, and its samples were not kept", remedy)
+
+
+class KnownMembers:
+    """What is known of a block's members where their ensemble is not: parameters, and the start as the first sample has it."""
+
+    def __init__(self, parameters: Mapping[str, np.ndarray], count: int, start: KeptFields | None):
+        self.parameters, self.count, self._start = parameters, count, start
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in SAVED or self.__dict__.get("_start") is None:
+            raise AttributeError(f"members of a result have parameters, count and the start's fields, and no {name!r}")
+        return self._start[name][0].astype(np.float64, copy=False)  # type: ignore[index]
+
+
+class KeptSamples:
+    """A result as its blocks: samples, members and ends of each.
+
+    Attributes:
+        total: number of members of the whole run, by which blocks are divided.
+        weights: what the members count for (n,); None where all count alike.
+        replicates: number of independent replicates of the design; 1 where the members are not those of a whole design.
+        events: the events of the scene.
+        ticks: (m,), the rows of samples at the ticks of the controller; None without a controller.
+    """
+
+    def __init__(self, result: Result, weights: np.ndarray | None = None):
+        self.result, self.weights = result, result.weights if weights is None else weights
+        ensemble = result.provenance.get("ensemble", {})
+        planned = len(ensemble["indices"]) if "indices" in ensemble else int(ensemble.get("members") or result.members)
+        whole = result.members in (planned, result.provenance.get("members"))
+        self.total = planned if whole else result.members
+        self.replicates = replicates_of(ensemble) if whole and weights is None else 1
+        self.events: tuple[Event, ...] = events_of(result.provenance["scene"].get("events", ()))
+
+    def blocks(self) -> Iterator[Block]:
+        """The blocks of these members, in order."""
+        for block in blocks(self.total):
+            if block.first < self.result.members:
+                yield Block(block.first, min(block.stop, self.result.members))
+
+    def weights_of(self, block: Block) -> np.ndarray | None:
+        """What the members of a block count for; None where all count alike."""
+        return None if self.weights is None else np.asarray(self.weights[block.first : block.stop])
+
+    @functools.cached_property
+    def scene(self) -> Any:
+        """The scene, with its controller."""
+        known = self.result.parameters
+        if isinstance(known, DrawnParameters):
+            return known.ensemble.scene
+        return Scene.from_dict(self.result.provenance["scene"])
+
+    @property
+    def period(self) -> float | None:
+        """Time between two ticks of the controller [s]; None without one."""
+        table = self.result.provenance["scene"].get("controller")
+        return None if table is None else float(table["period"])
+
+    def tick_rows(self, key: str) -> np.ndarray | None:
+        """The rows of samples at the controller's ticks; None without a controller. Refuses samples that lack a tick."""
+        if self.period is None:
+            return None
+        h = self.result.provenance["step"]
+        made = np.rint(self.result.time / h).astype(np.int64)
+        ticks = np.arange(0, made[-1] + 1, max(1, round(self.period / h)))
+        rows = np.minimum(np.searchsorted(made, ticks), len(made) - 1)
+        if not np.array_equal(made[rows], ticks):
+            remedy = f"keep them: save=lw.SaveAt(every={self.period:g}, fields=...), or gather it on the way"
+            raise refusal(
+                key, "...", f"is of every tick of the controller, and samples lack some of {len(ticks):,}", remedy
+            )
+        return rows
+
+    def ends(self, block: Block) -> Ends:
+        """How and when the members of a block ended."""
+        at, result = slice(block.first, block.stop), self.result
+        status = np.asarray(result.status[at])
+        event = np.zeros(len(status), np.uint8) if result.event is None else np.asarray(result.event[at])
+        if result.event is None:
+            for i, each in enumerate(self.events):
+                event[status == each.status] = i + 1
+        return Ends(status, event, result.end_time[at], tuple(each.key for each in self.events))
+
+    def members(self, block: Block, names: tuple[str, ...]) -> Any:
+        """What functions of (samples, members) see of a block's members."""
+        known = self.result.parameters
+        if isinstance(known, DrawnParameters):
+            return known.select(block.first, block.stop)
+        at = slice(block.first, block.stop)
+        of_block = known.part(at) if isinstance(known, Arrays) else known
+        parameters = {name: of_block[name] for name in of_block}
+        if not isinstance(known, Arrays):
+            parameters = {name: values[at] if len(values) > 1 else values for name, values in parameters.items()}
+        start = next(self.pieces(block, names, np.zeros(1, np.int64)))[1] if names else None
+        return KnownMembers(parameters, block.count, start)
+
+    def of_block(self, block: Block, names: tuple[str, ...]) -> Result:
+        """The members of a block as a result in memory, with some of their samples."""
+        result, at = self.result, slice(block.first, block.stop)
+        rows = np.arange(len(result.time))
+        known = result.parameters
+        parameters = known.part(at) if isinstance(known, Arrays) else known
+        bare = replace(result, samples={}, parameters={}, starts={}, store=None)
+        few = bare.part(np.arange(block.first, block.stop))
+        return replace(few, samples={name: self._read(name, rows, at) for name in names}, parameters=parameters)
+
+    def pieces(
+        self, block: Block, names: tuple[str, ...], rows: np.ndarray, controller: Any = None
+    ) -> Iterator[tuple[slice, KeptFields]]:
+        """Samples of a block at some of the times, a few at once: their places among `rows`, and the samples."""
+        result, at = self.result, slice(block.first, block.stop)
+        status = np.asarray(result.status[at])
+        at_once = max(1, READ_AT_ONCE // (FIELD_BYTES * max(len(names), 1) * block.count))
+        # A member's own samples are those up to its end, at which an event may have stopped it.
+        last = np.searchsorted(result.time, result.end_time[at] * (1.0 + ROUNDING), side="right") - 1
+        # The start comes by itself, as in a run.
+        for first, stop in itertools.pairwise([0, *range(1, len(rows), at_once), len(rows)]):
+            chosen = rows[first:stop]
+            fields = {name: self._read(name, chosen, at) for name in names}
+            others = (result.time[chosen], chosen, result.terms, lambda: (status, last), controller)
+            yield slice(first, stop), KeptFields(fields, *others)
+
+    def _read(self, name: str, rows: np.ndarray, at: slice) -> np.ndarray:
+        follow = len(rows) == rows[-1] - rows[0] + 1
+        when = slice(int(rows[0]), int(rows[-1]) + 1) if follow else rows
+        if isinstance(self.result.samples, Arrays):
+            return self.result.samples.rows(name, when, at)
+        return self.result.samples[name][when, at]

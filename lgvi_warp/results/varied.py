@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What differed between the members of a result: numbers of the scene and of the start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from lgvi_warp.results.result import Result
+
+# Fields of the start that the first sample shows.
+STARTS = ("position", "velocity", "angular_velocity")
+
+
+def varied(result: Result) -> dict[str, np.ndarray]:
+    """Collect the numbers (n,) that differ between members, by name and component: parameters, then those of the start."""
+    inputs = {}
+    starts: Mapping[str, np.ndarray] = result.starts
+    if not starts:
+        # A file of an earlier version shows the start by the first samples alone.
+        starts = {f"start.{name}": result.samples[name][0] for name in result.samples if name in STARTS}
+    for name, values in (*result.parameters.items(), *starts.items()):
+        if len(values) != result.members:
+            continue
+        columns = values.reshape(len(values), -1)
+        # What differs by round-off alone does not vary.
+        for i in np.flatnonzero(np.ptp(columns, axis=0) > 1e-12 * np.abs(columns).max(initial=0.0)):
+            place = "" if values.ndim == 1 else [int(k) for k in np.unravel_index(i, values.shape[1:])]
+            inputs[f"{name}{place}"] = columns[:, i]
+    return inputs

@@ -190,8 +190,8 @@ class RareSearch:
     def subset(self, first: Sequence[SubsetRun]) -> RareAnswer:
         """Chains alone, of sizes chosen from those before; the first ones, which are small, serve the choice alone."""
         runs: list[SubsetRun] = []
-        spread, total = math.sqrt(np.mean([(RELATED * run.spread) ** 2 for run in first]) / RUNS), RUNS * first[0].size
-        levels = np.mean([run.members / run.size for run in first])
+        spread = RELATED * math.sqrt(sum(run.spread**2 for run in first)) / RUNS
+        total, levels = RUNS * first[0].size, sum(run.members / run.size for run in first) / RUNS
         for round_ in range(1, ROUNDS + 1):
             wanted = total * (spread / (AIM * self.relative_error)) ** 2
             size = int(np.clip((wanted - sum(run.size for run in runs)) / RUNS, LEAST_SIZE, LARGEST_SIZE))

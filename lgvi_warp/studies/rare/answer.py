@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.studies.files import Saved, finite_or_none
 from lgvi_warp.studies.rare.subset import SubsetRun
 from lgvi_warp.studies.sweeps.setup import duration_text
 
@@ -23,7 +24,7 @@ ESTIMATORS = {
 
 
 @dataclass(frozen=True, eq=False)
-class RareEvent:
+class RareEvent(Saved):
     """The probability of a rare event, and members for which it happens.
 
     Attributes:
@@ -35,6 +36,7 @@ class RareEvent:
         members: number of members that were run, by setting: "scene", and what `cheaper` says.
         failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None where
             noise alone varies.
+        normals: (m, d), the numbers that vary of these members as standard normals, in the order of `moved`.
         draws: (m, k), standard normals of noise of these members, for lw.prepare(..., draws="given"); k = 0 without noise.
         weights: (m,), what each of them stands for; they sum to 1.
         failed_share: part of the probability that is of members that failed, or have a number that is not finite.
@@ -51,6 +53,9 @@ class RareEvent:
         provenance: scene, what varies, settings, versions and machine.
     """
 
+    study: ClassVar[str] = "rare"
+    endings: ClassVar[tuple[str, ...]] = ("json", "csv", "txt")
+
     event: str
     probability: float
     interval: tuple[float, float]
@@ -58,6 +63,7 @@ class RareEvent:
     estimator: str
     members: Mapping[str, int]
     failing: Table | None
+    normals: np.ndarray = field(repr=False)
     draws: np.ndarray = field(repr=False)
     weights: np.ndarray = field(repr=False)
     failed_share: float
@@ -92,6 +98,47 @@ class RareEvent:
             lines.append(f"likeliest   {numbers or 'the scene'}{noise}: {self.distance:.2f} sd from the middle")
             lines.append(f"moved       {_moved_text({**self.moved, **self.noise_moved})}")
         return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
+
+    def to_dict(self) -> dict[str, Any]:
+        failing = None if self.failing is None else self.failing.own_values()
+        kept = ("probability", "spread", "thresholds", "acceptance", "size", "members")
+        runs = [{name: getattr(run, name) for name in kept} | {"limits": list(run.limits)} for run in self.runs]
+        own = {item.name: getattr(self, item.name) for item in fields(self)}
+        return finite_or_none(own | {"failing": failing, "runs": runs, "likeliest": dict(self.likeliest)})
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        arrays = {name: np.array(content[name], float) for name in ("draws", "normals", "weights", "likeliest_draws")}
+        for name in ("draws", "normals"):
+            arrays[name] = arrays[name].reshape(len(arrays["weights"]), -1)
+        failing = content["failing"]
+        runs = tuple(_run_of(run) for run in content["runs"])
+        table = None if failing is None else Table(values={name: np.array(each) for name, each in failing.items()})
+        more = {"interval": tuple(content["interval"]), "messages": tuple(content["messages"])}
+        return cls(**content | arrays | more | {"failing": table, "runs": runs})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        columns = {} if self.failing is None else _entries(self.failing.own_values())
+        for i, weight in enumerate(self.weights):
+            yield {name: float(column[i]) for name, column in columns.items()} | {"weight": float(weight)}
+
+
+def _run_of(content: Mapping[str, Any]) -> SubsetRun:
+    """A run from the content of a file, which leaves its failing members out: they are those of the answer."""
+    nothing = np.zeros(0)
+    thresholds = np.array([-np.inf if bound is None else bound for bound in content["thresholds"]])
+    limits = tuple(np.array([np.inf if each is None else each for each in level]) for level in content["limits"])
+    return SubsetRun(content["probability"], content["spread"], thresholds, limits, np.array(content["acceptance"]),
+                     nothing.reshape(0, 0), nothing, content["size"], content["members"])  # fmt: skip
+
+
+def _entries(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of single numbers: of a vector or a matrix its entries, "start.position[2]"."""
+    entries = {}
+    for name, values in columns.items():
+        for index in np.ndindex(*values.shape[1:]):
+            entries[f"{name}[{','.join(map(str, index))}]" if index else name] = values[(slice(None), *index)]
+    return entries
 
 
 def _short(value: Any) -> str:

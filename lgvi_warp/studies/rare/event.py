@@ -12,8 +12,10 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.status import failed
+from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.statistics.base import TYPES, Statistic
+from lgvi_warp.statistics.metrics.nearest import DISTANCES, LEAST, named
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.tracking import check_wanted
 from lgvi_warp.studies.sweeps.setup import kept, metric_of
@@ -42,15 +44,18 @@ class RareCondition:
     metrics: Mapping[str, Statistic] = field(default_factory=dict)
     statuses: tuple[str, ...] = ()
 
-    def arguments(self, scene: Any) -> dict[str, Any]:
-        """What `prepare` must know of it."""
+    def arguments(self, scene: Any, h: float | None = None) -> dict[str, Any]:
+        """What `prepare` must know of it; h: step of the run [s], None for that of the scene."""
         if self.of is not None:
             return {"of": self.of, "failed": "nan"}
         faults = Faults()
         check_wanted(faults, "limit", self.metrics, scene.controller)
         faults.raise_if_any()
         known = kept(self.metrics, scene.controller)
-        return {"save": known["save"], "statistics": known["statistics"]}
+        save = known["save"]
+        if scene.controller is None:  # there are no ticks: metrics look at samples
+            save = SaveAt(every=scene.run.save_every or h or scene.run.step, fields=())
+        return {"save": save, "statistics": known["statistics"]}
 
     def distances(self, answer: Any) -> tuple[np.ndarray, np.ndarray]:
         """How far members are beyond the bounds of each limit (k, n), and which of them failed (n,).
@@ -92,10 +97,16 @@ def condition_of(limit: Any, scene: Any) -> RareCondition:
 
 
 def _of_text(text: str, scene: Any) -> RareCondition:
-    if text in (event.key for event in scene.events):
-        return _of_event(text)
+    if event := next((event for event in scene.events if event.key == text), None):
+        return _of_event(event)
     if found := ABOVE_OR_BELOW.fullmatch(text):
         return _of_conditions({found[1]: {found[2]: float(found[3])}})
+    if text.partition(" ")[0] in ("outcome", "end_time"):
+        problem, remedy = (
+            "is there or not: nothing says how near a member is to it",
+            'give the name of the event, "floor"',
+        )
+        raise refusal("limit", text, problem, remedy)
     if text.partition(" ")[0] in TYPES:
         raise refusal("limit", text, "is a metric without a bound", f'write "{text} above 12.0"')
     if found := LESS.fullmatch(text):
@@ -112,10 +123,13 @@ def _of_text(text: str, scene: Any) -> RareCondition:
     return _of_conditions({text: {"above": 0.0}})
 
 
-def _of_event(name: str) -> RareCondition:
-    key, metric = metric_of("limit", {"type": "nearest", "of": name})
-    # At the event the distance is 0.
-    return RareCondition(name, None, {key: (-np.inf, np.nextafter(0.0, 1.0))}, {key: metric})
+def _of_event(event: Any) -> RareCondition:
+    if event.type not in DISTANCES:
+        problem = f"is an event whose distance is not known here ({event.type})"
+        raise refusal("limit", event.key, problem, "give a quantity, or a function of a Result, that grows towards it")
+    key, metric = metric_of("limit", named(event))
+    # At the event the distance is 0, and before it no less than this.
+    return RareCondition(event.key, None, {key: (-np.inf, LEAST)}, {key: metric})
 
 
 def _of_conditions(conditions: dict[str, Any]) -> RareCondition:

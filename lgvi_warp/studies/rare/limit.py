@@ -50,7 +50,8 @@ class VehicleLimit:
             raise refusal("fleet", "...", "has members that were given one by one", "give distributions in vary")
         varies = {"levels": True} if self.fleet.vary else {}
         self.run: Prepared = prepare(
-            self.fleet, **condition.arguments(self.fleet.scene) | varies | _given(self.fleet) | dict(settings)
+            self.fleet,
+            **condition.arguments(self.fleet.scene, settings.get("h")) | varies | _given(self.fleet) | dict(settings),
         )
         self.names = self.run.names if self.fleet.vary else ()
         self.sources = tuple(getattr(self.run, "draws", ()))

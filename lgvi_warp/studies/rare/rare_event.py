@@ -111,8 +111,10 @@ def rare_event(
     except NoProgress as stuck:
         raise _refused(stuck, condition) from None
     if found.probability >= 1.0:
-        problem = f"happens for each of {found.members:,} members"
-        raise refusal("limit", condition.label, problem, 'ask for what is rare, as {"peak depth": {"above": 12.0}}')
+        lost = bool(np.isinf(found.limits).all())
+        problem = f"happens for each of {found.members:,} members" + (", all of which failed" if lost else "")
+        remedy = "mend what fails" if lost else 'ask for what is rare, as {"peak depth": {"above": 12.0}}'
+        raise refusal("limit", condition.label, problem, remedy)
     return _told(found, own, others, condition, settings)
 
 
@@ -155,6 +157,7 @@ def _told(
         estimator=found.estimator,
         members={name: each.members for name, each in limits.items()},
         failing=own.table(found.failing),
+        normals=found.failing[:, :count],
         draws=found.failing[:, count:],
         weights=found.weights,
         failed_share=float(found.weights[np.isinf(found.limits)].sum()),

@@ -20,8 +20,8 @@ RUNS, FIRST_SIZE, LEAST_SIZE, LARGEST_SIZE = 4, 500, 1000, 200_000
 TRIES, TRIED, MOST_DRAWN, FEWEST_FITTED = 2, 2000, 10_000, 100
 # Part of the failing members that may be near the margin of the cheap limit.
 NEAR_GATE = 0.01
-# What is likelier than this is looked for by plain sampling.
-RARE = 1e-3
+# What is likelier than this is looked for by plain sampling, with so many members at least.
+RARE, FEWEST_PLAIN = 1e-3, 256
 # Chains' own spread is less than there is, by this, since chains begin at members that are related; it counts for so many
 # runs beside the spread between runs, unless that is larger beyond chance (F, 5 %).
 RELATED, OWN_COUNT, BEYOND_CHANCE = 1.2, 12, 0.05
@@ -136,7 +136,7 @@ class RareSearch:
     def plain(self, probability: float) -> RareAnswer:
         """Plain sampling, of what is not rare."""
         count = (1.0 - probability) / (probability * (AIM * self.relative_error) ** 2)
-        count = min(count, self.most - self.members)
+        count = min(max(count, FEWEST_PLAIN), self.most - self.members)
         self._expected = self.members + count
         found = sampled(self.limit, self.d, math.ceil(count), self.seed, self._told)
         weights = np.full(len(found.failing), 1.0 / max(1, len(found.failing)))

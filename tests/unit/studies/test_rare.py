@@ -188,9 +188,7 @@ def test_what_comes_no_nearer_ends(limit, kind):
 
 def test_members_that_fail_count_as_the_event():
     # A member that fails has an infinite limit: it is beyond every threshold. Here on the way to the event.
-    found = RareSearch(
-        lambda u: np.where((u[:, 0] > 3.5) & (u[:, 1] > 1.0), np.inf, u[:, 0] - 4.0), 2, seed=1
-    ).answer()
+    found = RareSearch(lambda u: np.where((u[:, 0] > 3.5) & (u[:, 1] > 1.0), np.inf, u[:, 0] - 4.0), 2, seed=1).answer()
     p, lost = ndtr(-4.0) + (ndtr(-3.5) - ndtr(-4.0)) * ndtr(-1.0), ndtr(-3.5) * ndtr(-1.0)
     assert abs(found.probability / p - 1.0) < 3.0 * found.spread
     assert found.weights[np.isinf(found.limits)].sum() == pytest.approx(lost / p, abs=0.1)

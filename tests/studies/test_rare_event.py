@@ -12,6 +12,7 @@ from scipy.special import ndtr, ndtri
 import lgvi_warp as lw
 from lgvi_warp.calls.prepared import FailedMembers
 from lgvi_warp.statistics.metrics.nearest import LEAST
+from tests.support.pages import blocks
 from tests.support.refusals import says
 
 DRAG, T1 = 20.0, 3.0
@@ -300,3 +301,16 @@ def test_the_picture(found, tmp_path):
     # At the event the curve is the run's probability.
     at_event = chances[np.searchsorted(limits, 0.0)]
     assert at_event == pytest.approx(found.runs[0].probability, rel=0.02)
+
+
+def test_the_snippets_of_the_page_on_rare_events(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    names = {"lw": lw}
+    for text in blocks("docs/guide/rare_events.md", "python"):
+        exec(text, names)
+    # In 5 s a speed v leads tau (1 - exp(-5 / tau)) v down.
+    way = TAU * (1.0 - np.exp(-5.0 / TAU))
+    p = ndtr(-4.0 / np.hypot(0.5, 0.3 * way))
+    assert abs(names["found"].probability / p - 1.0) < 3.0 * names["found"].relative_error
+    assert (names["again"].samples["position"][-1, :, 2] > 9.0).all()

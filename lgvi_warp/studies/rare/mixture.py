@@ -17,8 +17,9 @@ LEAST_VARIANCE = 1e-6
 WIDER, WIDE_SHARE, WIDE = 1.2, 0.1, 2.0
 # Variances and means of failing members along an axis on which the event does not depend.
 FREE, FREE_MEAN = (0.5, 1.6), 0.6
-# When weights are the answer: effective number of them, in all and for each normal, largest share of one, most normals.
-EFFECTIVE, EFFECTIVE_EACH, LARGEST, MOST_NORMALS = 150.0, 15.0, 0.02, 30
+# When weights are the answer: effective number of them, in all and for each number of a covariance; the largest share of
+# one; most normals.
+EFFECTIVE, EFFECTIVE_EACH, LARGEST, MOST_NORMALS = 150.0, 3.0, 0.02, 30
 # Spreads by which weights and chains may differ; the part of a run's failing members that may lie where weights are large.
 AGREEMENT, UNCOVERED = 3.0, 0.05
 
@@ -200,7 +201,8 @@ def doubts(
 
 def effective_wanted(weighted: Weighted) -> float:
     """The effective number of weights that it takes: more where a mixture has more to learn."""
-    return max(EFFECTIVE, EFFECTIVE_EACH * weighted.failing.shape[1])
+    d = weighted.failing.shape[1]
+    return max(EFFECTIVE, EFFECTIVE_EACH * d * (d + 1) / 2)
 
 
 def wanting(weighted: Weighted, asked: float) -> float:

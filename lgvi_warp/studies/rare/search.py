@@ -23,8 +23,8 @@ NEAR_GATE = 0.01
 # What is likelier than this is looked for by plain sampling, with so many members at least.
 RARE, FEWEST_PLAIN = 1e-3, 256
 # Chains' own spread is less than there is, by this, since chains begin at members that are related; it counts for so many
-# runs beside the spread between runs, unless that is larger beyond chance (F, 5 %).
-RELATED, OWN_COUNT, BEYOND_CHANCE = 1.2, 12, 0.05
+# runs beside the spread between runs, unless that is larger beyond chance (F, 1 %).
+RELATED, OWN_COUNT, BEYOND_CHANCE = 1.2, 12, 0.01
 # The part of the error asked for that numbers are chosen for; one so much larger is left as it is. Most rounds of runs.
 AIM, LEFT, ROUNDS = 1.0, 1.2, 4
 
@@ -194,7 +194,9 @@ class RareSearch:
         total, levels = RUNS * first[0].size, sum(run.members / run.size for run in first) / RUNS
         for round_ in range(1, ROUNDS + 1):
             wanted = total * (spread / (AIM * self.relative_error)) ** 2
-            size = int(np.clip((wanted - sum(run.size for run in runs)) / RUNS, LEAST_SIZE, LARGEST_SIZE))
+            # Four runs tell their spread only roughly: there are no more than twice as many members in each round.
+            most = sum(run.size for run in runs) / RUNS or LARGEST_SIZE
+            size = int(np.clip((wanted - sum(run.size for run in runs)) / RUNS, LEAST_SIZE, max(LEAST_SIZE, most)))
             size = round(size / (1.0 / SHARE)) * round(1.0 / SHARE)
             if self.members + RUNS * size * levels > self.most:
                 afford = int((self.most - self.members) / (RUNS * levels)) // 10 * 10

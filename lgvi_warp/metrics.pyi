@@ -7,6 +7,7 @@ from lgvi_warp.statistics.metrics.actuator_metrics import Effort as Effort
 from lgvi_warp.statistics.metrics.actuator_metrics import SaturationShare as SaturationShare
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure as TimeToFailure
 from lgvi_warp.statistics.metrics.actuator_metrics import Travel as Travel
+from lgvi_warp.statistics.metrics.nearest import Nearest as Nearest
 from lgvi_warp.statistics.metrics.tracking_metrics import IAE as IAE
 from lgvi_warp.statistics.metrics.tracking_metrics import ISE as ISE
 from lgvi_warp.statistics.metrics.tracking_metrics import ITAE as ITAE

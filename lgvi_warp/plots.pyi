@@ -14,6 +14,7 @@ from lgvi_warp.views.plots.fans import fan as fan
 from lgvi_warp.views.plots.maps import stability as stability
 from lgvi_warp.views.plots.overview import drift as drift
 from lgvi_warp.views.plots.overview import summary as summary
+from lgvi_warp.views.plots.rare import rare as rare
 from lgvi_warp.views.plots.tracks import attitude as attitude
 from lgvi_warp.views.plots.tracks import paths as paths
 from lgvi_warp.views.plots.tracks import phase as phase

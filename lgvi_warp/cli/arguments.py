@@ -14,6 +14,7 @@ from lgvi_warp.cli.completion import completion
 from lgvi_warp.cli.lists import list_names, new, schema, show_help
 from lgvi_warp.cli.machine import bench, calibrate, info
 from lgvi_warp.cli.plot import plot
+from lgvi_warp.cli.rare import rare
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.stores import export, merge, report
 from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
@@ -23,7 +24,7 @@ from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import closest
 
 # In the order of the help.
-_VERBS = (run, check, predict, resume, merge, export, report, tradeoff, sensitivity, stability, sweep, view, info, bench,
+_VERBS = (run, check, predict, resume, merge, export, report, tradeoff, sensitivity, stability, sweep, rare, view, info, bench,
           warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
@@ -44,6 +45,7 @@ EPILOG = """examples:
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
   lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
+  lgvi-warp rare examples/paper.toml --when "position[0] above 60"
   lgvi-warp info runs/large
   lgvi-warp run examples/paper.toml --json -q
 

@@ -42,6 +42,7 @@ TYPES = registry.Kinds(
             *("overshoot", "undershoot", "peak_time", "peak", "rise_time", "settling_time", "steady_state_error"),
             *("max_error", "cross_track", "iae", "ise", "itae", "rms"),
         ),
+        "metrics.nearest": ("nearest",),
         "metrics.actuator_metrics": ("effort", "travel", "saturation_share", "energy", "time_to_failure", "own_metric"),
         "order": ("extremes", "quantiles"),
         "outcomes": ("outcome", "end_time"),

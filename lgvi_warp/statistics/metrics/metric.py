@@ -92,6 +92,8 @@ class _Follow(Gatherer):
 
         self._state["ended"] = in_order(np.where(ends.status != 0, ends.time, np.inf))
         self._state["failed"] = in_order(failed(ends.status))
+        if self._metric.outcomes:
+            self._state["ended_so"] = in_order(ends.are(self._metric.outcomes[0]))
 
     def close(self) -> Part:
         state = self._state
@@ -141,7 +143,7 @@ class Metric(MemberStatistic):
         """Return the members' numbers (n,) from the state after the last tick.
 
         It also has "until" (n,) [s], each member's last tick under way, "ended" (n,) [s], when it stopped or failed, else
-        infinite, "failed" (n,), and "end" [s], that of the run.
+        infinite, "failed" (n,), and "end" [s], that of the run; "ended_so" (n,), whether by its outcome, where it names one.
         """
         raise TypeError(f"{type(self).__name__} is abstract")
 

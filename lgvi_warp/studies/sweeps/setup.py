@@ -94,11 +94,7 @@ class Setup:
 
     def kept(self, fleet: Ensemble) -> dict[str, Any]:
         """The arguments of `solve` for what a run keeps: metrics alone, all of them at ticks."""
-        metrics, controller = list(self.metrics.values()), fleet.scene.controller
-        # Metrics come to ticks by themselves; expressions over the path are of the samples.
-        by_samples = controller is not None and not all(metric.ticks for metric in metrics)
-        save = SaveAt(every=float(controller.period) if by_samples else None, fields=())
-        return {"save": save, "statistics": metrics, "keep": "none"}
+        return kept(self.metrics, fleet.scene.controller)
 
     def run(self, fleet: Ensemble, *, simulate: Callable[..., Any] = solve, **more: Any) -> Record:
         """Run a cell, by `solve` or what stands for it, with further arguments of it."""
@@ -126,6 +122,14 @@ class SweepCell:
         """The case and the point, as text."""
         at = ", ".join(f"{name} = {value}" for name, value in self.point.items())
         return f"{self.case.name} at {at}" if at else self.case.name
+
+
+def kept(metrics: Mapping[str, Statistic], controller: Any) -> dict[str, Any]:
+    """The arguments of `solve` for what a run keeps whose metrics alone are wanted, all of them at ticks."""
+    # Metrics come to ticks by themselves; expressions over the path are of the samples.
+    by_samples = controller is not None and not all(metric.ticks for metric in metrics.values())
+    save = SaveAt(every=float(controller.period) if by_samples else None, fields=())
+    return {"save": save, "statistics": list(metrics.values()), "keep": "none"}
 
 
 def setup_of(

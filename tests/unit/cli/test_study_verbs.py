@@ -260,3 +260,37 @@ def test_the_plan_of_a_sweep_runs_nothing(sweep, tmp_path, capsys):
     assert (setup.members.members, threads) == (5, 2)
     assert sweep("--plan", "--json", plan=plan)[0] == 0
     assert json.loads(capsys.readouterr().out)["plan"] == ["cells 4", "time 2"]
+
+
+class Rare:
+    """What a search for a rare event found."""
+
+    def save(self, out):
+        (out / "rare.json").write_text("{}")
+        return [out / "rare.json"]
+
+    def to_dict(self):
+        return {"probability": 1e-5}
+
+    def __str__(self):
+        return "the probability in words"
+
+
+def test_arguments_of_a_rare_event(tmp_path, capsys):
+    study = Study(Rare())
+    verb = ["rare", PAPER, "--when", "position[0] above 60", "--out", str(tmp_path)]
+    assert main([*verb, "-q"], study=study, draw=draw) == 0
+    more = ["--error", "0.2", "--cheaper", "h=0.1,dtype=float32", "--cheaper", "vehicle.mass = 5", "--failed", "refuse",
+            "--most", "50000", "--seed", "7", "--threads", "2"]  # fmt: skip
+    assert main([*verb, *more], study=study, draw=draw) == 0
+    ((_, when), plain), (_, others) = study.calls
+    seed = lw.Scene.load(PAPER).ensemble_settings.seed
+    assert when == "position[0] above 60"
+    assert plain == {"relative_error": 0.1, "cheaper": [], "failed": "event", "most": 1_000_000, "seed": seed,
+                     "threads": None, "progress": None}  # fmt: skip
+    assert others.pop("progress") is not None
+    assert others == {"relative_error": 0.2, "cheaper": [{"h": 0.1, "dtype": "float32"}, {"vehicle.mass": 5.0}],
+                      "failed": "refuse", "most": 50_000, "seed": 7, "threads": 2}  # fmt: skip
+    assert capsys.readouterr().out.startswith("the probability in words")
+    assert main([*verb, "--cheaper", "h", "-q"], study=study, draw=draw) == 2
+    assert "--cheaper = 'h': names no values" in capsys.readouterr().err

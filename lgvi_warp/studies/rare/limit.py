@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The limit of an event as a function of standard normals: those of the numbers that vary, then the draws of noise."""
+
+from __future__ import annotations
+
+import inspect
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.calls.prepared import FailedMembers, Prepared, prepare
+from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.control.sensor import DRAWING, Sensor
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.runs.request import ensemble_of
+from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.scene.columns import as_given, columns_of
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.studies.rare.event import FAILED, RareCondition
+
+# Most numbers of the normals of one call: 160 MB.
+MOST_NUMBERS = 20_000_000
+# Levels of the cube are as far from its sides as this.
+NEAREST_LEVEL = 2.0**-53
+
+
+class VehicleLimit:
+    """A scene as a limit: (n, d) standard normals -> (n,), above 0 where the event happens.
+
+    fleet: the scene and what varies. condition: the event. settings: of `prepare`. failed: "event", so that a member that
+    fails has the limit `FAILED`, or "refuse".
+
+    Attributes:
+        names: names of the numbers that vary, whose normals come first.
+        draws: number of normals of noise, which follow.
+        members, seconds: members that were run, and how long that took [s].
+    """
+
+    def __init__(self, fleet: Any, condition: RareCondition, settings: Mapping[str, Any], failed: str = "event"):
+        self.fleet: Ensemble = ensemble_of(fleet)
+        self.condition, self._refuse = condition, failed == "refuse"
+        if brought := [*self.fleet.sampling.own_values(), *self.fleet.sampling.distributions()]:
+            problem = f"is a {self.fleet.sampling.kind}, which gives members values and no distribution"
+            remedy = f"give distributions of {', '.join(brought[:4])} in vary"
+            raise refusal("ensemble.sampling", self.fleet.sampling.kind, problem, remedy)
+        if self.fleet.explicit():
+            raise refusal("fleet", "...", "has members that were given one by one", "give distributions in vary")
+        varies = {"levels": True} if self.fleet.vary else {}
+        self.run: Prepared = prepare(
+            self.fleet,
+            **condition.arguments(self.fleet.scene, settings.get("h")) | varies | _given(self.fleet) | dict(settings),
+        )
+        self.names = self.run.names if self.fleet.vary else ()
+        self.sources = tuple(getattr(self.run, "draws", ()))
+        self.draws = int(sum(each.numbers for each in self.sources))
+        self.members, self.seconds = 0, 0.0
+        self._spreads: np.ndarray | None = None
+        if not self.d:
+            remedy = "give distributions, vary={...}, or noise"
+            raise refusal("fleet", "...", "has nothing that varies, and no noise", remedy)
+
+    @property
+    def d(self) -> int:
+        """Number of the normals."""
+        return len(self.names) + self.draws
+
+    def __call__(self, u: np.ndarray) -> np.ndarray:
+        """The limits (n,) of members whose normals are u (n, d)."""
+        at_once = max(1, MOST_NUMBERS // self.d)
+        parts = [self._limits(u[first : first + at_once]) for first in range(0, len(u), at_once)]
+        return np.concatenate(parts)
+
+    def _limits(self, u: np.ndarray) -> np.ndarray:
+        begin = time.perf_counter()
+        distances, lost = self.condition.distances(self._answers(u))
+        self.seconds += time.perf_counter() - begin
+        self.members += len(u)
+        if self._refuse and lost.any():
+            problem = f"limit: {int(lost.sum())} of {len(lost)} members failed, or have a number that is not finite"
+            raise FailedMembers([f'{problem}; mend what fails, or count them as the event: failed="event"'])
+        if self._spreads is None:
+            self._spreads = _spreads(distances)
+        limits = (distances / self._spreads[:, None]).max(axis=0)
+        limits[lost] = FAILED
+        return np.asarray(limits)
+
+    def _answers(self, u: np.ndarray) -> Any:
+        """What the run returns of members with these normals."""
+        count = len(self.names)
+        xi: dict[str, Any] = {"xi": np.ascontiguousarray(u[:, count:])} if self.draws else {}
+        if count:
+            return self.run(self.levels(u), **xi)
+        member = self.fleet.select(0, 1)
+        states: Any = {name: np.repeat(getattr(member, name), len(u), axis=0) for name in FIELDS}
+        return self.run.states(**states, **xi)
+
+    def levels(self, u: np.ndarray) -> np.ndarray:
+        """Levels in (0, 1) of the numbers that vary, in the order of the names."""
+        from scipy.special import ndtr
+
+        return np.asarray(np.clip(ndtr(u[:, : len(self.names)]), NEAREST_LEVEL, 1.0 - NEAREST_LEVEL))
+
+    def values(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """Values (n, ...) of what varies, by name."""
+        fleet = self.fleet
+        described = as_given(fleet)
+        columns = [column for variation in described for column in columns_of(fleet.space, variation.key)]
+        cube = np.empty((len(u), len(columns)))
+        cube[:, columns] = self.levels(u)
+        levels = fleet.space.split(cube)
+        drawn = [pair for variation in described for pair in variation.values(levels[variation.key])]
+        return {target.label: values for target, values in drawn}
+
+    def table(self, u: np.ndarray) -> Table | None:
+        """Members with these normals as a table for `lw.Ensemble`; None where noise alone varies."""
+        return Table(values=self.values(u)) if self.names and len(u) else None
+
+
+def _spreads(distances: np.ndarray) -> np.ndarray:
+    """What each limit (k, n) is measured in: its standard deviation; 1 where it is alone, and stays in its unit."""
+    if len(distances) == 1:
+        return np.ones(1)
+    ordinary = np.where(np.abs(distances) < 1e300, distances, np.nan)
+    with np.errstate(all="ignore"):
+        spreads = np.nanstd(ordinary, axis=1)
+    return np.where(spreads > 0.0, spreads, 1.0)
+
+
+def _given(fleet: Ensemble) -> dict[str, Any]:
+    """Let calls give the draws of noise: a run that draws them itself gives row i the same noise in every call."""
+    if "draws" in inspect.signature(prepare).parameters:
+        return {"draws": "given"}
+    if noise := noisy_parts(fleet):
+        problem = f"draws noise ({', '.join(noise)}), which would be the same in every call"
+        raise SceneError([f"fleet: {problem}; leave the noise out, or give its numbers distributions"])
+    return {}
+
+
+def noisy_parts(fleet: Ensemble) -> list[str]:
+    """Terms and sensors of a scene that draw random numbers."""
+    scene, varied = fleet.scene, fleet.varied_names
+
+    def draws(part: Any, names: Any) -> bool:
+        return any(f"{part.key}.{name}" in varied or np.any(part.parameters().get(name, 0.0)) for name in names)
+
+    terms = [term.key for term in scene.terms if isinstance(term, NoisyTerm) and draws(term, term.parameters())]
+    sensors = scene.controller.sensors if scene.controller else ()
+    return terms + [part.key for part in sensors if isinstance(part, Sensor) and draws(part, DRAWING)]

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Importance sampling from failing members: a Gaussian mixture of them, weights, and whether the answer may be believed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+# Most parts of a mixture, starts of each fit, most iterations of it, and the members that it is made from.
+PARTS, STARTS, ITERATIONS, FITTED = 4, 3, 100, 2000
+# The least variance of a part: what failing members share to many digits is still drawn.
+LEAST_VARIANCE = 1e-6
+# Times the spread of the failing members; the share of the draws that is wider still, and how many times.
+WIDER, WIDE_SHARE, WIDE = 1.2, 0.1, 2.0
+# Variances and means of failing members along an axis on which the event does not depend.
+FREE, FREE_MEAN = (0.5, 1.6), 0.6
+# When weights are the answer: effective number of them, in all and for each number of a covariance; the largest share of
+# one; most normals.
+EFFECTIVE, EFFECTIVE_EACH, LARGEST, MOST_NORMALS = 150.0, 3.0, 0.02, 30
+# Spreads by which weights and chains may differ; the part of a run's failing members that may lie where weights are large.
+AGREEMENT, UNCOVERED = 3.0, 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """A Gaussian mixture; shares: (k,); means: (k, d); roots: (k, d, d), the lower Cholesky factors of the covariances."""
+
+    shares: np.ndarray
+    means: np.ndarray
+    roots: np.ndarray
+
+    def draw(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Draw points (count, d)."""
+        part = rng.choice(len(self.shares), size=count, p=self.shares)
+        z = rng.standard_normal((count, self.means.shape[1]))
+        return np.asarray(self.means[part] + np.einsum("nij,nj->ni", self.roots[part], z))
+
+    def log_parts(self, u: np.ndarray) -> np.ndarray:
+        """Logarithm of each part's share of the density at points (n, d): (n, k)."""
+        from scipy.linalg import solve_triangular
+
+        logs = []
+        for share, mean, root in zip(self.shares, self.means, self.roots, strict=True):
+            z = solve_triangular(root, (u - mean).T, lower=True)
+            scale = np.log(np.diag(root)).sum() + 0.5 * u.shape[1] * math.log(2.0 * math.pi)
+            logs.append(math.log(share) - 0.5 * (z**2).sum(axis=0) - scale)
+        return np.stack(logs, axis=1)
+
+    def log_density(self, u: np.ndarray) -> np.ndarray:
+        """Logarithm of the density at points (n, d): (n,)."""
+        from scipy.special import logsumexp
+
+        return np.asarray(logsumexp(self.log_parts(u), axis=1))
+
+    def widened(self) -> Mixture:
+        """Parts somewhat wider than those that were fitted, and beside each one wider still, which bounds the weights."""
+        parts = [_as_where_free(mean, root) for mean, root in zip(self.means, self.roots, strict=True)]
+        means, fitted = (np.stack(column) for column in zip(*parts, strict=True))
+        roots = np.concatenate([WIDER * fitted, WIDER * WIDE * fitted])
+        shares = np.concatenate([(1.0 - WIDE_SHARE) * self.shares, WIDE_SHARE * self.shares])
+        return Mixture(shares, np.concatenate([means] * 2), roots)
+
+
+def _as_where_free(mean: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A part with mean 0 and variance 1 along axes on which the event tells nothing: few chains find these only roughly."""
+    variances, axes = np.linalg.eigh(root @ root.T)
+    along = axes.T @ mean
+    free = (variances > FREE[0]) & (variances < FREE[1]) & (np.abs(along) < FREE_MEAN)
+    along, variances = np.where(free, 0.0, along), np.where(free, 1.0, variances)
+    return axes @ along, np.linalg.cholesky((axes * variances) @ axes.T)
+
+
+def fitted(points: np.ndarray, rng: np.random.Generator) -> Mixture:
+    """The mixture of 1 to 4 parts that describes points (n, d) best, by BIC (Schwarz 1978)."""
+    if len(points) > FITTED:
+        points = points[rng.permutation(len(points))[:FITTED]]
+    # Chains repeat members: they count once as evidence.
+    distinct, d = len(np.unique(points, axis=0)), points.shape[1]
+    best, least = None, math.inf
+    for k in range(1, PARTS + 1):
+        free = k - 1 + k * d + k * d * (d + 1) / 2
+        if best is not None and k * (d + 1) > distinct:
+            break
+        for _ in range(STARTS if k > 1 else 1):
+            mixture, likelihood = _maximised(points, k, rng)
+            criterion = free * math.log(distinct) - 2.0 * likelihood * distinct / len(points)
+            if criterion < least:
+                best, least = mixture, criterion
+    assert best is not None
+    return best
+
+
+def _maximised(points: np.ndarray, k: int, rng: np.random.Generator) -> tuple[Mixture, float]:
+    """A mixture of k parts by expectation and maximisation (Dempster, Laird & Rubin 1977), and its log-likelihood."""
+    from scipy.special import logsumexp
+
+    centres = points[[int(rng.integers(len(points)))]]
+    while len(centres) < k:  # far from those that there are
+        distance = ((points[:, None] - centres) ** 2).sum(axis=2).min(axis=1)
+        total = distance.sum()
+        chance = distance / total if total > 0.0 else None
+        centres = np.concatenate([centres, points[[int(rng.choice(len(points), p=chance))]]])
+    nearest = ((points[:, None] - centres) ** 2).sum(axis=2).argmin(axis=1)
+    shares_of_points = np.eye(k)[nearest]
+    before = -math.inf
+    for _ in range(ITERATIONS):
+        mixture = _of_shares(points, shares_of_points)
+        logs = mixture.log_parts(points)
+        density = logsumexp(logs, axis=1)
+        shares_of_points, likelihood = np.exp(logs - density[:, None]), float(density.sum())
+        if likelihood - before < 1e-4 * len(points):
+            break
+        before = likelihood
+    return mixture, likelihood
+
+
+def _of_shares(points: np.ndarray, shares: np.ndarray) -> Mixture:
+    """The mixture whose parts have these shares (n, k) of the points (n, d)."""
+    count, d = shares.sum(axis=0) + 1e-9, points.shape[1]
+    means = (shares.T @ points) / count[:, None]
+    roots = []
+    for j in range(len(count)):
+        away = points - means[j]
+        covariance = (shares[:, j, None] * away).T @ away / count[j]
+        # Few points do not tell a whole matrix: it is mixed with its diagonal.
+        trust = count[j] / (count[j] + d)
+        covariance = trust * covariance + (1.0 - trust) * np.diag(np.diag(covariance))
+        roots.append(np.linalg.cholesky(covariance + LEAST_VARIANCE * np.eye(d)))
+    return Mixture(count / count.sum(), means, np.stack(roots))
+
+
+@dataclass(frozen=True, eq=False)
+class Weighted:
+    """Members drawn from a mixture, of which those that fail have weights.
+
+    Attributes:
+        probability: of the event, the mean of the weights.
+        spread: standard deviation of its relative error.
+        effective: effective number of the weights of failing members.
+        largest: largest share of one weight.
+        failing: (m, d), standard normals of the failing members.
+        limits: (m,), their limits.
+        weights: (m,), of these; they sum to 1.
+        members: number of members that were drawn.
+    """
+
+    probability: float
+    spread: float
+    effective: float
+    largest: float
+    failing: np.ndarray
+    limits: np.ndarray
+    weights: np.ndarray
+    members: int
+
+    @classmethod
+    def of(cls, u: np.ndarray, limits: np.ndarray, mixture: Mixture) -> Weighted:
+        """From points (n, d) drawn from a mixture, and their limits (n,)."""
+        happens = limits > 0.0
+        failing, theirs = u[happens], limits[happens]
+        n, weights = len(u), np.exp(log_weights(mixture, failing))
+        total = float(weights.sum())
+        if not total > 0.0:
+            return cls(0.0, math.inf, 0.0, 1.0, failing, theirs, weights, n)
+        mean, square = total / n, float((weights**2).sum())
+        variance = max(0.0, square / n - mean**2) / max(1, n - 1)
+        spread, largest = math.sqrt(variance) / mean, float(weights.max()) / total
+        return cls(mean, spread, total**2 / square, largest, failing, theirs, weights / total, n)
+
+
+def log_weights(mixture: Mixture, u: np.ndarray) -> np.ndarray:
+    """Logarithm of the standard normal density over that of the mixture, at points (n, d): (n,)."""
+    d = u.shape[1]
+    return np.asarray(-0.5 * (u**2).sum(axis=1) - 0.5 * d * math.log(2.0 * math.pi) - mixture.log_density(u))
+
+
+def doubts(
+    weighted: Weighted, mixture: Mixture, probability: float, spread: float, failing: Sequence[np.ndarray], asked: float
+) -> list[str]:
+    """Why the weights are not the answer; empty where they are.
+
+    probability, spread: of the chains. failing: each run's failing members (m, d). asked: the relative error wanted.
+    """
+    reasons = []
+    if weighted.spread > asked:
+        reasons.append(f"its own error is {weighted.spread:.1%}")
+    if weighted.effective < (least := effective_wanted(weighted)):
+        reasons.append(f"its weights are worth {weighted.effective:.0f} members, fewer than {least:.0f}")
+    if weighted.largest > LARGEST:
+        reasons.append(f"one weight is {weighted.largest:.1%} of all, more than {LARGEST:.0%}")
+    both = math.hypot(spread, min(weighted.spread, 1.0))
+    if weighted.probability <= 0.0 or abs(math.log(weighted.probability / probability)) > AGREEMENT * both:
+        reasons.append(f"it gives {weighted.probability:.2e} where the chains give {probability:.2e}")
+    elif (share := uncovered(weighted, mixture, failing)) > UNCOVERED:
+        reasons.append(f"{share:.0%} of a run's failing members lie where the mixture hardly draws")
+    return reasons
+
+
+def effective_wanted(weighted: Weighted) -> float:
+    """The effective number of weights that it takes: more where a mixture has more to learn."""
+    d = weighted.failing.shape[1]
+    return max(EFFECTIVE, EFFECTIVE_EACH * d * (d + 1) / 2)
+
+
+def wanting(weighted: Weighted, asked: float) -> float:
+    """How many times as many draws it takes for this relative error, and for weights as even as they must be."""
+    if not math.isfinite(weighted.spread):
+        return math.inf
+    return max(
+        (weighted.spread / asked) ** 2, effective_wanted(weighted) / weighted.effective, weighted.largest / LARGEST
+    )
+
+
+def uncovered(weighted: Weighted, mixture: Mixture, failing: Sequence[np.ndarray]) -> float:
+    """The largest part of a run's failing members at which one weight would be larger than may be."""
+    most = math.log(LARGEST * weighted.probability * weighted.members)
+    return max((float((log_weights(mixture, each) > most).mean()) for each in failing if len(each)), default=0.0)

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rare_event`: the probability of what plain sampling would hardly ever see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import whole_number
+from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.results.quantities import OfInterest
+from lgvi_warp.runs.request import ensemble_of
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.rare.answer import RareEvent
+from lgvi_warp.studies.rare.cheaper import cheaper_of, chosen_chain
+from lgvi_warp.studies.rare.event import RareCondition, condition_of
+from lgvi_warp.studies.rare.limit import VehicleLimit
+from lgvi_warp.studies.rare.search import RareAnswer, RareSearch
+from lgvi_warp.studies.rare.subset import NoProgress
+
+# What members of the scene's own setting are called.
+OWN = "the scene's own"
+# The least error that can be asked, and the fewest members.
+LEAST_ERROR, FEWEST = 0.005, 10_000
+
+
+@shows_progress
+def rare_event(
+    fleet: Scene | Ensemble,
+    limit: OfInterest | Mapping[str, Any],
+    *,
+    relative_error: float = 0.1,
+    cheaper: Sequence[Mapping[str, Any]] = (),
+    failed: str = "event",
+    most: int = 1_000_000,
+    seed: int = 0,
+    progress: Callable[[float], None] | bool | None = None,
+    **settings: Any,
+) -> RareEvent:
+    """Estimate the probability of an event that plain Monte Carlo would hardly ever see, with its error.
+
+    Chains of members go level by level towards the event (subset simulation), over the numbers that vary and over the draws of
+    noise, in four independent runs; then members drawn about the failing ones, with weights, are the answer where checks say
+    that it may be believed, and more chains otherwise. What is likelier than 1e-3 is sampled plainly.
+
+    Args:
+        fleet: A Scene or an Ensemble; what varies is its `vary`, by distributions, and its noise.
+        limit: The event: a quantity or a function of a Result, of which above 0 is the event, "max(depth) - 40.0"; conditions
+            in a sweep's words, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of an event of the
+            scene.
+        relative_error: Standard deviation wanted of the probability's error, as a part of it, 0.005 to 0.5; 0.1 by default.
+        cheaper: Settings that chains may use first, the answer being that of the scene's own: numbers and settings of the run
+            that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by default.
+        failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
+        most: Members that may be run, from 10,000; 1,000,000 by default.
+        seed: Seed of all that is drawn; 0 by default.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            as far as that is known. None, the default, for nobody.
+        **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
+
+    Returns:
+        The probability, its interval, what it took, and the members for which the event happens.
+
+    Raises:
+        SceneError: If an argument is at fault; where the event never happens or always does; and where the limit takes so few
+            values that nothing says how near a member is.
+        FailedMembers: With failed="refuse", where members failed.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere")
+        >>> fleet = lw.Ensemble(scene, vary={"start.velocity[2]": lw.distributions.Normal(std=0.1)})
+        >>> found = lw.rare_event(fleet, "depth - 0.35", method="psi_x", h=0.1, t1=1.0)
+        >>> found.estimator
+        'importance'
+    """
+    members = ensemble_of(fleet)
+    faults = Faults()
+    faults.choice("failed", failed, ("event", "refuse"))
+    error = faults.number("relative_error", relative_error)
+    if error is not None and not LEAST_ERROR <= error <= 0.5:
+        faults.add(
+            "relative_error",
+            relative_error,
+            "is not between 0.005 and 0.5",
+            "give a part of the probability, such as 0.1",
+        )
+    for name in ("of", "levels", "statistics", "draws", "common_noise"):
+        if name in settings:
+            faults.add(name, settings[name], "is what rare_event decides", "leave it out")
+    faults.raise_if_any()
+    whole_number("most", most, FEWEST), whole_number("seed", seed, 0)
+    condition = condition_of(limit, members.scene)
+    own = VehicleLimit(members, condition, settings, failed)
+    others = {
+        each.name: VehicleLimit(each.fleet, condition, each.settings, failed)
+        for each in cheaper_of(cheaper, members, settings)
+    }
+    chain, notes = chosen_chain(own, others, seed) if others else (None, [])
+    search = RareSearch(
+        own, own.d, relative_error, seed, most, weighted=not own.draws, chained=chain,
+        margin=chain.margin if chain else 0.0, report=callback(progress) or (lambda fraction: None), notes=notes,
+    )  # fmt: skip
+    try:
+        found = search.answer()
+    except NoProgress as stuck:
+        raise _refused(stuck, condition) from None
+    if found.probability >= 1.0:
+        lost = bool(np.isinf(found.limits).all())
+        problem = f"happens for each of {found.members:,} members" + (", all of which failed" if lost else "")
+        remedy = "mend what fails" if lost else 'ask for what is rare, as {"peak depth": {"above": 12.0}}'
+        raise refusal("limit", condition.label, problem, remedy)
+    return _told(found, own, others, condition, settings)
+
+
+def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
+    """What is wrong where chains came no nearer to the event."""
+    if stuck.kind == "steps":
+        problem = "has the same value for most members, so that nothing says how near one is to the event"
+        remedy = (
+            'give a number that grows towards it: a distance, {"peak depth": {"above": 12.0}}, or the name of an event'
+        )
+        return refusal("limit", condition.label, problem, remedy)
+    problem = (
+        f"is not met down to a probability of 1e-15; the largest limit that members reached is {stuck.largest:.4g}"
+    )
+    return refusal("limit", condition.label, problem, "move the bound, or widen what varies")
+
+
+def _told(
+    found: RareAnswer,
+    own: VehicleLimit,
+    others: Mapping[str, VehicleLimit],
+    condition: RareCondition,
+    settings: Mapping[str, Any],
+) -> RareEvent:
+    """The answer in the scene's numbers."""
+    limits = {OWN: own, **others}
+    count = len(own.names)
+    nearest = int(np.argmin((found.failing**2).sum(axis=1)))
+    best = found.failing[nearest : nearest + 1]
+    mean = found.weights @ found.failing
+    noise: dict[str, list[float]] = {}
+    for source in own.sources:
+        noise.setdefault(source.of, []).extend(mean[count:][source.columns])
+    plain = (1.0 - found.probability) / (found.probability * max(found.spread, 1e-12) ** 2)
+    return RareEvent(
+        event=condition.label,
+        probability=found.probability,
+        interval=found.interval(),
+        relative_error=found.spread,
+        estimator=found.estimator,
+        members={name: each.members for name, each in limits.items()},
+        failing=own.table(found.failing),
+        normals=found.failing[:, :count],
+        draws=found.failing[:, count:],
+        weights=found.weights,
+        failed_share=float(found.weights[np.isinf(found.limits)].sum()),
+        likeliest={name: value[0] for name, value in own.values(best).items()} if count else {},
+        likeliest_draws=best[0, count:],
+        distance=float(np.linalg.norm(best)),
+        moved=dict(zip(own.names, map(float, mean[:count]), strict=True)),
+        noise_moved={name: float(np.linalg.norm(values)) for name, values in noise.items()},
+        runs=found.runs,
+        plain_members=plain,
+        plain_seconds=plain * own.seconds / max(1, own.members),
+        seconds=sum(each.seconds for each in limits.values()),
+        messages=found.notes,
+        provenance={
+            "scene": own.fleet.scene.to_dict(),
+            "ensemble": own.fleet.to_dict(),
+            "settings": {name: str(value) for name, value in settings.items()},
+            "versions": machine.versions(),
+            "machine": machine.describe(),
+        },
+    )

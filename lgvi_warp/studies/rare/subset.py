@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Subset simulation: the probability that a limit function of standard normals is above 0, however small (Au & Beck 2001).
+
+Several independent runs go level by level in step, so that the chains of all of them are one batch of the limit function.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+# (n, d) standard normals -> (n,): above 0 where the event happens.
+Limit = Callable[[np.ndarray], np.ndarray]
+
+# The part of a level's members that is above the next threshold, and the acceptance that chains are steered to.
+SHARE, ACCEPTANCE = 0.1, 0.44
+# The first scale of the chains' steps.
+FIRST_SCALE = 0.6
+# Most levels: what is rarer than 1e-15 is not looked for, since levels of the cube end at 1e-16.
+MOST_LEVELS = 15
+# A threshold that so large a part of a level's members reaches sorts nothing out.
+FLAT = 0.5
+
+
+class NoProgress(Exception):  # noqa: N818  (what happened, and no fault of the program)
+    """The levels do not come nearer to the event.
+
+    kind: "steps" where the limit has few values, "never" where the event is rarer than can be looked for. largest: the largest
+    limit that was seen.
+    """
+
+    def __init__(self, kind: str, largest: float):
+        super().__init__(kind)
+        self.kind, self.largest = kind, largest
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """The members of one level, all of whose limits are at the threshold or above it.
+
+    u: (n, d), chain by chain. limits: (n,). chains: number of them; n where the members are independent. threshold: -inf for
+    the first level. log_probability: of being here. variance: of the relative error so far, as the chains themselves say it.
+    """
+
+    u: np.ndarray
+    limits: np.ndarray
+    chains: int
+    threshold: float = -math.inf
+    log_probability: float = 0.0
+    variance: float = 0.0
+    acceptance: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SubsetRun:
+    """One run of subset simulation.
+
+    Attributes:
+        probability: of the event.
+        spread: standard deviation of its relative error, as the run's own chains say it, which is less than there is.
+        thresholds: (k,), the limit from which on each level's members are; the first is -inf.
+        limits: for each level, the limits of its members (n,).
+        acceptance: (k,), the part of the chains' proposals that was accepted at each level.
+        failing: (m, d), the standard normals of the last level's members for which the event happens.
+        failing_limits: (m,), their limits.
+        size: number of members of a level.
+        members: number of members that were run.
+    """
+
+    probability: float
+    spread: float
+    thresholds: np.ndarray
+    limits: tuple[np.ndarray, ...]
+    acceptance: np.ndarray
+    failing: np.ndarray
+    failing_limits: np.ndarray
+    size: int
+    members: int
+
+
+@dataclass(eq=False)
+class _Climber:
+    """A run under way: its levels, of which the normals of the last alone are kept."""
+
+    rng: np.random.Generator
+    level: Level
+    size: int
+    members: int = 0
+    scale: float = FIRST_SCALE
+    below: list[Level] = field(default_factory=list)
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the event is no rare one any more among the members of this level."""
+        return int((self.level.limits > 0.0).sum()) >= self.seeds
+
+    @property
+    def seeds(self) -> int:
+        """Number of chains of a level."""
+        return max(1, round(SHARE * self.size))
+
+    def threshold(self) -> float:
+        """The next threshold, that a tenth of the members reach. Raises NoProgress."""
+        limits = self.level.limits
+        bound = min(0.0, float(np.partition(limits, -self.seeds)[-self.seeds]))
+        reached, largest = (limits >= bound).mean(), float(limits.max())
+        if not math.isfinite(bound):
+            raise NoProgress("never", largest)
+        if reached > FLAT or bound <= self.level.threshold:
+            raise NoProgress("steps", largest)
+        if len(self.below) + 1 >= MOST_LEVELS:
+            raise NoProgress("never", largest)
+        return bound
+
+    def begin(self) -> None:
+        """Begin chains at members that reach the next threshold."""
+        level, bound = self.level, self.threshold()
+        inside = np.flatnonzero(level.limits >= bound)
+        chosen = self.rng.permutation(inside)[: self.seeds]
+        self._u, self._limits = [level.u[chosen]], [level.limits[chosen]]
+        # Numbers that the event narrows get steps as narrow.
+        self._widths = np.clip(level.u[inside].std(axis=0), 1e-3, 1.0)
+        share = len(inside) / len(level.limits)
+        log_probability = level.log_probability + math.log(share)
+        variance = level.variance + share_variance(level.limits >= bound, level.chains)
+        self._next = Level(level.u[:0], level.limits[:0], len(chosen), bound, log_probability, variance)
+        self._accepted, self._steps = 0.0, 0
+
+    def proposals(self) -> np.ndarray:
+        """The next places of all chains: each keeps the standard normal law (Papaioannou et al. 2015)."""
+        u, step = self._u[-1], np.minimum(1.0, self.scale * self._widths)
+        return np.sqrt(1.0 - step**2) * u + step * self.rng.standard_normal(u.shape)
+
+    def take(self, places: np.ndarray, limits: np.ndarray) -> None:
+        """Move the chains whose new places reach the threshold, and steer the step by how many did."""
+        accepted = limits >= self._next.threshold
+        self._u.append(np.where(accepted[:, None], places, self._u[-1]))
+        self._limits.append(np.where(accepted, limits, self._limits[-1]))
+        share, self._steps = float(accepted.mean()), self._steps + 1
+        self._accepted += share
+        self.scale = float(np.clip(self.scale * math.exp((share - ACCEPTANCE) / math.sqrt(self._steps)), 1e-3, 1e3))
+        self.members += len(limits)
+
+    def end(self) -> None:
+        """Go to the level that the chains have filled."""
+        self.below.append(replace(self.level, u=self.level.u[:0]))
+        u, limits = np.stack(self._u, axis=1), np.stack(self._limits, axis=1)
+        acceptance = self._accepted / max(1, self._steps)
+        self.level = replace(self._next, u=u.reshape(-1, u.shape[2]), limits=limits.ravel(), acceptance=acceptance)
+
+    def result(self) -> SubsetRun:
+        """The run, which has arrived."""
+        level, levels = self.level, [*self.below, self.level]
+        happens = level.limits > 0.0
+        return SubsetRun(
+            probability=math.exp(level.log_probability) * float(happens.mean()),
+            spread=math.sqrt(level.variance + share_variance(happens, level.chains)),
+            thresholds=np.array([each.threshold for each in levels]),
+            limits=tuple(each.limits for each in levels),
+            acceptance=np.array([each.acceptance for each in levels]),
+            failing=level.u[happens],
+            failing_limits=level.limits[happens],
+            size=self.size,
+            members=self.members,
+        )
+
+
+def share_variance(happens: np.ndarray, chains: int) -> float:
+    """Variance of the relative error of a share, of members (n,) chain by chain: from the spread of the chains' own shares."""
+    share = float(happens.mean())
+    if chains == len(happens):
+        return (1.0 - share) / (share * chains)
+    own = happens.reshape(chains, -1).mean(axis=1)
+    return float(own.var(ddof=1)) / (share**2 * chains) if chains > 1 else math.inf
+
+
+def first_levels(limit: Limit, d: int, size: int, generators: Sequence[np.random.Generator]) -> list[Level]:
+    """Independent members of the first level of several runs, as one batch."""
+    u = np.concatenate([rng.standard_normal((size, d)) for rng in generators])
+    limits = limit(u)
+    return [Level(u[i : i + size], limits[i : i + size], size) for i in range(0, len(u), size)]
+
+
+def climb(
+    limit: Limit, levels: Sequence[Level], generators: Sequence[np.random.Generator],
+    report: Callable[[int], None] = lambda members: None) -> list[SubsetRun]:  # fmt: skip
+    """Go from levels that there are to the event, every run by itself, all chains in one batch.
+
+    report: called with the number of members that each step runs.
+    Raises: NoProgress.
+    """
+    runs = [
+        _Climber(rng, level, len(level.limits), len(level.limits))
+        for rng, level in zip(generators, levels, strict=True)
+    ]
+    while active := [run for run in runs if not run.arrived]:
+        for run in active:
+            run.begin()
+        for _ in range(1, round(1.0 / SHARE)):
+            places = [run.proposals() for run in active]
+            limits = limit(np.concatenate(places))
+            report(len(limits))
+            ends = np.cumsum([len(each) for each in places])[:-1]
+            for run, own, values in zip(active, places, np.split(limits, ends), strict=True):
+                run.take(own, values)
+        for run in active:
+            run.end()
+    return [run.result() for run in runs]

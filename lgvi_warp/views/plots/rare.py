@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A picture of a rare event: how chains came to it level by level, and which members it happens to."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.arguments import of_kind
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.random import generator
+from lgvi_warp.views.plots.canvas import COLORS, GREY, panels, style, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
+
+if TYPE_CHECKING:
+    from lgvi_warp.studies.rare.answer import RareEvent
+    from lgvi_warp.studies.rare.subset import SubsetRun
+
+# Members as plain sampling draws them, and most failing ones, that are drawn.
+PLAIN, MOST = 1000, 1000
+
+
+@picture
+def rare(found: RareEvent, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
+    """Draw a rare event: how probable each limit is by the levels of each run, and failing members over plain ones.
+
+    The first panel says how probable it is that the limit is above a number, up to the event at 0; circles are the thresholds
+    of levels. The second has the two numbers that the event moves most, in standard deviations from the middle.
+
+    Args:
+        found: What `lw.rare_event` returns.
+
+    Returns:
+        The axes, shape (panels,).
+
+    Raises:
+        NothingToDraw: The event was sampled plainly, and nothing but noise varies.
+    """
+    of_kind("found", found, "probability runs normals", "of lw.rare_event", "give what lw.rare_event returns")
+    numbers = bool(found.moved) and len(found.normals) > 0
+    count = int(bool(found.runs)) + int(numbers)
+    if not count:
+        raise NothingToDraw("the event was sampled plainly, and no number varies: there is nothing to draw")
+    with panels(figure, path, (1, count), (1.0 + 5.0 * count, 4.8)) as grid:
+        if found.runs:
+            _levels(grid[0, 0], found)
+        if numbers:
+            _failing(grid[0, -1], found)
+        title = f"{found.event}: probability {found.probability:.3g}, error {100.0 * found.relative_error:.2g} % of it"
+        grid[0, 0].figure.suptitle(wrapped(title, grid[0, 0].figure))
+    return np.asarray(grid.ravel())
+
+
+def _levels(axes: Any, found: RareEvent) -> None:
+    """Draw how probable limits are, by each run."""
+    for i, run in enumerate(found.runs[:4]):
+        limits, chances = survival(run)
+        axes.semilogy(limits, chances, label=f"run {i + 1}, {run.members:,} members", **style(i))
+        bounds = run.thresholds[1:]
+        axes.semilogy(bounds, np.interp(bounds, limits, chances), "o", color=style(i)["color"], fillstyle="none")
+    axes.axvline(0.0, color="0.3", linestyle=":", label="the event")
+    axes.axhline(found.probability, color="0.3", linewidth=0.8)
+    axes.set(xlabel="limit", ylabel="probability of more")
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def survival(run: SubsetRun) -> tuple[np.ndarray, np.ndarray]:
+    """Limits (m,), rising, and how probable it is by a run that a member's is above them (m,)."""
+    limits, chances, chance = [], [], 1.0
+    ends = [*run.thresholds[1:], np.inf]
+    for own, bound in zip(run.limits, ends, strict=True):
+        ranked = np.sort(own[np.isfinite(own)])
+        above = chance * (len(own) - np.arange(len(ranked))) / len(own)
+        inside = ranked < bound
+        limits.append(ranked[inside])
+        chances.append(above[inside])
+        chance *= float((own >= bound).mean()) if np.isfinite(bound) else 1.0
+    return np.concatenate(limits), np.concatenate(chances)
+
+
+def _failing(axes: Any, found: RareEvent) -> None:
+    """Draw failing members over plain ones, in the two numbers that are moved most."""
+    names = list(found.moved)
+    spread = np.abs(found.weights @ found.normals) + np.sqrt(found.weights @ found.normals**2)
+    first, second = (*np.argsort(-spread)[:2], 0)[:2]
+    plain = generator(0, "rare picture").standard_normal((PLAIN, 2))
+    chosen = generator(1, "rare picture").choice(len(found.weights), size=MOST, p=found.weights)
+    axes.plot(
+        plain[:, 0], plain[:, 1] if len(names) > 1 else 0.0 * plain[:, 1], ".", color=GREY, markersize=3, label="plain"
+    )
+    x = found.normals[chosen, first]
+    y = found.normals[chosen, second] if len(names) > 1 else 0.0 * x
+    axes.plot(x, y, "^", color=COLORS[1], markersize=3, label="the event")
+    axes.set(xlabel=f"{names[first]} [sd]", ylabel=f"{names[second]} [sd]" if len(names) > 1 else "")
+    axes.grid(alpha=0.3)
+    axes.legend()

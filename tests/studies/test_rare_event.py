@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rare events of vehicles: a neutrally buoyant sphere in linear drag, whose place at the end is linear in its start."""
+
+import inspect
+import json
+import pickle
+
+import numpy as np
+import pytest
+from scipy.special import ndtr, ndtri
+
+import lgvi_warp as lw
+from lgvi_warp.calls.prepared import FailedMembers
+from lgvi_warp.statistics.metrics.nearest import LEAST
+from tests.support.pages import blocks
+from tests.support.refusals import says
+
+DRAG, T1 = 20.0, 3.0
+RUN = {"method": "psi_x", "h": 0.1, "t1": T1, "threads": 1}
+VEHICLE = lw.Scene.named("sphere").vehicle
+# Mass and added mass of a sphere, m + m / 2; a speed v leads to tau (1 - exp(-t / tau)) v.
+TAU = 1.5 * float(VEHICLE.mass) / DRAG
+WAY = TAU * (1.0 - np.exp(-T1 / TAU))
+NORTH, SPEED = 0.5, 0.3
+NOISE = lw.terms.WrenchNoise(force=(30.0, 0.0, 0.0))
+
+
+def scene_of(*more, events=()):
+    drag = lw.terms.Drag(linear=[DRAG] * 3 + [1.0] * 3)
+    return lw.Scene(VEHICLE, terms=[drag, *more], start=lw.Start(velocity=[1.0, 0.0, 0.5]), events=events)
+
+
+def fleet_of(**scene):
+    vary = {
+        "start.position[0]": lw.distributions.Normal(std=NORTH),
+        "start.velocity[0]": lw.distributions.Normal(std=SPEED),
+    }
+    return lw.Ensemble(scene_of(**scene), vary=vary)
+
+
+def bound_of(p):
+    """How far north a member is with a probability p."""
+    return WAY - ndtri(p) * np.hypot(NORTH, SPEED * WAY)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return lw.rare_event(fleet_of(), f"position[0] - {bound_of(1e-5):.12g}", **RUN)
+
+
+def test_the_probability_of_a_place_is_that_of_a_normal(found):
+    # The step's error, of second order, moves the place by 1e-5 of itself, and the probability by less than 0.1 %.
+    assert found.estimator == "importance"
+    assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.relative_error
+    assert found.relative_error < 0.1
+    assert found.members == {"the scene's own": pytest.approx(12_000, rel=0.4)}
+    assert found.interval[0] < found.probability < found.interval[1]
+    assert found.plain_members == pytest.approx(1e5 / found.relative_error**2, rel=0.2)
+    # The failing members' mean lies along (0.5, 0.3 WAY), a little beyond the 4.26 sd of the event.
+    toward = np.array([NORTH, SPEED * WAY]) / np.hypot(NORTH, SPEED * WAY)
+    moved = np.array([found.moved["start.position[0]"], found.moved["start.velocity[0]"]])
+    np.testing.assert_allclose(moved / np.linalg.norm(moved), toward, atol=0.05)
+    assert np.linalg.norm(moved) == pytest.approx(
+        np.exp(-0.5 * ndtri(1e-5) ** 2) / np.sqrt(2.0 * np.pi) / 1e-5, rel=0.02
+    )
+    assert found.distance == pytest.approx(-ndtri(1e-5), rel=0.03)
+
+
+def test_failing_members_fail_again(found):
+    again = lw.solve(lw.Ensemble(scene_of(), sampling=found.failing), **RUN)
+    assert again.members == len(found.weights) > 300
+    assert (again.samples["position"][-1, :, 0] > bound_of(1e-5)).all()
+    assert found.weights.sum() == pytest.approx(1.0)
+    place = found.likeliest["start.position[0]"] + WAY * found.likeliest["start.velocity[0]"]
+    assert place == pytest.approx(bound_of(1e-5), rel=0.02)
+
+
+def test_the_answer_says_what_it_is(found):
+    text = str(found)
+    assert text.startswith("probability 1")
+    for word in ("95 % interval", "event       position[0] above", "weights of members", "plain       would take", "likeliest",
+                 "moved       "):  # fmt: skip
+        assert word in text
+    again = pickle.loads(pickle.dumps(found))
+    assert str(again) == text
+    assert found.provenance["versions"]
+    assert found.provenance["scene"]["vehicle"]
+
+
+def test_the_answer_is_kept_in_files(found, tmp_path):
+    paths = found.save(tmp_path)
+    assert sorted(path.name for path in paths) == ["rare.csv", "rare.json", "rare.txt"]
+    again = lw.studies.RareEvent.load(tmp_path / "rare.json")
+    assert str(again) == str(found)
+    np.testing.assert_array_equal(again.normals, found.normals)
+    np.testing.assert_array_equal(
+        again.failing.own_values()["start.velocity[0]"], found.failing.own_values()["start.velocity[0]"]
+    )
+    assert json.loads((tmp_path / "rare.json").read_text())["probability"] == found.probability
+    table = lw.designs.Table(tmp_path / "rare.csv", ignore=["weight"])
+    assert lw.Ensemble(scene_of(), sampling=table).members == len(found.weights)
+
+
+def test_the_same_seed_has_the_same_answer(found):
+    again = lw.rare_event(fleet_of(), f"position[0] - {bound_of(1e-5):.12g}", **RUN)
+    assert again.probability == found.probability
+    np.testing.assert_array_equal(again.normals, found.normals)
+
+
+def test_ways_to_say_an_event(found):
+    bound = bound_of(1e-5)
+    for limit in (f"position[0] above {bound:.12g}", {"position[0]": {"above": float(f"{bound:.12g}")}}):
+        assert lw.rare_event(fleet_of(), limit, **RUN).probability == found.probability
+    below = lw.rare_event(fleet_of(), f"{2.0 * WAY - bound:.12g} - position[0]", **RUN)
+    assert abs(below.probability / 1e-5 - 1.0) < 3.0 * below.relative_error
+    assert below.event == f"position[0] below {2.0 * WAY - bound:g}"
+
+    def beyond(result):
+        return result.samples["position"][-1, :, 0] - bound
+
+    of_function = lw.rare_event(fleet_of(), beyond, save=lw.SaveAt(at=[T1]), **RUN)
+    assert of_function.probability == pytest.approx(found.probability, rel=1e-3)
+    assert of_function.event == "beyond above 0"
+
+
+def test_any_of_several_conditions_is_the_event():
+    vary = dict(fleet_of().vary) | {"start.position[1]": lw.distributions.Normal(std=NORTH)}
+    limit = {
+        "max(position[0])": {"above": bound_of(5e-6)},
+        "max(position[1])": {"above": -ndtri(5e-6) * NORTH},
+    }
+    either = lw.rare_event(lw.Ensemble(scene_of(), vary=vary), limit, save=lw.SaveAt(every=0.1), **RUN)
+    assert either.event.count(" or ") == 1
+    assert abs(either.probability / 1e-5 - 1.0) < 3.0 * either.relative_error
+    # Half of them go east: their mean is half of what one alone would be, 4.6 sd.
+    assert either.moved["start.position[1]"] == pytest.approx(2.3, abs=0.4)
+
+
+def test_an_event_of_the_scene_is_named():
+    floor, rate = 2.0, 0.15
+    p = 1e-5
+    depth = 0.5 * WAY - ndtri(p) * rate * WAY
+    fleet = lw.Ensemble(
+        scene_of(events=[lw.events.Floor(depth=depth, name="bottom")]),
+        vary={"start.velocity[2]": lw.distributions.Normal(std=rate)},
+    )
+    found = lw.rare_event(fleet, "bottom", **RUN)
+    assert found.event == "bottom"
+    assert abs(found.probability / p - 1.0) < 3.0 * found.relative_error + 0.01
+    again = lw.solve(lw.Ensemble(fleet.scene, sampling=found.failing), **RUN)
+    assert set(again.status.counts()) == {"floor"}
+    assert floor < depth
+
+
+def test_the_least_distance_to_an_event():
+    scene = scene_of(
+        events=[lw.events.Floor(depth=1.2), lw.events.Box(lower=[-1, -1, -1], upper=[9, 1, 9], name="basin")]
+    )
+    table = lw.designs.Table({"start.velocity[2]": [0.5, 1.0, 0.0], "start.position[2]": [0.0, 0.0, 1.1]})
+    each = [lw.metrics.Nearest("floor", then=lw.statistics.MemberValues()),
+            lw.metrics.Nearest("basin", kind="box", then=lw.statistics.MemberValues())]  # fmt: skip
+    fleet = lw.Ensemble(scene, sampling=table)
+    result = lw.solve(fleet, save=lw.SaveAt(every=0.1), statistics=each, **RUN)
+    assert result.status[1] == lw.Status.FLOOR
+    nearest = result.statistics["each nearest floor"].value[0, 0]
+    # The first falls by WAY / 2, the second is stopped, the third stays.
+    np.testing.assert_allclose(nearest, [1.2 - 0.5 * WAY, 0.0, 0.1], atol=1e-4)
+    basin = result.statistics["each nearest basin"].value[0, 0]
+    np.testing.assert_allclose(basin, [1.0, 1.0, 1.0], atol=1e-9)
+    assert basin[1] > LEAST
+    assert result.statistics["each nearest floor"].unit == "m"
+
+
+def test_a_metric_of_an_event_that_is_not_there():
+    with pytest.raises(lw.SceneError, match="is no outcome of this scene"):
+        lw.solve(scene_of(), statistics=[lw.metrics.Nearest("floor")], **RUN)
+    with pytest.raises(lw.SceneError, match="of no type whose distance is known"):
+        lw.metrics.Nearest("bottom")
+    with pytest.raises(lw.SceneError, match="looks at the truth"):
+        lw.metrics.Nearest("floor", measured=True)
+
+
+def test_chains_at_a_cheaper_setting(found):
+    limit = f"position[0] - {bound_of(1e-5):.12g}"
+    cheap = lw.rare_event(fleet_of(), limit, cheaper=[{"drag.linear[0]": 21.0}], **RUN)
+    assert abs(cheap.probability / 1e-5 - 1.0) < 3.0 * cheap.relative_error
+    assert cheap.members["drag.linear[0] = 21.0"] > cheap.members["the scene's own"]
+    assert cheap.members["the scene's own"] < 0.5 * found.members["the scene's own"]
+
+
+def test_a_cheaper_scene_that_tells_nothing_is_left_out(found):
+    limit = f"position[0] - {bound_of(1e-5):.12g}"
+    # Ten times the drag: where members end is where they began.
+    told = lw.rare_event(fleet_of(), limit, cheaper=[{"drag.linear[0]": 4000.0}], **RUN)
+    assert any("name a setting nearer to the scene's own" in message for message in told.messages)
+    assert told.probability == found.probability
+
+
+def test_members_that_fail_are_the_event_and_told_apart():
+    def lost(result):
+        north = result.samples["position"][-1, :, 0]
+        return np.where(north > bound_of(1e-5) + 0.1, np.nan, north - bound_of(1e-5))
+
+    more = {"save": lw.SaveAt(at=[T1]), **RUN}
+    found = lw.rare_event(fleet_of(), lost, **more)
+    assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.relative_error
+    sd = np.hypot(NORTH, SPEED * WAY)
+    assert found.failed_share == pytest.approx(ndtr(ndtri(1e-5) - 0.1 / sd) / 1e-5, abs=0.06)
+    assert "failed      " in str(found)
+    with pytest.raises(FailedMembers, match='failed="event"'):
+        lw.rare_event(fleet_of(), lost, failed="refuse", **more)
+
+
+def test_what_is_likely_is_sampled():
+    found = lw.rare_event(fleet_of(), f"position[0] - {bound_of(0.02):.12g}", **RUN)
+    assert found.estimator == "plain"
+    assert found.probability == pytest.approx(0.02, abs=4.0 * 0.02 * found.relative_error)
+
+
+def takes_draws():
+    return "draws" in inspect.signature(lw.prepare).parameters
+
+
+def test_noise_is_never_frozen():
+    """Where calls cannot give the draws, a scene with noise is refused; where they can, its probability is right."""
+    # White noise S of force: the variance of the place is the integral of (tau (1 - exp(-(T - s) / tau)) S / m)^2.
+    s = np.linspace(0.0, T1, 20_001)
+    of_noise = np.trapezoid((TAU * (1.0 - np.exp(-(T1 - s) / TAU)) * 30.0 / (1.5 * float(VEHICLE.mass))) ** 2, s)
+    bound = WAY - ndtri(1e-5) * np.sqrt(NORTH**2 + of_noise)
+    fleet = lw.Ensemble(scene_of(NOISE), vary={"start.position[0]": lw.distributions.Normal(std=NORTH)})
+    limit = f"position[0] - {bound:.12g}"
+    if not takes_draws():
+        with pytest.raises(lw.SceneError, match="which would be the same in every call"):
+            lw.rare_event(fleet, limit, **RUN)
+        return
+    found = lw.rare_event(fleet, limit, **RUN)
+    assert found.estimator == "subset"
+    # Steps of 0.1 s have 0.1 % less variance, 2 % less probability.
+    assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.relative_error
+    assert found.draws.shape == (len(found.weights), 90)
+    assert found.noise_moved["wrench_noise"] > 2.0
+    again = lw.prepare(fleet, of="position[0]", levels=True, draws="given", **RUN)(ndtr(found.normals), found.draws)
+    assert (again > bound).all()
+
+
+@pytest.mark.skipif(not takes_draws(), reason="calls do not give draws")
+def test_noise_alone_can_be_the_cause():
+    s = np.linspace(0.0, T1, 20_001)
+    of_noise = np.trapezoid((TAU * (1.0 - np.exp(-(T1 - s) / TAU)) * 30.0 / (1.5 * float(VEHICLE.mass))) ** 2, s)
+    found = lw.rare_event(scene_of(NOISE), f"position[0] - {WAY - ndtri(1e-5) * np.sqrt(of_noise):.12g}", **RUN)
+    assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.relative_error
+    assert found.failing is None
+    assert "the scene and its noise" in str(found)
+
+
+@pytest.mark.parametrize("limit, words", [
+    ("floor", "neither a quantity nor an event of the scene"),
+    ("outcome floor", "is there or not"),
+    ({"status": "floor"}, 'rare_event(fleet, "floor")'),
+    ({}, "is a status"),
+    ("peak depth", "is a metric without a bound"),
+    ("position", "is 3 numbers; name one of its entries"),
+    ("position[0] - 1000.0", "is not met down to a probability of 1e-15; the largest limit that members reached is"),
+    ("position[0] + 1000.0", "happens for each of"),
+    ("position[1] - 1.0", "has the same value for most members"),
+    (3.0, "is no event"),
+    ({"position[0]": {"near": 1.0}}, "is no condition"),
+])  # fmt: skip
+def test_what_is_no_rare_event_is_refused(limit, words):
+    with pytest.raises(lw.SceneError) as error:
+        lw.rare_event(fleet_of(), limit, **RUN)
+    assert words in str(error.value)
+
+
+def test_faulty_arguments_are_told_at_once():
+    with pytest.raises(lw.SceneError) as error:
+        lw.rare_event(fleet_of(), "depth", relative_error=2.0, failed="drop", levels=True, **RUN)
+    says(str(error.value), "failed = 'drop'", "relative_error = 2.0", "levels = True")
+    for more, words in (({"cheaper": {"h": 1.0}}, "is no list"), ({"cheaper": [{}]}, "names nothing that differs"),
+                        ({"cheaper": [{"start.position[0]": 1.0}]}, "is of a number that varies"),
+                        ({"most": 10}, "most = 10")):  # fmt: skip
+        with pytest.raises(lw.SceneError, match=words):
+            lw.rare_event(fleet_of(), "position[0] - 9.0", **more, **RUN)
+    with pytest.raises(lw.SceneError, match="nothing that varies, and no noise"):
+        lw.rare_event(scene_of(), "position[0] - 9.0", **RUN)
+    table = lw.designs.Table({"vehicle.mass": [70.0]})
+    with pytest.raises(lw.SceneError, match="gives members values and no distribution"):
+        lw.rare_event(lw.Ensemble(scene_of(), sampling=table), "position[0] - 9.0", **RUN)
+
+
+def test_the_picture(found, tmp_path):
+    pytest.importorskip("matplotlib")
+    axes = lw.plots.rare(found, path=tmp_path / "rare.png")
+    assert len(axes) == 2
+    assert (tmp_path / "rare.png").stat().st_size > 10_000
+    from lgvi_warp.views.plots.rare import survival
+
+    limits, chances = survival(found.runs[0])
+    assert (np.diff(limits) >= 0.0).all()
+    assert chances[0] == 1.0
+    # At the event the curve is the run's probability.
+    at_event = chances[np.searchsorted(limits, 0.0)]
+    assert at_event == pytest.approx(found.runs[0].probability, rel=0.02)
+
+
+def test_the_snippets_of_the_page_on_rare_events(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    names = {"lw": lw}
+    for text in blocks("docs/guide/rare_events.md", "python"):
+        exec(text, names)
+    # In 5 s a speed v leads tau (1 - exp(-5 / tau)) v down.
+    way = TAU * (1.0 - np.exp(-5.0 / TAU))
+    p = ndtr(-4.0 / np.hypot(0.5, 0.3 * way))
+    assert abs(names["found"].probability / p - 1.0) < 3.0 * names["found"].relative_error
+    assert (names["again"].samples["position"][-1, :, 2] > 9.0).all()

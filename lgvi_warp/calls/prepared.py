@@ -402,7 +402,7 @@ def prepare(
             interests = quantities(of)
     faults.choice("failed", failed, ("refuse", "nan"))
     faults.choice("draws", draws, (DRAWN, GIVEN))
-    if draws == GIVEN and common_noise is True:
+    if isinstance(draws, str) and draws == GIVEN and common_noise is True:
         faults.add(
             "common_noise", True, 'says whose noise each row has, where draws="given" takes it from xi', "leave it out"
         )

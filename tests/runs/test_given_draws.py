@@ -76,7 +76,7 @@ SETTINGS = [
     ("psi_x", "float32", None, "stationary"), ("psi_x", "float32_compensated", H / 2, "zero"),
     ("psi_s", "float64", H / 2, "zero"), ("psi_s", "float64", None, "stationary"),
     ("psi_w", "float64", H / 4, "zero"), ("rk4", "float64", None, None),
-    ("rk8", "float64", H / 2, None), ("rkmk4", "float32", None, None),
+    ("rk8", "float64", H / 2, None),
 ]  # fmt: skip
 
 
@@ -88,6 +88,15 @@ def test_every_kind_of_run_has_the_bits_of_the_counters(method, dtype, noise_ste
     assert xi.dtype == (
         np.float64 if "float64" in (dtype, "float64" if current == "stationary" else "") else np.float32
     )
+
+
+@pytest.mark.slow
+def test_a_kernel_that_is_compiled_otherwise_sees_the_same_draws():
+    """Given draws make another kernel: here its compiler joins a sum of positions otherwise, below 1 m by 6e-8 at most."""
+    given, drawn = pair(everything(None, None), of=STATE, method="rkmk4", dtype="float32")
+    found, expected = given(X, lw.uq.draws_of(given, INDICES)), drawn(X, indices=INDICES)
+    np.testing.assert_array_equal(found[:, 3:], expected[:, 3:])
+    np.testing.assert_allclose(found[:, :3], expected[:, :3], rtol=0.0, atol=1.2e-7)
 
 
 @pytest.mark.slow
@@ -326,6 +335,8 @@ def test_other_arguments_that_do_not_go_together_are_refused(white):
         lw.uq.draws_of(given, [0, 1], members=3)
     with pytest.raises(lw.SceneError, match=r"indices = .*from 0"):
         lw.uq.draws_of(given, [-1])
+    with pytest.raises(lw.SceneError, match=r"indices = .*from 0"):
+        lw.uq.draws_of(given, [[1], [1, 2]])
     with pytest.raises(lw.SceneError, match=r"run = .*: is no prepared run"):
         lw.uq.draws_of(lambda X: X)
 

@@ -75,9 +75,9 @@ class KeptSamples:
         self.result, self.weights = result, result.weights if weights is None else weights
         ensemble = result.provenance.get("ensemble", {})
         planned = len(ensemble["indices"]) if "indices" in ensemble else int(ensemble.get("members") or result.members)
-        whole = result.members in (planned, result.provenance.get("members"))
-        self.total = planned if whole else result.members
-        self.replicates = replicates_of(ensemble) if whole and weights is None else 1
+        of_design = result.members in (planned, result.provenance.get("members"))
+        self.total = planned if of_design else result.members
+        self.replicates = replicates_of(ensemble) if of_design and weights is None else 1
         self.events: tuple[Event, ...] = events_of(result.provenance["scene"].get("events", ()))
 
     def blocks(self) -> Iterator[Block]:

@@ -262,7 +262,7 @@ class Statistic:
         if not is_weighted(part):
             return self.read(part, time)
         weighted = Weighted.of(part)
-        return weighted.told(self.weighted_read(weighted, time))
+        return weighted.with_effective(self.weighted_read(weighted, time))
 
     def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
         """Return the statistic of weighted members with its interval."""

@@ -173,13 +173,16 @@ class Quantiles(Statistic):
     def _weighted_whole(self, parts: Sequence[Part], size: int | None) -> Part:
         """The parts of weighted members as one, thinned to a size; None: not."""
         each = [Weighted.of(part) for part in parts]
-        counts = [
-            np.sum([kind[i]["count"] for kind in ((one.own, one.squares) for one in each)], axis=0) for i in (0, 1)
-        ]
-        kept = weighted_sketch.together([one.own for one in each], size)
-        return both_measures(
-            {"count": counts[0]} | kept, {"count": counts[1]}, np.sum([one.members for one in each], axis=0)
+        kept = weighted_sketch.together([part.own for part in each], size)
+        own, squares, members = (
+            np.sum(sums, axis=0)
+            for sums in (
+                [part.own["count"] for part in each],
+                [part.squares["count"] for part in each],
+                [part.members for part in each],
+            )
         )
+        return both_measures({"count": own} | kept, {"count": squares}, members)
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
         # The quantiles of all members, a few sample times at once to bound memory.

@@ -83,7 +83,7 @@ class Weighted:
         seen = (p > 0.0) & (p < 1.0) & (variance > 0.0)
         return np.where(seen, p * (1.0 - p) / np.where(seen, variance, 1.0), n)
 
-    def told(self, estimate: Estimate) -> Estimate:
+    def with_effective(self, estimate: Estimate) -> Estimate:
         """Return the estimate with the effective number as its count, and the number of members beside it."""
         arrays = estimate.arrays | {"count": self.effective, "members": self.members}
         dims = estimate.dims | {"count": ("time",), "members": ("time",)}

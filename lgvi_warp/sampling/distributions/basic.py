@@ -36,7 +36,7 @@ class Distribution:
     kinds: ClassVar[MutableMapping[str, Any]] = registry.Kinds(
         "lgvi_warp.sampling.distributions",
         {
-            "basic": ("normal", "truncated_normal", "uniform", "lognormal", "choice"),
+            "basic": ("normal", "uniform", "lognormal", "truncated_normal", "choice"),
             "joint": (
                 *("correlated_normal", "rotation_normal", "uniform_rotation"),
                 *("positive_definite", "physical_inertia"),

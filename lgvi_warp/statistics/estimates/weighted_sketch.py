@@ -74,13 +74,13 @@ def at_fraction(values: np.ndarray, places: np.ndarray, fraction: np.ndarray) ->
     """Return the values (k, q, d) at fractions (k, q, d) or (q, 1), linear between those kept; NaN where none counts."""
     k, d = values.shape[:2]
     fraction = np.broadcast_to(fraction, (k, *np.shape(fraction)[-2:-1], d))
-    found = np.full(fraction.shape, np.nan)
+    quantiles = np.full(fraction.shape, np.nan)
     for i in range(k):
         for j in range(d):
             some = np.isfinite(values[i, j])
             if some.any():
-                found[i, :, j] = np.interp(fraction[i, :, j], places[i, j, some], values[i, j, some])
-    return found
+                quantiles[i, :, j] = np.interp(fraction[i, :, j], places[i, j, some], values[i, j, some])
+    return quantiles
 
 
 def squares_below(values: np.ndarray, squares: np.ndarray, x: np.ndarray) -> np.ndarray:

@@ -87,9 +87,9 @@ def given_data(
     interests, inputs = quantities(of), varied(result)
     _check(result, inputs, confidence)
     columns, labels = _values(result, interests)
-    found = [explained(inputs, y, confidence) for y in columns]
+    explanations = [explained(inputs, y, confidence) for y in columns]
     arrays = {
-        column: np.array([[getattr(found_of[name], field) for name in inputs] for found_of in found])
+        column: np.array([[getattr(of_output[name], field) for name in inputs] for of_output in explanations])
         for column, field in zip(GivenDataIndices.columns, ("share", "lower", "upper", "p", "slope"), strict=True)
     }
     good = [y[np.isfinite(y)] for y in columns]
@@ -150,9 +150,9 @@ def _values(result: Result, of: Sequence[OfResult]) -> tuple[list[np.ndarray], t
             of_outcome = isinstance(each, EndQuantity) and each.kind != "at"
             group.append(numbers if of_outcome else np.where(lost[:, None], np.nan, numbers))
         groups.append(group)
-    whole = [np.concatenate(arrays) for arrays in zip(*groups, strict=True)]
-    labels = [label for each, numbers in zip(of, whole, strict=True) for label in each.labels(numbers.shape[1])]
-    return [column for numbers in whole for column in numbers.T], tuple(labels)
+    joined = [np.concatenate(arrays) for arrays in zip(*groups, strict=True)]
+    labels = [label for each, numbers in zip(of, joined, strict=True) for label in each.labels(numbers.shape[1])]
+    return [column for numbers in joined for column in numbers.T], tuple(labels)
 
 
 def _messages(

@@ -65,7 +65,7 @@ def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = N
 
 def _bars(axes: Any, indices: Indices, q: int, shown: np.ndarray) -> None:
     """Draw the bars of one quantity, the columns of a factor side by side; shown: indices of the factors."""
-    places, columns = np.arange(len(shown)), indices.drawn or indices.columns
+    places, columns = np.arange(len(shown)), getattr(indices, "drawn", ()) or indices.columns
     width = 0.8 / len(columns)
     for i, column in enumerate(columns):
         name = indices.intervals.get(column)

@@ -106,10 +106,16 @@ class RareSearch:
     report: Callable[[float], None] = lambda fraction: None
     members: int = 0
     notes: list[str] = field(default_factory=list)
-    _expected: float = 4.0 * RUNS * FIRST_SIZE
+    _expected: float = 8.0 * RUNS * FIRST_SIZE
+    _fraction: float = 0.0
 
     def answer(self) -> RareAnswer:
         """The probability. Raises NoProgress."""
+        found = self._answer()
+        self.report(1.0)
+        return found
+
+    def _answer(self) -> RareAnswer:
         runs = self.climbed(0, FIRST_SIZE, self.chained or self.limit)
         probability, spread, _ = joined(runs)
         if probability > RARE:
@@ -124,7 +130,9 @@ class RareSearch:
     def _told(self, count: int) -> None:
         self.members += count
         self._expected = max(self._expected, 1.05 * self.members)
-        self.report(min(1.0, self.members / self._expected))
+        # How much work there is turns out on the way: what was told is never taken back.
+        self._fraction = max(self._fraction, self.members / self._expected)
+        self.report(self._fraction)
 
     def climbed(self, round_: int, size: int, limit: Limit) -> list[SubsetRun]:
         """Independent runs of chains."""

@@ -111,6 +111,14 @@ def test_the_same_seed_has_the_same_bits():
     assert answers("unequal sides", 1e-5, [8])[0].probability != a.probability
 
 
+def test_progress_is_told_and_never_taken_back():
+    told = []
+    answers("a ball", 1e-5, [1], report=told.append)
+    assert told == sorted(told)
+    assert 0.0 < told[0] < 0.3
+    assert told[-1] == 1.0
+
+
 def test_what_is_likely_is_sampled_plainly():
     found = RareSearch(lambda u: u[:, 0] - 2.0, 3).answer()
     assert found.estimator == "plain"

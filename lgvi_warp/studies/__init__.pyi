@@ -3,6 +3,7 @@
 
 from lgvi_warp.calls.predict import Prediction as Prediction
 from lgvi_warp.studies.comparison import Candidate as Candidate
+from lgvi_warp.studies.estimating.answer import Estimated as Estimated
 from lgvi_warp.studies.files import Saved as Saved
 from lgvi_warp.studies.reference import Growth as Growth
 from lgvi_warp.studies.search.tune import Tuned as Tuned

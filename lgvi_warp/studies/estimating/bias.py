@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bias of a statistic by method and step: paired differences of the same members against finer steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lgvi_warp.studies.estimating.estimators import REPLICATES, plain, replicated, slope
+
+# Two settings agree where what they differ by is at most this part of the error asked for.
+AGREE = 0.25
+# Steps halve a difference of first order; where halvings fell by this factor twice, the next is a third of the last.
+FALLING = 3.0
+# Where settings leave more than this of each other's variance, their members are apart: chaos, or noise that is not shared.
+APART = 0.5
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How much a statistic changes from a coarse setting to a fine one, both on the same members and noise.
+
+    value: coarse less fine. half: of its 95 % interval. left: 1 - rho^2. members: number of pairs.
+    """
+
+    value: float
+    half: float
+    left: float
+    members: int
+
+    @property
+    def largest(self) -> float:
+        """The farther end of the interval from 0."""
+        return abs(self.value) + self.half
+
+
+@dataclass(frozen=True)
+class Bias:
+    """The bias of a setting, with half the width of its 95 % interval."""
+
+    value: float
+    half: float
+
+    @property
+    def mean_square(self) -> float:
+        """What it adds to the square of the error: half an interval is two standard errors."""
+        return self.value**2 + (0.5 * self.half) ** 2
+
+
+def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_replicates: bool = True) -> Difference:
+    """The paired difference of two settings' contributions (n,); in_replicates: whether they are of replicates.
+
+    least: as of `estimators.plain`; where none of n members differs, up to 3 / n of them may, with 95 %.
+    """
+    apart, n = coarse - fine, len(coarse)
+    part = replicated(apart) if in_replicates and n >= 2 * REPLICATES else plain(apart)
+    half = part.half_width(0.95)
+    if not apart.any():
+        half = 3.0 * least / n
+    return Difference(part.value, half, slope(fine, coarse)[1], n)
+
+
+def beyond(halvings: Sequence[Difference]) -> float:
+    """What is left beyond the finest step: the last halving bounds it for order one; a third where halvings fall faster.
+
+    A difference that happens to be near 0 says little: the one before, divided by four, is taken where that is larger.
+    """
+    sizes = [abs(each.value) for each in halvings]
+    last = max(sizes[-1], 0.25 * sizes[-2]) if len(sizes) > 1 else sizes[-1]
+    fell = len(sizes) > 1 and sizes[-2] >= FALLING * sizes[-1]
+    return last / 3.0 if fell else last
+
+
+def biases(halvings: Sequence[Difference]) -> list[Bias]:
+    """The bias of every step of a ladder, the coarsest first, from the difference of each to the next.
+
+    The differences of one ladder are of the same members and are added as they come, halves too, which bounds their sum.
+    """
+    if not halvings:
+        return [Bias(0.0, float("inf"))]
+    rest, found = beyond(halvings), [Bias(0.0, beyond(halvings) + halvings[-1].half)]
+    value = half = 0.0
+    for each in reversed(halvings):
+        value, half = value + each.value, half + each.half
+        found.append(Bias(value, half + rest))
+    return found[::-1]
+
+
+def interval(value: float, sampling_half: float, bias: Bias) -> tuple[float, float]:
+    """The 95 % interval of a value whose bias is told and not taken off.
+
+    What is random of both adds in squares; the bias itself widens the side on which the truth then lies.
+    """
+    half = float(np.hypot(sampling_half, bias.half))
+    return value - max(bias.value, 0.0) - half, value - min(bias.value, 0.0) + half

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pilot: a few members at ever finer steps, until the bias is small; then what settings share, and what they cost.
+
+Noise on a grid is drawn at the finer step of each pair, so that both see one path. The pilot costs at most a tenth of what
+plain Monte Carlo is predicted to cost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.studies.estimating import bias as biases_of
+from lgvi_warp.studies.estimating.bias import AGREE, APART, Bias, Difference, difference
+from lgvi_warp.studies.estimating.choice import Observed
+from lgvi_warp.studies.estimating.estimators import plain, tail_index
+from lgvi_warp.studies.estimating.levels import Runs, Setting, design, normals
+from lgvi_warp.studies.estimating.target import Solved, Target
+
+# Members of the first stage, and how many stages there are, each of four times the members of the one before.
+FIRST, STAGES = 64, (64, 256, 1024)
+# Part of plain Monte Carlo's predicted cost that the pilot may take.
+SHARE = 0.1
+# Where plain Monte Carlo needs at most so many members, a pilot is not worth its cost.
+FEW = 10 * FIRST
+# A tail that falls off by a smaller power has no finite variance, with what is known of so many members.
+HEAVY, KNOWN = 1.5, 256
+# Hits that a probability needs before its spread is known.
+HITS = 4
+
+
+@dataclass
+class Pilot:
+    """Members of the pilot, whose numbers are kept by setting and grid of the noise [s].
+
+    noise: "none", "grid" where settings may share a path, "free" where they cannot.
+    error: asked for; of the value where relative.
+    """
+
+    runs: Runs
+    target: Target
+    noise: str
+    error: float
+    relative: bool = False
+    numbers: dict[tuple[Setting, float | None], np.ndarray] = field(default_factory=dict)
+    messages: list[str] = field(default_factory=list)
+
+    def grid(self, setting: Setting) -> float | None:
+        """The grid of the noise of a setting alone, and of its pairs with coarser ones [s]."""
+        return setting.h if self.noise == "grid" else None
+
+    def y(self, setting: Setting, grid: float | None, members: int) -> np.ndarray:
+        """The numbers of the first members (n,)."""
+        known = self.numbers.get((setting, grid), np.empty(0))
+        if len(known) < members:
+            points = design(self.runs.seed, "estimate pilot", self.runs.dimensions, len(known), members - len(known))
+            new = self.runs(setting, grid, points, np.arange(len(known), members))
+            known = self.numbers[setting, grid] = np.concatenate([known, new])
+        return known[:members]
+
+    def solved(self, setting: Setting, members: int) -> Solved:
+        """The target by one setting."""
+        return self.target.solved([(1.0, self.y(setting, self.grid(setting), members))])
+
+    def asked(self, at: Solved) -> float:
+        """The error asked for, in the unit of the statistic."""
+        return self.error * abs(at.value) if self.relative else self.error
+
+    def plain_members(self, setting: Setting, members: int) -> float:
+        """How many members plain Monte Carlo needs."""
+        at = self.solved(setting, members)
+        z, error = self.target.contributions(self.y(setting, self.grid(setting), members), at), self.asked(at)
+        variance = plain(z, self.target.least(at)).variance * members
+        return variance / error**2 if error > 0.0 else (math.inf if variance > 0.0 else 1.0)
+
+    def most_seconds(self, setting: Setting, members: int) -> float:
+        """What the pilot may cost [s]."""
+        return SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting))
+
+    def pair(self, coarse: Setting, fine: Setting, members: int) -> Difference:
+        """How much the target changes from one setting to a finer one."""
+        grid = self.grid(fine)
+        below, above = self.y(coarse, grid, members), self.y(fine, grid, members)
+        at = self.target.solved([(1.0, above)])
+        z = (self.target.contributions(y, at) for y in (below, above))
+        return difference(*z, self.target.least(at))
+
+
+@dataclass
+class Ladder:
+    """Steps of one method that were run, the coarsest first; refused: why others were not.
+
+    halvings: the difference of each step to the next.
+    end: why it ended: "agree", "apart", "members" (their number leaves the difference open), "cost" or "steps".
+    """
+
+    settings: list[Setting] = field(default_factory=list)
+    halvings: list[Difference] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+    end: str = "steps"
+
+    def biases(self) -> list[Bias]:
+        """The bias of each step."""
+        return biases_of.biases(self.halvings)
+
+    def settled(self, error: float) -> int:
+        """The coarsest step whose bias takes at most half of the error; where there is none the finest but one."""
+        if len(self.settings) < 2:
+            return 0
+        found = [i for i, bias in enumerate(self.biases()) if bias.mean_square <= (0.5 * error) ** 2]
+        return found[0] if found else len(self.settings) - (1 if self.end != "apart" else 2)
+
+
+def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None) -> Ladder:
+    """Run ever finer steps until two agree, members are apart, or more would cost too much.
+
+    fixed: a setting that the caller asked for: the ladder goes on to the one after it and ends.
+    """
+    ladder = Ladder()
+    for setting in steps:
+        if fixed is None and len(ladder.settings) > 1 and _too_dear(pilot, ladder, 4.0):
+            ladder.end = "cost"
+            break
+        if not _runs(pilot, setting, ladder):
+            continue
+        ladder.settings.append(setting)
+        if len(ladder.settings) < 2:
+            _first_look(pilot, setting)
+            continue
+        if fixed is None and pilot.plain_members(ladder.settings[0], FIRST) <= FEW:
+            ladder.halvings.append(pilot.pair(*ladder.settings[-2:], FIRST))
+            ladder.end = "agree" if _agree(pilot, ladder) else ladder.end
+        else:
+            ladder.halvings.append(_compared(pilot, ladder))
+        if fixed is None and (end := _ended(pilot, ladder)):
+            ladder.end = end
+            break
+    return ladder
+
+
+def _runs(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
+    """Whether a setting is taken and no member fails at it."""
+    try:
+        y = pilot.y(setting, pilot.grid(setting), FIRST)
+        if pilot.grid(setting) is not None and ladder.settings:
+            pilot.y(ladder.settings[-1], pilot.grid(setting), FIRST)
+    except SceneError as error:
+        ladder.refused[str(setting)] = error.faults[0]
+        return False
+    if np.isnan(y).any():
+        ladder.refused[str(setting)] = f"{int(np.isnan(y).sum())} of {len(y)} members fail"
+        return False
+    if np.isinf(y).any():
+        problem = f"is infinite for {int(np.isinf(y).sum())} of {len(y)} members, so that its mean is"
+        raise refusal("of", pilot.runs.question.label, problem, "ask for a quantile or a probability")
+    return True
+
+
+def _first_look(pilot: Pilot, setting: Setting) -> None:
+    """Take more members at the coarsest step where a probability's hits are few and its error is relative."""
+    if not (pilot.relative and pilot.target.kind == "probability"):
+        return
+    for members in STAGES:
+        hits = float(pilot.y(setting, pilot.grid(setting), members).sum())
+        if hits >= HITS:
+            return
+    problem = f"was seen {hits:.0f} times among {members:,} members of the pilot, too seldom to fix their number"
+    remedy = "use lw.rare_event, which finds rare events, or give error= in place of relative_error="
+    raise refusal("of", pilot.runs.question.label, problem, remedy)
+
+
+def _compared(pilot: Pilot, ladder: Ladder) -> Difference:
+    """The last halving, of as many members as it takes to know whether it is small, and as are worth their cost."""
+    for members in STAGES:
+        found = pilot.pair(*ladder.settings[-2:], members)
+        small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
+        if found.left > APART or found.half <= small or abs(found.value) > max(found.half, small):
+            break
+        if _too_dear(pilot, ladder, 3.0 * members / FIRST):
+            break
+    return found
+
+
+def _too_dear(pilot: Pilot, ladder: Ladder, firsts: float) -> bool:
+    """Whether the pilot would cost too much with so many times 64 members more at the finest step."""
+    last = ladder.settings[-1]
+    more = firsts * FIRST * pilot.runs.cost(last, pilot.grid(last))
+    at = ladder.settings[-2] if len(ladder.settings) > 1 else last
+    return pilot.runs.seconds + more > pilot.most_seconds(at, FIRST)
+
+
+def _agree(pilot: Pilot, ladder: Ladder) -> bool:
+    small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
+    return abs(ladder.halvings[-1].value) <= max(small, 0.0)
+
+
+def _ended(pilot: Pilot, ladder: Ladder) -> str:
+    """Why no finer step is run; "" to go on."""
+    halvings = ladder.halvings
+    if len(halvings) > 1 and all(each.left > APART for each in halvings[-2:]):
+        return "apart"
+    if not _agree(pilot, ladder):
+        return ""
+    small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
+    return "agree" if halvings[-1].half <= small else "members"
+
+
+def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: int) -> Observed:
+    """What settings have in common: all of the same members, noise drawn at the step of the top one."""
+    settings, grid = [top, *coarser], pilot.grid(top)
+    y = [pilot.y(setting, grid, members) for setting in settings]
+    kept = [i for i, values in enumerate(y) if np.isfinite(values).all()]
+    if 0 not in kept:
+        raise failing(top, y[0])
+    refuse_heavy(pilot.runs.question.label, y[0])
+    at = pilot.target.solved([(1.0, y[0])])
+    for i in kept:
+        pilot.y(settings[i], pilot.grid(settings[i]), FIRST)  # which tells what it costs alone
+
+    def pair(f: int, c: int) -> float:
+        # Both costs are known with the draws of the top step, which are as many or more.
+        return pilot.runs.cost(settings[kept[f]], grid) + pilot.runs.cost(settings[kept[c]], grid)
+
+    points = design(pilot.runs.seed, "estimate pilot", pilot.runs.dimensions, 0, members)
+    return Observed(
+        [pilot.target.contributions(y[i], at) for i in kept],
+        normals(points),
+        [pilot.runs.cost(settings[i], pilot.grid(settings[i])) for i in kept],
+        pair,
+        pilot.target.least(at),
+        [settings[i] for i in kept],
+        at,
+    )
+
+
+def failing(setting: Setting, y: np.ndarray) -> SceneError:
+    """The refusal of a statistic of members that fail at the finest step."""
+    count = int(np.isnan(y).sum())
+    problem = f"{count} of {len(y)} members fail, or have no finite number"
+    return refusal("setting", str(setting), problem, "mend what fails (lw.solve says which), or vary less")
+
+
+def refuse_heavy(label: str, y: np.ndarray) -> None:
+    """Refuse a statistic whose variance seems infinite; SceneError."""
+    index = tail_index(y)
+    if len(y) >= KNOWN and index < HEAVY:
+        problem = f"has no finite variance, as it seems: its tail falls off with the power {index:.2g} of {len(y)} members"
+        raise refusal("of", label, problem, "ask for a quantile, risk=0.5, or a probability")

@@ -21,13 +21,16 @@ from lgvi_warp.studies.estimating.levels import Level, Runs, Setting, estimated
 from lgvi_warp.studies.estimating.pilot import (
     FEW,
     FIRST,
+    SHARE,
     STAGES,
     Ladder,
     Pilot,
+    at_once,
     climb,
     failing,
     observed,
     refuse_heavy,
+    runs_at,
 )
 from lgvi_warp.studies.estimating.target import Solved
 
@@ -72,7 +75,7 @@ def answered(
     own_step: float | None, report: Callable[[float], None], content: Mapping[str, Any],
 ) -> Estimated:  # fmt: skip
     """Run the pilot, choose, run, and tell."""
-    chosen = setting_of(pilot, ladders, fixed)
+    chosen = setting_of(pilot, ladders, fixed, own_step)
     report(0.1)
     top = chosen.setting
     if constant(pilot, top):
@@ -95,11 +98,16 @@ def answered(
     return told(pilot, chosen, levels, (seen, ways, pilot_seconds), (solved, part), own_step, content)
 
 
-def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool) -> Chosen:
-    """Climb the ladders and choose the setting that is predicted to cost least."""
+def setting_of(
+    pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, own_step: float | None
+) -> Chosen:
+    """Climb the ladders and choose the setting that is predicted to cost least; the own step where members are few."""
     climbed = []
+    own = ladders[0][-2] if fixed else None if own_step is None else replace(ladders[0][0], h=own_step)
     for i, steps in enumerate(ladders):
-        asked = steps[-2] if fixed else None
+        if i == 0 and own is not None and seems_few(pilot, steps) and (ladder := at_once(pilot, own)):
+            return choice_of(pilot, ladder, own)
+        asked = own if fixed else None
         ladder = climb(pilot, steps, asked)
         if asked is not None and asked not in ladder.settings:
             why = ladder.refused.get(str(asked), "it was not run")
@@ -109,10 +117,19 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool) 
         elif i == len(ladders) - 1 and not climbed:
             causes = "; ".join(f"{name}: {why}" for name, why in list(ladder.refused.items())[-2:])
             raise SceneError([f"setting: no step was taken: {causes}; mend what fails, or fix method= and h="])
-        if climbed and climbed[-1].ladder.end in ("apart", "cost"):
+        if climbed and climbed[-1].ladder.end == "apart":
             break
     best = min(climbed, key=lambda each: each.bias.mean_square > each.error**2 or price(pilot, each))
     return compared(pilot, best, [each for each in climbed if each is not best])
+
+
+def seems_few(pilot: Pilot, steps: Sequence[Setting]) -> bool:
+    """Whether plain Monte Carlo needs few members, by the coarsest step that runs."""
+    for setting in steps:
+        ladder = Ladder()
+        if runs_at(pilot, setting, ladder):
+            return pilot.plain_members(setting, FIRST) <= FEW
+    return False
 
 
 def price(pilot: Pilot, chosen: Chosen) -> float:
@@ -150,7 +167,7 @@ def compared(pilot: Pilot, best: Chosen, others: Sequence[Chosen]) -> Chosen:
     if math.sqrt(best.bias.mean_square) > 0.87 * best.error:
         messages.append(
             f"the bias is known to {math.sqrt(best.bias.mean_square):.2g} alone, the error asked for is {best.error:.2g}: "
-            + {"cost": "more would cost beyond what plain Monte Carlo takes", "apart": "members of all steps are apart"}.get(
+            + {"apart": "members of all steps are apart", "members": "more members of the pilot would cost too much"}.get(
                 ladder.end, "ask for a shorter t1 or a larger error")
         )  # fmt: skip
     return best
@@ -190,12 +207,12 @@ def looked(pilot: Pilot, top: Setting, coarser: Sequence[Setting], variance: flo
     seen = observed(pilot, top, [] if few else coarser, FIRST)
     for members in STAGES[1:]:
         best = candidates(seen, variance)[0]
-        used = [seen.settings.index(setting) for setting in seen.settings]
-        # A setting that no way among the best stands on is not run further.
-        more = 0.75 * members * sum(seen.costs[i] for i in used)
-        if more > WORTH * best.seconds or pilot.runs.seconds + more > pilot.most_seconds(top, FIRST):
+        kept = worth_more(seen, variance)
+        more = 0.75 * members * sum(seen.costs[seen.settings.index(setting)] for setting in (top, *kept))
+        within_share = pilot.runs.seconds + more <= pilot.most_seconds(top, FIRST)
+        if few or more > (WORTH if within_share else SHARE) * best.seconds:
             break
-        seen = observed(pilot, top, worth_more(seen, variance), members)
+        seen = observed(pilot, top, kept, members)
     return seen
 
 

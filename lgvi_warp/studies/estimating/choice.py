@@ -109,7 +109,10 @@ def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: floa
         weight *= factor
     spreads.append(_spread(seen, kind, weight * seen.z[chain[-1]], seen.costs[chain[-1]], weight))
     numbers = best_numbers(spreads, variance)
-    members = tuple(rounded(kind, ROOM * n, seen.normals.shape[1]) for n in numbers)
+    dimensions = seen.normals.shape[1]
+    members = tuple(
+        rounded(kind, ROOM * n, dimensions, spread.power) for n, spread in zip(numbers, spreads, strict=True)
+    )
     seconds = float(sum(max(ROOM * n, FEWEST) * spread.cost for n, spread in zip(numbers, spreads, strict=True)))
     left = sum(spread.at(n) for spread, n in zip(spreads, members, strict=True))
     return Candidate(kind, chain, tuple(slopes), members, seconds, left)
@@ -124,10 +127,17 @@ def _spread(seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float
     return spread_of_plain(z, cost, least)
 
 
-def rounded(kind: str, members: float, dimensions: int) -> int:
-    """A number of members as an estimator takes it: powers of two of points in each replicate."""
+def rounded(kind: str, members: float, dimensions: int, power: float = 1.0) -> int:
+    """A number of members as an estimator takes it.
+
+    Powers of two of Sobol points in each replicate are balanced, which pays where the variance falls faster than members
+    grow; elsewhere an eighth of a power is fine enough.
+    """
     if kind == "sobol":
-        return REPLICATES * 2 ** max(2, math.ceil(math.log2(max(members, 1.0) / REPLICATES)))
+        points = max(members / REPLICATES, 4.0)
+        whole = 2 ** math.ceil(math.log2(points))
+        part = whole if power > 1.0 else max(whole // 16, 1)
+        return REPLICATES * part * math.ceil(points / part)
     least = max(FEWEST, 8 * (dimensions + 1)) if kind == "regression" else FEWEST
     return REPLICATES * math.ceil(max(members, least) / REPLICATES)
 

@@ -13,6 +13,8 @@ import numpy as np
 REPLICATES = 16
 # How fast a variance may fall at most with the number of points, as a power of it; independent members have 1.
 STEEPEST = 2.0
+# A design whose variance is not smaller than that of independent members by this gains no more with more points.
+SMOOTH = 3.0
 
 
 @dataclass(frozen=True)
@@ -109,11 +111,12 @@ def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> Spread:
 def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replicates: int = REPLICATES) -> Spread:
     """How the variance of a replicated design's mean falls, from some of its members (n,), in the order of the design.
 
-    A quarter of the points shows how fast. Both variances are known to a third, so half of what exceeds 1 is taken.
+    A quarter of the points shows how fast. Both variances are known to a third, so half of what exceeds 1 is taken; and
+    nothing where noise leaves little gain over independent members.
     """
     n = len(y)
     variance, power = replicated(y, least, replicates).variance, 1.0
-    if n >= 8 * replicates:
+    if n >= 8 * replicates and plain(y, least).variance > SMOOTH * variance:
         fewer = replicated(y[: n // 4], least, replicates).variance
         seen = math.log(fewer / variance) / math.log(4.0) if variance > 0.0 and fewer > 0.0 else 1.0
         power = float(np.clip(0.5 + 0.5 * seen, 1.0, STEEPEST))

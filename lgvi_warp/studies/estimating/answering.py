@@ -77,25 +77,42 @@ def answered(
     """Run the pilot, choose, run, and tell."""
     chosen = setting_of(pilot, ladders, fixed, own_step)
     report(0.1)
-    top = chosen.setting
-    if constant(pilot, top):
+    if constant(pilot, chosen.setting):
         return told(pilot, chosen, [], None, None, own_step, content)
-    coarser = coarser_than(pilot, chosen, coarse)
-    seen = looked(pilot, top, coarser, chosen.variance)
-    pilot_seconds = pilot.runs.seconds
-    report(0.2)
+    while True:
+        top = chosen.setting
+        seen = looked(pilot, top, coarser_than(pilot, chosen, coarse), chosen.variance)
+        pilot_seconds = pilot.runs.seconds
+        report(0.2)
+        levels, ways, failed = tried(pilot, seen, chosen, report)
+        if failed is None:
+            break
+        pilot.messages.append(f"{failed} is left out: members fail at it")
+        if chosen.place + 1 == len(chosen.ladder.settings):
+            raise failing(top, np.concatenate(levels[0].y))
+        chosen = finer(chosen)
+    solved, part = enough(pilot, chosen, levels)
+    return told(pilot, chosen, levels, (seen, ways, pilot_seconds), (solved, part), own_step, content)
+
+
+def tried(
+    pilot: Pilot, seen: Observed, chosen: Chosen, report: Callable[[float], None]
+) -> tuple[list[Level], list[Candidate], Setting | None]:
+    """Run the best way that does not stand on a setting at which members fail; the top setting where they fail at it."""
     while True:
         ways = candidates(seen, chosen.variance)
         levels = levels_of(pilot, seen, ways[0])
         failed = run(pilot.runs, levels, lambda part: report(0.2 + 0.7 * part))
-        if failed is None:
-            break
-        if failed == top:
-            raise failing(top, np.concatenate(levels[0].y))
+        if failed is None or failed == chosen.setting:
+            return levels, ways, failed
         pilot.messages.append(f"{failed} is left out: members fail at it")
         seen = without(seen, failed)
-    solved, part = enough(pilot, chosen, levels)
-    return told(pilot, chosen, levels, (seen, ways, pilot_seconds), (solved, part), own_step, content)
+
+
+def finer(chosen: Chosen) -> Chosen:
+    """The next step of the ladder."""
+    place = chosen.place + 1
+    return replace(chosen, place=place, bias=chosen.ladder.biases()[place])
 
 
 def setting_of(

@@ -111,12 +111,15 @@ def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> Spread:
 def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replicates: int = REPLICATES) -> Spread:
     """How the variance of a replicated design's mean falls, from some of its members (n,), in the order of the design.
 
-    A quarter of the points shows how fast. Both variances are known to a third, so half of what exceeds 1 is taken; and
-    nothing where noise leaves little gain over independent members.
+    Variances of 16 replicates are known to a third. Where they gain less than three times over independent members, as where
+    noise acts, half of the gain's logarithm is believed. Elsewhere a quarter of the points shows how fast the variance
+    falls, and half of what exceeds the power 1 is taken.
     """
     n = len(y)
-    variance, power = replicated(y, least, replicates).variance, 1.0
-    if n >= 8 * replicates and plain(y, least).variance > SMOOTH * variance:
+    variance, alone, power = replicated(y, least, replicates).variance, plain(y, least).variance, 1.0
+    if alone <= SMOOTH * variance:
+        variance = math.sqrt(alone * variance)
+    elif n >= 8 * replicates:
         fewer = replicated(y[: n // 4], least, replicates).variance
         seen = math.log(fewer / variance) / math.log(4.0) if variance > 0.0 and fewer > 0.0 else 1.0
         power = float(np.clip(0.5 + 0.5 * seen, 1.0, STEEPEST))

@@ -27,6 +27,8 @@ FIRST, STAGES = 64, (64, 256, 1024)
 SHARE = 0.1
 # Where plain Monte Carlo needs at most so many members, a pilot is not worth its cost.
 FEW = 10 * FIRST
+# Half the step leaves pairs apart by a half to a 1.4th; where it leaves more, more pairs do better.
+STALLED = 0.8
 # A tail that falls off by a smaller power has no finite variance, with what is known of so many members.
 HEAVY, KNOWN = 1.5, 256
 # Hits that a probability needs before its spread is known.
@@ -192,19 +194,22 @@ def _compared(pilot: Pilot, ladder: Ladder) -> Difference:
     for members in STAGES:
         found = pilot.pair(*ladder.settings[-2:], members)
         small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
-        if found.left > APART or found.half <= small or abs(found.value) > max(found.half, small):
-            break
-        if _too_dear(pilot, ladder, 3.0 * members / FIRST):
+        known = found.half <= small or abs(found.value) > max(found.half, small)
+        if known or found.left > APART or not _stalls(ladder, found, small) or _too_dear(pilot, ladder, members):
             break
     return found
 
 
-def _too_dear(pilot: Pilot, ladder: Ladder, firsts: float) -> bool:
-    """Whether the pilot would cost too much with so many times 64 members more at the finest step."""
+def _stalls(ladder: Ladder, found: Difference, small: float) -> bool:
+    """Whether a finer step would not make the pairs agree much better than more of them do."""
+    return found.half <= 4.0 * small or bool(ladder.halvings and found.half > STALLED * ladder.halvings[-1].half)
+
+
+def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
+    """Whether three times as many pairs more would cost too much."""
     last = ladder.settings[-1]
-    more = firsts * FIRST * pilot.runs.cost(last, pilot.grid(last))
-    at = ladder.settings[-2] if len(ladder.settings) > 1 else last
-    return pilot.runs.seconds + more > pilot.most_seconds(at, FIRST)
+    more = 3.0 * members * 1.5 * pilot.runs.cost(last, pilot.grid(last))
+    return pilot.runs.seconds + more > pilot.most_seconds(ladder.settings[-2], FIRST)
 
 
 def _ended(pilot: Pilot, ladder: Ladder) -> str:
@@ -214,8 +219,9 @@ def _ended(pilot: Pilot, ladder: Ladder) -> str:
         return "apart"
     if any(bias.mean_square <= (0.5 * error) ** 2 for bias in ladder.biases()):
         return "agree"
-    open_ = halvings[-1].half > AGREE * error and abs(halvings[-1].value) <= halvings[-1].half
-    return "members" if open_ else ""
+    last = halvings[-1]
+    stalls = len(halvings) > 1 and last.half > STALLED * halvings[-2].half and abs(last.value) <= last.half
+    return "members" if stalls and last.half > AGREE * error else ""
 
 
 def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: int) -> Observed:

@@ -210,7 +210,7 @@ def coarser_than(pilot: Pilot, chosen: Chosen, coarse: Sequence[Sequence[Setting
             if multiple < 1.0 - 1e-9 or abs(multiple - round(multiple)) > 1e-9 * multiple:
                 continue
             try:
-                if np.isfinite(pilot.y(replace(step, method=top.method), pilot.grid(top), FIRST)).all():
+                if not np.isnan(pilot.y(replace(step, method=top.method), pilot.grid(top), FIRST)).any():
                     found.append(replace(step, method=top.method))
                     break
             except SceneError as error:
@@ -275,7 +275,7 @@ def run(runs: Runs, levels: Sequence[Level], report: Callable[[float], None]) ->
     for i, level in enumerate(levels):
         level.grow(runs, level.members)
         for setting, numbers in ((level.fine, level.y), (level.coarse, level.below)):
-            if setting is not None and not np.isfinite(numbers[-1]).all():
+            if setting is not None and np.isnan(numbers[-1]).any():
                 return setting
         report((i + 1) / len(levels))
     return None
@@ -286,13 +286,14 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solve
 
     The variance is then at least a quarter of the first: a stop by chance must not tell too small an error.
     """
-    refuse_heavy(pilot.runs.question.label, np.concatenate(levels[0].y))
+    if pilot.target.kind in ("mean", "cvar"):
+        refuse_heavy(pilot.runs.question.label, np.concatenate(levels[0].y))
     solved, part = estimated(levels, pilot.target)
     if part.variance <= max(chosen.error**2 - chosen.bias.mean_square, 0.25 * chosen.error**2):
         return solved, part
     for level in levels:
         level.grow(pilot.runs, level.members)
-        if not all(np.isfinite(numbers[-1]).all() for numbers in (level.y, level.below) if numbers):
+        if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):
             raise failing(level.fine, level.y[-1])
     before = part.variance
     solved, part = estimated(levels, pilot.target)

@@ -29,6 +29,8 @@ SHARE = 0.1
 FEW = 10 * FIRST
 # Half the step leaves pairs apart by a half to a 1.4th; where it leaves more, more pairs do better.
 STALLED = 0.8
+# Conditions and quantiles are smoothed over this part of the numbers' spread to see how a step changes them.
+WIDTH = 0.2
 # A tail that falls off by a smaller power has no finite variance, with what is known of so many members.
 HEAVY, KNOWN = 1.5, 256
 # Hits that a probability needs before its spread is known.
@@ -88,6 +90,9 @@ class Pilot:
         grid = self.grid(fine)
         below, above = self.y(coarse, grid, members), self.y(fine, grid, members)
         at = self.target.solved([(1.0, above)])
+        spread = float(np.std(above[np.isfinite(above)])) if np.isfinite(above).any() else 0.0
+        if self.target.smooth and spread > 0.0:
+            return difference(*(self.target.smoothed(y, at, WIDTH * spread) for y in (below, above)))
         z = (self.target.contributions(y, at) for y in (below, above))
         return difference(*z, self.target.least(at))
 
@@ -170,7 +175,7 @@ def runs_at(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
     if np.isnan(y).any():
         ladder.refused[str(setting)] = f"{int(np.isnan(y).sum())} of {len(y)} members fail"
         return False
-    if np.isinf(y).any():
+    if pilot.target.kind in ("mean", "cvar") and np.isinf(y).any():
         problem = f"is infinite for {int(np.isinf(y).sum())} of {len(y)} members, so that its mean is"
         raise refusal("of", pilot.runs.question.label, problem, "ask for a quantile or a probability")
     return True
@@ -181,7 +186,7 @@ def _first_look(pilot: Pilot, setting: Setting) -> None:
     if not (pilot.relative and pilot.target.kind == "probability"):
         return
     for members in STAGES:
-        hits = float(pilot.y(setting, pilot.grid(setting), members).sum())
+        hits = float(pilot.target.counted(pilot.y(setting, pilot.grid(setting), members)).sum())
         if hits >= HITS:
             return
     problem = f"was seen {hits:.0f} times among {members:,} members of the pilot, too seldom to fix their number"
@@ -228,10 +233,11 @@ def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: in
     """What settings have in common: all of the same members, noise drawn at the step of the top one."""
     settings, grid = [top, *coarser], pilot.grid(top)
     y = [pilot.y(setting, grid, members) for setting in settings]
-    kept = [i for i, values in enumerate(y) if np.isfinite(values).all()]
+    kept = [i for i, values in enumerate(y) if not np.isnan(values).any()]
     if 0 not in kept:
         raise failing(top, y[0])
-    refuse_heavy(pilot.runs.question.label, y[0])
+    if pilot.target.kind in ("mean", "cvar"):
+        refuse_heavy(pilot.runs.question.label, y[0])
     at = pilot.target.solved([(1.0, y[0])])
     for i in kept:
         pilot.y(settings[i], pilot.grid(settings[i]), FIRST)  # which tells what it costs alone

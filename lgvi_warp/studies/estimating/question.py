@@ -33,7 +33,6 @@ class Question:
     label: of the answer, as "mean position[0]".
     of: a quantity of interest; None where a metric gives the number.
     metric: the statistic that gathers the number of each member; None where a quantity gives it.
-    above, below: a condition on the number, which is then 1 where it holds, else 0.
     """
 
     label: str
@@ -41,8 +40,6 @@ class Question:
     target: Target
     of: Any = None
     metric: Statistic | None = None
-    above: float | None = None
-    below: float | None = None
 
     def settings(self, scene: SceneLike) -> dict[str, Any]:
         """Arguments of `lw.prepare` that the question needs in a scene."""
@@ -65,11 +62,7 @@ class Question:
             y = np.where(failed(answer.status), np.nan, gathered)
         if y.ndim != 1:
             raise refusal("of", self.label, f"is {y.shape[1]} numbers", "name one of its entries")
-        if self.above is None and self.below is None:
-            return np.array(y)
-        above = -np.inf if self.above is None else self.above
-        below = np.inf if self.below is None else self.below
-        return np.where(np.isnan(y), np.nan, ((y > above) & (y < below)).astype(np.float64))
+        return np.array(y)
 
 
 def question_of(of: Any, risk: Any = "mean") -> Question:
@@ -196,7 +189,7 @@ def _bounded(question: Question, above: float | None = None, below: float | None
     if not limits:
         above = 0.5
     label = f"probability {inner}{limits}"
-    return replace(question, label=label, unit="1", target=Target("probability"), above=above, below=below)
+    return replace(question, label=label, unit="1", target=Target("probability", above=above, below=below))
 
 
 def _of_passage(statistic: statistics.FirstPassage) -> Question:

@@ -32,15 +32,18 @@ class Target:
     """A mean ("mean"), a probability ("probability"), a "quantile" of a level, or the mean of the worst part, a "cvar".
 
     level: of the quantile, or the part.
+    above, below: a probability's limits; without any the numbers are 1 or 0 themselves.
     """
 
     kind: str = "mean"
     level: float = 0.5
+    above: float | None = None
+    below: float | None = None
 
     def solved(self, samples: Sequence[Weighted]) -> Solved:
         """The value from weighted samples, whose weights have the sum 1."""
         if self.kind in ("mean", "probability"):
-            return Solved(mean_of(samples, lambda y: y))
+            return Solved(mean_of(samples, self.counted))
         level = self.level if self.kind == "quantile" else 1.0 - self.level
         threshold = quantile_of(samples, level)
         if self.kind == "quantile":
@@ -54,7 +57,36 @@ class Target:
             return at.threshold + (self.level - (y <= at.threshold)) / at.density
         if self.kind == "cvar":
             return np.asarray(at.threshold + np.maximum(y - at.threshold, 0.0) / self.level)
-        return y
+        return self.counted(y)
+
+    def counted(self, y: np.ndarray) -> np.ndarray:
+        """The numbers themselves; of a condition 1 where it holds and 0 where not."""
+        if self.above is None and self.below is None:
+            return y
+        holds = np.ones(y.shape, bool) if self.above is None else y > self.above
+        holds = holds if self.below is None else holds & (y < self.below)
+        return np.where(np.isnan(y), np.nan, holds)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether contributions jump where a number passes a threshold, and may be smoothed to see small changes of it."""
+        return self.kind == "quantile" or self.above is not None or self.below is not None
+
+    def smoothed(self, y: np.ndarray, at: Solved, width: float) -> np.ndarray:
+        """Contributions whose jumps are smoothed over a width, for differences: how much probability small changes move.
+
+        The change of a probability is the density at the threshold times the change of the number; over a width the density
+        is averaged, while of a few members none may jump.
+        """
+        from scipy.special import ndtr
+
+        def beyond(limit: float) -> np.ndarray:
+            return np.asarray(ndtr((y - limit) / width))
+
+        if self.kind == "quantile":
+            return np.asarray(at.threshold + (self.level - 1.0 + beyond(at.threshold)) / at.density)
+        whole = np.ones(len(y)) if self.above is None else beyond(self.above)
+        return whole if self.below is None else whole - beyond(self.below)
 
     def least(self, at: Solved) -> float:
         """The smallest change of a contribution: 0 where contributions are continuous."""

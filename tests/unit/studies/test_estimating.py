@@ -16,9 +16,9 @@ from lgvi_warp.studies.estimating.question import question_of
 from lgvi_warp.studies.estimating.target import Solved, Target
 from tests.support.refusals import refused, says
 
-SEEDS = range(400)
-# Of 400 seeds 95 % hold in 369 to 391 with 99 %.
-HELD = (0.92, 0.978)
+SEEDS = range(200)
+# Of 200 seeds 95 % hold in 181 to 197 with 99 %.
+HELD = (0.905, 0.985)
 
 
 def covered(parts, truth):
@@ -43,7 +43,7 @@ def test_points_of_replicates_go_on():
 def test_plain_intervals_hold():
     rng = np.random.default_rng(1)
     parts = [estimators.plain(rng.exponential(size=200)) for _ in SEEDS]
-    assert HELD[0] - 0.01 <= covered(parts, 1.0) <= HELD[1]
+    assert HELD[0] <= covered(parts, 1.0) <= HELD[1]
     assert parts[0].freedom == 199.0
 
 
@@ -172,7 +172,7 @@ def test_intervals_of_quantiles_and_worst_parts_hold(kind, truth):
         y = rng.normal(size=2000)
         at = target.solved([(1.0, y)])
         held.append(abs(at.value - truth) <= estimators.plain(target.contributions(y, at)).half_width(0.95))
-    assert HELD[0] - 0.01 <= np.mean(held) <= HELD[1]
+    assert HELD[0] <= np.mean(held) <= HELD[1]
 
 
 def test_differences_hold_in_replicates_and_alone():
@@ -280,15 +280,15 @@ def test_what_is_asked():
     assert same == ["mean depth"] * 3
     for of in ("depth above 3", "probability depth above 3", S.Exceedance("depth", above=3.0)):
         question = question_of(of)
-        assert (question.label, question.above, question.target.kind) == ("probability depth above 3", 3.0, "probability")
+        assert (question.label, question.target) == ("probability depth above 3", Target("probability", above=3.0))
     assert question_of("outcome floor").target == question_of(S.Outcome("floor")).target == Target("probability")
     assert question_of(S.Quantiles("depth", levels=[0.9])) == question_of("depth", 0.9)
     assert question_of("max(depth)", metrics.CVaR(0.1)).target == Target("cvar", 0.1)
     assert question_of("itae depth").label == question_of(metrics.ITAE("depth")).label == "mean itae depth"
     above = question_of(metrics.ITAE("depth", then=S.Exceedance(above=3.0)))
-    assert (above.label, above.above) == ("probability itae depth above 3", 3.0)
+    assert (above.label, above.target.above) == ("probability itae depth above 3", 3.0)
     passage = question_of(S.FirstPassage("depth", below=3.0))
-    assert (passage.of, passage.below) == ("min(depth)", 3.0)
+    assert (passage.of, passage.target.below) == ("min(depth)", 3.0)
 
 
 @pytest.mark.parametrize(
@@ -310,8 +310,24 @@ def test_what_is_no_question(of, words):
 
 
 def test_conditions_of_numbers():
-    numbers = question_of("depth above 3").numbers(np.array([2.0, 4.0, np.nan]))
-    np.testing.assert_array_equal(numbers, [0.0, 1.0, np.nan])
+    counted = question_of("depth above 3").target.counted(np.array([2.0, 4.0, np.nan, np.inf]))
+    np.testing.assert_array_equal(counted, [0.0, 1.0, np.nan, 1.0])
+
+
+@pytest.mark.parametrize("target", [Target("probability", above=0.5), Target("probability", below=0.5),
+                                    Target("probability", above=-0.2, below=0.5), Target("quantile", 0.7)], ids=str)  # fmt: skip
+def test_smoothed_changes_of_probabilities(target):
+    """A shift of 0.01 moves what the density says, and 64 members tell it, of which hardly one jumps."""
+    y = stats.norm.ppf(cubed(1, 64, 1)[:, 0])
+    at = Solved(0.0, stats.norm.ppf(0.7), stats.norm.pdf(stats.norm.ppf(0.7)))
+    found = bias.difference(target.smoothed(y + 0.01, at, 0.2), target.smoothed(y, at, 0.2))
+    if target.kind == "quantile":
+        truth = 0.01
+    else:
+        ends = [np.inf if target.below is None else target.below, -np.inf if target.above is None else target.above]
+        truth = float(np.subtract(*stats.norm.cdf(np.subtract(ends, 0.01))) - np.subtract(*stats.norm.cdf(ends)))
+    assert found.value == pytest.approx(truth, rel=0.1)
+    assert found.half < 0.5 * abs(truth)
 
 
 def test_an_answer_in_words():

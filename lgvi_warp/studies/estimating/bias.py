@@ -16,6 +16,8 @@ AGREE = 0.25
 FALLING = 3.0
 # Where settings leave more than this of each other's variance, their members are apart: chaos, or noise that is not shared.
 APART = 0.5
+# Spreads that differ by more than this factor are not alike.
+ALIKE = 2.0
 
 
 @dataclass(frozen=True)
@@ -23,17 +25,24 @@ class Difference:
     """How much a statistic changes from a coarse setting to a fine one, both on the same members and noise.
 
     value: coarse less fine. half: of its 95 % interval. left: 1 - rho^2. members: number of pairs.
+    alike: whether both spread about as much, as members that are apart by chaos do, and steps that are too long do not.
     """
 
     value: float
     half: float
     left: float
     members: int
+    alike: bool = True
 
     @property
     def largest(self) -> float:
         """The farther end of the interval from 0."""
         return abs(self.value) + self.half
+
+    @property
+    def apart(self) -> bool:
+        """Whether members of both settings have little in common, and no step is too long."""
+        return self.alike and self.left > APART
 
 
 @dataclass(frozen=True)
@@ -46,7 +55,7 @@ class Bias:
     @property
     def mean_square(self) -> float:
         """What it adds to the square of the error: half an interval is two standard errors."""
-        return self.value**2 + (0.5 * self.half) ** 2
+        return self.value * self.value + 0.25 * self.half * self.half
 
 
 def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_replicates: bool = True) -> Difference:
@@ -54,12 +63,15 @@ def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_r
 
     least: as of `estimators.plain`; where none of n members differs, up to 3 / n of them may, with 95 %.
     """
-    apart, n = coarse - fine, len(coarse)
-    part = replicated(apart) if in_replicates and n >= 2 * REPLICATES else plain(apart)
-    half = part.half_width(0.95)
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of steps that are too long may be huge
+        apart, n = coarse - fine, len(coarse)
+        part = replicated(apart) if in_replicates and n >= 2 * REPLICATES else plain(apart)
+        half = part.half_width(0.95)
+        a, b = float(np.std(coarse)), float(np.std(fine))
+        left = slope(fine, coarse)[1]
     if not apart.any():
         half = 3.0 * least / n
-    return Difference(part.value, half, slope(fine, coarse)[1], n)
+    return Difference(part.value, half, left if np.isfinite(left) else 1.0, n, a <= ALIKE * b and b <= ALIKE * a)
 
 
 def beyond(halvings: Sequence[Difference]) -> float:

@@ -129,10 +129,10 @@ def estimate(
 
 def drawn(fleet: Ensemble) -> Ensemble:
     """The same variation, of which other points are drawn; SceneError where members have numbers that none draws."""
-    own = [*fleet.sampling.own_values(), *fleet.sampling.distributions(), *fleet.explicit()]
-    own = [name for name in own if name not in ("indices", "points")]
-    if own:
-        problem = f"gives {', '.join(own[:4])} to its members, which no distribution draws"
+    own = dict.fromkeys([*fleet.sampling.own_values(), *fleet.sampling.distributions(), *fleet.explicit()])
+    names = [name for name in own if name not in ("indices", "points")]
+    if names:
+        problem = f"gives {', '.join(names[:4])} to its members, which no distribution draws"
         remedy = "name what varies by distributions, or ask lw.solve for the statistic of these members"
         raise refusal("fleet", fleet.sampling.kind, problem, remedy)
     return Ensemble(fleet.scene, 1, fleet.seed, fleet.vary)

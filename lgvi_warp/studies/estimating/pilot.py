@@ -15,7 +15,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.studies.estimating import bias as biases_of
-from lgvi_warp.studies.estimating.bias import AGREE, APART, Bias, Difference, difference
+from lgvi_warp.studies.estimating.bias import AGREE, Bias, Difference, difference
 from lgvi_warp.studies.estimating.choice import Observed
 from lgvi_warp.studies.estimating.estimators import REPLICATES, plain, tail_index
 from lgvi_warp.studies.estimating.levels import Runs, Setting, design, normals
@@ -78,7 +78,8 @@ class Pilot:
         """How many members plain Monte Carlo needs."""
         at = self.solved(setting, members)
         z, error = self.target.contributions(self.y(setting, self.grid(setting), members), at), self.asked(at)
-        variance = plain(z, self.target.least(at)).variance * members
+        with np.errstate(over="ignore", invalid="ignore"):
+            variance = plain(z, self.target.least(at)).variance * members
         return variance / error**2 if error > 0.0 else (math.inf if variance > 0.0 else 1.0)
 
     def most_seconds(self, setting: Setting, members: int) -> float:
@@ -200,7 +201,7 @@ def _compared(pilot: Pilot, ladder: Ladder) -> Difference:
         found = pilot.pair(*ladder.settings[-2:], members)
         small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
         known = found.half <= small or abs(found.value) > max(found.half, small)
-        if known or found.left > APART or not _stalls(ladder, found, small) or _too_dear(pilot, ladder, members):
+        if known or found.apart or not _stalls(ladder, found, small) or _too_dear(pilot, ladder, members):
             break
     return found
 
@@ -220,7 +221,7 @@ def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
 def _ended(pilot: Pilot, ladder: Ladder) -> str:
     """Why no finer step is run; "" to go on."""
     halvings, error = ladder.halvings, pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
-    if len(halvings) > 1 and all(each.left > APART for each in halvings[-2:]):
+    if len(halvings) > 1 and all(each.apart for each in halvings[-2:]):
         return "apart"
     if any(bias.mean_square <= (0.5 * error) ** 2 for bias in ladder.biases()):
         return "agree"

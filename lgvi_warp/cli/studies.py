@@ -98,14 +98,14 @@ def estimate(chosen: argparse.Namespace, *, study: Part = None) -> int:
     from lgvi_warp.studies.estimating.estimate import estimate as answer
 
     # load_scene puts step, method and dtype into the scene: what is asked for by name is fixed.
-    fixed = {"method": scene.run.method if chosen.method is not None else None,
+    fixed: dict[str, Any] = {"method": scene.run.method if chosen.method is not None else None,
              "h": scene.run.step if chosen.step is not None else None, "dtype": scene.run.dtype}  # fmt: skip
     with progress_bar(chosen.quiet) as progress:
         found = (study or answer)(
             scene, chosen.of, chosen.error, relative_error=chosen.relative_error, risk=risk, cheaper=cheaper,
             threads=chosen.threads, progress=progress, **fixed,
         )  # fmt: skip
-    tell(chosen, lambda: {"estimate": found.to_dict()}, lambda: str(found))
+    tell(chosen, found.to_dict, lambda: str(found))
     return 0
 
 

@@ -20,7 +20,11 @@ METHOD = "rk4"
 def sphere(*terms, **sections):
     """A body with the same mass along all axes and nothing that turns it, in linear drag."""
     vehicle = lw.Vehicle(
-        mass=MASS, added_mass=[ADDED] * 3, inertia=[5.0, 6.0, 7.0], buoyancy=MASS * GRAVITY - HEAVY, center_of_buoyancy=[0.0] * 3
+        mass=MASS,
+        added_mass=[ADDED] * 3,
+        inertia=[5.0, 6.0, 7.0],
+        buoyancy=MASS * GRAVITY - HEAVY,
+        center_of_buoyancy=[0.0] * 3,
     )
     drag = lw.terms.Drag(linear=[DRAG] * 3 + [1.0] * 3)
     environment = lw.Environment(gravity=GRAVITY)

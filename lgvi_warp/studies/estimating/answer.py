@@ -99,6 +99,7 @@ class Estimated(Summarized):
         """Return everything but the provenance, in a form that JSON holds."""
         names = [name for name in self.__dataclass_fields__ if name not in ("provenance", "settings")]
         content = {name: getattr(self, name) for name in names}
+        content |= {name: list(content[name]) for name in ("interval", "bias_interval", "messages")}
         return content | {"members": dict(self.members), "rivals": dict(self.rivals)}
 
 

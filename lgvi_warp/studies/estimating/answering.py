@@ -15,8 +15,8 @@ from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.studies.estimating import bias as biases
 from lgvi_warp.studies.estimating.answer import Estimated
 from lgvi_warp.studies.estimating.bias import APART, Bias
-from lgvi_warp.studies.estimating.choice import FEWEST, Candidate, Observed, candidates, gains
-from lgvi_warp.studies.estimating.estimators import REPLICATES, Part, plain
+from lgvi_warp.studies.estimating.choice import Candidate, Observed, candidates, gains
+from lgvi_warp.studies.estimating.estimators import Part, plain
 from lgvi_warp.studies.estimating.levels import Level, Runs, Setting, estimated
 from lgvi_warp.studies.estimating.pilot import (
     FEW,
@@ -115,9 +115,7 @@ def finer(chosen: Chosen) -> Chosen:
     return replace(chosen, place=place, bias=chosen.ladder.biases()[place])
 
 
-def setting_of(
-    pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, own_step: float | None
-) -> Chosen:
+def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, own_step: float | None) -> Chosen:
     """Climb the ladders and choose the setting that is predicted to cost least; the own step where members are few."""
     climbed = []
     own = ladders[0][-2] if fixed else None if own_step is None else replace(ladders[0][0], h=own_step)
@@ -180,7 +178,9 @@ def compared(pilot: Pilot, best: Chosen, others: Sequence[Chosen]) -> Chosen:
     if ladder.end == "apart" or (lefts and lefts[-1] > APART and pilot.noise == "free"):
         cause = ("noise acts whose path no two steps share" if pilot.noise == "free"
                  else "small differences grow over the run until they fill its spread, as in chaos")  # fmt: skip
-        messages.append(f"levels gain nothing: members of two steps are apart (1 - rho^2 is {lefts[-1]:.2g}), since {cause}")
+        messages.append(
+            f"levels gain nothing: members of two steps are apart (1 - rho^2 is {lefts[-1]:.2g}), since {cause}"
+        )
     if math.sqrt(best.bias.mean_square) > 0.87 * best.error:
         messages.append(
             f"the bias is known to {math.sqrt(best.bias.mean_square):.2g} alone, the error asked for is {best.error:.2g}: "
@@ -202,7 +202,9 @@ def coarser_than(pilot: Pilot, chosen: Chosen, coarse: Sequence[Sequence[Setting
     top, found = chosen.setting, list[Setting]()
     if chosen.ladder.end == "apart" or pilot.noise == "free":
         return []
-    below = chosen.ladder.settings[: chosen.place]
+    # Steps that are too long spread otherwise than the next one.
+    pairs = zip(chosen.ladder.settings[: chosen.place], chosen.ladder.halvings, strict=False)
+    below = [setting for setting, halving in pairs if halving.alike]
     found += below[:: max(1, math.ceil(len(below) / MOST_COARSER))]
     for steps in coarse:
         for step in steps:

@@ -80,13 +80,14 @@ def together(parts: Sequence[Part]) -> Part:
 def slope(fine: np.ndarray, coarse: np.ndarray) -> tuple[float, float]:
     """The factor of the coarse numbers that leaves the least of the fine ones' variance, and what part of it is left.
 
-    The part left is 1 - rho^2; 1 where either does not vary.
+    The part left is 1 - rho^2; 1 where either does not vary, or overflows.
     """
-    a, b = fine - fine.mean(), coarse - coarse.mean()
-    spread, other = float(a @ a), float(b @ b)
-    if spread <= 0.0 or other <= 0.0:
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of steps that are too long may be huge
+        a, b = fine - fine.mean(), coarse - coarse.mean()
+        spread, other, shared = float(a @ a), float(b @ b), float(a @ b)
+    if not (spread > 0.0 and 0.0 < other < math.inf):
         return 0.0, 1.0
-    factor = float(a @ b) / other
+    factor = shared / other
     return factor, float(np.clip(1.0 - factor**2 * other / spread, 0.0, 1.0))
 
 

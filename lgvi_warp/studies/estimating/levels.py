@@ -69,7 +69,7 @@ class Runs:
         key = setting, grid
         if key not in self._prepared:
             fleet = self._fleets[setting.scene]
-            fleet = Ensemble(fleet.scene, 1, self.seed, fleet.vary)  # type: ignore[arg-type]
+            fleet = Ensemble(fleet.scene, 1, self.seed, fleet.vary)
             fleet = fleet if grid is None else drawn_every(fleet, grid)
             asked = self.question.settings(fleet.scene)
             self._prepared[key] = prepare(

@@ -93,9 +93,10 @@ class Pilot:
         at = self.target.solved([(1.0, above)])
         spread = float(np.std(above[np.isfinite(above)])) if np.isfinite(above).any() else 0.0
         if self.target.smooth and spread > 0.0:
-            return difference(*(self.target.smoothed(y, at, WIDTH * spread) for y in (below, above)))
-        z = (self.target.contributions(y, at) for y in (below, above))
-        return difference(*z, self.target.least(at))
+            width = WIDTH * spread
+            return difference(self.target.smoothed(below, at, width), self.target.smoothed(above, at, width))
+        coarser, finer = self.target.contributions(below, at), self.target.contributions(above, at)
+        return difference(coarser, finer, self.target.least(at))
 
 
 @dataclass
@@ -198,7 +199,7 @@ def _first_look(pilot: Pilot, setting: Setting) -> None:
 def _compared(pilot: Pilot, ladder: Ladder) -> Difference:
     """The last halving, of as many members as it takes to know whether it is small, and as are worth their cost."""
     for members in STAGES:
-        found = pilot.pair(*ladder.settings[-2:], members)
+        found = pilot.pair(ladder.settings[-2], ladder.settings[-1], members)
         small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
         known = found.half <= small or abs(found.value) > max(found.half, small)
         if known or found.apart or not _stalls(ladder, found, small) or _too_dear(pilot, ladder, members):
@@ -270,5 +271,7 @@ def refuse_heavy(label: str, y: np.ndarray) -> None:
     """Refuse a statistic whose variance seems infinite; SceneError."""
     index = tail_index(y)
     if len(y) >= KNOWN and index < HEAVY:
-        problem = f"has no finite variance, as it seems: its tail falls off with the power {index:.2g} of {len(y)} members"
+        problem = (
+            f"has no finite variance, as it seems: its tail falls off with the power {index:.2g} of {len(y)} members"
+        )
         raise refusal("of", label, problem, "ask for a quantile, risk=0.5, or a probability")

@@ -22,8 +22,8 @@ from lgvi_warp.studies.estimating.target import Target
 from lgvi_warp.studies.search.risk import CVaR
 from lgvi_warp.studies.sweeps.setup import metric_of
 
-REMEDY = ('give "mean position[0]", "depth above 3", "outcome floor", lw.statistics.Mean, Exceedance, Outcome, FirstPassage or '
-          "Quantiles of one level, or a metric")  # fmt: skip
+REMEDY = ('give "mean position[0]", "depth above 3", "outcome floor", lw.statistics.Mean, Exceedance, Outcome, FirstPassage '
+          "or Quantiles of one level, or a metric")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,9 @@ def _of_statistic(statistic: Statistic) -> Question:
 def _only(statistic: MemberStatistic) -> Statistic:
     """What is asked of the number of each member."""
     if len(statistic.then) != 1:
-        raise refusal(f"{statistic.type}.then", len(statistic.then), "statistics are asked for", "ask for one at a time")
+        raise refusal(
+            f"{statistic.type}.then", len(statistic.then), "statistics are asked for", "ask for one at a time"
+        )
     return statistic.then[0]
 
 

@@ -10,6 +10,7 @@ from scipy import stats
 
 import lgvi_warp as lw
 from tests.support import closed_answers as closed
+from tests.support.pages import blocks
 from tests.support.refusals import refused, says
 
 RUN = {"t1": closed.TIME, "method": closed.METHOD, "threads": 1}
@@ -122,6 +123,28 @@ def test_the_probability_of_an_event():
 def test_a_cheaper_scene_may_carry_a_level():
     found, truth = estimated("fall", error=2e-3, cheaper=[{"environment.gravity": closed.GRAVITY}])
     assert abs(found.value - truth) <= 8e-3
+
+
+def test_members_that_two_steps_leave_apart():
+    """A number that the last digits of a position decide: its mean over a normal position is 0."""
+
+    def last_digits(result):
+        return np.sin(1e10 * result.position[-1, :, 2])
+
+    found = lw.estimate(closed.falling(), last_digits, 0.02, **RUN)
+    says(" ".join(found.messages), "levels gain nothing", "as in chaos")
+    assert abs(found.value) <= 4.0 * found.sampling_error
+    assert not found.estimator.startswith("levels")
+
+
+def test_the_page():
+    """The snippets of docs/guide/least_cost.md."""
+    known = {"lw": lw}
+    for code in blocks("docs/guide/least_cost.md", "python"):
+        exec(code, known)
+    found = known["found"]
+    assert found.error_reached <= 0.011
+    assert abs(found.value - 15.0) < 1.0
 
 
 def test_refusals():

@@ -37,7 +37,7 @@ from lgvi_warp.studies.estimating.target import Solved
 # More members in the pilot pay where they cost at most this part of the run.
 WORTH = 0.3
 # Coarser settings that levels are sought among.
-MOST_COARSER = 3
+MOST_COARSER = 4
 # Noise of the pilot has indices from 0, that of the levels from here on, so many for each.
 INDICES = 2**27
 # Members of a level at most.

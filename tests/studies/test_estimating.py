@@ -142,9 +142,12 @@ def test_the_page():
     known = {"lw": lw}
     for code in blocks("docs/guide/least_cost.md", "python"):
         exec(code, known)
-    found = known["found"]
-    assert found.error_reached <= 0.011
-    assert abs(found.value - 15.0) < 1.0
+    found, fleet = known["found"], known["fleet"]
+    many = lw.Ensemble(fleet.scene, 4096, 5, fleet.vary, sampling="sobol")
+    save = lw.SaveAt(fields=("position",))
+    # The same kernel at half the step: 4,096 Sobol points tell the mean to a few millimetres.
+    finer = lw.solve(many, method=found.settings["method"], h=0.5 * found.settings["h"], t1=10.0, save=save)
+    assert abs(found.value - finer.position[-1, :, 0].mean()) < 0.04
 
 
 def test_refusals():
@@ -172,13 +175,16 @@ def test_refusals():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_intervals_hold_over_seeds(name):
-    """Sampling and bias together, over 200 seeds: 93 to 100 %, and the error told is the one seen to a quarter."""
+    """Sampling and bias together, over 200 seeds, and the error told is the one seen to a quarter.
+
+    Of 200 intervals of 95 %, 182 or more hold in 99 of 100 tries.
+    """
     held, apart, told = [], [], []
     for seed in range(200):
         found, truth = estimated(name, seed)
         held.append(found.interval[0] <= truth <= found.interval[1])
         apart.append(found.value - truth)
         told.append(found.error_reached)
-    assert np.mean(held) >= 0.93
+    assert np.mean(held) >= 0.91
     assert np.sqrt(np.mean(np.square(apart))) <= KNOWN[name][3]
     assert np.sqrt(np.mean(np.square(apart))) <= 1.25 * np.sqrt(np.mean(np.square(told)))

@@ -19,7 +19,11 @@ SEEDS, MEMBERS = 3, 4096
 
 def paper():
     """North of the paper's vehicle."""
-    return lw.Ensemble.from_scene(lw.Scene.load(ROOT / "examples" / "paper.toml")), lw.statistics.Mean("position[0]"), 20.0
+    return (
+        lw.Ensemble.from_scene(lw.Scene.load(ROOT / "examples" / "paper.toml")),
+        lw.statistics.Mean("position[0]"),
+        20.0,
+    )
 
 
 def remus():

@@ -36,6 +36,8 @@ from lgvi_warp.studies.estimating.target import Solved
 
 # More members in the pilot pay where they cost at most this part of the run.
 WORTH = 0.3
+# Members that show what settings share and how much Sobol points gain, where that is worth its cost.
+LOOKS = (*STAGES[1:], 4 * STAGES[-1])
 # Coarser settings that levels are sought among.
 MOST_COARSER = 4
 # Noise of the pilot has indices from 0, that of the levels from here on, so many for each.
@@ -224,7 +226,7 @@ def looked(pilot: Pilot, top: Setting, coarser: Sequence[Setting], variance: flo
     """What the settings have in common, of as many members as are worth their cost."""
     few = pilot.plain_members(top, FIRST) <= FEW
     seen = observed(pilot, top, [] if few else coarser, FIRST)
-    for members in STAGES[1:]:
+    for members in LOOKS:
         best = candidates(seen, variance)[0]
         kept = worth_more(seen, variance)
         more = 0.75 * members * sum(seen.costs[seen.settings.index(setting)] for setting in (top, *kept))

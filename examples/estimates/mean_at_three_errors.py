@@ -13,8 +13,7 @@ fleet = lw.Ensemble.from_scene(scene)
 if __name__ == "__main__":
     for error in (1e-4, 1e-5, 1e-6):
         found = lw.estimate(fleet, "mean position[0]", error, t1=20.0, threads=1)
-        print(
-            f"to {error:g} m: {found.value:.7f} m by {found.estimator}, {found.setting}, {sum(found.members.values()):,} members: "
-            f"{found.seconds:.2g} s, plain Monte Carlo {found.plain_seconds:.2g} s"
-        )
+        members = sum(found.members.values())
+        print(f"to {error:g} m: {found.value:.7f} m by {found.estimator}, {found.setting}, {members:,} members")
+        print(f"  {found.seconds:.2g} s, plain Monte Carlo {found.plain_seconds:.2g} s")
     print(found)

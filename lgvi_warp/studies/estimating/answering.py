@@ -158,6 +158,9 @@ def choice_of(pilot: Pilot, ladder: Ladder, fixed: Setting | None) -> Chosen:
     """The setting of a ladder, and its bias."""
     last = ladder.settings[-1]
     error = pilot.asked(pilot.solved(last, FIRST))
+    if not error > 0.0:
+        problem = f"asks for a part of {pilot.runs.question.label}, which is 0"
+        raise refusal("relative_error", pilot.error, problem, "give error=, in the unit of the statistic")
     place = ladder.settings.index(fixed) if fixed is not None else ladder.settled(error)
     bias = ladder.biases()[place]
     pairs = ladder.halvings[-1].members if ladder.halvings else FIRST

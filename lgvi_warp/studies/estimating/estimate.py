@@ -23,6 +23,7 @@ from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.settings import EnsembleSettings
 from lgvi_warp.studies.estimating import answering
 from lgvi_warp.studies.estimating.answer import Estimated
 from lgvi_warp.studies.estimating.levels import Runs, Setting
@@ -112,7 +113,7 @@ def estimate(
         raise refusal("t1", t1, "is missing", "give the end in seconds: t1=150.0 or [run] duration")
     faults.positive("t1", t1)
     faults.raise_if_any()
-    seed = whole.seed if seed is None else seed
+    seed = whole.seed if seed is None else int(EnsembleSettings(1, seed).seed)
     fleets = [whole, *cheaper_fleets(whole, cheaper)]
     runs = Runs(fleets, question, float(t1), seed=seed, threads=threads)
     asked = error if error is not None else relative_error

@@ -80,7 +80,9 @@ class Pilot:
         z, error = self.target.contributions(self.y(setting, self.grid(setting), members), at), self.asked(at)
         with np.errstate(over="ignore", invalid="ignore"):
             variance = plain(z, self.target.least(at)).variance * members
-        return variance / error**2 if error > 0.0 else (math.inf if variance > 0.0 else 1.0)
+        if error * error > 0.0:
+            return variance / (error * error)
+        return math.inf if variance > 0.0 else 1.0
 
     def most_seconds(self, setting: Setting, members: int) -> float:
         """What the pilot may cost [s]."""

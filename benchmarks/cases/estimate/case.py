@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cost of lw.estimate, pilot included, beside plain Monte Carlo to the same error in the same setting.
 
-The paper's vehicle to 20 s, REMUS 100 in noise and its autopilot to 60 s; errors in spreads of the statistic. Plain Monte Carlo
-is what its members would cost by a measured call of 4,096 of them, at the setting that was found. Processor time of one
+The paper's vehicle to 20 s, REMUS 100 in noise and its autopilot to 60 s; errors in spreads of the statistic. Plain Monte
+Carlo is what its members would cost by a measured call of 4,096 of them, at the setting that was found. Processor time of one
 thread, without compiling; medians over seeds. inside: how many intervals hold the value of a run to half of the error.
 """
 

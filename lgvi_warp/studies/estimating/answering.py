@@ -15,8 +15,8 @@ from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.studies.estimating import bias as biases
 from lgvi_warp.studies.estimating.answer import Estimated
 from lgvi_warp.studies.estimating.bias import APART, Bias
-from lgvi_warp.studies.estimating.choice import Candidate, Observed, candidates, gains
-from lgvi_warp.studies.estimating.estimators import Part, plain
+from lgvi_warp.studies.estimating.choice import Observed, Way, candidates, gains
+from lgvi_warp.studies.estimating.estimators import MeanEstimate, plain
 from lgvi_warp.studies.estimating.levels import Level, Runs, Setting, estimated
 from lgvi_warp.studies.estimating.pilot import (
     FEW,
@@ -99,7 +99,7 @@ def answered(
 
 def tried(
     pilot: Pilot, seen: Observed, chosen: Chosen, report: Callable[[float], None]
-) -> tuple[list[Level], list[Candidate], Setting | None]:
+) -> tuple[list[Level], list[Way], Setting | None]:
     """Run the best way that does not stand on a setting at which members fail; the top setting where they fail at it."""
     while True:
         ways = candidates(seen, chosen.variance)
@@ -136,7 +136,7 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
             raise SceneError([f"setting: no step was taken: {causes}; mend what fails, or fix method= and h="])
         if climbed and climbed[-1].ladder.end == "apart":
             break
-    best = min(climbed, key=lambda each: each.bias.mean_square > each.error**2 or price(pilot, each))
+    best = min(climbed, key=lambda each: (each.bias.mean_square > each.error**2, price(pilot, each)))
     return compared(pilot, best, [each for each in climbed if each is not best])
 
 
@@ -259,7 +259,7 @@ def without(seen: Observed, failed: Setting) -> Observed:
                    pair=lambda f, c: pair(kept[f], kept[c]))  # fmt: skip
 
 
-def levels_of(pilot: Pilot, seen: Observed, way: Candidate) -> list[Level]:
+def levels_of(pilot: Pilot, seen: Observed, way: Way) -> list[Level]:
     """The levels of a way, each with points and noise of its own."""
     levels, weight = [], 1.0
     for i, (place, members) in enumerate(zip(way.chain, way.members, strict=True)):
@@ -288,7 +288,7 @@ def run(runs: Runs, levels: Sequence[Level], report: Callable[[float], None]) ->
     return None
 
 
-def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solved, Part]:
+def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solved, MeanEstimate]:
     """The estimate; where its error is beyond the one asked for, once more with twice the members.
 
     The variance is then at least a quarter of the first: a stop by chance must not tell too small an error.
@@ -308,15 +308,21 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solve
 
 
 def told(
-    pilot: Pilot, chosen: Chosen, levels: Sequence[Level], found: tuple[Observed, Sequence[Candidate], float] | None,
-    reached: tuple[Solved, Part] | None, own_step: float | None, content: Mapping[str, Any],
+    pilot: Pilot, chosen: Chosen, levels: Sequence[Level], found: tuple[Observed, Sequence[Way], float] | None,
+    reached: tuple[Solved, MeanEstimate] | None, own_step: float | None, content: Mapping[str, Any],
 ) -> Estimated:  # fmt: skip
     """The answer in full."""
     top, target, runs = chosen.setting, pilot.target, pilot.runs
     question, messages = runs.question, list(pilot.messages)
     if reached is None or found is None:
         y = pilot.y(top, pilot.grid(top), FIRST)
-        part, name, members, rivals, pilot_seconds = Part(float(y[0]), 0.0, math.inf), "one run", {str(top): 1}, {}, 0.0
+        part, name, members, rivals, pilot_seconds = (
+            MeanEstimate(float(y[0]), 0.0, math.inf),
+            "one run",
+            {str(top): 1},
+            {},
+            0.0,
+        )
         variance_of_one = 0.0
         messages.append("nothing varies and no noise acts: one run is the answer, with its bias alone")
     else:
@@ -341,7 +347,7 @@ def told(
     )  # fmt: skip
 
 
-def within(part: Part, low: float, high: float, bias: Bias, members: int) -> tuple[float, float]:
+def within(part: MeanEstimate, low: float, high: float, bias: Bias, members: int) -> tuple[float, float]:
     """The interval of a probability: Wilson's, with as many members as have the variance, in [0, 1]."""
     p = float(np.clip(part.value, 0.0, 1.0))
     from scipy.special import stdtrit

@@ -21,7 +21,7 @@ ALIKE = 2.0
 
 
 @dataclass(frozen=True)
-class Difference:
+class StepChange:
     """How much a statistic changes from a coarse setting to a fine one, both on the same members and noise.
 
     value: coarse less fine. half: of its 95 % interval. left: 1 - rho^2. members: number of pairs.
@@ -58,7 +58,7 @@ class Bias:
         return self.value * self.value + 0.25 * self.half * self.half
 
 
-def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_replicates: bool = True) -> Difference:
+def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_replicates: bool = True) -> StepChange:
     """The paired difference of two settings' contributions (n,); in_replicates: whether they are of replicates.
 
     least: as of `estimators.plain`; where none of n members differs, up to 3 / n of them may, with 95 %.
@@ -71,10 +71,10 @@ def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_r
         left = slope(fine, coarse)[1]
     if not apart.any():
         half = 3.0 * least / n
-    return Difference(part.value, half, left if np.isfinite(left) else 1.0, n, a <= ALIKE * b and b <= ALIKE * a)
+    return StepChange(part.value, half, left if np.isfinite(left) else 1.0, n, a <= ALIKE * b and b <= ALIKE * a)
 
 
-def beyond(halvings: Sequence[Difference]) -> float:
+def beyond(halvings: Sequence[StepChange]) -> float:
     """What is left beyond the finest step: the last halving bounds it for order one; a third where halvings fall faster.
 
     A difference that happens to be near 0 says little: the one before, divided by four, is taken where that is larger.
@@ -85,7 +85,7 @@ def beyond(halvings: Sequence[Difference]) -> float:
     return last / 3.0 if fell else last
 
 
-def biases(halvings: Sequence[Difference]) -> list[Bias]:
+def biases(halvings: Sequence[StepChange]) -> list[Bias]:
     """The bias of every step of a ladder, the coarsest first, from the difference of each to the next.
 
     The differences of one ladder are of the same members and are added as they come, halves too, which bounds their sum.

@@ -13,7 +13,7 @@ import numpy as np
 from lgvi_warp.studies.estimating.bias import APART
 from lgvi_warp.studies.estimating.estimators import (
     REPLICATES,
-    Spread,
+    VarianceModel,
     best_numbers,
     regressed,
     slope,
@@ -34,7 +34,7 @@ FEWEST = 4 * REPLICATES
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Way:
     """A way to estimate: settings from the finest to the coarsest, by their numbers in the pilot, and members of each level.
 
     slopes: of each level but the last, what the coarser setting counts.
@@ -74,7 +74,7 @@ class Observed:
     at: Solved
 
 
-def candidates(seen: Observed, variance: float) -> list[Candidate]:
+def candidates(seen: Observed, variance: float) -> list[Way]:
     """All ways to reach a variance, the cheapest first."""
     chains = [(0,)] + [chain for k in (2, 3) for chain in coupled(seen, k)]
     kinds = ["plain"] + (["sobol"] if seen.normals.shape[1] else [])
@@ -100,8 +100,8 @@ def coupled(seen: Observed, count: int) -> list[tuple[int, ...]]:
     return chains
 
 
-def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: float) -> Candidate:
-    slopes, spreads, weight = list[float](), list[Spread](), 1.0
+def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: float) -> Way:
+    slopes, spreads, weight = list[float](), list[VarianceModel](), 1.0
     for f, c in itertools.pairwise(chain):
         factor = slope(seen.z[f], seen.z[c])[0]
         spreads.append(_spread(seen, kind, weight * (seen.z[f] - factor * seen.z[c]), seen.pair(f, c), weight))
@@ -115,15 +115,15 @@ def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: floa
     )
     seconds = float(sum(max(ROOM * n, FEWEST) * spread.cost for n, spread in zip(numbers, spreads, strict=True)))
     left = sum(spread.at(n) for spread, n in zip(spreads, members, strict=True))
-    return Candidate(kind, chain, tuple(slopes), members, seconds, left)
+    return Way(kind, chain, tuple(slopes), members, seconds, left)
 
 
-def _spread(seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float) -> Spread:
+def _spread(seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float) -> VarianceModel:
     least = abs(weight) * seen.least
     if kind == "sobol":
         return spread_of_replicates(z, cost, least)
     if kind == "regression":
-        return Spread(regressed(z, seen.normals).variance * len(z), cost)
+        return VarianceModel(regressed(z, seen.normals).variance * len(z), cost)
     return spread_of_plain(z, cost, least)
 
 
@@ -142,7 +142,7 @@ def rounded(kind: str, members: float, dimensions: int, power: float = 1.0) -> i
     return REPLICATES * math.ceil(max(members, least) / REPLICATES)
 
 
-def gains(ways: Sequence[Candidate]) -> dict[str, float]:
+def gains(ways: Sequence[Way]) -> dict[str, float]:
     """By estimator, how many times less than plain Monte Carlo in the same setting its best way is predicted to cost."""
     plain = next(way.seconds for way in ways if way.kind == "plain" and len(way.chain) == 1)
     best: dict[str, float] = {}

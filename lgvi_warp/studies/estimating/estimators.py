@@ -18,7 +18,7 @@ SMOOTH = 3.0
 
 
 @dataclass(frozen=True)
-class Part:
+class MeanEstimate:
     """An estimate, the variance of it, and the degrees of freedom that this variance was estimated with."""
 
     value: float
@@ -33,32 +33,32 @@ class Part:
             return 0.0
         return float(stdtrit(max(self.freedom, 1.0), 0.5 + 0.5 * confidence)) * math.sqrt(self.variance)
 
-    def times(self, weight: float) -> Part:
+    def times(self, weight: float) -> MeanEstimate:
         """The estimate of so many times what this one is of."""
-        return Part(weight * self.value, weight**2 * self.variance, self.freedom)
+        return MeanEstimate(weight * self.value, weight**2 * self.variance, self.freedom)
 
 
-def plain(y: np.ndarray, least: float = 0.0) -> Part:
+def plain(y: np.ndarray, least: float = 0.0) -> MeanEstimate:
     """The mean of independent members (n,).
 
     least: smallest change of a member's number other than none, 0 where numbers are continuous. Members that agree by chance
         have no spread: the variance of one that changes by it among all is added.
     """
     n = len(y)
-    return Part(float(np.mean(y)), float(np.var(y, ddof=1)) / n + (least / n) ** 2, n - 1.0)
+    return MeanEstimate(float(np.mean(y)), float(np.var(y, ddof=1)) / n + (least / n) ** 2, n - 1.0)
 
 
-def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) -> Part:
+def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) -> MeanEstimate:
     """The mean of members (n,) of independent replicates of a design, member i of replicate i mod R: Student's t of R - 1.
 
     least: as of `plain`.
     """
     means = y.reshape(-1, replicates).mean(axis=0)
     variance = float(np.var(means, ddof=1)) / replicates + (least / len(y)) ** 2
-    return Part(float(means.mean()), variance, replicates - 1.0)
+    return MeanEstimate(float(means.mean()), variance, replicates - 1.0)
 
 
-def regressed(y: np.ndarray, normals: np.ndarray) -> Part:
+def regressed(y: np.ndarray, normals: np.ndarray) -> MeanEstimate:
     """The mean of independent members (n,) by least squares on standard normals (n, d), whose means are known to be 0."""
     n, d = normals.shape
     columns = np.column_stack([np.ones(n), normals])
@@ -66,15 +66,15 @@ def regressed(y: np.ndarray, normals: np.ndarray) -> Part:
     freedom = n - d - 1.0
     left = float(np.sum((y - columns @ factors) ** 2)) / freedom
     # The spread of the mean of the normals about 0 adds d / n of it, to first order.
-    return Part(float(factors[0]), left / n * (1.0 + d / n), freedom)
+    return MeanEstimate(float(factors[0]), left / n * (1.0 + d / n), freedom)
 
 
-def together(parts: Sequence[Part]) -> Part:
+def together(parts: Sequence[MeanEstimate]) -> MeanEstimate:
     """The sum of independent estimates; degrees of freedom by Welch (1947) and Satterthwaite (1946)."""
     variance = sum(part.variance for part in parts)
     below = sum(part.variance**2 / part.freedom for part in parts)
     freedom = variance**2 / below if below > 0.0 else math.inf
-    return Part(sum(part.value for part in parts), variance, freedom)
+    return MeanEstimate(sum(part.value for part in parts), variance, freedom)
 
 
 def slope(fine: np.ndarray, coarse: np.ndarray) -> tuple[float, float]:
@@ -92,7 +92,7 @@ def slope(fine: np.ndarray, coarse: np.ndarray) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Spread:
+class VarianceModel:
     """How the variance of an estimate falls with the members: `of_one` n^-power; cost: of a member [s]."""
 
     of_one: float
@@ -104,12 +104,12 @@ class Spread:
         return self.of_one * members**-self.power
 
 
-def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> Spread:
+def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceModel:
     """How the variance of the mean of independent members falls, from some of them (n,)."""
-    return Spread(plain(y, least).variance * len(y), cost)
+    return VarianceModel(plain(y, least).variance * len(y), cost)
 
 
-def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replicates: int = REPLICATES) -> Spread:
+def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replicates: int = REPLICATES) -> VarianceModel:
     """How the variance of a replicated design's mean falls, from some of its members (n,), in the order of the design.
 
     Variances of 16 replicates are known to a third. Where they gain less than three times over independent members, as where
@@ -124,10 +124,10 @@ def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replica
         fewer = replicated(y[: n // 4], least, replicates).variance
         seen = math.log(fewer / variance) / math.log(4.0) if variance > 0.0 and fewer > 0.0 else 1.0
         power = float(np.clip(0.5 + 0.5 * seen, 1.0, STEEPEST))
-    return Spread(variance * n**power, cost, power)
+    return VarianceModel(variance * n**power, cost, power)
 
 
-def best_numbers(spreads: Sequence[Spread], variance: float) -> np.ndarray:
+def best_numbers(spreads: Sequence[VarianceModel], variance: float) -> np.ndarray:
     """Numbers of members (levels,) that reach a variance of the sum for the least cost.
 
     The least of sum C n subject to sum V n^-a = v is where n = (m a V / C)^(1 / (1 + a)), with one m for all; where all a are

@@ -15,9 +15,9 @@ from lgvi_warp.common.random import generator
 from lgvi_warp.sampling.designs.sequences import sobol_points
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies.comparison import drawn_every
-from lgvi_warp.studies.estimating.estimators import REPLICATES, Part, plain, regressed, replicated, together
+from lgvi_warp.studies.estimating.estimators import REPLICATES, MeanEstimate, plain, regressed, replicated, together
 from lgvi_warp.studies.estimating.question import Question
-from lgvi_warp.studies.estimating.target import Solved, Target, Weighted
+from lgvi_warp.studies.estimating.target import Solved, Sought, Weighted
 
 # Members of one call.
 AT_ONCE = 65_536
@@ -186,7 +186,7 @@ class Level:
         samples = [(self.weight, np.concatenate(self.y))]
         return [*samples, (-self.weight * self.slope, np.concatenate(self.below))] if self.below else samples
 
-    def part(self, target: Target, at: Solved) -> Part:
+    def part(self, target: Sought, at: Solved) -> MeanEstimate:
         """The estimate of the level, times its weight."""
         z, least = target.contributions(np.concatenate(self.y), at), target.least(at)
         if self.below:
@@ -205,7 +205,7 @@ def normals(points: np.ndarray) -> np.ndarray:
     return np.asarray(ndtri(np.clip(points, 2.0**-53, 1.0 - 2.0**-53)))
 
 
-def estimated(levels: Sequence[Level], target: Target) -> tuple[Solved, Part]:
+def estimated(levels: Sequence[Level], target: Sought) -> tuple[Solved, MeanEstimate]:
     """The target from all levels, and the estimate of its error."""
     samples = [sample for level in levels for sample in level.weighted()]
     at = target.solved(samples)

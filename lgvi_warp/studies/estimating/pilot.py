@@ -15,15 +15,15 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.studies.estimating import bias as biases_of
-from lgvi_warp.studies.estimating.bias import AGREE, Bias, Difference, difference
+from lgvi_warp.studies.estimating.bias import AGREE, Bias, StepChange, difference
 from lgvi_warp.studies.estimating.choice import Observed
 from lgvi_warp.studies.estimating.estimators import REPLICATES, plain, tail_index
 from lgvi_warp.studies.estimating.levels import Runs, Setting, design, normals
-from lgvi_warp.studies.estimating.target import Solved, Target
+from lgvi_warp.studies.estimating.target import Solved, Sought
 
 # Members of the first stage, and how many stages there are, each of four times the members of the one before.
 FIRST, STAGES = 64, (64, 256, 1024)
-# Part of plain Monte Carlo's predicted cost that the pilot may take.
+# MeanEstimate of plain Monte Carlo's predicted cost that the pilot may take.
 SHARE = 0.1
 # Where plain Monte Carlo needs at most so many members, a pilot is not worth its cost.
 FEW = 10 * FIRST
@@ -46,7 +46,7 @@ class Pilot:
     """
 
     runs: Runs
-    target: Target
+    target: Sought
     noise: str
     error: float
     relative: bool = False
@@ -88,7 +88,7 @@ class Pilot:
         """What the pilot may cost [s]."""
         return SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting))
 
-    def pair(self, coarse: Setting, fine: Setting, members: int) -> Difference:
+    def pair(self, coarse: Setting, fine: Setting, members: int) -> StepChange:
         """How much the target changes from one setting to a finer one."""
         grid = self.grid(fine)
         below, above = self.y(coarse, grid, members), self.y(fine, grid, members)
@@ -110,7 +110,7 @@ class Ladder:
     """
 
     settings: list[Setting] = field(default_factory=list)
-    halvings: list[Difference] = field(default_factory=list)
+    halvings: list[StepChange] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     end: str = "steps"
 
@@ -198,7 +198,7 @@ def _first_look(pilot: Pilot, setting: Setting) -> None:
     raise refusal("of", pilot.runs.question.label, problem, remedy)
 
 
-def _compared(pilot: Pilot, ladder: Ladder) -> Difference:
+def _compared(pilot: Pilot, ladder: Ladder) -> StepChange:
     """The last halving, of as many members as it takes to know whether it is small, and as are worth their cost."""
     for members in STAGES:
         found = pilot.pair(ladder.settings[-2], ladder.settings[-1], members)
@@ -209,7 +209,7 @@ def _compared(pilot: Pilot, ladder: Ladder) -> Difference:
     return found
 
 
-def _stalls(ladder: Ladder, found: Difference, small: float) -> bool:
+def _stalls(ladder: Ladder, found: StepChange, small: float) -> bool:
     """Whether a finer step would not make the pairs agree much better than more of them do."""
     return found.half <= 4.0 * small or bool(ladder.halvings and found.half > STALLED * ladder.halvings[-1].half)
 

@@ -18,7 +18,7 @@ from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.statistics.base import TYPES, Statistic, from_list
 from lgvi_warp.statistics.estimates.naming import spelled
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
-from lgvi_warp.studies.estimating.target import Target
+from lgvi_warp.studies.estimating.target import Sought
 from lgvi_warp.studies.search.risk import CVaR
 from lgvi_warp.studies.sweeps.setup import metric_of
 
@@ -37,7 +37,7 @@ class Question:
 
     label: str
     unit: str
-    target: Target
+    target: Sought
     of: Any = None
     metric: Statistic | None = None
 
@@ -82,10 +82,10 @@ def with_risk(question: Question, risk: Any) -> Question:
     """The same number of each member, of which a quantile or the mean of the worst part is asked."""
     inner = question.label.removeprefix("mean ")
     if isinstance(risk, CVaR):
-        target = Target("cvar", risk.share) if risk.share < 1.0 else Target()
+        target = Sought("cvar", risk.share) if risk.share < 1.0 else Sought()
         return replace(question, label=f"{risk} of {inner}", target=target)
     if isinstance(risk, float) and 0.0 < risk < 1.0:
-        return replace(question, label=f"{100.0 * risk:g} % quantile of {inner}", target=Target("quantile", risk))
+        return replace(question, label=f"{100.0 * risk:g} % quantile of {inner}", target=Sought("quantile", risk))
     remedy = 'give "mean", a level such as 0.95, or lw.metrics.CVaR(0.05)'
     raise refusal("risk", risk, "is no risk", remedy)
 
@@ -130,11 +130,11 @@ def _of_quantity(of: Any) -> Question:
     (interest,) = quantities(of)
     kind = getattr(interest, "kind", "")
     if kind == "outcome":
-        return Question(interest.label, "1", Target("probability"), of)
+        return Question(interest.label, "1", Sought("probability"), of)
     if kind == "end_time" or getattr(interest, "outcome", ""):
         problem = "is of those members alone that end so, whose number is not fixed"
         raise refusal("of", interest.label, problem, "ask for the probability of the outcome, or run lw.solve")
-    return Question(f"mean {interest.label}", interest.unit or "1", Target(), of)
+    return Question(f"mean {interest.label}", interest.unit or "1", Sought(), of)
 
 
 def _of_statistic(statistic: Statistic) -> Question:
@@ -154,7 +154,7 @@ def _of_statistic(statistic: Statistic) -> Question:
         raise refusal("of", statistic.key, problem, f"name one, such as {statistic.quantity.labels[0]!r}")
     if isinstance(statistic, MemberStatistic):
         _, gathering = metric_of("of", statistic)
-        question = Question(f"mean {statistic.key}", statistic.unit or "1", Target(), None, gathering)
+        question = Question(f"mean {statistic.key}", statistic.unit or "1", Sought(), None, gathering)
         return _asked_of(question, _only(statistic))
     if isinstance(statistic, statistics.FirstPassage):
         return _of_passage(statistic)
@@ -191,7 +191,7 @@ def _bounded(question: Question, above: float | None = None, below: float | None
     if not limits:
         above = 0.5
     label = f"probability {inner}{limits}"
-    return replace(question, label=label, unit="1", target=Target("probability", above=above, below=below))
+    return replace(question, label=label, unit="1", target=Sought("probability", above=above, below=below))
 
 
 def _of_passage(statistic: statistics.FirstPassage) -> Question:

@@ -28,7 +28,7 @@ class Solved:
 
 
 @dataclass(frozen=True)
-class Target:
+class Sought:
     """A mean ("mean"), a probability ("probability"), a "quantile" of a level, or the mean of the worst part, a "cvar".
 
     level: of the quantile, or the part.

@@ -17,15 +17,15 @@ from lgvi_warp.cli.plot import plot
 from lgvi_warp.cli.rare import rare
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.stores import export, merge, report
-from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
+from lgvi_warp.cli.studies import estimate, sensitivity, stability, sweep, tradeoff
 from lgvi_warp.cli.verb import COMMON
 from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import closest
 
 # In the order of the help.
-_VERBS = (run, check, predict, resume, merge, export, report, tradeoff, sensitivity, stability, sweep, rare, view, info, bench,
-          warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
+_VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare, view, info,
+          bench, warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
 }
@@ -42,6 +42,7 @@ EPILOG = """examples:
   lgvi-warp resume runs/large
   lgvi-warp view runs/paper
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
+  lgvi-warp estimate examples/paper.toml --of "mean position[0]" --error 1e-3
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
   lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws

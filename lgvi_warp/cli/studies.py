@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verbs tradeoff, sensitivity, stability and sweep."""
+"""The verbs tradeoff, estimate, sensitivity, stability and sweep."""
 
 from __future__ import annotations
 
@@ -64,6 +64,73 @@ def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = Non
     code = finish(written, chosen, {"tradeoff": measurements.to_dict()}, text_of("tradeoff", measurements))
     missing = [f"--methods {name}: has no measurement: {why}" for name, why in measurements.missing.items()]
     return 1 if print_faults(missing) else code
+
+
+def estimate_arguments(verb: Any) -> None:
+    """Add the arguments of the verb estimate."""
+    add = verb.add_argument
+    add_shared(verb, "scene", scene="scene file (TOML) with [ensemble.vary]")
+    add("--of", metavar="Q", required=True, help='what to estimate: "mean position[0]", "depth above 3", "outcome floor", '
+        '"max(depth)", "itae depth" ...')  # fmt: skip
+    add("--error", metavar="E", type=float, help="root mean square error asked for, in its unit")
+    add("--relative-error", metavar="E", type=float, help="the same as a fraction of the statistic")
+    add("--risk", metavar="R", help="a quantile's level, such as 0.95, or cvar:0.05 for the mean of the worst 5 %%, in "
+        "place of the mean")  # fmt: skip
+    add("--cheaper", metavar="KEY=VALUE", action="append", default=[], help="a number whose scene costs less and behaves "
+        "alike, as controller.delay=0.0; may be given several times")  # fmt: skip
+    add_shared(verb, "--duration --method --step --dtype --seed --threads --set", method="fixes the method",
+               step="fixes the step [s]", dtype="fixes the precision", seed="seed of points and noise")  # fmt: skip
+
+
+@as_verb(
+    "estimate",
+    "a mean, probability or quantile at the error asked for, for the least work",
+    estimate_arguments,
+    reads=True,
+)
+def estimate(chosen: argparse.Namespace, *, study: Part = None) -> int:
+    """Run the verb estimate: a statistic at an error, for the least work.
+
+    Returns: The exit code, 0.
+    """
+    risk, cheaper = _risk(chosen.risk), [_number_of(text) for text in chosen.cheaper]
+    scene = load_scene(chosen)
+    from lgvi_warp.studies.estimating.estimate import estimate as answer
+
+    # load_scene puts step, method and dtype into the scene: what is asked for by name is fixed.
+    fixed: dict[str, Any] = {"method": scene.run.method if chosen.method is not None else None,
+             "h": scene.run.step if chosen.step is not None else None, "dtype": scene.run.dtype}  # fmt: skip
+    with progress_bar(chosen.quiet) as progress:
+        found = (study or answer)(
+            scene, chosen.of, chosen.error, relative_error=chosen.relative_error, risk=risk, cheaper=cheaper,
+            threads=chosen.threads, progress=progress, **fixed,
+        )  # fmt: skip
+    tell(chosen, found.to_dict, lambda: str(found))
+    return 0
+
+
+def _risk(text: str | None) -> Any:
+    """A risk as the command has it. Raises SceneError."""
+    if text is None or text == "mean":
+        return "mean"
+    from lgvi_warp.studies.search.risk import CVaR
+
+    kind, _, share = text.partition(":")
+    try:
+        return CVaR(float(share)) if kind == "cvar" else float(text)
+    except ValueError as error:
+        if isinstance(error, SceneError):
+            raise
+        raise refusal("--risk", text, "is no risk", "give 0.95 or cvar:0.05") from error
+
+
+def _number_of(text: str) -> dict[str, float]:
+    """A number of a scene as the command has it: NAME=VALUE. Raises SceneError."""
+    name, _, value = text.partition("=")
+    try:
+        return {name: float(value)}
+    except ValueError as error:
+        raise refusal("--cheaper", text, "is no number of a scene", 'give "controller.delay=0.0"') from error
 
 
 def sensitivity_arguments(verb: Any) -> None:

@@ -15,8 +15,9 @@ from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from lgvi_warp.studies.stability.map import GRIDS
 from tests.conftest import ROOT
 from tests.support.verbs import Study, main
-from tests.unit.cli.test_terminal import region, sobol
+from tests.unit.cli.test_terminal import document, region, sobol
 from tests.unit.studies.test_cost import found as tradeoff_of
+from tests.unit.studies.test_estimating import answer
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 
@@ -294,3 +295,32 @@ def test_arguments_of_a_rare_event(tmp_path, capsys):
     assert capsys.readouterr().out.startswith("the probability in words")
     assert main([*verb, "--cheaper", "h", "-q"], study=study, draw=draw) == 2
     assert "--cheaper = 'h': names no values" in capsys.readouterr().err
+
+
+def test_arguments_of_an_estimate(capsys):
+    study = Study(answer())
+    assert main(["estimate", PAPER, "--of", "mean depth", "--error", "0.1", "-q"], study=study) == 0
+    more = ["--of", "max(depth)", "--relative-error", "0.01", "--risk", "cvar:0.1", "--cheaper", "controller.delay=0",
+            "--step", "0.1", "--method", "rk4", "--seed", "7", "--threads", "1", "--dtype", "float32"]  # fmt: skip
+    assert main(["estimate", PAPER, *more], study=study) == 0
+    assert capsys.readouterr().out == f"{answer()}\n"
+    ((scene, of, error), settings), ((other, *_), others) = study.calls
+    assert (of, error, scene.ensemble_settings.members) == ("mean depth", 0.1, 4096)
+    assert (settings["method"], settings["h"], settings["risk"], settings["cheaper"]) == (None, None, "mean", [])
+    assert other.ensemble_settings.seed == 7
+    assert (others["method"], others["h"], others["dtype"], others["threads"]) == ("rk4", 0.1, "float32", 1)
+    assert (others["relative_error"], others["risk"]) == (0.01, lw.metrics.CVaR(0.1))
+    assert others["cheaper"] == [{"controller.delay": 0.0}]
+    assert (
+        document(["estimate", PAPER, "--of", "depth", "--error", "1"], capsys, study=study)["members"]["psi_x 0.2"]
+        == 8192
+    )
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [(["--risk", "large"], "--risk"), (["--risk", "cvar:2"], "is no part"), (["--cheaper", "a"], "--cheaper")],
+)
+def test_odd_arguments_of_an_estimate(option, words, capsys):
+    assert main(["estimate", PAPER, "--of", "depth", "--error", "1", *option], study=Study(answer())) == 2
+    assert words in capsys.readouterr().err

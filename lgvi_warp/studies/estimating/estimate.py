@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`estimate`: a statistic at the error asked for, for the least work."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.engine.executors import check_threads
+from lgvi_warp.methods import saveat
+from lgvi_warp.methods.method import Method
+from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.runs.default_method import is_damped
+from lgvi_warp.runs.request import ensemble_of
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.settings import EnsembleSettings
+from lgvi_warp.studies.estimating import answering
+from lgvi_warp.studies.estimating.answer import Estimated
+from lgvi_warp.studies.estimating.levels import Runs, Setting
+from lgvi_warp.studies.estimating.pilot import Pilot
+from lgvi_warp.studies.estimating.question import question_of
+from lgvi_warp.studies.speed import void
+from lgvi_warp.studies.suggest import SHORT
+
+# Methods whose steps are tried: the scene's own, and the first of those that are cheapest by what acts.
+METHODS = 2
+# Halvings of the coarsest step that are tried, and doublings of one that was asked for.
+HALVINGS, DOUBLINGS = 10, 4
+
+
+@shows_progress
+def estimate(
+    fleet: Ensemble | Scene,
+    of: Any,
+    error: float | None = None,
+    *,
+    relative_error: float | None = None,
+    t1: float | None = None,
+    risk: Any = "mean",
+    cheaper: Sequence[Any] = (),
+    method: str | Method | None = None,
+    h: float | None = None,
+    dtype: str | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    progress: Callable[[float], None] | bool | None = None,
+) -> Estimated:
+    """Estimate a statistic at an error, for the least work that a small pilot finds.
+
+    A pilot runs few members at several steps. It tells the bias of each, and what plain Monte Carlo, Sobol points, regression
+    and levels (paired differences of fine and coarse settings) would take. The cheapest is run with numbers of members that
+    are fixed beforehand.
+
+    Args:
+        fleet: the ensemble, or a Scene with one. Its distributions are drawn from anew; members and sampling do not matter.
+        of: what is asked, at the end of the run: "mean position[0]", "depth above 3", "outcome floor", "max(depth)",
+            lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles of one level, or a metric such as
+            lw.metrics.ITAE("depth").
+        error: root mean square error asked for, of sampling and bias together, in the unit of the statistic; above 0.
+        relative_error: the same as a fraction of the statistic, in place of `error`.
+        t1: end time [s]. Default: run.duration of the scene.
+        risk: of a quantity or a metric: "mean" (the default), the level of a quantile, such as 0.95, or lw.metrics.CVaR(0.05).
+        cheaper: scenes that cost less and behave alike: numbers that differ, such as {"controller.delay": 0.0}, or Scenes.
+            They serve as coarse levels alone. Default none.
+        method: fixes the method. Default: the scene's own, and one that suits what acts.
+        h: fixes the step [s], whose bias is told all the same; with the scene's method unless `method` is given.
+        dtype: precision. Default: that of the scene.
+        seed: of points and noise. Default: that of the ensemble.
+        threads: threads of the runs. Default: as of `lw.solve`.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            from 0 to 1.
+
+    Returns:
+        The value, its interval and what it took; `print` shows it.
+
+    Raises:
+        SceneError: for faulty arguments, for a statistic of another kind or without finite variance, and where members fail
+            at the finest setting.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)}, members=64)
+        >>> found = lw.estimate(fleet, "mean depth", error=0.01, t1=2.0, method="rk4")
+        >>> found.interval[1] - found.interval[0] < 0.1
+        True
+    """
+    faults = Faults()
+    if (error is None) == (relative_error is None):
+        faults.add("error", error, "and relative_error are both given, or none is", "give one of them")
+    for name, value in (("error", error), ("relative_error", relative_error)):
+        if value is not None:
+            faults.positive(name, value, "in the unit of the statistic")
+    check_threads(faults, threads)
+    question = None
+    with faults.including():
+        question = question_of(of, risk)
+    faults.raise_if_any()
+    assert question is not None
+    whole = drawn(ensemble_of(fleet))
+    t1 = whole.scene.run.duration if t1 is None else t1
+    if t1 is None:
+        raise refusal("t1", t1, "is missing", "give the end in seconds: t1=150.0 or [run] duration")
+    faults.positive("t1", t1)
+    faults.raise_if_any()
+    seed = whole.seed if seed is None else int(EnsembleSettings(1, seed).seed)
+    fleets = [whole, *cheaper_fleets(whole, cheaper)]
+    runs = Runs(fleets, question, float(t1), seed=seed, threads=threads)
+    asked = error if error is not None else relative_error
+    assert asked is not None
+    steps = [spacing_of(each.scene, float(t1)) for each in fleets]
+    ladders, noise = ladders_of(whole, float(t1), steps[0], method, h, dtype)
+    pilot = Pilot(runs, question.target, noise, float(asked), error is None)
+    coarse = [coarse_of(spacing, i, ladders[0][0]) for i, spacing in enumerate(steps) if i]
+    content = {"scene": whole.scene.to_dict(), "ensemble": whole.to_dict(), "seed": seed, "t1": float(t1)}
+    content |= {"versions": machine.versions(), "machine": machine.describe()}
+    fixed = h is not None
+    return answering.answered(pilot, ladders, coarse, fixed, whole.scene.run.step, callback(progress) or void, content)
+
+
+def drawn(fleet: Ensemble) -> Ensemble:
+    """The same variation, of which other points are drawn; SceneError where members have numbers that none draws."""
+    own = dict.fromkeys([*fleet.sampling.own_values(), *fleet.sampling.distributions(), *fleet.explicit()])
+    names = [name for name in own if name not in ("indices", "points")]
+    if names:
+        problem = f"gives {', '.join(names[:4])} to its members, which no distribution draws"
+        remedy = "name what varies by distributions, or ask lw.solve for the statistic of these members"
+        raise refusal("fleet", fleet.sampling.kind, problem, remedy)
+    return Ensemble(fleet.scene, 1, fleet.seed, fleet.vary)
+
+
+def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
+    """The same variation of each cheaper scene; names of what varies that a change fixes stay varied."""
+    if isinstance(cheaper, Mapping | str) or not isinstance(cheaper, Sequence):
+        raise refusal("cheaper", cheaper, "is no list of scenes", 'give [{"controller.delay": 0.0}]')
+    faults, fleets = Faults(), list[Ensemble]()
+    for i, entry in enumerate(cheaper):
+        with faults.including():
+            if isinstance(entry, Mapping):
+                entry = fleet.scene.with_numbers(entry)  # type: ignore[attr-defined]
+            if isinstance(entry, Ensemble):
+                entry = entry.scene
+            if not isinstance(entry, Scene):
+                raise refusal(f"cheaper[{i}]", entry, "is no scene", 'give {"controller.delay": 0.0}, or a Scene')
+            fleets.append(Ensemble(entry, 1, fleet.seed, fleet.vary))
+    faults.raise_if_any()
+    return fleets
+
+
+def spacing_of(scene: Any, t1: float) -> Fraction:
+    """The longest step that a scene takes [s]: it divides the run, the samples, and the times of the controller."""
+    times = [saveat.exact(t1)]
+    every, controller = scene.run.save_every, scene.controller
+    if every is not None and every <= t1:
+        times.append(saveat.exact(every))
+    if controller is not None:
+        times += [saveat.exact(float(time)) for time in (controller.period, controller.delay) if time > 0.0]
+    spacing = times[0]
+    for time in times[1:]:
+        shared = math.gcd(spacing.numerator * time.denominator, time.numerator * spacing.denominator)
+        spacing = Fraction(shared, spacing.denominator * time.denominator)
+    return spacing / 20 if len(times) == 1 else spacing
+
+
+def ladders_of(
+    fleet: Ensemble, t1: float, spacing: Fraction, method: Any, h: float | None, dtype: str | None
+) -> tuple[list[list[Setting]], str]:
+    """Settings to try by method, the coarsest step first, the asked one last but one; and how noise acts.
+
+    Returns: The settings; and "none", "grid" where settings may share a path of noise, or "free" where they cannot.
+    """
+    scene = fleet.scene
+    dtype = scene.run.dtype if dtype is None else dtype
+    few = fleet.with_seed(fleet.seed, 64) if fleet.vary else fleet
+    rate = float(np.nanmax(np.linalg.norm(few.select(0, few.members).angular_velocity, axis=1)))
+    m = max(1, math.ceil(float(spacing) * max(rate, 2.0 * math.pi / t1)))
+    coarsest = spacing / m
+    names: list[Any] = [method] if method is not None else list(own_and_short(fleet, h is not None))
+    taken, refused, noise = list[Any](), list[str](), "none"
+    for name in names:
+        try:
+            plan = make_plan(fleet, name, h or float(coarsest), t1, dtype=dtype)
+        except SceneError as fault:
+            refused += fault.faults
+            continue
+        laws = plan.kernel_choice.laws
+        noisy = [term for term, module in laws if getattr(module, "NOISE", False)]
+        if noisy:
+            noise = "grid" if all(isinstance(term, NoisyTerm) for term in noisy) else "free"
+        taken.append(name if isinstance(name, str | Method) else plan.method)
+    if not taken:
+        raise SceneError(refused)
+    taken = taken[:1] if h is not None else taken[:METHODS]
+    if h is None:
+        return [[Setting(name, float(coarsest / 2**k), dtype) for k in range(HALVINGS)] for name in taken], noise
+    exact = saveat.exact(h)
+    longer = [exact * 2**k for k in range(DOUBLINGS, 0, -1) if (spacing / (exact * 2**k)).denominator == 1]
+    return [[Setting(taken[0], float(step), dtype) for step in (*longer, exact, exact / 2)]], noise
+
+
+def own_and_short(fleet: Ensemble, alone: bool) -> Sequence[Any]:
+    """The scene's own method, and the first ones of those that are cheapest by what acts; alone: the scene's own if any."""
+    own, noisy = fleet.scene.run.method, any(isinstance(term, NoisyTerm) for term in fleet.scene.terms)
+    kind = "noisy" if noisy else "damped" if is_damped(fleet) else "conservative"
+    if own is None:
+        return SHORT[kind]
+    named = own if not fleet.scene.run.method_options else fleet.scene.run.method_of(None)
+    return [named] if alone else [named, *(name for name in SHORT[kind] if name != own)]
+
+
+def coarse_of(spacing: Fraction, scene: int, like: Setting) -> list[Setting]:
+    """Steps of a cheaper scene, the longest first, down to the coarsest one of the scene itself."""
+    steps = [float(spacing / 2**k) for k in range(4)]
+    return [replace(like, h=step, scene=scene) for step in steps if step > 0.4 * like.h] or [replace(like, scene=scene)]

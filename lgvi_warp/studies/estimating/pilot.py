@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pilot: a few members at ever finer steps, until the bias is small; then what settings share, and what they cost.
+
+Noise on a grid is drawn at the finer step of each pair, so that both see one path. The pilot costs at most a tenth of what
+plain Monte Carlo is predicted to cost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.studies.estimating import bias as biases_of
+from lgvi_warp.studies.estimating.bias import AGREE, Bias, StepChange, difference
+from lgvi_warp.studies.estimating.choice import Observed
+from lgvi_warp.studies.estimating.estimators import REPLICATES, plain, tail_index
+from lgvi_warp.studies.estimating.levels import Runs, Setting, design, normals
+from lgvi_warp.studies.estimating.target import Solved, Sought
+
+# Members of the first stage, and how many stages there are, each of four times the members of the one before.
+FIRST, STAGES = 64, (64, 256, 1024)
+# MeanEstimate of plain Monte Carlo's predicted cost that the pilot may take.
+SHARE = 0.1
+# Where plain Monte Carlo needs at most so many members, a pilot is not worth its cost.
+FEW = 10 * FIRST
+# Half the step leaves pairs apart by a half to a 1.4th; where it leaves more, more pairs do better.
+STALLED = 0.8
+# Conditions and quantiles are smoothed over this part of the numbers' spread to see how a step changes them.
+WIDTH = 0.2
+# A tail that falls off by a smaller power has no finite variance, with what is known of so many members.
+HEAVY, KNOWN = 1.5, 256
+# Hits that a probability needs before its spread is known.
+HITS = 4
+
+
+@dataclass
+class Pilot:
+    """Members of the pilot, whose numbers are kept by setting and grid of the noise [s].
+
+    noise: "none", "grid" where settings may share a path, "free" where they cannot.
+    error: asked for; of the value where relative.
+    """
+
+    runs: Runs
+    target: Sought
+    noise: str
+    error: float
+    relative: bool = False
+    numbers: dict[tuple[Setting, float | None], np.ndarray] = field(default_factory=dict)
+    messages: list[str] = field(default_factory=list)
+
+    def grid(self, setting: Setting) -> float | None:
+        """The grid of the noise of a setting alone, and of its pairs with coarser ones [s]."""
+        return setting.h if self.noise == "grid" else None
+
+    def y(self, setting: Setting, grid: float | None, members: int) -> np.ndarray:
+        """The numbers of the first members (n,)."""
+        known = self.numbers.get((setting, grid), np.empty(0))
+        if len(known) < members:
+            points = design(self.runs.seed, "estimate pilot", self.runs.dimensions, len(known), members - len(known))
+            new = self.runs(setting, grid, points, np.arange(len(known), members))
+            known = self.numbers[setting, grid] = np.concatenate([known, new])
+        return known[:members]
+
+    def solved(self, setting: Setting, members: int) -> Solved:
+        """The target by one setting."""
+        return self.target.solved([(1.0, self.y(setting, self.grid(setting), members))])
+
+    def asked(self, at: Solved) -> float:
+        """The error asked for, in the unit of the statistic."""
+        return self.error * abs(at.value) if self.relative else self.error
+
+    def plain_members(self, setting: Setting, members: int) -> float:
+        """How many members plain Monte Carlo needs."""
+        at = self.solved(setting, members)
+        z, error = self.target.contributions(self.y(setting, self.grid(setting), members), at), self.asked(at)
+        with np.errstate(over="ignore", invalid="ignore"):
+            variance = plain(z, self.target.least(at)).variance * members
+        if error * error > 0.0:
+            return variance / (error * error)
+        return math.inf if variance > 0.0 else 1.0
+
+    def most_seconds(self, setting: Setting, members: int) -> float:
+        """What the pilot may cost [s]."""
+        return SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting))
+
+    def pair(self, coarse: Setting, fine: Setting, members: int) -> StepChange:
+        """How much the target changes from one setting to a finer one."""
+        grid = self.grid(fine)
+        below, above = self.y(coarse, grid, members), self.y(fine, grid, members)
+        at = self.target.solved([(1.0, above)])
+        spread = float(np.std(above[np.isfinite(above)])) if np.isfinite(above).any() else 0.0
+        if self.target.smooth and spread > 0.0:
+            width = WIDTH * spread
+            return difference(self.target.smoothed(below, at, width), self.target.smoothed(above, at, width))
+        coarser, finer = self.target.contributions(below, at), self.target.contributions(above, at)
+        return difference(coarser, finer, self.target.least(at))
+
+
+@dataclass
+class Ladder:
+    """Steps of one method that were run, the coarsest first; refused: why others were not.
+
+    halvings: the difference of each step to the next.
+    end: why it ended: "agree", "apart", "members" (their number leaves the difference open) or "steps".
+    """
+
+    settings: list[Setting] = field(default_factory=list)
+    halvings: list[StepChange] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+    end: str = "steps"
+
+    def biases(self) -> list[Bias]:
+        """The bias of each step."""
+        return biases_of.biases(self.halvings)
+
+    def settled(self, error: float) -> int:
+        """The coarsest step whose bias takes at most half of the error; where there is none the finest but one."""
+        if len(self.settings) < 2:
+            return 0
+        found = [i for i, bias in enumerate(self.biases()) if bias.mean_square <= (0.5 * error) ** 2]
+        return found[0] if found else len(self.settings) - (1 if self.end == "steps" else 2)
+
+
+def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None) -> Ladder:
+    """Run ever finer steps until two agree or members are apart.
+
+    Each step costs 64 members, all together the 128 of the finest: a tenth of plain Monte Carlo where that takes 1,280.
+
+    fixed: a setting that the caller asked for: the ladder goes on to the one after it and ends.
+    """
+    ladder = Ladder()
+    for setting in steps:
+        if not runs_at(pilot, setting, ladder):
+            continue
+        ladder.settings.append(setting)
+        if len(ladder.settings) < 2:
+            _first_look(pilot, setting)
+            continue
+        ladder.halvings.append(_compared(pilot, ladder))
+        if fixed is None and (end := _ended(pilot, ladder)):
+            ladder.end = end
+            break
+    return ladder
+
+
+def at_once(pilot: Pilot, own: Setting) -> Ladder | None:
+    """A step that the caller has and half of it, where plain Monte Carlo needs so few members that a pilot does not pay.
+
+    A 16th of them tell the bias. None where it takes more members, or where the step is not taken.
+    """
+    ladder, half = Ladder(), replace(own, h=0.5 * own.h)
+    if not runs_at(pilot, own, ladder):
+        return None
+    members = pilot.plain_members(own, FIRST)
+    if members > FEW:
+        return None
+    some = REPLICATES * math.ceil(max(members, 1.0) / REPLICATES**2)
+    try:
+        found = pilot.pair(own, half, some)
+    except SceneError:
+        return None
+    return Ladder([own, half], [found], {}, "agree") if math.isfinite(found.value) else None
+
+
+def runs_at(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
+    """Whether a setting is taken and no member fails at it."""
+    try:
+        y = pilot.y(setting, pilot.grid(setting), FIRST)
+        if pilot.grid(setting) is not None and ladder.settings:
+            pilot.y(ladder.settings[-1], pilot.grid(setting), FIRST)
+    except SceneError as error:
+        ladder.refused[str(setting)] = error.faults[0]
+        return False
+    if np.isnan(y).any():
+        ladder.refused[str(setting)] = f"{int(np.isnan(y).sum())} of {len(y)} members fail"
+        return False
+    if pilot.target.kind in ("mean", "cvar") and np.isinf(y).any():
+        problem = f"is infinite for {int(np.isinf(y).sum())} of {len(y)} members, so that its mean is"
+        raise refusal("of", pilot.runs.question.label, problem, "ask for a quantile or a probability")
+    return True
+
+
+def _first_look(pilot: Pilot, setting: Setting) -> None:
+    """Take more members at the coarsest step where a probability's hits are few and its error is relative."""
+    if not (pilot.relative and pilot.target.kind == "probability"):
+        return
+    for members in STAGES:
+        hits = float(pilot.target.counted(pilot.y(setting, pilot.grid(setting), members)).sum())
+        if hits >= HITS:
+            return
+    problem = f"was seen {hits:.0f} times among {members:,} members of the pilot, too seldom to fix their number"
+    remedy = "use lw.rare_event, which finds rare events, or give error= in place of relative_error="
+    raise refusal("of", pilot.runs.question.label, problem, remedy)
+
+
+def _compared(pilot: Pilot, ladder: Ladder) -> StepChange:
+    """The last halving, of as many members as it takes to know whether it is small, and as are worth their cost."""
+    for members in STAGES:
+        found = pilot.pair(ladder.settings[-2], ladder.settings[-1], members)
+        small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
+        known = found.half <= small or abs(found.value) > max(found.half, small)
+        if known or found.apart or not _stalls(ladder, found, small) or _too_dear(pilot, ladder, members):
+            break
+    return found
+
+
+def _stalls(ladder: Ladder, found: StepChange, small: float) -> bool:
+    """Whether a finer step would not make the pairs agree much better than more of them do."""
+    return found.half <= 4.0 * small or bool(ladder.halvings and found.half > STALLED * ladder.halvings[-1].half)
+
+
+def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
+    """Whether three times as many pairs more would cost too much."""
+    last = ladder.settings[-1]
+    more = 3.0 * members * 1.5 * pilot.runs.cost(last, pilot.grid(last))
+    return pilot.runs.seconds + more > pilot.most_seconds(ladder.settings[-2], FIRST)
+
+
+def _ended(pilot: Pilot, ladder: Ladder) -> str:
+    """Why no finer step is run; "" to go on."""
+    halvings, error = ladder.halvings, pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
+    if len(halvings) > 1 and all(each.apart for each in halvings[-2:]):
+        return "apart"
+    if any(bias.mean_square <= (0.5 * error) ** 2 for bias in ladder.biases()):
+        return "agree"
+    last = halvings[-1]
+    stalls = len(halvings) > 1 and last.half > STALLED * halvings[-2].half and abs(last.value) <= last.half
+    return "members" if stalls and last.half > AGREE * error else ""
+
+
+def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: int) -> Observed:
+    """What settings have in common: all of the same members, noise drawn at the step of the top one."""
+    settings, grid = [top, *coarser], pilot.grid(top)
+    y = [pilot.y(setting, grid, members) for setting in settings]
+    kept = [i for i, values in enumerate(y) if not np.isnan(values).any()]
+    if 0 not in kept:
+        raise failing(top, y[0])
+    if pilot.target.kind in ("mean", "cvar"):
+        refuse_heavy(pilot.runs.question.label, y[0])
+    at = pilot.target.solved([(1.0, y[0])])
+    for i in kept:
+        pilot.y(settings[i], pilot.grid(settings[i]), FIRST)  # which tells what it costs alone
+
+    def pair(f: int, c: int) -> float:
+        # Both costs are known with the draws of the top step, which are as many or more.
+        return pilot.runs.cost(settings[kept[f]], grid) + pilot.runs.cost(settings[kept[c]], grid)
+
+    points = design(pilot.runs.seed, "estimate pilot", pilot.runs.dimensions, 0, members)
+    return Observed(
+        [pilot.target.contributions(y[i], at) for i in kept],
+        normals(points),
+        [pilot.runs.cost(settings[i], pilot.grid(settings[i])) for i in kept],
+        pair,
+        pilot.target.least(at),
+        [settings[i] for i in kept],
+        at,
+    )
+
+
+def failing(setting: Setting, y: np.ndarray) -> SceneError:
+    """The refusal of a statistic of members that fail at the finest step."""
+    count = int(np.isnan(y).sum())
+    problem = f"{count} of {len(y)} members fail, or have no finite number"
+    return refusal("setting", str(setting), problem, "mend what fails (lw.solve says which), or vary less")
+
+
+def refuse_heavy(label: str, y: np.ndarray) -> None:
+    """Refuse a statistic whose variance seems infinite; SceneError."""
+    index = tail_index(y)
+    if len(y) >= KNOWN and index < HEAVY:
+        problem = (
+            f"has no finite variance, as it seems: its tail falls off with the power {index:.2g} of {len(y)} members"
+        )
+        raise refusal("of", label, problem, "ask for a quantile, risk=0.5, or a probability")

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is estimated of the members' numbers: a mean, a probability, a quantile or the mean of the worst part.
+
+Levels give signed samples: E g(Y) is the sum of weights times means of g over arrays of members. A quantile and the mean of a
+part are solved for from such sums, and their errors are those of the mean of what each member contributes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+# A weight, and the numbers (n,) of members whose mean has it.
+Weighted = tuple[float, np.ndarray]
+# Halvings of the interval in which a quantile is.
+HALVINGS = 60
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A target's value, the threshold it is about, and the density there; of means and probabilities the value alone."""
+
+    value: float
+    threshold: float = 0.0
+    density: float = 1.0
+
+
+@dataclass(frozen=True)
+class Sought:
+    """A mean ("mean"), a probability ("probability"), a "quantile" of a level, or the mean of the worst part, a "cvar".
+
+    level: of the quantile, or the part.
+    above, below: a probability's limits; without any the numbers are 1 or 0 themselves.
+    """
+
+    kind: str = "mean"
+    level: float = 0.5
+    above: float | None = None
+    below: float | None = None
+
+    def solved(self, samples: Sequence[Weighted]) -> Solved:
+        """The value from weighted samples, whose weights have the sum 1."""
+        if self.kind in ("mean", "probability"):
+            return Solved(mean_of(samples, self.counted))
+        level = self.level if self.kind == "quantile" else 1.0 - self.level
+        threshold = quantile_of(samples, level)
+        if self.kind == "quantile":
+            return Solved(threshold, threshold, density_of(samples, level))
+        beyond = mean_of(samples, lambda y: np.maximum(y - threshold, 0.0))
+        return Solved(threshold + beyond / self.level, threshold)
+
+    def contributions(self, y: np.ndarray, at: Solved) -> np.ndarray:
+        """What each member contributes (n,): their mean is the value, to first order."""
+        if self.kind == "quantile":
+            return at.threshold + (self.level - (y <= at.threshold)) / at.density
+        if self.kind == "cvar":
+            return np.asarray(at.threshold + np.maximum(y - at.threshold, 0.0) / self.level)
+        return self.counted(y)
+
+    def counted(self, y: np.ndarray) -> np.ndarray:
+        """The numbers themselves; of a condition 1 where it holds and 0 where not."""
+        if self.above is None and self.below is None:
+            return y
+        holds = np.ones(y.shape, bool) if self.above is None else y > self.above
+        holds = holds if self.below is None else holds & (y < self.below)
+        return np.where(np.isnan(y), np.nan, holds)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether contributions jump where a number passes a threshold, and may be smoothed to see small changes of it."""
+        return self.kind == "quantile" or self.above is not None or self.below is not None
+
+    def smoothed(self, y: np.ndarray, at: Solved, width: float) -> np.ndarray:
+        """Contributions whose jumps are smoothed over a width, for differences: how much probability small changes move.
+
+        The change of a probability is the density at the threshold times the change of the number; over a width the density
+        is averaged, while of a few members none may jump.
+        """
+        from scipy.special import ndtr
+
+        def beyond(limit: float) -> np.ndarray:
+            return np.asarray(ndtr((y - limit) / width))
+
+        if self.kind == "quantile":
+            return np.asarray(at.threshold + (self.level - 1.0 + beyond(at.threshold)) / at.density)
+        whole = np.ones(len(y)) if self.above is None else beyond(self.above)
+        return whole if self.below is None else whole - beyond(self.below)
+
+    def least(self, at: Solved) -> float:
+        """The smallest change of a contribution: 0 where contributions are continuous."""
+        return 1.0 if self.kind == "probability" else 1.0 / at.density if self.kind == "quantile" else 0.0
+
+
+def mean_of(samples: Sequence[Weighted], of: Callable[[np.ndarray], np.ndarray]) -> float:
+    """The mean of a function of the members' numbers."""
+    return float(sum(weight * np.mean(of(y)) for weight, y in samples))
+
+
+def quantile_of(samples: Sequence[Weighted], level: float) -> float:
+    """Where the weighted distribution reaches a level: it may fall a little between levels of signed weights."""
+    values = np.concatenate([y for _, y in samples])
+    low, high = float(values.min()), float(values.max())
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        below = mean_of(samples, lambda y, at=middle: y <= at)  # type: ignore[misc]
+        low, high = (low, middle) if below >= level else (middle, high)
+    return high
+
+
+def density_of(samples: Sequence[Weighted], level: float) -> float:
+    """The density at the quantile of a level, from the quantiles a third of the nearer tail, at most 0.05, on both sides."""
+    apart = min(level, 1.0 - level, 0.15) / 3.0
+    low, high = quantile_of(samples, level - apart), quantile_of(samples, level + apart)
+    rise = mean_of(samples, lambda y: y <= high) - mean_of(samples, lambda y: y <= low)
+    return rise / (high - low) if high > low and rise > 0.0 else float(np.inf)

@@ -24,8 +24,8 @@ from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import closest
 
 # In the order of the help.
-_VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare, view, info,
-          bench, warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
+_VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare, view,
+          info, bench, warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
 }

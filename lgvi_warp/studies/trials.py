@@ -73,7 +73,7 @@ def tried(
 
 
 @dataclass
-class Series:
+class StepSeries:
     """Steps of one setting, each half of the one before.
 
     m: number of steps in the sample's spacing.
@@ -107,7 +107,7 @@ def trials_of(
     """
     solvers = SOLVERS if solvers is None else solvers
     every = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
-    trials, skipped, begun, waiting = list[Trial](), list[str](), set[str](), list[Series]()
+    trials, skipped, begun, waiting = list[Trial](), list[str](), set[str](), list[StepSeries]()
     for i, series in enumerate(every):
         report(0.5 * i / len(every))
         asked = named and series.method not in begun
@@ -132,18 +132,18 @@ def trials_of(
 
 def series_of(
     sample: Sample, methods: Sequence[str], solvers: Sequence[tuple[str, int | None]], compensated: Sequence[str]
-) -> list[Series]:
+) -> list[StepSeries]:
     """The series of settings, the default precision of every method first."""
     plain: tuple[str, int | None] = ("quartic", None)
     settings = [(name, dtype, plain) for dtype in PRECISIONS for name in methods]
     settings += [(SOLVED_BY, "float64", solved) for solved in solvers if SOLVED_BY in methods]
     summed, _ = sample.accepted([name for name in compensated if name in methods], "float32_compensated")
     settings += [(name, "float32_compensated", plain) for name in summed]
-    return [Series(*setting, sample.coarsest(1.0)) for setting in settings]
+    return [StepSeries(*setting, sample.coarsest(1.0)) for setting in settings]
 
 
 def halved(
-    sample: Sample, series: Series, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
+    sample: Sample, series: StepSeries, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
 ) -> bool:
     """Run the next step of a series, and tell whether another is worth it."""
     trial = tried(sample, series.candidate(sample), reference, until, budget)

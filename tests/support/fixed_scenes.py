@@ -78,8 +78,8 @@ def stored(fleet, **settings):
     with tempfile.TemporaryDirectory() as folder:
         solved(fleet, store=Path(folder) / "run.zarr", **settings)
         for path in sorted(Path(folder).rglob("*")):
-            # Texts tell of versions and of the machine; chunks of arrays lie below a folder "c", and are named by numbers.
-            if path.is_file() and path.name.replace(".", "").isdigit():
+            # Texts tell of versions and of the machine; chunks of arrays are c.0.3.0.
+            if path.is_file() and path.name.removeprefix("c").replace(".", "").isdigit() and path.suffix != ".json":
                 total.update(path.relative_to(folder).as_posix().encode())
                 total.update(path.read_bytes())
     return total.hexdigest()

@@ -74,12 +74,27 @@ class Series:
         return self.quantity.label
 
     def at(self, time: float) -> np.ndarray | None:
-        """The values (m,) that were measured at a time [s]; None for none."""
+        """Select the values that were measured at a time.
+
+        Args:
+            time: The time [s].
+
+        Returns:
+            Values (m,), or None where nothing was measured then.
+        """
         rows = np.flatnonzero(np.abs(self.time - time) <= 1e-9 * max(1.0, time))
         return np.asarray(self.values[rows[0]]) if len(rows) else None
 
     def near(self, measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:
-        """Predictions (m, n) of the measured values (m,): of angles those within half a turn of them."""
+        """Move predictions of angles by whole turns, to within half a turn of what was measured.
+
+        Args:
+            measured: Measured values (m,).
+            predicted: What n members predict of them, (m, n).
+
+        Returns:
+            The predictions, (m, n); of what is no angle as they were.
+        """
         if self.label not in ANGLES:
             return predicted
         apart = predicted - measured[:, None]

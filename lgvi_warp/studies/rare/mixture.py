@@ -133,7 +133,7 @@ def _of_shares(points: np.ndarray, shares: np.ndarray) -> Mixture:
 
 
 @dataclass(frozen=True, eq=False)
-class Weighted:
+class WeightedMembers:
     """Members drawn from a mixture, of which those that fail have weights.
 
     Attributes:
@@ -157,7 +157,7 @@ class Weighted:
     members: int
 
     @classmethod
-    def of(cls, u: np.ndarray, limits: np.ndarray, mixture: Mixture) -> Weighted:
+    def of(cls, u: np.ndarray, limits: np.ndarray, mixture: Mixture) -> WeightedMembers:
         """From points (n, d) drawn from a mixture, and their limits (n,)."""
         happens = limits > 0.0
         failing, theirs = u[happens], limits[happens]
@@ -178,7 +178,12 @@ def log_weights(mixture: Mixture, u: np.ndarray) -> np.ndarray:
 
 
 def doubts(
-    weighted: Weighted, mixture: Mixture, probability: float, spread: float, failing: Sequence[np.ndarray], asked: float
+    weighted: WeightedMembers,
+    mixture: Mixture,
+    probability: float,
+    spread: float,
+    failing: Sequence[np.ndarray],
+    asked: float,
 ) -> list[str]:
     """Why the weights are not the answer; empty where they are.
 
@@ -199,13 +204,13 @@ def doubts(
     return reasons
 
 
-def effective_wanted(weighted: Weighted) -> float:
+def effective_wanted(weighted: WeightedMembers) -> float:
     """The effective number of weights that it takes: more where a mixture has more to learn."""
     d = weighted.failing.shape[1]
     return max(EFFECTIVE, EFFECTIVE_EACH * d * (d + 1) / 2)
 
 
-def wanting(weighted: Weighted, asked: float) -> float:
+def wanting(weighted: WeightedMembers, asked: float) -> float:
     """How many times as many draws it takes for this relative error, and for weights as even as they must be."""
     if not math.isfinite(weighted.spread):
         return math.inf
@@ -214,7 +219,7 @@ def wanting(weighted: Weighted, asked: float) -> float:
     )
 
 
-def uncovered(weighted: Weighted, mixture: Mixture, failing: Sequence[np.ndarray]) -> float:
+def uncovered(weighted: WeightedMembers, mixture: Mixture, failing: Sequence[np.ndarray]) -> float:
     """The largest part of a run's failing members at which one weight would be larger than may be."""
     most = math.log(LARGEST * weighted.probability * weighted.members)
     return max((float((log_weights(mixture, each) > most).mean()) for each in failing if len(each)), default=0.0)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lgvi_warp.common.random import generator
-from lgvi_warp.studies.rare.mixture import MOST_NORMALS, Mixture, Weighted, doubts, fitted, wanting
+from lgvi_warp.studies.rare.mixture import MOST_NORMALS, Mixture, WeightedMembers, doubts, fitted, wanting
 from lgvi_warp.studies.rare.plain import sampled
 from lgvi_warp.studies.rare.subset import SHARE, Limit, SubsetRun, climb, first_levels
 
@@ -173,10 +173,10 @@ class RareSearch:
         for _ in range(TRIES):
             mixture = fitted(around, rng).widened()
             u, limits = self._drawn(mixture, rng, TRIED)
-            found = Weighted.of(u, limits, mixture)
+            found = WeightedMembers.of(u, limits, mixture)
             if TRIED < (wanted := TRIED * wanting(found, asked)) <= MOST_DRAWN:
                 more, their_limits = self._drawn(mixture, rng, math.ceil(1.2 * wanted) - TRIED)
-                found = Weighted.of(np.concatenate([u, more]), np.concatenate([limits, their_limits]), mixture)
+                found = WeightedMembers.of(np.concatenate([u, more]), np.concatenate([limits, their_limits]), mixture)
             reasons = doubts(found, mixture, probability, spread, [run.failing for run in runs], self.relative_error)
             if not reasons:
                 told = found.probability, found.spread, found.effective

@@ -38,7 +38,7 @@ class NoProgress(Exception):  # noqa: N818  (what happened, and no fault of the 
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class ChainLevel:
     """The members of one level, all of whose limits are at the threshold or above it.
 
     u: (n, d), chain by chain. limits: (n,). chains: number of them; n where the members are independent. threshold: -inf for
@@ -86,11 +86,11 @@ class _Climber:
     """A run under way: its levels, of which the normals of the last alone are kept."""
 
     rng: np.random.Generator
-    level: Level
+    level: ChainLevel
     size: int
     members: int = 0
     scale: float = FIRST_SCALE
-    below: list[Level] = field(default_factory=list)
+    below: list[ChainLevel] = field(default_factory=list)
 
     @property
     def arrived(self) -> bool:
@@ -126,7 +126,7 @@ class _Climber:
         share = len(inside) / len(level.limits)
         log_probability = level.log_probability + math.log(share)
         variance = level.variance + share_variance(level.limits >= bound, level.chains)
-        self._next = Level(level.u[:0], level.limits[:0], len(chosen), bound, log_probability, variance)
+        self._next = ChainLevel(level.u[:0], level.limits[:0], len(chosen), bound, log_probability, variance)
         self._accepted, self._steps = 0.0, 0
 
     def proposals(self) -> np.ndarray:
@@ -177,15 +177,15 @@ def share_variance(happens: np.ndarray, chains: int) -> float:
     return float(own.var(ddof=1)) / (share**2 * chains) if chains > 1 else math.inf
 
 
-def first_levels(limit: Limit, d: int, size: int, generators: Sequence[np.random.Generator]) -> list[Level]:
+def first_levels(limit: Limit, d: int, size: int, generators: Sequence[np.random.Generator]) -> list[ChainLevel]:
     """Independent members of the first level of several runs, as one batch."""
     u = np.concatenate([rng.standard_normal((size, d)) for rng in generators])
     limits = limit(u)
-    return [Level(u[i : i + size], limits[i : i + size], size) for i in range(0, len(u), size)]
+    return [ChainLevel(u[i : i + size], limits[i : i + size], size) for i in range(0, len(u), size)]
 
 
 def climb(
-    limit: Limit, levels: Sequence[Level], generators: Sequence[np.random.Generator],
+    limit: Limit, levels: Sequence[ChainLevel], generators: Sequence[np.random.Generator],
     report: Callable[[int], None] = lambda members: None) -> list[SubsetRun]:  # fmt: skip
     """Go from levels that there are to the event, every run by itself, all chains in one batch.
 

@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import chi2
 
 from lgvi_warp.studies.rare.cheaper import compared
-from lgvi_warp.studies.rare.mixture import Mixture, Weighted, doubts, fitted, log_weights, uncovered
+from lgvi_warp.studies.rare.mixture import Mixture, WeightedMembers, doubts, fitted, log_weights, uncovered
 from lgvi_warp.studies.rare.plain import sampled
 from lgvi_warp.studies.rare.search import RareSearch, joined
 from lgvi_warp.studies.rare.subset import NoProgress, climb, first_levels, share_variance
@@ -237,7 +237,7 @@ def test_weights_of_a_shifted_normal_are_right():
     rng, n = np.random.default_rng(5), 200_000
     shifted = Mixture(np.ones(1), np.array([[3.0]]), np.ones((1, 1, 1)))
     u = shifted.draw(rng, n)
-    found = Weighted.of(u, u[:, 0] - 3.0, shifted)
+    found = WeightedMembers.of(u, u[:, 0] - 3.0, shifted)
     p, square = ndtr(-3.0), math.exp(9.0) * ndtr(-6.0)
     spread = math.sqrt((square - p**2) / n) / p
     assert found.spread == pytest.approx(spread, rel=0.02)
@@ -250,7 +250,7 @@ def test_a_side_that_weights_do_not_see_is_doubted():
     rng = np.random.default_rng(6)
     one = Mixture(np.ones(1), np.array([[4.5, 0.0]]), np.array([np.diag([0.3, 1.0])])).widened()
     u = one.draw(rng, 4000)
-    found = Weighted.of(u, np.abs(u[:, 0]) - 4.2, one)
+    found = WeightedMembers.of(u, np.abs(u[:, 0]) - 4.2, one)
     here = np.column_stack([rng.normal(4.4, 0.1, 200), rng.standard_normal(200)])
     assert uncovered(found, one, [here]) == 0.0
     assert uncovered(found, one, [here, here * [-1.0, 1.0]]) == 1.0
@@ -264,7 +264,7 @@ def test_a_side_that_weights_do_not_see_is_doubted():
 
 def test_nothing_drawn_that_fails_has_no_weight():
     one = Mixture(np.ones(1), np.zeros((1, 2)), np.eye(2)[None])
-    found = Weighted.of(np.zeros((5, 2)), -np.ones(5), one)
+    found = WeightedMembers.of(np.zeros((5, 2)), -np.ones(5), one)
     assert (found.probability, found.spread) == (0.0, math.inf)
     assert doubts(found, one, 1e-5, 0.2, [np.ones((3, 2))], 0.1)
 

@@ -69,7 +69,7 @@ class Chosen:
     @property
     def variance(self) -> float:
         """The variance of sampling that the error leaves; a quarter of its square where the bias takes it all."""
-        return max(self.error**2 - self.bias.mean_square, 0.25 * self.error**2)
+        return max(self.error**2 - self.bias.mean_square, 0.25 * self.error**2, 1e-300)
 
 
 def answered(

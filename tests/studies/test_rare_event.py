@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rare events of vehicles: a neutrally buoyant sphere in linear drag, whose place at the end is linear in its start."""
 
+import copy
 import inspect
 import json
 import pickle
@@ -81,8 +82,9 @@ def test_the_answer_says_what_it_is(found):
     for word in ("95 % interval", "event       position[0] above", "weights of members", "plain       would take", "likeliest",
                  "moved       "):  # fmt: skip
         assert word in text
-    again = pickle.loads(pickle.dumps(found))
-    assert str(again) == text
+    for again in (pickle.loads(pickle.dumps(found)), copy.copy(found), copy.deepcopy(found)):
+        assert str(again) == text
+        assert repr(again) == repr(found)
     assert found.provenance["versions"]
     assert found.provenance["scene"]["vehicle"]
 

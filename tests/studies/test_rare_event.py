@@ -262,7 +262,7 @@ def test_noise_alone_can_be_the_cause():
     ({}, "is a status"),
     ("peak depth", "is a metric without a bound"),
     ("position", "is 3 numbers; name one of its entries"),
-    ("position[0] - 1000.0", "has a probability below 1e-15; the largest limit that members reached is"),
+    ("position[0] - 1000.0", "has a probability below 1e-15, or none; the largest limit that members reached is"),
     ("position[0] + 1000.0", "happens for each of"),
     ("position[1] - 1.0", "has the same value for most members"),
     (3.0, "is no event"),

@@ -46,7 +46,7 @@ EPILOG = """examples:
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
   lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
-  lgvi-warp rare examples/paper.toml --when "position[0] above 60"
+  lgvi-warp rare examples/paper.toml --when "position[2] above 690"
   lgvi-warp info runs/large
   lgvi-warp run examples/paper.toml --json -q
 

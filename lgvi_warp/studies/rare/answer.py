@@ -62,7 +62,7 @@ class RareEvent(Saved):
     relative_error: float
     estimator: str
     members: Mapping[str, int]
-    failing: Table | None
+    failing: Table | None = field(repr=False)
     normals: np.ndarray = field(repr=False)
     draws: np.ndarray = field(repr=False)
     weights: np.ndarray = field(repr=False)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import inspect
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -11,10 +10,8 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.prepared import FailedMembers, Prepared, prepare
-from lgvi_warp.common.errors import SceneError, refusal
-from lgvi_warp.control.sensor import DRAWING, Sensor
+from lgvi_warp.common.errors import refusal
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.columns import as_given, columns_of
@@ -51,7 +48,7 @@ class VehicleLimit:
         varies = {"levels": True} if self.fleet.vary else {}
         self.run: Prepared = prepare(
             self.fleet,
-            **condition.arguments(self.fleet.scene, settings.get("h")) | varies | _given(self.fleet) | dict(settings),
+            **condition.arguments(self.fleet.scene, settings.get("h")) | varies | {"draws": "given"} | dict(settings),
         )
         self.names = self.run.names if self.fleet.vary else ()
         self.sources = tuple(getattr(self.run, "draws", ()))
@@ -127,25 +124,3 @@ def _spreads(distances: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         spreads = np.nanstd(ordinary, axis=1)
     return np.where(spreads > 0.0, spreads, 1.0)
-
-
-def _given(fleet: Ensemble) -> dict[str, Any]:
-    """Let calls give the draws of noise: a run that draws them itself gives row i the same noise in every call."""
-    if "draws" in inspect.signature(prepare).parameters:
-        return {"draws": "given"}
-    if noise := noisy_parts(fleet):
-        problem = f"draws noise ({', '.join(noise)}), which would be the same in every call"
-        raise SceneError([f"fleet: {problem}; leave the noise out, or give its numbers distributions"])
-    return {}
-
-
-def noisy_parts(fleet: Ensemble) -> list[str]:
-    """Terms and sensors of a scene that draw random numbers."""
-    scene, varied = fleet.scene, fleet.varied_names
-
-    def draws(part: Any, names: Any) -> bool:
-        return any(f"{part.key}.{name}" in varied or np.any(part.parameters().get(name, 0.0)) for name in names)
-
-    terms = [term.key for term in scene.terms if isinstance(term, NoisyTerm) and draws(term, term.parameters())]
-    sensors = scene.controller.sensors if scene.controller else ()
-    return terms + [part.key for part in sensors if isinstance(part, Sensor) and draws(part, DRAWING)]

@@ -126,7 +126,7 @@ def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
             'give a number that grows towards it: a distance, {"peak depth": {"above": 12.0}}, or the name of an event'
         )
         return refusal("limit", condition.label, problem, remedy)
-    problem = f"has a probability below 1e-15; the largest limit that members reached is {stuck.largest:.4g}"
+    problem = f"has a probability below 1e-15, or none; the largest limit that members reached is {stuck.largest:.4g}"
     return refusal("limit", condition.label, problem, "move the bound, or widen what varies")
 
 

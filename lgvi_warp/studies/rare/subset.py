@@ -110,7 +110,9 @@ class _Climber:
         if not math.isfinite(bound):
             raise NoProgress("never", largest)
         if reached > FLAT or bound <= self.level.threshold:
-            raise NoProgress("steps", largest)
+            # A value that many members have is a step; after more levels the limit has come to its largest value.
+            steps = len(self.below) < 3 or bool((self.below[0].limits == bound).any())
+            raise NoProgress("steps" if steps else "never", largest)
         if len(self.below) + 1 >= MOST_LEVELS:
             raise NoProgress("never", largest)
         return bound

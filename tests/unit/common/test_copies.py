@@ -125,7 +125,7 @@ APART = {"Indices", "Saved", "Policy"}
 # Classes of which a run makes one, and a study.
 OF_RUNS = {"Result", "Prepared", "Sweep", "Outputs", "ScalarModel"}
 OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned", "StabilityMap", "SobolIndices",
-              "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff"}  # fmt: skip
+              "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff", "RareEvent"}  # fmt: skip
 
 
 def classes():
@@ -264,6 +264,7 @@ def test_what_studies_give():
         "SobolIndices": lw.uq.sobol(SPHERE, "depth", vary=both, samples=16, **short),
         "MorrisEffects": lw.uq.morris(SPHERE, "depth", vary=both, samples=4, **short),
         "Suggestion": lw.suggest(lw.Ensemble(SPHERE, 16, 0, vary), 1e-2, t1=1.0),
+        "RareEvent": lw.rare_event(lw.Ensemble(SPHERE, 1, 0, vary), "depth - 3.0", **short),
         "Tradeoff": lw.tradeoff(lw.Ensemble(SPHERE, 16, 0, vary), t1=1.0, methods=["psi_s"], members=16, seconds=2.0),
     }  # fmt: skip
     assert found.keys() >= OF_STUDIES

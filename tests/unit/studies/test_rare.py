@@ -188,6 +188,7 @@ def test_a_cheaper_limit_that_shuts_failures_out_is_noticed():
     (lambda u: np.floor(u[:, 0]) - 8.0, "steps"),
     (lambda u: np.minimum(u[:, 0], 2.0) - 3.0, "steps"),
     (lambda u: np.tanh(u[:, 0]) - 1.1, "never"),
+    (lambda u: 1000.0 - (u[:, 0] - 1.0) ** 2 - 1000.1, "never"),
 ])  # fmt: skip
 def test_what_comes_no_nearer_ends(limit, kind):
     with pytest.raises(NoProgress) as stuck:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.calls.sizes import Sizes, sizes
+from lgvi_warp.calls.sizes import Sizes, sizes, with_ends
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults
@@ -161,7 +161,10 @@ def predict(
         compile_seconds += plan.compile()
         set_up, step = costs(plan, blocks_of_run, count, observed)
     place = nearest_folder(into.folder) if into else Path.cwd()
-    runs = [Sized(plan, into, fields if observed.samples else (), sizes(plan, observed.watch(plan.grid.times)[0]))]
+    of_statistics = with_ends(
+        sizes(plan, observed.watch(plan.grid.times)[0]), plan, into is not None, request.keeps_final
+    )
+    runs = [Sized(plan, into, fields if observed.samples else (), of_statistics)]
     runs += size_of_rerun(plan, observed, into, fields)
     write, metadata = writing(runs, place, count) if into else (0.0, 0)
     n, steps = plan.ensemble.members, plan.grid.steps

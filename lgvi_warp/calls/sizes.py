@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.going_on import known_settings, left_by
 from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.engine.work import at_start, samples_of
 from lgvi_warp.statistics.base import Statistic
@@ -64,6 +65,28 @@ def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
     launch = max(plan.launches.ticks_held(runs[0].count), *due)
     at_once = max(1, SORTED_AT_ONCE * times * 8 // max(values["joined"], 1))
     return Sizes(**values, taking=at("taking", launch), reading=at("reading", min(times, at_once)))
+
+
+def with_ends(of_statistics: Sizes, plan: Plan, stored: bool, kept: bool) -> Sizes:
+    """The same sizes with those of what members end with, where a run keeps it."""
+    if not kept:
+        return of_statistics
+    each, block = _file_of_ends(plan), blocks(plan.ensemble.members)[0]
+    if stored:
+        return replace(of_statistics, file=of_statistics.file + each)
+    return replace(of_statistics, estimates=of_statistics.estimates + each * plan.ensemble.members // block.count)
+
+
+def _file_of_ends(plan: Plan) -> int:
+    """The size of a block's part of the end of a run in a file [bytes]."""
+    from lgvi_warp.engine.keepers.final import Finals
+    from lgvi_warp.engine.packets import Packets
+
+    block, *_ = blocks(plan.ensemble.members)
+    packets = Packets(plan, plan.ensemble.select(block.first, block.stop))
+    # The looks at the start, whose energies are kept.
+    packets.launch(plan.grid.first, plan.grid.first)
+    return len(packed([Finals()], [(left_by(packets), known_settings(plan))]))
 
 
 def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:

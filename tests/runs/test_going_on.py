@@ -323,7 +323,7 @@ def test_what_is_refused():
     assert kept.final.members == 20
 
 
-@pytest.mark.parametrize("method", ["psi_x", "rk4"])
+@pytest.mark.parametrize("method", ["psi_x", "psi_s"])
 def test_what_is_remembered_stays(method):
     # From states that somebody set anew, to what they were: the current and the thrusters go on with what they remember.
     fleet = fleet_of("torpedo", terms=list(CASES["Gauss-Markov current"].terms + CASES["thrusters"].terms))

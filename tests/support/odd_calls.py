@@ -23,7 +23,7 @@ UNCALLED = {
     "Interrupted", "MembersFailed", "Status", "Warnings", "CallbackInput", "Allocation", "ControlLaw", "Guidance",
     "MeasuringPart", "Packed", "PackingContext", "Term", "Event", "NoisyTerm", "Prepared", "Result", "LinearModel",
     "Regulator", "Margins", "Trim", "Tuned", "WorstCase", "StabilityMap", "Sweep", "Prediction", "SceneError", "show",
-    "register", "number", "Cell",
+    "register", "number", "Cell", "Assimilated", "Estimated", "Final", "RareEvent", "GivenDataIndices",
 }  # fmt: skip
 
 
@@ -50,7 +50,8 @@ def goods(scene, fleet, result, folder):
         "outputs": ["X"], "to": "csv", "coefficients": {}, "source": "none", "mass": 20.0,
         "term": lw.terms.Drag(linear=[1.0] * 6), "part": lw.control.HeadingPID(kp=1.0), "model": None, "Q": np.eye(2),
         "R": np.eye(2),
-        "over": {}, "within": {}, "of": "depth", "minimise": "depth", "found": None, "matrix": np.eye(6),
+        "series": lw.studies.Series("depth", [0.1], [0.0], 0.1), "limit": "depth - 9.0", "time": [0.1], "values": [0.0],
+        "std": 0.1, "over": {}, "within": {}, "of": "depth", "minimise": "depth", "found": None, "matrix": np.eye(6),
     }  # fmt: skip
     own = {
         "CurrentHarmonics": {"amplitudes": AHEAD, "periods": [10.0]}, "Fins": fins,

@@ -191,12 +191,13 @@ class Table(Sampling):
             return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
-        return {name: column for name, column in self.arrays().items() if name != self.weights}
+        own: dict[str, np.ndarray] = self._own  # type: ignore[attr-defined]
+        return {name: column for name, column in own.items() if name != self.weights}
 
     def own_weights(self) -> np.ndarray | None:
         if self.weights is None:
             return None
-        weights = self.arrays()[self.weights]
+        weights = self._own[self.weights]  # type: ignore[attr-defined]
         return np.asarray(weights / weights.mean())
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -204,7 +205,7 @@ class Table(Sampling):
         return dict(self._own)  # type: ignore[attr-defined]
 
     def own_members(self, space: Space) -> int:
-        return len(next(iter(self.arrays().values())))
+        return len(next(iter(self._own.values())))  # type: ignore[attr-defined]
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         # Random levels for the names that the table does not contain.

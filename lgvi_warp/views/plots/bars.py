@@ -74,6 +74,6 @@ def _bars(axes: Any, indices: Indices, q: int, shown: np.ndarray) -> None:
         axes.barh(at, getattr(indices, column)[q][shown], width, xerr=half, label=column, color=COLORS[i], hatch=hatch(i),
                   edgecolor="white", linewidth=0.0, error_kw={"capsize": 2.0})  # fmt: skip
     axes.axvline(0.0, color="black", linewidth=0.5)
-    of_variance = "first" in indices.columns
+    of_variance = indices.name.startswith("Sobol") or "first" in indices.columns
     axes.set(title=in_words(indices.quantities[q]), xlabel="part of the variance" if of_variance else "effect")
     axes.grid(True, axis="x", alpha=0.3)

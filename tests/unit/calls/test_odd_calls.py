@@ -18,7 +18,8 @@ from tests.unit.studies.test_cost import found as tradeoff_of
 DELIBERATE = (lw.SceneError, NothingToDraw, MissingExtra, OSError)
 # Studies and trials of the disk: seconds each where an odd argument is taken, as None is.
 LONG = {"stability_map", "suggest", "term_cost", "scaling", "linearize", "trim", "tradeoff", "margins", "sweep", "tune_gains",
-        "worst_case", "predict", "record", "report", "statistics", "summary"}  # fmt: skip
+        "worst_case", "rare_event", "estimate", "assimilate", "predict", "record", "report", "statistics",
+        "summary"}  # fmt: skip
 PACKAGE = str(Path(lw.__file__).parent)
 
 

@@ -123,9 +123,10 @@ OTHERS = {
 # What the two kinds of indices and all studies have in common, and what has a test of its own.
 APART = {"Indices", "Saved", "Policy"}
 # Classes of which a run makes one, and a study.
-OF_RUNS = {"Result", "Prepared", "Sweep", "Outputs", "ScalarModel"}
+OF_RUNS = {"Result", "Final", "Prepared", "Sweep", "Outputs", "ScalarModel"}
 OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned", "StabilityMap", "SobolIndices",
-              "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff", "RareEvent"}  # fmt: skip
+              "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff", "RareEvent", "Assimilated",
+              "Estimated"}  # fmt: skip
 
 
 def classes():
@@ -212,7 +213,8 @@ def ran():
     settings = dict(method="psi_s", h=0.1, t1=0.5)
     found = lw.solve(fleet, **settings, statistics=[lw.statistics.Mean("position")])
     run = lw.prepare(SPHERE, list(vary), of="depth", **settings)
-    made = {"Result": found, "Estimates": found.statistics, "Estimate": found.statistics["mean position"], "Prepared": run,
+    made = {"Result": found, "Final": found.final, "Prepared": run,
+            "Estimates": found.statistics, "Estimate": found.statistics["mean position"],
             "ScalarModel": lw.uq.model(SPHERE, vary, "depth", **settings),
             "Outputs": lw.uq.evaluate(fleet, "depth", **settings),
             "status": found.status, "warnings": found.warnings, "prediction": lw.predict(fleet, **settings),
@@ -264,6 +266,8 @@ def test_what_studies_give():
         "SobolIndices": lw.uq.sobol(SPHERE, "depth", vary=both, samples=16, **short),
         "MorrisEffects": lw.uq.morris(SPHERE, "depth", vary=both, samples=4, **short),
         "Suggestion": lw.suggest(lw.Ensemble(SPHERE, 16, 0, vary), 1e-2, t1=1.0),
+        "Assimilated": lw.assimilate(lw.Ensemble(SPHERE, 16, 0, vary), lw.studies.Series("depth", [0.2], [0.1], 0.5), **run),
+        "Estimated": lw.estimate(lw.Ensemble(SPHERE, 1, 0, vary), "mean depth", 0.1, **short),
         "RareEvent": lw.rare_event(lw.Ensemble(SPHERE, 1, 0, vary), "depth - 3.0", **short),
         "Tradeoff": lw.tradeoff(lw.Ensemble(SPHERE, 16, 0, vary), t1=1.0, methods=["psi_s"], members=16, seconds=2.0),
     }  # fmt: skip

@@ -449,6 +449,7 @@ def test_distributions_in_salibs_words():
     assert (told(LogNormal(sigma=0.2), -2.0), told(Choice([1.0, 2.0]))) == ([None], [None])
 
 
+@pytest.mark.kernel
 def test_a_model_describes_its_columns(monkeypatch):
     monkeypatch.setattr(Plan, "compile", lambda plan: 0.0)
     settings = {"method": "psi_s", "h": 0.1, "t1": 1.0}
@@ -481,6 +482,7 @@ def test_a_model_describes_its_columns(monkeypatch):
         _ = odd.problem
 
 
+@pytest.mark.kernel
 def test_a_model_is_called_in_two_shapes(monkeypatch):
     monkeypatch.setattr(Plan, "compile", lambda plan: 0.0)
     model = adaptor.model(BARE, {"vehicle.mass": Normal(std=0.1)}, "depth", method="psi_s", h=0.1, t1=1.0, progress="p")

@@ -100,7 +100,8 @@ def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members:
     """Standard normals that the counters give: what a call draws that is not given its draws.
 
     run(X, lw.uq.draws_of(run, indices)) has the bits of a call with these indices of the same run prepared without
-    draws="given". So what is to be changed may start from there: one gust, the leading draws, the noise of a chain.
+    draws="given" (but for the last digit with `rkmk4` in float32, and with width=1). So what is to be changed may start from
+    there: one gust, the leading draws, the noise of a chain.
 
     Args:
         run: A run made by `lw.prepare`.

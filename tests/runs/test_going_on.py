@@ -68,8 +68,12 @@ def check(fleet, method, **settings):
 
 
 @pytest.mark.slow_but("all together-psi_x", "thrusters-rk4", "Gauss-Markov current-psi_x")
-@pytest.mark.parametrize("method", ["psi_x", "rk4"])
-@pytest.mark.parametrize("name", [name for name in CASES if "slack" not in name])
+@pytest.mark.parametrize(
+    ("name", "method"),
+    # A current that wanders is no flow of an explicit method.
+    [(name, method) for name in CASES for method in ("psi_x", "rk4") if "slack" not in name
+     and not (method == "rk4" and ("Gauss" in name or "all" in name))],
+)  # fmt: skip
 def test_every_term(name, method):
     check(fleet_of("torpedo", terms=list(CASES[name].terms)), method, checks="all")
 
@@ -94,7 +98,8 @@ def test_steps_that_are_chosen():
 
 @pytest.mark.slow
 def test_steps_that_are_divided():
-    fleet = fleet_of("nordkvist_sanyal")
+    # Some members turn by more than a step of 0.4 s can.
+    fleet = fleet_of("nordkvist_sanyal", vary={"start.angular_velocity": lw.distributions.Normal(std=4.0)})
     whole = check(fleet, "psi_s", h=0.4, length=0.4, on_failure="substep")
     assert whole.substeps.any()
 

@@ -264,6 +264,7 @@ def test_what_studies_give():
         "StabilityMap": lw.stability_map(SPHERE, ("h", 0.1, 0.2), ("angular_velocity", 0.5, 1.0), ["psi_s"], points=2,
                                          directions=1, t1=1.0, error_time=0.5, h=0.1),
         "SobolIndices": lw.uq.sobol(SPHERE, "depth", vary=both, samples=16, **short),
+        "GivenDataIndices": lw.uq.given_data(lw.solve(lw.Ensemble(SPHERE, 64, 0, both), **short), "depth"),
         "MorrisEffects": lw.uq.morris(SPHERE, "depth", vary=both, samples=4, **short),
         "Suggestion": lw.suggest(lw.Ensemble(SPHERE, 16, 0, vary), 1e-2, t1=1.0),
         "Assimilated": lw.assimilate(lw.Ensemble(SPHERE, 16, 0, vary), lw.studies.Series("depth", [0.2], [0.1], 0.5), **run),

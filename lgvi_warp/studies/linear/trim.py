@@ -98,8 +98,8 @@ def trim(
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("bluerov2_heavy")
         >>> steady = lw.linear.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
-        >>> steady.start.velocity.round(3)
-        array([0.5, 0. , 0. ])
+        >>> print(f"{steady.start.velocity[0]:.3f} m/s")
+        0.500 m/s
     """
     from scipy.optimize import least_squares
 

@@ -172,7 +172,9 @@ class Prepared:
             fleet.seed = final.seed if seed is None else int(EnsembleSettings(fleet.members, seed).seed)
             fleet.indices = final.indices
         if t0 is not None:
-            fleet.start_time = Faults().number("t0", t0, "s", 0.0) or 0.0
+            faults = Faults()
+            fleet.start_time = faults.number("t0", t0, "s", 0.0) or 0.0
+            faults.raise_if_any()
         fleet = self._with_noise(fleet, None, indices)
         return self._answer(self._given(fleet, xi, {"seed": seed, "indices": indices}), None)
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_kernels.advance.beginning import GOES_ON, GOES_ON_WITHOUT_LEAD, STARTS
+from lgvi_kernels.advance.events import FIRST
 from lgvi_kernels.advance.spec import Spec
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.engine.arrays import put_rows
@@ -23,6 +24,8 @@ from lgvi_warp.sampling.final import MEMORY, Final
 Plan = Any
 Packets = Any
 
+# The controller's own rows of the memory.
+SIGNALS = f"{MEMORY}signals"
 # Parts of a Spec that change no state and nothing that is remembered.
 BESIDE: dict[str, Any] = dict(
     width=0, shared_rows=False, checked=True, warning_rows=(), energy=False, backward=False, substep=False, control=None
@@ -96,6 +99,17 @@ def begun(plan: Plan) -> Plan:
     for name in FIELDS:
         if name in needed and name not in final.states:
             faults.add(name, "...", "was not kept by the run before", f"add {name!r} to its SaveAt(fields=...)")
+    codes, known = final.lanes.get("status", np.zeros(1)), FIRST + len(plan.ensemble.scene.events)
+    if np.any((codes < 0) | (codes >= known)):
+        problem = "has members that an event stopped which the scene does not have"
+        faults.add(
+            "status", int(np.max(codes)), problem, "go on in the scene of the run before, or with the other members"
+        )
+    wrong = [name for name, rows in final.lanes.items() if rows.ndim != 2 or len(rows) != final.members]
+    if plan.launches.goes_on_exactly and final.lanes["state"].shape != (final.members, plan.spec.state_fields):
+        wrong.append("state")
+    for name in wrong:
+        faults.add(name, final.lanes[name].shape, "is damaged", "run what it is the end of again")
     faults.raise_if_any()
     return plan
 
@@ -128,17 +142,17 @@ def places_of(packets: Packets) -> dict[str, slice]:
     kinds = ("law", choice.laws), ("part", choice.parts_of_control), ("event", choice.events)
     names = [name_of(kind, term) for kind, each in kinds for term, _ in each]
     places = dict(zip(names, laws.remembered, strict=True))
-    return {f"{MEMORY}signals": slice(0, packets.bus_rows), **places}
+    return {SIGNALS: slice(0, packets.bus_rows), **places}
 
 
 def take(packets: Packets, final: Final) -> None:
     """Put what members ended with into their packets, which hold those members from their starts on."""
     exact, memory = packets.plan.launches.goes_on_exactly, packets.laws.memory.view
     half = memory.shape[1] // 2
-    lanes = final.lanes
+    lanes = _in_steps(final, packets.plan)
     if exact:
         put_rows(packets.state_lanes.view, lanes["state"])
-        if "scratch" in lanes:
+        if "scratch" in lanes and lanes["scratch"].shape[1] == half - packets.laws.scratch:
             put_rows(memory[:, packets.laws.scratch : half], lanes["scratch"])
     for name, place in places_of(packets).items():
         rows = lanes.get(name)
@@ -149,6 +163,28 @@ def take(packets: Packets, final: Final) -> None:
     for name, view in packets.noted.items():
         if name in lanes and (exact or name in ENDED):
             put_rows(view if view.ndim == 3 else view[:, None, :], lanes[name])
+
+
+def _in_steps(final: Final, plan: Plan) -> Mapping[str, np.ndarray]:
+    """The rows of an end, of which some count steps from t = 0: as the plan counts them, whose step or time may be another."""
+    ratio = final.step / plan.grid.h
+    shift = plan.grid.first - final.steps * ratio
+    if ratio == 1.0 and shift == 0.0:
+        return final.lanes
+    lanes, controller = dict(final.lanes), plan.kernel_choice.controller
+    if "failed_step" in lanes:
+        # Of an event the size is the square of the part of its step that was made.
+        size = lanes.get("failed_size", np.zeros_like(lanes["failed_step"], dtype=np.float64))
+        event = lanes["status"] >= FIRST
+        at = (lanes["failed_step"] + np.where(event, np.sqrt(size), 0.0)) * ratio + shift
+        steps = np.where(event, np.floor(at), np.rint(at))
+        lanes["failed_step"] = steps.astype(lanes["failed_step"].dtype)
+        lanes["failed_size"] = np.where(event, (at - steps) ** 2, size)
+    if controller is not None and controller.bus.delayed and SIGNALS in lanes:
+        rows, begin = lanes[SIGNALS].copy(), controller.bus.acting + 2 * controller.bus.channels
+        rows[:, begin] = rows[:, begin] * ratio + shift
+        lanes[SIGNALS] = rows
+    return lanes
 
 
 # What is noted of members that ended, which stay so whatever else changes.

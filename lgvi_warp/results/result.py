@@ -275,7 +275,10 @@ class Result(Summarized):
         samples = {name: values[:, places] for name, values in self.samples.items()}
         starts = {name: values[places] for name, values in self.starts.items()}
         of_members = {name: values[places] for name, values in self._of_members().items()}
-        end = None if self.end is None else self.final.part(places)
+        # That of a store is read when it is asked for.
+        end = (
+            functools.partial(_part_of, self.end, places) if callable(self.end) else self.end and self.end.part(places)
+        )
         return replace(self, samples=samples, parameters=parameters, starts=starts, end=end, **of_members)
 
     def _of_members(self) -> dict[str, np.ndarray]:
@@ -414,6 +417,11 @@ class Result(Summarized):
         few = replace(result.part(members), parameters=_below("parameters/", kept), statistics=Estimates(), end=None)
         few = replace(few, samples={name: kept[name] for name in kept if name in IN_FILES})
         return replace(result, kept=few, kept_members=members)
+
+
+def _part_of(end: Callable[[], Final], places: np.ndarray) -> Final:
+    """Some members of the end that a function reads."""
+    return end().part(places)
 
 
 def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

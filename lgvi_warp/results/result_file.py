@@ -64,6 +64,7 @@ def _final(content: Mapping[str, np.ndarray]) -> None:
     table = parsed(str(content["final"]))
     whole = isinstance(table, dict) and all(isinstance(table.get(name), int) for name in ("steps", "seed"))
     real = whole and all(isinstance(table.get(name), int | float) for name in ("time", "step"))
+    real = bool(real and np.isfinite([table["time"], table["step"]]).all() and table["step"] > 0.0 <= table["time"])
     arrays = {"final.indices", "final.status"} <= set(content)
     if not real or not arrays or not isinstance(table.get("settings"), dict):
         raise ValueError("its end tells no time, step or settings")

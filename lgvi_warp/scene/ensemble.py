@@ -509,7 +509,7 @@ class Ensemble(Summarized):
                 fault = f"are drawn, where the states of {draws.total} are given"
                 raise refusal("members", members, fault, "leave members out")
             total = counted(draws.sampling, space, settings.members)
-            ensemble = self._drawing(space=space, total=total, places=None)
+            ensemble = self._drawing(space=space, total=total, places=None).from_zero()
             ensemble._indices = None
         ensemble.seed = new_seed
         ensemble._check_physical()

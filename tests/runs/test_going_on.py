@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs that go on from where another ended: pieces have the bits of one run, whatever acts, remembers or draws."""
 
+import dataclasses
 import pickle
 import re
 import tomllib
@@ -337,3 +338,32 @@ def test_what_is_remembered_stays(method):
     again = lw.solve(fleet, method, h=STEPS, t1=0.4, start=first.final.changed(**states))
     np.testing.assert_allclose(again.velocity[-1], whole.velocity[-1], atol=1e-12)
     np.testing.assert_allclose(again.position[-1], whole.position[-1], atol=1e-12)
+
+
+def test_another_step_counts_the_same_time():
+    # What is noted in steps, the end of a member and the time from which commands act, is told in the steps of the next run.
+    events = [lw.events.StopTime(at=0.31)]
+    fleet = fleet_of("torpedo", events=events, terms=[])
+    first = lw.solve(fleet, "psi_x", h=STEPS, t1=0.4)
+    second = lw.solve(fleet, "psi_x", h=0.025, t1=0.6, start=first.final)
+    np.testing.assert_allclose(second.failure_time, 0.31, atol=1e-9)
+    delayed = autopilot(vary={"controller.delay": lw.distributions.Choice([0.02])})
+    whole = lw.solve(delayed, "psi_x", h=0.005, t1=1.0)
+    finer = lw.solve(delayed, "psi_x", h=0.005, t1=0.5)
+    coarse = lw.solve(delayed, "psi_x", h=0.01, t1=1.0, start=finer.final)
+    # Commands that would act only after as many of the longer steps differ by a tenth of a radian; the step does by 1e-4.
+    np.testing.assert_allclose(coarse.attitude[-1], whole.attitude[-1], atol=2e-3)
+
+
+def test_an_end_that_does_not_fit():
+    fleet = fleet_of("torpedo", events=[lw.events.StopTime(at=0.1)], terms=[])
+    final = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2).final
+    with pytest.raises(lw.SceneError, match="an event stopped which the scene does not have"):
+        lw.solve(fleet_of("torpedo", terms=[]), "psi_x", h=STEPS, t1=0.4, start=final)
+    torn = dataclasses.replace(final, lanes={**final.lanes, "state": final.lanes["state"][:, :7]})
+    with pytest.raises(lw.SceneError, match=r"start\.state = .*is damaged"):
+        lw.solve(fleet, "psi_x", h=STEPS, t1=0.4, start=torn)
+    run = lw.prepare(fleet.scene, method="psi_x", h=STEPS, t1=0.2)
+    for odd in (-1.0, float("nan"), "soon"):
+        with pytest.raises(lw.SceneError, match="t0 = "):
+            run.states(final, t0=odd)

@@ -211,3 +211,15 @@ def test_vehicles_are_as_sure_as_they_should_be(filter):
     low, high = stats.chi2.ppf([0.001, 0.999], 2 * len(nees)) / len(nees)
     # Of n members the inverse of a covariance is too large by (n - 1) / (n - 4), and its mean by as much again.
     assert low < np.mean(nees) / ((n - 1.0) / (n - 4.0)) ** 2 < high
+
+
+def test_two_instruments_of_one_quantity():
+    fleet, (_, y, fixes) = drifting(), series()
+    other = lw.studies.Series("position[0]", TIMES[:1], y[:1] + 0.1, 0.3)
+    with pytest.raises(lw.SceneError, match=re.escape("series = 'position[0]': is measured by two")):
+        lw.assimilate(fleet, [fixes, other], method="rk8", h=0.05)
+    named = lw.studies.Series("position[0]", TIMES[:1], y[:1] + 0.1, 0.3, name="second receiver")
+    silent = lw.studies.Series("depth", [0.5], [np.nan], 0.1)
+    answer = lw.assimilate(fleet, [fixes, named, silent], method="rk8", h=0.05)
+    assert set(answer.innovations) == {"position[0]", "second receiver", "depth"}
+    assert len(answer.effective) == len(answer.time) == 4

@@ -91,6 +91,9 @@ def assimilate(
     for one in instruments:
         if not isinstance(one, Series):
             faults.add("series", one, "is no Series", "give lw.studies.Series(of, time, values, std)")
+    labels = [one.label for one in instruments if isinstance(one, Series)]
+    for label in sorted({label for label in labels if labels.count(label) > 1}):
+        faults.add("series", label, "is measured by two of them", "give one of them a name: Series(..., name=...)")
     faults.choice("filter", filter, METHODS)
     if discount is not None and not 1.0 / 3.0 < discount <= 1.0:
         faults.add("discount", discount, "is not between 1/3 and 1", "give 0.98, or None")
@@ -194,7 +197,7 @@ class _Track:
         self.parameters = members.parameters
         self.log_weights = np.zeros(n)
         self.indices, self.fresh = np.array(members.indices), int(np.max(members.indices)) + 1
-        self.time = 0.0
+        self.time, self.effective = 0.0, float(n)
         self.states: dict[str, Any] = {name: np.array(getattr(members, name)) for name in FIELDS}
         self.learned = learned_rows(self.targets, members.parameters, n)
         # Set by the first run.
@@ -257,7 +260,6 @@ class _Track:
         self.states, self.learned = states_of(moved, centre)
         assert self.final is not None
         self.final = self.final.changed(**self.states)
-        self.notes.setdefault("effective", []).append(float(n))
 
     def _weigh(self, Y: np.ndarray, y: np.ndarray, sigma: np.ndarray) -> None:
         """Weights by likelihood; members are drawn anew where few of them count."""
@@ -267,7 +269,7 @@ class _Track:
             raise SceneError([f"series: {problem}; give more members, a wider spread, or larger std"])
         weights, n = filters.normalised(self.log_weights), self.fleet.members
         effective = filters.effective_number(weights)
-        self.notes.setdefault("effective", []).append(effective)
+        self.effective = effective
         if effective >= RESAMPLE_BELOW * n:
             return
         places = filters.resampled(weights, self.rng)
@@ -308,6 +310,7 @@ class _Track:
         self.notes.setdefault("mean", []).append(mean)
         self.notes.setdefault("std", []).append(std)
         self.notes.setdefault("centre", []).append(centre)
+        self.notes.setdefault("effective", []).append(self.effective)
 
     def answer(self, times: np.ndarray) -> Assimilated:
         """The answer, once all measurements are in."""

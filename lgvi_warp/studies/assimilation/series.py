@@ -24,6 +24,7 @@ class Series:
         time: Rising times (k,) [s], from 0.
         values: Measured values, (k,) or (k, m) of m numbers; NaN for one that is missing.
         std: Standard deviation of the errors, a number or (m,), in the unit of the values.
+        name: Its name in the answer; by default that of what it measures.
 
     Raises:
         SceneError: If an argument is at fault; the message names every fault.
@@ -39,6 +40,7 @@ class Series:
     time: Any
     values: Any
     std: Any
+    name: str | None = None
 
     def __post_init__(self) -> None:
         faults = Faults("series.")
@@ -71,7 +73,7 @@ class Series:
     @property
     def label(self) -> str:
         """Its name."""
-        return self.quantity.label
+        return self.name or self.quantity.label
 
     def at(self, time: float) -> np.ndarray | None:
         """Select the values that were measured at a time.
@@ -95,7 +97,7 @@ class Series:
         Returns:
             The predictions, (m, n); of what is no angle as they were.
         """
-        if self.label not in ANGLES:
+        if self.quantity.label not in ANGLES:
             return predicted
         apart = predicted - measured[:, None]
         return np.asarray(predicted - 2.0 * np.pi * np.rint(apart / (2.0 * np.pi)))

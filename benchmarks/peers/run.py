@@ -4,7 +4,8 @@
 With --out DIR the lines also go to DIR/peers.jsonl, DIR/peers.png is drawn and its table printed to stderr; --draw DIR
 does the latter two again from DIR/peers.jsonl.
 A peer that is not installed gives a line with "missing". All settings take turns, so that what slows the machine for a
-while slows them all; times leave out compilation. Versions: requirements.txt.
+while slows them all; times leave out compilation. The first round times all settings; later ones those that are
+near the front of their peer. Versions: requirements.txt.
 """
 
 from __future__ import annotations
@@ -13,17 +14,27 @@ import argparse
 import importlib
 import os
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from benchmarks.pages import read, show
 from benchmarks.peers.plot import TITLES
+from lgvi_warp.studies import cost
+
+# What is measured, its members times seconds, its errors.
+Setting = tuple[dict[str, Any], float, dict[str, float]]
 
 PEERS = (
     "lgvi_warp", "hand_lanes", "heyoka", "numba", "numba_simd", "jax", "diffrax", "warp_ordinary", "mujoco", "newton",
 )  # fmt: skip
 RIGID_MEMBERS = 1024
+# Later rounds repeat settings whose time is at most this many times their peer's cheapest of the same error.
+NEAR_FRONT = 1.3
+# Finer settings of a method are left out after a first call, compiling included, of more seconds.
+LONGEST = 30.0
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -81,7 +92,6 @@ def measure(names: list[str], chosen: list[str], quick: bool, threads: int, roun
     from benchmarks.peers import problem as problems
     from benchmarks.peers import reference
     from lgvi_warp.common import machine, warp_setup
-    from lgvi_warp.studies import speed
 
     warp_setup.start()
     yield {"machine": machine.describe(), "versions": machine.versions(), "threads": threads, "quick": quick}
@@ -95,7 +105,8 @@ def measure(names: list[str], chosen: list[str], quick: bool, threads: int, roun
         except ModuleNotFoundError as error:
             yield {"peer": name, "missing": error.name}
     members, t1 = (512, 5.0) if quick else (4096, 20.0)
-    records, calls, closest = [], [], {}
+    records: list[Setting] = []
+    calls, closest = [], {}
     for kind in chosen:
         taking = [name for name, module in modules.items() if kind in getattr(module, "PROBLEMS", ("vehicle",))]
         if taking in ([], ["lgvi_warp"]) and kind == "rigid":
@@ -113,8 +124,14 @@ def measure(names: list[str], chosen: list[str], quick: bool, threads: int, roun
             "reference_agrees_to": agreement,
         }
         for name in taking:
+            slow = set()
             for run in modules[name].runs(problem, threads):
+                if (run.method, run.dtype) in slow:
+                    continue
+                start = time.perf_counter()
                 run.call()
+                if time.perf_counter() - start > LONGEST:
+                    slow.add((run.method, run.dtype))
                 found = problems.error(run.end(), truth)
                 note(f"{kind} {name} {run.method} {run.setting} {found['error_max']:.1e}")
                 about = {"peer": name, "problem": kind, "method": run.method, "setting": run.setting}
@@ -125,5 +142,28 @@ def measure(names: list[str], chosen: list[str], quick: bool, threads: int, roun
         smallest = min(found["error_max"] for about, _, found in records if about["problem"] == kind)
         yield {"problem": kind, "smallest_error": smallest, "reference_differs_by": float(f"{difference:.3g}")}
     note(f"{rounds} rounds of {len(calls)} settings")
-    for (about, work, found), seconds in zip(records, speed.interleaved(calls, rounds), strict=True):
-        yield about | {"us_per_vehicle_second": float(f"{1e6 * seconds / work:.4g}")} | found
+    for (about, _, found), us in zip(records, costs_in_rounds(records, calls, rounds), strict=True):
+        yield about | {"us_per_vehicle_second": float(f"{us:.4g}")} | found
+
+
+def costs_in_rounds(records: list[Setting], calls: list[Callable[[], None]], rounds: int) -> list[float]:
+    """Median time of each setting [us per vehicle and second]: of one reading where it is far from the front."""
+    from benchmarks.peers import plot
+
+    def timed(which: list[int]) -> list[float]:
+        seconds = cost.in_turn([calls[i] for i in which], 1, time.perf_counter)
+        return [1e6 * s / records[i][1] for i, (s,) in zip(which, seconds, strict=True)]
+
+    readings = [[us] for us in timed(list(range(len(calls))))]
+    first = [about | found | {"us_per_vehicle_second": us}
+             for (about, _, found), (us,) in zip(records, readings, strict=True)]  # fmt: skip
+    near = []
+    for i, line in enumerate(first):
+        cheapest, _ = plot.front(first, line["problem"], line["dtype"], line["peer"], line["error_max"])
+        if line["us_per_vehicle_second"] <= NEAR_FRONT * cheapest:
+            near.append(i)
+    note(f"{rounds - 1} more of {len(near)} settings")
+    for _ in range(rounds - 1):
+        for i, us in zip(near, timed(near), strict=True):
+            readings[i].append(us)
+    return [median(us) for us in readings]

@@ -339,7 +339,10 @@ class Packets:
     def _warned_at_start(self) -> tuple[np.ndarray, np.ndarray]:
         """(bits, value) of the warnings at the start; no value where there are none."""
         plan, members, peaks = self.plan, self.members, self.state_lanes.peaks
-        if plan.checks == "none" or (peaks is not None and calm(plan, members, self.frame, peaks.max(axis=(0, 2)))):
+        # Along packets first: lanes beside each other in memory are compared at once.
+        if plan.checks == "none" or (
+            peaks is not None and calm(plan, members, self.frame, peaks.max(axis=0).max(axis=1))
+        ):
             return np.zeros(members.count, np.uint16), np.zeros(0)
         momentum = self.state_lanes.rows()[:, 12:15] * self.scale[:, None]
         return at_start(plan, members, self.frame, momentum, self._packing.water)

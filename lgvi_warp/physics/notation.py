@@ -116,7 +116,7 @@ def reduced(operation: np.ufunc, values: np.ndarray) -> np.ndarray:
     """What an operation makes of the numbers of all members, such as the largest.
 
     Args:
-        operation: np.maximum, np.minimum or np.logical_or, for which the order of members does not matter.
+        operation: np.maximum, np.minimum, np.logical_or or np.bitwise_or, for which the order of members does not matter.
         values: Numbers (n, ...).
 
     Returns:
@@ -137,8 +137,12 @@ def only_diagonal(matrices: np.ndarray) -> np.ndarray | None:
     Returns:
         Diagonals (n, 3); None where some matrix has another entry.
     """
-    diagonals = np.einsum("nii->ni", matrices)
-    return diagonals if np.count_nonzero(matrices) == np.count_nonzero(diagonals) else None
+    entries: np.ndarray = matrices
+    if len(matrices) > FOLD:
+        # All bits of an entry that some matrix has, but that of the sign: a third of the time.
+        entries = reduced(np.bitwise_or, np.ascontiguousarray(matrices, np.float64).view(np.int64))[None] << 1
+    none_beside = np.count_nonzero(entries) == np.count_nonzero(np.einsum("nii->ni", entries))
+    return np.einsum("nii->ni", matrices) if none_beside else None
 
 
 def rotations(R: np.ndarray) -> np.ndarray:

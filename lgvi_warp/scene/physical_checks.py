@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.base import own
 from lgvi_warp.scene.like import SceneLike
@@ -144,6 +145,9 @@ def _heavy(p: Numbers) -> np.ndarray:
 
 
 def _light_with_water(p: Numbers, tolerance: float) -> np.ndarray:
+    added = notation.only_diagonal(p["vehicle.added_mass"])
+    if added is not None:
+        return _heavy(p) & ~_positive(p["vehicle.mass"][:, None] + added)
     return _heavy(p) & ~_positive_definite(vehicles.mass_matrix(p))
 
 
@@ -166,11 +170,17 @@ def _no_density(p: Numbers, tolerance: float) -> np.ndarray:
     return np.asarray(~(np.isfinite(density) & (density > 0)))
 
 
+def _positive(diagonals: np.ndarray) -> np.ndarray:
+    """Return which diagonals (n, d) have an inverse."""
+    # By columns: rows of few numbers take many times as long.
+    return functools.reduce(np.logical_and, [(x >= vehicles.LEAST) & np.isfinite(x) for x in diagonals.T])
+
+
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:
     """Return which symmetric matrices (n, d, d) are positive definite, by elimination; False where not finite."""
     d, diagonals = matrices.shape[-1], np.einsum("nii->ni", matrices)
     if np.count_nonzero(matrices) == np.count_nonzero(diagonals):  # diagonal matrices
-        return np.asarray(((diagonals >= vehicles.LEAST) & np.isfinite(diagonals)).all(axis=1))
+        return _positive(diagonals)
     remainder = matrices.copy()
     good = np.isfinite(matrices).all(axis=(1, 2))
     for k in range(d):

@@ -165,3 +165,15 @@ def test_numbers_of_all_members_together(members, operation):
     values = np.random.default_rng(members).normal(size=(members, 2, 3)) * (np.arange(6).reshape(2, 3) > 1)
     for each in (values, values.transpose(0, 2, 1), values[:, 0, 0]):
         np.testing.assert_array_equal(notation.reduced(operation, each), operation.reduce(each, axis=0))
+
+
+@pytest.mark.parametrize("count", [1, 3, 64, 65, 1024, 1030])
+@pytest.mark.parametrize("beside", [1e-320, -1.0, np.nan, np.inf])
+def test_one_entry_beside_a_diagonal_is_seen_among_many_matrices(count, beside):
+    matrices = np.zeros((count, 3, 3))
+    matrices[:, [0, 1, 2], [0, 1, 2]] = [1.0, -2.0, 0.0]
+    matrices[:, 0, 1] = -0.0
+    assert np.array_equal(notation.only_diagonal(matrices), np.tile([1.0, -2.0, 0.0], (count, 1)))
+    matrices[count // 2, 2, 1] = beside
+    assert notation.only_diagonal(matrices) is None
+    assert notation.only_diagonal(np.swapaxes(matrices, -1, -2)) is None

@@ -206,6 +206,13 @@ def test_what_becomes_odd_on_the_way_is_said():
     assert plausibility.on_the_way(scene(), {}).messages(3) == ()
 
 
+def test_a_fast_member_is_found_beside_one_that_is_no_number():
+    v = [[[1.0, 0, 0]] * 2, [[np.nan, 0, 0], [-18.0, 18.0, -18.0]]]
+    assert "31.18 m/s" in plausibility.on_the_way(scene(), samples(velocity=v)).messages(2)[0]
+    v[1][1] = [-17.0, 17.0, -17.0]
+    assert plausibility.on_the_way(scene(), samples(velocity=v)).messages(2) == ()
+
+
 def test_of_very_many_samples_the_last_are_looked_at(monkeypatch):
     monkeypatch.setattr(plausibility, "MOST_SAMPLES", 5)
     v = [[[0.0, 0.0, 0.0]], [[50.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]]]

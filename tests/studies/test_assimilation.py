@@ -132,6 +132,26 @@ def test_a_drifting_body_is_a_linear_regression():
     assert later.position[-1, :, 0].mean() == pytest.approx(expected, abs=1e-8)
 
 
+def test_another_library_finds_the_same():
+    filters = pytest.importorskip("filterpy.kalman")
+    fleet, (_, y, fixes) = drifting(), series()
+    answer = lw.assimilate(fleet, fixes, ["current.velocity[0]"], method="rk8", h=0.05)
+    z = unknowns(fleet)
+    # One axis of the body: its place, its speed over ground and the current, from fix to fix.
+    other = filters.KalmanFilter(dim_x=3, dim_z=1)
+    other.x, other.P = z.mean(axis=1)[:, None], np.cov(z)
+    other.H, other.R, other.Q = np.array([[1.0, 0.0, 0.0]]), np.array([[0.04]]), np.zeros((3, 3))
+    for dt, fix in zip(np.diff(TIMES, prepend=0.0), y, strict=True):
+        b, left = MASS / DRAG * (1.0 - np.exp(-DRAG * dt / MASS)), np.exp(-DRAG * dt / MASS)
+        other.F = np.array([[1.0, b, dt - b], [0.0, left, 1.0 - left], [0.0, 0.0, 1.0]])
+        other.predict()
+        other.update(fix)
+    learned = answer.parameters["current.velocity[0]"]
+    assert learned.mean() == pytest.approx(other.x[2, 0], abs=1e-9)
+    assert learned.var(ddof=1) == pytest.approx(other.P[2, 2], rel=1e-7)
+    assert answer.final.position[:, 0].mean() == pytest.approx(other.x[0, 0], abs=1e-8)
+
+
 @pytest.mark.parametrize("name", ["enkf", "particles"])
 def test_other_filters_come_near_it(name):
     fleet, (_, y, fixes) = drifting(4000), series()

@@ -72,8 +72,8 @@ def kind_of(method: Method, choice: KernelChoice) -> str:
         return "explicit"
     if method.base == "psi_1":
         return "single"
-    # psi_w iterates, one product after the other.
-    return "chained" if method.turns or method.base == "psi_w" else "plain"
+    # psi_w iterates, one product after the other; so do the rotations of a splitting of two parts.
+    return "chained" if method.turns or method.two_part or method.base == "psi_w" else "plain"
 
 
 def _control(choice: KernelChoice, signals: tuple[str, ...]) -> Control | None:

@@ -21,7 +21,8 @@ from lgvi_warp.common.errors import SceneError
 # Widths that kernels have, as lgvi_kernels knows them.
 WIDTHS = (1, 2, 4, 8, 16, 32)
 # Kinds of kernels. plain: sub-maps, of which each has independent operations; single: psi_1, with one free rotation a step;
-# chained: turns and iterations, of which each waits for the one before; dense: damping laws with their implicit step V;
+# chained: turns, iterations and the stages of two-part
+# splittings, of which each waits for the one before; dense: damping laws with their implicit step V;
 # explicit: stages of explicit and collocation methods.
 KINDS = ("plain", "single", "chained", "dense", "explicit")
 # Compensated kernels are of one kind, whatever the method: their sums fill the registers by themselves.

@@ -19,7 +19,7 @@ BOTH_SIDES, ONE_SIDE = (2, 4), (1, 2)
 # What a slope leaves of a change vanishes by so many times at the next increment where there is a step or a kink between the
 # two; of a kink it had grown by more than the second number from this increment to the one before.
 ABRUPT, KINK_GROWTH = 1e4, 5.0
-# A derivative whose error is above this part of it, so many times round-off, and this part of the slopes to each side, is none.
+# A derivative is none whose error is above this part of it, so many times round-off, and this part of the slopes to each side.
 MOST_ERROR, MOST_ROUND_OFF, MOST_OF_SLOPES = 0.1, 10.0, 1e-3
 FINE, FEW, ROUGH, STEPS, KINK = range(5)
 
@@ -29,8 +29,8 @@ class Extrapolated:
     """Derivatives, all arrays of one shape.
 
     value, error: of the derivative. first: place of the largest increment that it stands on. jump: the derivative from above
-    less that from below. rounding: error of a value, by the scatter at the least increments. code: FINE; FEW increments without
-    failed copies; ROUGH: they disagree; STEPS: no change at small ones; KINK: the two sides differ.
+    less that from below. rounding: error of a value, by the scatter at the least increments. code: FINE; FEW increments
+    without failed copies; ROUGH: they disagree; STEPS: a jump between two of them; KINK: the two sides differ.
     """
 
     value: np.ndarray
@@ -64,7 +64,12 @@ def extrapolated(
 
 
 def _extrapolated(
-    at: np.ndarray, above: np.ndarray, below: np.ndarray, increments: np.ndarray, eps: float, rounding: np.ndarray | None
+    at: np.ndarray,
+    above: np.ndarray,
+    below: np.ndarray,
+    increments: np.ndarray,
+    eps: float,
+    rounding: np.ndarray | None,
 ) -> Extrapolated:
     up, down = (above - at[..., None]) / increments, (at[..., None] - below) / increments
     one_sided = np.isnan(above).all(axis=-1) | np.isnan(below).all(axis=-1)
@@ -76,8 +81,8 @@ def _extrapolated(
         rounding = scatter(value, increments[..., WINDOW - 1 :])
     rounding = np.maximum(rounding, eps * np.abs(at))
     noise = rounding[..., None] / increments
-    told = np.fmax(disagreement + 2.0 * noise[..., 2:], _beyond_finer(value, noise[..., 2:]))
-    told = np.where(np.isfinite(told), told, np.inf)
+    told = disagreement + 2.0 * noise[..., 2:]
+    told = np.where(np.isfinite(told), np.maximum(told, _beyond_finer(value, noise[..., 2:])), np.inf)
     first = told.argmin(axis=-1)
 
     def chosen(each: np.ndarray, offset: int = 0) -> np.ndarray:

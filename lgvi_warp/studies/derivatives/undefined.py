@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What of a scene has no derivative, whatever differences say: what goes in steps, jumps by a tick or is known no more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from lgvi_warp.common.status import Status, failed, stopped
+from lgvi_warp.control.fault import Fault
+from lgvi_warp.control.sensor import Sensor
+from lgvi_warp.control.waypoints import Waypoints
+from lgvi_warp.physics.terms.events import StopTime
+from lgvi_warp.results.quantities import EndQuantity, MetricQuantity, OfResult
+from lgvi_warp.sampling.final import MEMORY, Final
+from lgvi_warp.scene.variations import Target
+from lgvi_warp.statistics.metrics.nearest import DISTANCES
+from lgvi_warp.studies.derivatives.extrapolation import FEW, KINK, ROUGH, STEPS, Extrapolated
+
+# Growth of small differences beyond which a derivative says nothing of the path.
+MOST_GROWTH = 1e6
+# Type of a metric -> how it changes.
+JUMPING = dict.fromkeys(
+    ("settling_time", "rise_time", "peak_time", "path_time"), "is the time of a tick or sample, and jumps by one"
+) | {
+    "saturation_share": "counts ticks, and jumps by one",
+    "time_to_failure": 'is the time of a step: ask for "end_time NAME" of an event',
+}
+OF_SENSORS = {
+    "dropout": "decides which readings are lost, one by one",
+    "every": "is a whole number of ticks",
+    "latency": "is a whole number of ticks",
+    "quantum": "is the step by which readings jump",
+}
+BEFORE = 'ask for a quantity at a time before, "depth at 30", or for when it ends, "end_time NAME"'
+
+
+def of_number(scene: Any, target: Target) -> str | None:
+    """Why nothing has a derivative by a number of a scene; None where nothing is known against it."""
+    key, _, name = target.name.rpartition(".")
+    if target.name == "controller.delay":
+        return "lasts a whole number of steps"
+    part = next((part for part in scene.parts if part.key == key), None)
+    if isinstance(part, Sensor):
+        return OF_SENSORS.get(name)
+    if isinstance(part, Fault) and name == "time":
+        return "begins at a whole tick"
+    if isinstance(part, Waypoints) and name == "radius":
+        return "decides at which whole tick a leg is done"
+    return None
+
+
+def of_interest(interest: OfResult, number: Target, scene: Any) -> str | None:
+    """Why a quantity has no derivative, by a number or by any; None where nothing is known against it."""
+    if isinstance(interest, MetricQuantity):
+        return JUMPING.get(interest.metric.type)
+    if isinstance(interest, EndQuantity) and interest.kind == "outcome":
+        return "is 1 or 0, and jumps"
+    if is_end_time(interest):
+        events = {event.key: event for event in scene.events}
+        known = isinstance(events.get(interest.outcome), StopTime) or interest.outcome in timed_events(scene)
+        return None if known else "is the time of a step: no distance is known that is used up then"
+    key, _, name = number.name.rpartition(".")
+    timed = any(isinstance(event, StopTime) and event.key == key for event in scene.events)
+    return "goes by whole steps with the time at which members stop" if timed and name == "at" else None
+
+
+def is_end_time(interest: OfResult) -> TypeGuard[EndQuantity]:
+    """Whether a quantity is the time at which members ended in some way."""
+    return isinstance(interest, EndQuantity) and interest.kind == "end_time"
+
+
+def timed_events(scene: Any) -> dict[str, Any]:
+    """Events by name whose distance is known, so that the time at which they stop members has a derivative."""
+    return {event.key: event for event in scene.events if event.type in DISTANCES}
+
+
+def quanta(scene: Any, numbers: Mapping[str, np.ndarray]) -> dict[str, float]:
+    """The largest quantum by the name of each sensor's that rounds; numbers: what members have of their own."""
+    names = {f"{part.key}.quantum": part for part in scene.parts if isinstance(part, Sensor)}
+    largest = {name: float(np.max(np.abs(numbers.get(name, part.quantum)))) for name, part in names.items()}
+    return {name: quantum for name, quantum in largest.items() if quantum > 0.0}
+
+
+def of_loop(rounding: Mapping[str, float]) -> str | None:
+    """Why nothing of a loop has a derivative whose sensors round."""
+    if not rounding:
+        return None
+    sensors = ", ".join(f"{name.rpartition('.')[0]} to {quantum:g}" for name, quantum in rounding.items())
+    return f"goes in steps, since readings are rounded ({sensors}); smooth=True leaves that out"
+
+
+def legs_done(scene: Any, final: Final) -> np.ndarray:
+    """How many legs of waypoints members have done (n,), 0 without waypoints."""
+    done = np.zeros(final.members)
+    for part in scene.parts:
+        if isinstance(part, Waypoints):
+            done = np.maximum(done, np.asarray(final.lanes[f"{MEMORY}part {part.key} {type(part).__name__}"])[:, 0])
+    return np.rint(done)
+
+
+def of_member(interest: OfResult, value: float, code: int, end: float, growth: float, legs: float) -> str | None:
+    """Why a quantity of a member has no derivative; None where nothing is known against it.
+
+    code: its status. end: when it ended [s]. growth: of small differences of its start. legs: of waypoints that it has done.
+    """
+    if failed(np.array([code]))[0]:
+        return f"is of a member that failed ({Status(code).name.lower()})"
+    timed, at_end = code == Status.TIME, is_end_time(interest)
+    early = isinstance(interest, EndQuantity) and interest.when is not None and interest.when < end
+    if stopped(np.array([code]))[0] and not (timed or at_end or early):
+        return f"is where an event stopped the member ({Status(code).name.lower()}), whose time moves too; {BEFORE}"
+    if not np.isfinite(value):
+        return "is not reached" if at_end else f"is {value:g}"
+    if growth > MOST_GROWTH:
+        return (
+            f"is lost: a small difference of the start grows {growth:.1g} times, more than 1e6; ask at an earlier time"
+        )
+    if legs > 0.0 and not early:
+        return f"jumps with the tick at which a leg is done, and waypoints had {legs:.0f} done; ask for a time before"
+    return None
+
+
+def of_differences(found: Extrapolated, place: tuple[int, ...], increments: np.ndarray) -> str | None:
+    """Why differences give no derivative; None where they do. increments: (levels,)."""
+    code, largest, least = int(found.code[place]), increments.max(), increments.min()
+    if code == FEW:
+        return (
+            f"is not known beside: members fail, or end in another way, at increments from {least:.2g} to {largest:.2g}"
+        )
+    if code == STEPS:
+        return f"jumps between increments of {least:.2g} and {largest:.2g}"
+    if code == KINK:
+        value, jump = found.value[place], found.jump[place]
+        above, below = value + 0.5 * jump, value - 0.5 * jump
+        return f"has a kink here: its derivative is {above:.6g} from above and {below:.6g} from below"
+    if code == ROUGH:
+        return f"has differences that disagree at increments from {least:.2g} to {largest:.2g}"
+    return None

@@ -12,6 +12,8 @@ import numpy as np
 
 from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
 
+# Pairs of names that are told with one reason.
+MOST_NAMES = 2
 ARRAYS = ("value", "jacobian", "error", "increments")
 
 
@@ -68,11 +70,16 @@ class Derivatives(Saved):
                 slopes, errors = self.jacobian[..., i, j], self.error[..., i, j]
                 text = _ends(slopes) if fleet else _sure(float(slopes), float(errors))
                 lines.append(f"  by {number:<28} {text}")
-        lines += [f"undefined   {name}: {reason}" for name, reason in self.undefined.items()]
+        pairs: dict[str, list[str]] = {}
+        for name, reason in self.undefined.items():
+            pairs.setdefault(reason, []).append(name)
+        for reason, names in pairs.items():
+            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+            lines.append(f"undefined   {', '.join(names[:MOST_NAMES])}{more}: {reason}")
         return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
 
     def to_dict(self) -> dict[str, Any]:
-        return finite_or_none({item.name: getattr(self, item.name) for item in fields(self)})  # type: ignore[no-any-return]
+        return finite_or_none({item.name: getattr(self, item.name) for item in fields(self)})
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Self:

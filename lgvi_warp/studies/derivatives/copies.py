@@ -127,12 +127,10 @@ class Copies:
         rng = np.random.default_rng(0)
         turn, shift, spin = (NUDGE * rng.normal(size=(n, 3)) / np.sqrt(3.0) for _ in range(3))
         R = start.attitude @ notation.matrix_from_rotation_vector(turn)
-        others = start.position, R, start.velocity + shift, start.angular_velocity + spin
-        own = {name: values for name, values in self.numbers.items() if name in self._known}
-        both = [
-            Ensemble.from_states(self.scene, *states, own or None)
-            for states in ([getattr(start, name) for name in FIELDS], others)
-        ]
+        beside = start.position, R, start.velocity + shift, start.angular_velocity + spin
+        own = {name: values for name, values in self.numbers.items() if name in self._known} or None
+        here = start.position, start.attitude, start.velocity, start.angular_velocity
+        both = [Ensemble.from_states(self.scene, *states, own) for states in (here, beside)]
         for each in both:
             each.indices, each.seed = self.fleet.indices, self.fleet.seed
         return both[0], both[1]

@@ -267,10 +267,11 @@ class _Answer:
         )  # fmt: skip
         increments = near.increments[row, j]
         numbers = times[place] if place in times else _numbers(tells, place, increments)
-        if isinstance(reason := reason or numbers, str):
-            self._reasons.setdefault((i, j), {}).setdefault(reason, []).append(member)
+        told: Told = reason or numbers
+        if isinstance(told, str):
+            self._reasons.setdefault((i, j), {}).setdefault(told, []).append(member)
             return
-        for array, each in zip(self._arrays.values(), reason, strict=True):
+        for array, each in zip(self._arrays.values(), told, strict=True):
             array[member, i, j] = each
 
     def _stop_times(self, members: np.ndarray, near: Neighbours) -> dict[tuple[int, ...], Told]:

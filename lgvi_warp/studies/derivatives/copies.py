@@ -21,7 +21,6 @@ from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.variations import Target
-from lgvi_warp.studies.derivatives.extrapolation import RATIO
 
 # Least size of a number of the start, and of an entry beside the others of its array.
 LEAST_SIZE = 1e-3
@@ -57,7 +56,10 @@ class Copies:
     @functools.cached_property
     def at(self) -> np.ndarray:
         """The members' numbers that are moved (n, k)."""
-        return np.stack([self._entry(target, self.numbers[target.name]) for target in self.targets], axis=1)
+        return self._beside([self._entry(target, self.numbers[target.name]) for target in self.targets])
+
+    def _beside(self, columns: Sequence[np.ndarray]) -> np.ndarray:
+        return np.stack(columns, axis=1) if columns else np.zeros((self.fleet.members, 0))
 
     @staticmethod
     def _entry(target: Target, values: np.ndarray) -> np.ndarray:
@@ -74,7 +76,7 @@ class Copies:
             least = np.where(target.name.startswith("start."), LEAST_SIZE, 0.0) + LEAST_SIZE * largest
             size = np.where(self.at[:, j] == 0.0, largest, np.maximum(np.abs(self.at[:, j]), least))
             columns.append(np.where(size > 0.0, size, 1.0))
-        return np.stack(columns, axis=1)
+        return self._beside(columns)
 
     def moved(self, each: np.ndarray, by: np.ndarray) -> dict[str, np.ndarray]:
         """Numbers (N, ...) by name of copies of members each (N,), moved by (N, k)."""
@@ -127,10 +129,10 @@ class Copies:
         rng = np.random.default_rng(0)
         turn, shift, spin = (NUDGE * rng.normal(size=(n, 3)) / np.sqrt(3.0) for _ in range(3))
         R = start.attitude @ notation.matrix_from_rotation_vector(turn)
-        beside = start.position, R, start.velocity + shift, start.angular_velocity + spin
+        beside = R, start.velocity + shift, start.angular_velocity + spin
         own = {name: values for name, values in self.numbers.items() if name in self._known} or None
-        here = start.position, start.attitude, start.velocity, start.angular_velocity
-        both = [Ensemble.from_states(self.scene, *states, own) for states in (here, beside)]
+        here = start.attitude, start.velocity, start.angular_velocity
+        both = [Ensemble.from_states(self.scene, start.position, R, v, w, own) for R, v, w in (here, beside)]
         for each in both:
             each.indices, each.seed = self.fleet.indices, self.fleet.seed
         return both[0], both[1]
@@ -237,33 +239,38 @@ def neighbours(
     """Run members and copies of them in one call; relative: (k, levels), increments as parts of the numbers' sizes."""
     copies = runs.copies
     n, (k, levels) = len(members), relative.shape
+    count = 1 + 2 * k * levels
     increments = copies.sizes[members][:, :, None] * relative
-    by = np.zeros((n, 1 + 2 * k * levels, k))
-    moved = by[:, 1:].reshape(n, k, levels, 2, k)
+    each = np.repeat(members, count)
     good = np.ones((k, 2, levels), bool)
-    each = np.repeat(members, by.shape[1])
-
-    def fill() -> None:
-        for j in range(k):
-            moved[:, j, :, ABOVE, j] = np.where(good[j, ABOVE], increments[:, j], 0.0)
-            moved[:, j, :, BELOW, j] = np.where(good[j, BELOW], -increments[:, j], 0.0)
-        by[:, 1:] = moved.reshape(n, -1, k)
-
-    fill()
     try:
-        ends, added = runs(each, by.reshape(-1, k), report)
+        ends, added = runs(each, _moves(increments, good), report)
     except SceneError:
         good = copies.physical(members, increments)
-        fill()
-        ends, added = runs(each, by.reshape(-1, k), report)
-    values = ends.values.reshape(n, by.shape[1], -1)
-    status, time = ends.status.reshape(n, -1), ends.time.reshape(n, -1)
+        ends, added = runs(each, _moves(increments, good), report)
+    m = ends.values.shape[1]
+    values = ends.values.reshape(n, count, m)
+    status, time = ends.status.reshape(n, count), ends.time.reshape(n, count)
     # A copy that ended in another way is no neighbour of the member.
     values = np.where((status == status[:, :1])[:, :, None], values, np.nan)
-    beside = np.moveaxis(values[:, 1:].reshape(n, k, levels, 2, -1), -1, 1)
-    beside = np.where(np.moveaxis(good, 1, 2)[None, None], beside, np.nan)
-    shifts = added.reshape(n, by.shape[1], k)[:, 1:].reshape(n, k, levels, 2, k)
-    own = np.einsum("njlsj->njls", shifts)
-    sides = np.moveaxis(good, 1, 2).sum(axis=-1)
-    span = np.where(sides > 0, np.abs(own).sum(axis=-1) / np.maximum(sides, 1), RATIO * increments)
+    counts = np.moveaxis(good, 1, 2)
+    beside = np.moveaxis(values[:, 1:].reshape(n, k, levels, 2, m), -1, 1)
+    beside = np.where(counts[None, None], beside, np.nan)
+    own = np.einsum("njlsj->njls", added.reshape(n, count, k)[:, 1:].reshape(n, k, levels, 2, k))
+    sides = counts.sum(axis=-1)
+    span = np.where(sides > 0, np.abs(own).sum(axis=-1) / np.maximum(sides, 1), increments)
     return Neighbours(values[:, 0], beside[..., ABOVE], beside[..., BELOW], span, status[:, 0], time[:, 0])
+
+
+def _moves(increments: np.ndarray, good: np.ndarray) -> np.ndarray:
+    """How far copies are moved (n (1 + 2 k levels), k): a member itself, then copies above and below of each increment.
+
+    increments: (n, k, levels). good: (k, 2, levels), those that are not good stay where they are.
+    """
+    n, k, levels = increments.shape
+    moved = np.zeros((n, k, levels, 2, k))
+    for j in range(k):
+        moved[:, j, :, ABOVE, j] = np.where(good[j, ABOVE], increments[:, j], 0.0)
+        moved[:, j, :, BELOW, j] = np.where(good[j, BELOW], -increments[:, j], 0.0)
+    members = np.zeros((n, 1, k))
+    return np.concatenate([members, moved.reshape(n, 2 * k * levels, k)], axis=1).reshape(n * (1 + 2 * k * levels), k)

@@ -3,11 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import Any
-
-import numpy as np
 
 from lgvi_warp.calls.prepared import scene_value
 from lgvi_warp.common.arguments import flag
@@ -23,15 +20,7 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.variations import Target, targets
 from lgvi_warp.studies.derivatives import undefined
 from lgvi_warp.studies.derivatives.answer import Derivatives
-from lgvi_warp.studies.derivatives.copies import Copies, CopyRuns, Neighbours, neighbours
-from lgvi_warp.studies.derivatives.extrapolation import Extrapolated, extrapolated, relative_increments
-from lgvi_warp.studies.derivatives.stop_times import StopTimeRuns
-from lgvi_warp.studies.reference import ROUND_OFF
-
-# Members on which increments are chosen, and how many of these others are run at.
-LOOKED_AT, KEPT_LEVELS = 8, 4
-# A derivative, its error and its increment; or why there is none.
-Told = tuple[float, float, float] | str
+from lgvi_warp.studies.derivatives.answering import Answering, Question
 
 
 @shows_progress
@@ -97,24 +86,10 @@ def derivatives(
         scheduler=scheduler,
     )  # fmt: skip
     question = _checked(fleet, of, by, smooth, seed)
-    runs = CopyRuns(question.copies, question.interests, settings)
-    found = _found(runs, callback(progress) or (lambda share: None))
-    return _Answer(question, runs, found, settings).told()
+    return Answering(question, settings, callback(progress) or (lambda share: None)).answer()
 
 
-@dataclass(frozen=True)
-class _Question:
-    """What is asked, of which members; alone: of a scene; rounding: quanta of sensors that act; notes: for the user."""
-
-    copies: Copies
-    interests: tuple[OfResult, ...]
-    names: tuple[str, ...]
-    alone: bool
-    rounding: Mapping[str, float]
-    notes: tuple[str, ...]
-
-
-def _checked(fleet: Any, of: Any, by: Any, smooth: Any, seed: Any) -> _Question:
+def _checked(fleet: Any, of: Any, by: Any, smooth: Any, seed: Any) -> Question:
     """The question. Raises SceneError, with all faults of the arguments."""
     scene, faults = scene_of(fleet), Faults()
     interests: tuple[OfResult, ...] = ()
@@ -133,179 +108,19 @@ def _checked(fleet: Any, of: Any, by: Any, smooth: Any, seed: Any) -> _Question:
             numbers += several
     with faults.including():
         flag("smooth", smooth)
-    if isinstance(fleet, Ensemble):
-        members = fleet
-        if fleet.final is not None:
-            faults.add("fleet", "...", "goes on from another run", "give members that start at t = 0")
-        with faults.including():
-            members = fleet if seed is None else fleet.with_seed(seed)
-    else:
-        settings = scene.ensemble_settings
-        members = Ensemble(scene, 1)
-        with faults.including():
+    alone = not isinstance(fleet, Ensemble)
+    members = Ensemble(scene, 1) if alone else fleet
+    if members.final is not None:
+        faults.add("fleet", "...", "goes on from another run", "give members that start at t = 0")
+    settings = scene.ensemble_settings
+    with faults.including():
+        if alone:
             members = Ensemble(scene, 1, (settings.seed if settings else 0) if seed is None else seed)
+        elif seed is not None:
+            members = fleet.with_seed(seed)
     faults.raise_if_any()
-    n = members.members
-    of_members = members.parameters(0, n)
-    rounding = undefined.quanta(scene, of_members)
-    notes: tuple[str, ...] = ()
-    if smooth and rounding:
-        scene = scene.with_numbers({name: 0.0 * scene.parameters()[name] for name in rounding})
-        notes = (f"readings are not rounded: {', '.join(rounding)} left out",)
-    copies = Copies(members, scene, tuple(numbers), tuple(rounding) if smooth else ())
-    return _Question(copies, interests, names, not isinstance(fleet, Ensemble), {} if smooth else rounding, notes)
-
-
-@dataclass(frozen=True)
-class _Found:
-    """Differences of all members: values (n, m), what they tell (n, m, k), increments (n, k, levels) of each place."""
-
-    near: Sequence[tuple[np.ndarray, Neighbours, Extrapolated]]
-    growth: np.ndarray
-    legs: np.ndarray
-
-
-def _found(runs: CopyRuns, report: Callable[[float], None]) -> _Found:
-    """Run some members at all increments, and the others at those that were best."""
-    n, k, eps = runs.copies.fleet.members, len(runs.copies.targets), ROUND_OFF[runs.dtype.partition("_")[0]]
-    relative = np.broadcast_to(relative_increments(runs.dtype), (k, len(relative_increments(runs.dtype))))
-    looked = np.arange(min(n, LOOKED_AT))
-    share = len(looked) / n
-    growth, from_here = runs.nudged()
-    near = neighbours(runs, looked, relative, lambda part: report(0.1 + 0.9 * share * part))
-    tells = _extrapolated(near, eps)
-    found = [(looked, near, tells)]
-    if n > len(looked):
-        others = np.arange(len(looked), n)
-        first = np.median(tells.first.reshape(-1, k), axis=0).astype(int)
-        first = np.clip(first, 0, relative.shape[1] - KEPT_LEVELS)
-        chosen = np.take_along_axis(relative, first[:, None] + np.arange(KEPT_LEVELS), axis=1)
-        near = neighbours(runs, others, chosen, lambda part: report(0.1 + 0.9 * (share + (1.0 - share) * part)))
-        rounding = np.broadcast_to(2.0 * np.nan_to_num(tells.rounding).max(axis=0), near.above.shape[:-1])
-        found.append((others, near, _extrapolated(near, eps, rounding)))
-    wide = growth if runs.dtype == "float64" else np.zeros(n)
-    return _Found(found, wide, undefined.legs_done(runs.copies.scene, from_here.final))
-
-
-def _extrapolated(near: Neighbours, eps: float, rounding: np.ndarray | None = None) -> Extrapolated:
-    """Extrapolate differences; near.at has no number that is moved."""
-    at = np.broadcast_to(near.at[:, :, None], near.above.shape[:-1])
-    increments = np.broadcast_to(near.increments[:, None], near.above.shape)
-    return extrapolated(at, near.above, near.below, increments, eps, rounding)
-
-
-class _Answer:
-    """The answer as it is put together: arrays (n, m, k), and reasons by pair of names."""
-
-    def __init__(self, question: _Question, runs: CopyRuns, found: _Found, settings: Mapping[str, Any]):
-        self._question, self._runs, self._found, self._settings = question, runs, found, settings
-        n, m, k = runs.copies.fleet.members, len(runs.labels), len(question.names)
-        self._value = np.full((n, m), np.nan)
-        self._arrays = {name: np.full((n, m, k), np.nan) for name in ("jacobian", "error", "increments")}
-        self._reasons: dict[tuple[int, int], dict[str, list[int]]] = {}
-        self._sides: dict[int, str] = {}
-
-    def told(self) -> Derivatives:
-        """Fill in what each group of members gave."""
-        for members, near, tells in self._found.near:
-            self._value[members] = near.at
-            self._note_sides(near)
-            times = self._stop_times(members, near)
-            for place in np.ndindex(*tells.value.shape):
-                self._put(int(members[place[0]]), place, near, tells, times)
-        question, runs = self._question, self._runs
-        arrays = {"value": self._value, **self._arrays}
-        if question.alone:
-            arrays = {name: values[0] for name, values in arrays.items()}
-        return Derivatives(
-            of=runs.labels,
-            units=runs.units,
-            by=question.names,
-            **arrays,
-            undefined={self._name(*pair): self._text(reasons) for pair, reasons in self._reasons.items()},
-            messages=(*question.notes, *self._sides.values()),
-            members=runs.members,
-            provenance=runs.provenance,
-        )
-
-    def _name(self, i: int, j: int) -> str:
-        return f"{self._runs.labels[i]} by {self._question.names[j]}"
-
-    def _text(self, reasons: Mapping[str, list[int]]) -> str:
-        """The reasons of members in one text."""
-        if self._question.alone:
-            return next(iter(reasons))
-        counted = [f"{text} ({len(which)} of {len(self._value)} members, the first {which[0]})"
-                   for text, which in reasons.items()]  # fmt: skip
-        return "; ".join(counted[:3])
-
-    def _note_sides(self, near: Neighbours) -> None:
-        """Say which numbers could be moved to one side only."""
-        for j, name in enumerate(self._question.names):
-            for values, side in ((near.below, "above"), (near.above, "below")):
-                if np.isnan(values[:, :, j]).all() and not np.isnan(near.at).all():
-                    self._sides[j] = (
-                        f"{name}: differences are from {side} alone, since no copy counts on the other side"
-                    )
-
-    def _put(
-        self, member: int, place: tuple[int, ...], near: Neighbours, tells: Extrapolated,
-        times: Mapping[tuple[int, ...], Told],
-    ) -> None:  # fmt: skip
-        """Note a derivative of a member, or why there is none."""
-        row, i, j = place
-        number, interest = self._question.copies.targets[j], self._question.interests[self._runs.owner[i]]
-        scene, found = self._question.copies.scene, self._found
-        reason = (
-            undefined.of_number(scene, number)
-            or undefined.of_interest(interest, number, scene)
-            or undefined.of_loop(self._question.rounding)
-            or undefined.of_member(
-                interest, float(near.at[row, i]), int(near.status[row]), float(near.time[row]),
-                float(found.growth[member]), float(found.legs[member]),
-            )
-        )  # fmt: skip
-        increments = near.increments[row, j]
-        numbers = times[place] if place in times else _numbers(tells, place, increments)
-        told: Told = reason or numbers
-        if isinstance(told, str):
-            self._reasons.setdefault((i, j), {}).setdefault(told, []).append(member)
-            return
-        for array, each in zip(self._arrays.values(), told, strict=True):
-            array[member, i, j] = each
-
-    def _stop_times(self, members: np.ndarray, near: Neighbours) -> dict[tuple[int, ...], Told]:
-        """What is told of the times at which events stopped members, by place (row, i, j)."""
-        runs, copies = self._runs, self._question.copies
-        grid, events = runs.plan.grid, undefined.timed_events(copies.scene)
-        settings = {**self._settings, "method": runs.plan.method, "h": grid.h, "dtype": runs.dtype}
-        relative = relative_increments(runs.dtype)
-        told: dict[tuple[int, ...], Told] = {}
-        for i, owner in enumerate(runs.owner):
-            interest = self._question.interests[owner]
-            if not undefined.is_end_time(interest) or interest.outcome not in events:
-                continue
-            steps = np.floor(np.nan_to_num(near.at[:, i], nan=-1.0) / grid.h + 1e-9).astype(int)
-            for step in np.unique(steps[steps >= 0]):
-                rows = np.flatnonzero(steps == step)
-                own = StopTimeRuns(copies, events[interest.outcome], int(step), settings)
-                beside = neighbours(own, members[rows], np.broadcast_to(relative, (len(copies.targets), len(relative))))
-                tells = _extrapolated(beside, ROUND_OFF[runs.dtype.partition("_")[0]])
-                runs.members += own.members
-                for row, j in np.ndindex(len(rows), len(copies.targets)):
-                    by_cubic, by_parabola = (
-                        _numbers(tells, (row, root, j), beside.increments[row, j]) for root in (0, 1)
-                    )
-                    if not isinstance(by_cubic, str) and not isinstance(by_parabola, str):
-                        slope, error, increment = by_cubic
-                        by_cubic = slope, error + abs(slope - by_parabola[0]), increment
-                    told[int(rows[row]), i, j] = by_cubic
-        return told
-
-
-def _numbers(tells: Extrapolated, place: tuple[int, ...], increments: np.ndarray) -> Told:
-    """Derivative, error and increment, or why there is none; increments: (levels,)."""
-    reason = undefined.of_differences(tells, place, increments)
-    if reason is not None:
-        return reason
-    return float(tells.value[place]), float(tells.error[place]), float(increments[int(tells.first[place])])
+    rounding = undefined.quanta(scene, members.parameters(0, members.members))
+    if smooth:
+        smoothed = scene.with_numbers({name: 0.0 * scene.parameters()[name] for name in rounding})
+        return Question(members, smoothed, interests, names, tuple(numbers), alone, smoothed=tuple(rounding))
+    return Question(members, scene, interests, names, tuple(numbers), alone, rounding=rounding)

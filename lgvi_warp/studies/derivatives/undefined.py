@@ -40,31 +40,35 @@ BEFORE = 'ask for a quantity at a time before, "depth at 30", or for when it end
 def of_number(scene: Any, target: Target) -> str | None:
     """Why nothing has a derivative by a number of a scene; None where nothing is known against it."""
     key, _, name = target.name.rpartition(".")
-    if target.name == "controller.delay":
-        return "lasts a whole number of steps"
     part = next((part for part in scene.parts if part.key == key), None)
-    if isinstance(part, Sensor):
-        return OF_SENSORS.get(name)
-    if isinstance(part, Fault) and name == "time":
-        return "begins at a whole tick"
-    if isinstance(part, Waypoints) and name == "radius":
-        return "decides at which whole tick a leg is done"
-    return None
+    reason = None
+    if target.name == "controller.delay":
+        reason = "lasts a whole number of steps"
+    elif isinstance(part, Sensor):
+        reason = OF_SENSORS.get(name)
+    elif isinstance(part, Fault) and name == "time":
+        reason = "is that of the tick at or after it"
+    elif isinstance(part, Waypoints) and name == "radius":
+        reason = "decides at which tick a leg is done"
+    return f"{target.label} {reason}" if reason else None
 
 
 def of_interest(interest: OfResult, number: Target, scene: Any) -> str | None:
     """Why a quantity has no derivative, by a number or by any; None where nothing is known against it."""
-    if isinstance(interest, MetricQuantity):
-        return JUMPING.get(interest.metric.type)
-    if isinstance(interest, EndQuantity) and interest.kind == "outcome":
-        return "is 1 or 0, and jumps"
-    if is_end_time(interest):
-        events = {event.key: event for event in scene.events}
-        known = isinstance(events.get(interest.outcome), StopTime) or interest.outcome in timed_events(scene)
-        return None if known else "is the time of a step: no distance is known that is used up then"
     key, _, name = number.name.rpartition(".")
-    timed = any(isinstance(event, StopTime) and event.key == key for event in scene.events)
-    return "goes by whole steps with the time at which members stop" if timed and name == "at" else None
+    events = {event.key: event for event in scene.events}
+    timed = isinstance(events.get(key), StopTime) and name == "at"
+    reason = None
+    if isinstance(interest, MetricQuantity):
+        reason = JUMPING.get(interest.metric.type)
+    elif isinstance(interest, EndQuantity) and interest.kind == "outcome":
+        reason = "is 1 or 0, and jumps"
+    elif is_end_time(interest):
+        known = isinstance(events.get(interest.outcome), StopTime) or interest.outcome in timed_events(scene)
+        return None if known else f"{interest.label} is the time of a step, without a distance that is used up then"
+    if reason is None and timed:
+        reason = "goes by whole steps with the time at which members stop"
+    return f"{interest.label} {reason}" if reason else None
 
 
 def is_end_time(interest: OfResult) -> TypeGuard[EndQuantity]:
@@ -89,7 +93,7 @@ def of_loop(rounding: Mapping[str, float]) -> str | None:
     if not rounding:
         return None
     sensors = ", ".join(f"{name.rpartition('.')[0]} to {quantum:g}" for name, quantum in rounding.items())
-    return f"goes in steps, since readings are rounded ({sensors}); smooth=True leaves that out"
+    return f"the loop goes in steps, since readings are rounded ({sensors}); smooth=True leaves that out"
 
 
 def legs_done(scene: Any, final: Final) -> np.ndarray:
@@ -107,19 +111,17 @@ def of_member(interest: OfResult, value: float, code: int, end: float, growth: f
     code: its status. end: when it ended [s]. growth: of small differences of its start. legs: of waypoints that it has done.
     """
     if failed(np.array([code]))[0]:
-        return f"is of a member that failed ({Status(code).name.lower()})"
+        return f"the member failed ({Status(code).name.lower()})"
     timed, at_end = code == Status.TIME, is_end_time(interest)
     early = isinstance(interest, EndQuantity) and interest.when is not None and interest.when < end
     if stopped(np.array([code]))[0] and not (timed or at_end or early):
-        return f"is where an event stopped the member ({Status(code).name.lower()}), whose time moves too; {BEFORE}"
+        return f"an event stopped the member ({Status(code).name.lower()}), and that time moves too; {BEFORE}"
     if not np.isfinite(value):
-        return "is not reached" if at_end else f"is {value:g}"
+        return "the member does not end so" if at_end else f"it is {value:g}"
     if growth > MOST_GROWTH:
-        return (
-            f"is lost: a small difference of the start grows {growth:.1g} times, more than 1e6; ask at an earlier time"
-        )
+        return f"a small difference of the start grows {growth:.1g} times, more than 1e6; ask at an earlier time"
     if legs > 0.0 and not early:
-        return f"jumps with the tick at which a leg is done, and waypoints had {legs:.0f} done; ask for a time before"
+        return f"it jumps with the tick at which a leg is done, and {legs:.0f} of the waypoints were; ask for a time before"
     return None
 
 
@@ -127,15 +129,13 @@ def of_differences(found: Extrapolated, place: tuple[int, ...], increments: np.n
     """Why differences give no derivative; None where they do. increments: (levels,)."""
     code, largest, least = int(found.code[place]), increments.max(), increments.min()
     if code == FEW:
-        return (
-            f"is not known beside: members fail, or end in another way, at increments from {least:.2g} to {largest:.2g}"
-        )
+        return f"copies at increments from {least:.2g} to {largest:.2g} fail, or end in another way"
     if code == STEPS:
-        return f"jumps between increments of {least:.2g} and {largest:.2g}"
+        return f"it jumps between increments of {least:.2g} and {largest:.2g}"
     if code == KINK:
         value, jump = found.value[place], found.jump[place]
         above, below = value + 0.5 * jump, value - 0.5 * jump
-        return f"has a kink here: its derivative is {above:.6g} from above and {below:.6g} from below"
+        return f"there is a kink here: the derivative is {above:.6g} from above and {below:.6g} from below"
     if code == ROUGH:
-        return f"has differences that disagree at increments from {least:.2g} to {largest:.2g}"
+        return f"differences disagree at increments from {least:.2g} to {largest:.2g}"
     return None

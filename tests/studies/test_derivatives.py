@@ -4,11 +4,14 @@
 import copy
 import json
 import pickle
+import runpy
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from tests.conftest import ROOT
+from tests.support.pages import blocks
 from tests.support.refusals import faults, says
 
 MASS, ADDED, GRAVITY = 100.0, 20.0, 9.8
@@ -404,3 +407,27 @@ def test_progress_and_executors(found):
                            **RUN | {"threads": 2}, save=lw.SaveAt(every=1.0), progress=shares.append)  # fmt: skip
     np.testing.assert_array_equal(other.jacobian, found.jacobian)
     assert shares[-1] == 1.0
+
+
+def test_the_code_of_the_page_on_derivatives(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    names = {"lw": lw, "np": np}
+    autopilot, calibration = blocks("docs/guide/derivatives.md", "python")
+    exec(calibration, names)
+    assert names["linear"] == pytest.approx(26.0, rel=1e-9)
+    exec(autopilot, names)
+    found = names["found"]
+    assert np.isfinite(found.jacobian[:2, :3]).all()
+    assert np.isnan(found.jacobian[2]).all()
+    assert np.isnan(found.jacobian[:, 3]).all()
+
+
+@pytest.mark.slow
+def test_the_calibration_of_the_example(capsys):
+    """Estimates are normal about the truth with the covariance told: the square of their distance is chi-squared of three."""
+    example = runpy.run_path(str(ROOT / "examples" / "estimates" / "calibrate_remus.py"))
+    at, covariance = example["main"]()
+    apart = at - list(example["TRUTH"].values())
+    assert apart @ np.linalg.solve(covariance, apart) < 16.3  # 0.1 %
+    assert np.abs(apart).min() > 0.0
+    assert capsys.readouterr().out.count("truth") == 3

@@ -21,6 +21,8 @@ BOTH_SIDES, ONE_SIDE = (2, 4), (1, 2)
 ABRUPT, KINK_GROWTH = 1e4, 5.0
 # A derivative is none whose error is above this part of it, so many times round-off, and this part of the slopes to each side.
 MOST_ERROR, MOST_ROUND_OFF, MOST_OF_SLOPES = 0.1, 10.0, 1e-3
+# Scatter of values at the least increments that is so many times round-off, of numbers of 1 or more, is none of it.
+MOST_SCATTER = 1e6
 FINE, FEW, ROUGH, STEPS, KINK = range(5)
 
 
@@ -94,7 +96,8 @@ def _extrapolated(
     steepest = np.fmax(np.abs(chosen(up)), np.abs(chosen(down)))
     rough = (error > MOST_ERROR * np.abs(best)) & (error > MOST_ROUND_OFF * chosen(noise, 2))
     code = np.full(best.shape, FINE)
-    code[rough & (error > MOST_OF_SLOPES * steepest)] = ROUGH
+    scattered = (error > MOST_ERROR * np.abs(best)) & (rounding > MOST_SCATTER * eps * np.maximum(np.abs(at), 1.0))
+    code[(rough | scattered) & (error > MOST_OF_SLOPES * steepest)] = ROUGH
     code[~one_sided & (np.abs(jump) > 10.0 * unsure) & (np.abs(jump) > 1e-6 * np.abs(best))] = KINK
     left = [np.abs(each - best[..., None]) * increments for each in (up, down, slopes)]
     code[np.any([_abrupt(each, rounding) for each in left], axis=0)] = STEPS

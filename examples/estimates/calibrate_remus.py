@@ -49,7 +49,9 @@ def calibrated(measured, steps=6):
         here = model.with_numbers(dict(zip(names, at, strict=True)))
         found = lw.derivatives(here, fixes, names, method="rk4", h=0.05, t1=T1, save=lw.SaveAt(every=EVERY))
         J, left = found.jacobian, measured - found.value
-        print(f"step {step}: rms {np.sqrt(np.mean(left**2)):.4f} m, {dict(zip(names, at.round(4).tolist(), strict=True))}")
+        print(
+            f"step {step}: rms {np.sqrt(np.mean(left**2)):.4f} m, {dict(zip(names, at.round(4).tolist(), strict=True))}"
+        )
         change = np.linalg.lstsq(J, left, rcond=None)[0]
         at = at + change
         if np.abs(change / at).max() < 1e-8:
@@ -61,7 +63,9 @@ def main():
     """Calibrate, and say how far the coefficients are from those of the vehicle that was recorded."""
     at, covariance = calibrated(recording())
     for name, value, error in zip(TRUTH, at, np.sqrt(np.diag(covariance)), strict=True):
-        print(f"{name:<28} {value:9.4f} +- {error:.4f}   truth {TRUTH[name]:.4f}, {(value - TRUTH[name]) / error:+.1f} sd")
+        print(
+            f"{name:<28} {value:9.4f} +- {error:.4f}   truth {TRUTH[name]:.4f}, {(value - TRUTH[name]) / error:+.1f} sd"
+        )
     return at, covariance
 
 

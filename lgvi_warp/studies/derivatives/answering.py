@@ -27,7 +27,7 @@ NUMBERS = ("jacobian", "error", "increments")
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class SlopesQuestion:
     """What is asked.
 
     fleet: of which members. scene: of the copies. interests: what of them. names, targets: by which numbers. alone: of a
@@ -56,7 +56,7 @@ class Question:
 class Answering:
     """The answer as it is put together: arrays (n, m, k), and reasons by place (i, j) with the members that have them."""
 
-    def __init__(self, question: Question, settings: Mapping[str, Any], report: Callable[[float], None]):
+    def __init__(self, question: SlopesQuestion, settings: Mapping[str, Any], report: Callable[[float], None]):
         self._question, self._settings, self._report = question, settings, report
         # Numbers by which nothing has a derivative are not moved: they would cost copies, and memory of a controller.
         pairs = [[question.known_against(each, target) for each in question.interests] for target in question.targets]
@@ -71,9 +71,9 @@ class Answering:
     def answer(self) -> Derivatives:
         """Run the copies, and fill in what each group of members gave."""
         question, runs = self._question, self._runs
-        growth, from_here = runs.nudged()
+        growth, from_here = runs.nudged(final=undefined.has_waypoints(question.scene))
         self._growth = growth if runs.dtype == "float64" else np.zeros_like(growth)
-        self._legs = undefined.legs_done(question.scene, from_here.final)
+        self._legs = undefined.legs_done(question.scene, from_here)
         groups = self._groups()
         n, m, k = question.fleet.members, len(runs.labels), len(question.names)
         value = np.full((n, m), np.nan)

@@ -139,7 +139,7 @@ class Copies:
 
 
 @dataclass(frozen=True)
-class Ends:
+class CopyEnds:
     """What copies gave: values (N, m), NaN of those that failed, their status (N,) and the time of their end (N,) [s]."""
 
     values: np.ndarray
@@ -180,7 +180,7 @@ class CopyRuns:
 
     def __call__(
         self, each: np.ndarray, by: np.ndarray, report: Callable[[float], None] | None = None
-    ) -> tuple[Ends, np.ndarray]:
+    ) -> tuple[CopyEnds, np.ndarray]:
         """What copies of members each (N,) give, moved by (N, k), and how far they were moved (N, k), rounding included."""
         parts, added = [], self.copies.at[each] + by - self.copies.at[each]
         for first in range(0, len(each), PATHS_AT_ONCE):
@@ -191,9 +191,9 @@ class CopyRuns:
             if report:
                 report(min(1.0, (first + PATHS_AT_ONCE) / len(each)))
         self.members += len(each)
-        return Ends(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0]))), added
+        return CopyEnds(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0]))), added
 
-    def _ends(self, result: Result, group: Ensemble) -> Ends:
+    def _ends(self, result: Result, group: Ensemble) -> CopyEnds:
         numbers = values_of(result, group, self.interests)
         if not self.labels:
             counts = [values.shape[1] for values in numbers]
@@ -204,13 +204,16 @@ class CopyRuns:
             self.provenance = result.provenance
         status = np.asarray(result.status)
         values = np.where(failed(status)[:, None], np.nan, np.concatenate(numbers, axis=1, dtype=np.float64))
-        return Ends(values, status, np.asarray(result.end_time))
+        return CopyEnds(values, status, np.asarray(result.end_time))
 
-    def nudged(self) -> tuple[np.ndarray, Result]:
-        """How often the distance between two starts is larger at the end (n,), and the run from the first ones."""
+    def nudged(self, final: bool) -> tuple[np.ndarray, Result]:
+        """How often the distance between two starts is larger at the end (n,), and the run from the first ones.
+
+        final: whether its end is kept.
+        """
         ends, results = [], []
         for group in self.copies.nudged():
-            result = self.runner.run(group, warned=False, final=True)
+            result = self.runner.run(group, warned=False, final=final)
             kept = [result.samples[name][-1].reshape(group.members, -1) for name in FIELDS if name in result.samples]
             ends.append(np.concatenate(kept, axis=1, dtype=np.float64))
             results.append(result)

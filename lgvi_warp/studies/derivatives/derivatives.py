@@ -20,7 +20,7 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.variations import Target, targets
 from lgvi_warp.studies.derivatives import undefined
 from lgvi_warp.studies.derivatives.answer import Derivatives
-from lgvi_warp.studies.derivatives.answering import Answering, Question
+from lgvi_warp.studies.derivatives.answering import Answering, SlopesQuestion
 
 
 @shows_progress
@@ -89,7 +89,7 @@ def derivatives(
     return Answering(question, settings, callback(progress) or (lambda share: None)).answer()
 
 
-def _checked(fleet: Any, of: Any, by: Any, smooth: Any, seed: Any) -> Question:
+def _checked(fleet: Any, of: Any, by: Any, smooth: Any, seed: Any) -> SlopesQuestion:
     """The question. Raises SceneError, with all faults of the arguments."""
     scene, faults = scene_of(fleet), Faults()
     interests: tuple[OfResult, ...] = ()
@@ -122,5 +122,5 @@ def _checked(fleet: Any, of: Any, by: Any, smooth: Any, seed: Any) -> Question:
     rounding = undefined.quanta(scene, members.parameters(0, members.members))
     if smooth:
         smoothed = scene.with_numbers({name: 0.0 * scene.parameters()[name] for name in rounding})
-        return Question(members, smoothed, interests, names, tuple(numbers), alone, smoothed=tuple(rounding))
-    return Question(members, scene, interests, names, tuple(numbers), alone, rounding=rounding)
+        return SlopesQuestion(members, smoothed, interests, names, tuple(numbers), alone, smoothed=tuple(rounding))
+    return SlopesQuestion(members, scene, interests, names, tuple(numbers), alone, rounding=rounding)

@@ -13,7 +13,7 @@ from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfResult
 from lgvi_warp.results.result import Result
 from lgvi_warp.statistics.metrics.nearest import DISTANCES
-from lgvi_warp.studies.derivatives.copies import Copies, CopyRuns, Ends
+from lgvi_warp.studies.derivatives.copies import Copies, CopyEnds, CopyRuns
 
 # Samples about the end, in steps from the one before it, and how often a root is corrected.
 NODES, CORRECTIONS = (-1, 0, 1, 2), 8
@@ -34,11 +34,11 @@ class StopTimeRuns(CopyRuns):
         super().__init__(replace(copies, scene=scene), [OfResult("position", lambda result: result.position[-1])],
                          {**settings, **about})  # fmt: skip
 
-    def _ends(self, result: Result, group: Any) -> Ends:
+    def _ends(self, result: Result, group: Any) -> CopyEnds:
         ends = super()._ends(result, group)
         return replace(ends, values=result.position[-len(NODES) :].reshape(len(NODES), -1).T)
 
-    def __call__(self, each: np.ndarray, by: np.ndarray, report: Any = None) -> tuple[Ends, np.ndarray]:
+    def __call__(self, each: np.ndarray, by: np.ndarray, report: Any = None) -> tuple[CopyEnds, np.ndarray]:
         ends, added = super().__call__(each, by, report)
         positions = ends.values.reshape(len(each), 3, len(NODES)).transpose(2, 0, 1)
         numbers, event = self.copies.moved(each, by), self._event

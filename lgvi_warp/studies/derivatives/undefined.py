@@ -14,7 +14,8 @@ from lgvi_warp.control.sensor import Sensor
 from lgvi_warp.control.waypoints import Waypoints
 from lgvi_warp.physics.terms.events import StopTime
 from lgvi_warp.results.quantities import EndQuantity, MetricQuantity, OfResult
-from lgvi_warp.sampling.final import MEMORY, Final
+from lgvi_warp.results.result import Result
+from lgvi_warp.sampling.final import MEMORY
 from lgvi_warp.scene.variations import Target
 from lgvi_warp.statistics.metrics.nearest import DISTANCES
 from lgvi_warp.studies.derivatives.extrapolation import FEW, KINK, ROUGH, STEPS, Extrapolated
@@ -96,12 +97,17 @@ def of_loop(rounding: Mapping[str, float]) -> str | None:
     return f"the loop goes in steps, since readings are rounded ({sensors}); smooth=True leaves that out"
 
 
-def legs_done(scene: Any, final: Final) -> np.ndarray:
-    """How many legs of waypoints members have done (n,), 0 without waypoints."""
-    done = np.zeros(final.members)
-    for part in scene.parts:
-        if isinstance(part, Waypoints):
-            done = np.maximum(done, np.asarray(final.lanes[f"{MEMORY}part {part.key} {type(part).__name__}"])[:, 0])
+def has_waypoints(scene: Any) -> bool:
+    """Whether something guides along waypoints."""
+    return any(isinstance(part, Waypoints) for part in scene.parts)
+
+
+def legs_done(scene: Any, result: Result) -> np.ndarray:
+    """How many legs of waypoints members have done at the end of a run (n,), 0 without waypoints."""
+    done = np.zeros(result.members)
+    for part in (part for part in scene.parts if isinstance(part, Waypoints)):
+        remembered = result.final.lanes[f"{MEMORY}part {part.key} {type(part).__name__}"]
+        done = np.maximum(done, np.asarray(remembered, dtype=np.float64)[:, 0])
     return np.rint(done)
 
 

@@ -100,7 +100,8 @@ def _extrapolated(
     code[(rough | scattered) & (error > MOST_OF_SLOPES * steepest)] = ROUGH
     code[~one_sided & (np.abs(jump) > 10.0 * unsure) & (np.abs(jump) > 1e-6 * np.abs(best))] = KINK
     left = [np.abs(each - best[..., None]) * increments for each in (up, down, slopes)]
-    code[np.any([_abrupt(each, rounding) for each in left], axis=0)] = STEPS
+    least = np.maximum(MOST_ERROR * np.abs(best)[..., None] * increments, ABRUPT * rounding[..., None])
+    code[np.any([_abrupt(each, least) for each in left], axis=0)] = STEPS
     code[~np.isfinite(error)] = FEW
     return Extrapolated(best, error, first, np.where(one_sided, 0.0, jump), rounding, code)
 
@@ -140,8 +141,11 @@ def _jump(gaps: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return twice, np.abs(np.diff(once, axis=-1)) + 8.0 * noise[..., 2:]
 
 
-def _abrupt(left: np.ndarray, rounding: np.ndarray) -> np.ndarray:
-    """Whether what a slope leaves of changes (..., levels) stays a while, and vanishes from one increment to the next."""
+def _abrupt(left: np.ndarray, least: np.ndarray) -> np.ndarray:
+    """Whether what a slope leaves of changes (..., levels) stays a while, and vanishes from one increment to the next.
+
+    least: (..., levels), below which it is of no account.
+    """
     before, here, after = left[..., :-2], left[..., 1:-1], left[..., 2:]
-    vanishes = (here > ABRUPT * after) & (here > ABRUPT * np.maximum(rounding, np.finfo(float).tiny)[..., None])
+    vanishes = (here > ABRUPT * after) & (here > np.maximum(least, np.finfo(float).tiny)[..., 1:-1])
     return np.asarray((vanishes & (before < KINK_GROWTH * here)).any(axis=-1))

@@ -101,6 +101,12 @@ def test_steps():
     assert derivative(lambda x: 3.0 + x + 0.005 * np.round(1e3 * np.sin(3.0 * x)), 1.0).code[0] == STEPS
 
 
+def test_a_small_jump_far_away_is_of_no_account():
+    found = derivative(lambda x: 2.0 * x + 1e-5 * (np.abs(x - 1.0) > 0.01), 1.0)
+    assert found.code[0] == FINE
+    assert abs(found.value[0] - 2.0) <= found.error[0] < 1e-9
+
+
 def test_disagreement():
     def rough(x):
         return sum(0.6**i * np.cos(7.0**i * x) for i in range(40))

@@ -64,6 +64,19 @@ def test_a_fall_against_quadratic_drag():
     assert found.by == tuple(by)
 
 
+@pytest.mark.parametrize("method", ["psi_s", "psi_x"])
+def test_derivatives_have_the_order_of_the_method(method):
+    """Half the step is a fourth of the error, of value and derivative."""
+    truth, apart = fallen(HEAVY), []
+    for h in (0.2, 0.1, 0.05):
+        run = RUN | {"method": method, "h": h}
+        found = lw.derivatives(body(quadratic=QUADRATIC), "depth", "vehicle.buoyancy", **run)
+        assert found.error[0, 0] < 1e-9
+        apart.append([found.value[0] - truth[0], found.jacobian[0, 0] - truth[1]])
+    ratios = np.divide(apart[:-1], apart[1:])
+    np.testing.assert_allclose(ratios, 4.0, rtol=0.05)
+
+
 def turned(result):
     R = result.attitude[-1]
     return np.unwrap([np.full(len(R), 0.7 * T1), np.arctan2(R[:, 1, 0], R[:, 0, 0])], axis=0)[1]
@@ -213,6 +226,9 @@ def test_a_member_that_failed():
     scene = body(linear=1e5, start=lw.Start(velocity=[1.0, 0.0, 0.0]))
     found = lw.derivatives(scene, "position[0]", "start.velocity[0]", **RUN)
     says(found.undefined["position[0] by start.velocity[0]"], "the member failed (")
+    raising = lw.Scene.from_dict(scene.to_dict() | {"run": {"on_failure": "raise"}})
+    again = lw.derivatives(raising, "position[0]", "start.velocity[0]", **RUN)
+    assert again.undefined == found.undefined
 
 
 FLOOR = 4.0

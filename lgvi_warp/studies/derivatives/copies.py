@@ -165,7 +165,9 @@ class CopyRuns:
         first = copies.ensemble(every, copies.numbers)
         save = samples_for(copies.scene, self.interests, settings.get("save"))
         gathered = statistics_for(copies.scene, self.interests)
-        self.runner = Runner(first, gathered, **{**settings, "save": save})
+        # A copy that is far away may fail: that ends no study.
+        lasting = {"on_failure": "freeze"} if copies.scene.run.on_failure == "raise" else {}
+        self.runner = Runner(first, gathered, **{**settings, **lasting, "save": save})
         self.plan = self.runner.plan(first)
         self.labels: tuple[str, ...] = ()
         self.units: tuple[str, ...] = ()

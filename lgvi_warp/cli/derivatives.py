@@ -51,9 +51,9 @@ def derivatives(chosen: argparse.Namespace, *, study: Part = None) -> int:
     out = folder(chosen, "_derivatives")
     fleet = Ensemble.from_scene(scene) if chosen.fleet else scene
     with progress_bar(chosen.quiet) as progress:
-        found = (study or differences)(
+        slopes = (study or differences)(
             fleet, chosen.of, chosen.by, smooth=chosen.smooth, threads=chosen.threads, progress=progress
         )
     with progress_bar(chosen.quiet, "writing"):
-        written = Written(found.save(out))
-    return finish(written, chosen, {"derivatives": found.to_dict()}, str(found))
+        written = Written(slopes.save(out))
+    return finish(written, chosen, {"derivatives": slopes.to_dict()}, str(slopes))

@@ -22,7 +22,7 @@ from lgvi_warp.studies.reference import ROUND_OFF
 # Members on which increments are chosen, and how many of these others are run at.
 LOOKED_AT, KEPT_LEVELS = 8, 4
 # A derivative, its error and its increment; or why there is none.
-Told = tuple[float, float, float] | str
+SlopeOrReason = tuple[float, float, float] | str
 NUMBERS = ("jacobian", "error", "increments")
 
 
@@ -80,9 +80,9 @@ class Answering:
         self._arrays = {name: np.full((n, m, k), np.nan) for name in NUMBERS}
         against = [[question.known_against(question.interests[i], target) for target in question.targets]
                    for i in runs.owner]  # fmt: skip
-        for members, near, tells in groups:
+        for members, near, slopes in groups:
             value[members] = near.at
-            self._fill(members, near, tells)
+            self._fill(members, near, slopes)
         for i, j in np.ndindex(m, k):
             if (reason := against[i][j]) is not None:
                 self._arrays_at(slice(None), i, j, (np.nan,) * 3)
@@ -108,15 +108,15 @@ class Answering:
         looked = np.arange(min(n, LOOKED_AT))
         share = len(looked) / n
         near = neighbours(runs, looked, relative, lambda part: self._report(share * part))
-        tells = self._extrapolated(near)
-        groups = [(looked, near, tells)]
+        slopes = self._extrapolated(near)
+        groups = [(looked, near, slopes)]
         if n > len(looked):
             others = np.arange(len(looked), n)
-            first = np.median(tells.first, axis=(0, 1)).astype(int) if k else np.zeros(0, int)
+            first = np.median(slopes.first, axis=(0, 1)).astype(int) if k else np.zeros(0, int)
             first = np.clip(first, 0, relative.shape[1] - KEPT_LEVELS)
             chosen = np.take_along_axis(relative, first[:, None] + np.arange(KEPT_LEVELS), axis=1)
             near = neighbours(runs, others, chosen, lambda part: self._report(share + (1.0 - share) * part))
-            rounding = np.broadcast_to(2.0 * np.nan_to_num(tells.rounding).max(axis=0), near.above.shape[:-1])
+            rounding = np.broadcast_to(2.0 * np.nan_to_num(slopes.rounding).max(axis=0), near.above.shape[:-1])
             groups.append((others, near, self._extrapolated(near, rounding)))
         return groups
 
@@ -129,18 +129,18 @@ class Answering:
         for array, values in zip(self._arrays.values(), numbers, strict=True):
             array[members, i, j] = values
 
-    def _fill(self, members: np.ndarray, near: Neighbours, tells: Extrapolated) -> None:
+    def _fill(self, members: np.ndarray, near: Neighbours, slopes: Extrapolated) -> None:
         """Take over derivatives of members, and look closely at those that may have none."""
         times = self._stop_times(members, near)
         odd = (near.status != 0) | (self._growth[members] > undefined.MOST_GROWTH) | (self._legs[members] > 0.0)
         odd = odd[:, None] | ~np.isfinite(near.at)
         for i, place in np.ndindex(len(self._runs.labels), len(self._live)):
             j = self._live[place]
-            increments = np.take_along_axis(near.increments[:, place], tells.first[:, i, place, None], axis=1)[:, 0]
-            self._arrays_at(members, i, j, (tells.value[:, i, place], tells.error[:, i, place], increments))
-            closely = odd[:, i] | (tells.code[:, i, place] != FINE)
+            increments = np.take_along_axis(near.increments[:, place], slopes.first[:, i, place, None], axis=1)[:, 0]
+            self._arrays_at(members, i, j, (slopes.value[:, i, place], slopes.error[:, i, place], increments))
+            closely = odd[:, i] | (slopes.code[:, i, place] != FINE)
             for row in np.flatnonzero(closely):
-                self._put(int(members[row]), (int(row), i, place), near, tells, times)
+                self._put(int(members[row]), (int(row), i, place), near, slopes, times)
         for place, j in enumerate(self._live):
             for values, side in ((near.below, "above"), (near.above, "below")):
                 if np.isnan(values[:, :, place]).all() and not np.isnan(near.at).all():
@@ -149,20 +149,20 @@ class Answering:
                     )
 
     def _put(
-        self, member: int, place: tuple[int, int, int], near: Neighbours, tells: Extrapolated,
-        times: Mapping[tuple[int, int, int], Told],
+        self, member: int, place: tuple[int, int, int], near: Neighbours, slopes: Extrapolated,
+        times: Mapping[tuple[int, int, int], SlopeOrReason],
     ) -> None:  # fmt: skip
         """Note a derivative of a member, or why there is none."""
         row, i, j = place[0], place[1], self._live[place[2]]
-        told: Told | None = undefined.of_member(
+        slope: SlopeOrReason | None = undefined.of_member(
             self._question.interests[self._runs.owner[i]], float(near.at[row, i]), int(near.status[row]),
             float(near.time[row]), float(self._growth[member]), float(self._legs[member]),
         )  # fmt: skip
-        told = told or times.get(place) or _numbers(tells, place, near.increments[row, place[2]])
-        if isinstance(told, str):
-            self._reasons.setdefault((i, j), {}).setdefault(told, []).append(member)
-            told = (np.nan,) * 3
-        self._arrays_at(member, i, j, told)
+        slope = slope or times.get(place) or _numbers(slopes, place, near.increments[row, place[2]])
+        if isinstance(slope, str):
+            self._reasons.setdefault((i, j), {}).setdefault(slope, []).append(member)
+            slope = (np.nan,) * 3
+        self._arrays_at(member, i, j, slope)
 
     def _text(self, reasons: Mapping[str, list[int]], n: int) -> str:
         """The reasons of members in one text."""
@@ -171,9 +171,9 @@ class Answering:
         counted = [f"{text} ({len(which)} of {n} members, the first {which[0]})" for text, which in reasons.items()]
         return "; ".join(counted[:3])
 
-    def _stop_times(self, members: np.ndarray, near: Neighbours) -> dict[tuple[int, int, int], Told]:
+    def _stop_times(self, members: np.ndarray, near: Neighbours) -> dict[tuple[int, int, int], SlopeOrReason]:
         """What is told of the times at which events stopped members, by place (row, i, j)."""
-        runs, told = self._runs, dict[tuple[int, int, int], Told]()
+        runs, times = self._runs, dict[tuple[int, int, int], SlopeOrReason]()
         grid, events = runs.plan.grid, undefined.timed_events(self._question.scene)
         settings = {**self._settings, "method": runs.plan.method, "h": grid.h, "dtype": runs.dtype}
         relative = relative_increments(runs.dtype)
@@ -186,22 +186,22 @@ class Answering:
                 rows = np.flatnonzero(steps == step)
                 own = StopTimeRuns(self._copies, events[interest.outcome], int(step), settings)
                 beside = neighbours(own, members[rows], np.broadcast_to(relative, (len(self._live), len(relative))))
-                tells = self._extrapolated(beside)
+                slopes = self._extrapolated(beside)
                 runs.members += own.members
                 for row, j in np.ndindex(len(rows), len(self._live)):
                     by_cubic, by_parabola = (
-                        _numbers(tells, (row, root, j), beside.increments[row, j]) for root in (0, 1)
+                        _numbers(slopes, (row, root, j), beside.increments[row, j]) for root in (0, 1)
                     )
                     if not isinstance(by_cubic, str) and not isinstance(by_parabola, str):
-                        slope, error, increment = by_cubic
-                        by_cubic = slope, error + abs(slope - by_parabola[0]), increment
-                    told[int(rows[row]), i, j] = by_cubic
-        return told
+                        value, error, increment = by_cubic
+                        by_cubic = value, error + abs(value - by_parabola[0]), increment
+                    times[int(rows[row]), i, j] = by_cubic
+        return times
 
 
-def _numbers(tells: Extrapolated, place: tuple[int, int, int], increments: np.ndarray) -> Told:
+def _numbers(slopes: Extrapolated, place: tuple[int, int, int], increments: np.ndarray) -> SlopeOrReason:
     """Derivative, error and increment, or why there is none; increments: (levels,)."""
-    reason = undefined.of_differences(tells, place, increments)
+    reason = undefined.of_differences(slopes, place, increments)
     if reason is not None:
         return reason
-    return float(tells.value[place]), float(tells.error[place]), float(increments[int(tells.first[place])])
+    return float(slopes.value[place]), float(slopes.error[place]), float(increments[int(slopes.first[place])])

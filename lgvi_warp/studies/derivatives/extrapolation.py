@@ -83,14 +83,14 @@ def _extrapolated(
         rounding = scatter(value, increments[..., WINDOW - 1 :])
     rounding = np.maximum(rounding, eps * np.abs(at))
     noise = rounding[..., None] / increments
-    told = disagreement + 2.0 * noise[..., 2:]
-    told = np.where(np.isfinite(told), np.maximum(told, _beyond_finer(value, noise[..., 2:])), np.inf)
-    first = told.argmin(axis=-1)
+    bounds = disagreement + 2.0 * noise[..., 2:]
+    bounds = np.where(np.isfinite(bounds), np.maximum(bounds, _beyond_finer(value, noise[..., 2:])), np.inf)
+    first = bounds.argmin(axis=-1)
 
     def chosen(each: np.ndarray, offset: int = 0) -> np.ndarray:
         return np.asarray(np.take_along_axis(each, first[..., None] + offset, axis=-1)[..., 0])
 
-    best, error = chosen(value), chosen(told)
+    best, error = chosen(value), chosen(bounds)
     jump, unsure = _jump(up - down, noise)
     jump, unsure = chosen(jump), chosen(unsure)
     steepest = np.fmax(np.abs(chosen(up)), np.abs(chosen(down)))
@@ -119,7 +119,9 @@ def _windows(slopes: np.ndarray, sides: np.ndarray) -> tuple[np.ndarray, np.ndar
 
     sides: (..., 1): 1 where the error has even powers of the increment alone, else 0.
     """
-    low, high = (np.where(sides > 0, RATIO**two, RATIO**one) for two, one in zip(BOTH_SIDES, ONE_SIDE, strict=True))
+    low, high = (
+        np.where(sides > 0, RATIO**even, RATIO**any_power) for even, any_power in zip(BOTH_SIDES, ONE_SIDE, strict=True)
+    )
     once = slopes[..., 1:] + np.diff(slopes, axis=-1) / (low - 1.0)
     twice = once[..., 1:] + np.diff(once, axis=-1) / (high - 1.0)
     return twice, np.abs(np.diff(once, axis=-1))

@@ -131,15 +131,15 @@ def of_member(interest: OfResult, value: float, code: int, end: float, growth: f
     return None
 
 
-def of_differences(found: Extrapolated, place: tuple[int, ...], increments: np.ndarray) -> str | None:
+def of_differences(slopes: Extrapolated, place: tuple[int, ...], increments: np.ndarray) -> str | None:
     """Why differences give no derivative; None where they do. increments: (levels,)."""
-    code, largest, least = int(found.code[place]), increments.max(), increments.min()
+    code, largest, least = int(slopes.code[place]), increments.max(), increments.min()
     if code == FEW:
         return f"copies at increments from {least:.2g} to {largest:.2g} fail, or end in another way"
     if code == STEPS:
         return f"it jumps between increments of {least:.2g} and {largest:.2g}"
     if code == KINK:
-        value, jump = found.value[place], found.jump[place]
+        value, jump = slopes.value[place], slopes.jump[place]
         above, below = value + 0.5 * jump, value - 0.5 * jump
         return f"there is a kink here: the derivative is {above:.6g} from above and {below:.6g} from below"
     if code == ROUGH:

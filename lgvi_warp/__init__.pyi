@@ -43,6 +43,7 @@ from lgvi_warp.store.export import export as export
 from lgvi_warp.store.open import open_run as open_run
 from lgvi_warp.store.settings import Store as Store
 from lgvi_warp.studies.assimilation.assimilate import assimilate as assimilate
+from lgvi_warp.studies.derivatives.derivatives import derivatives as derivatives
 from lgvi_warp.studies.estimating.estimate import estimate as estimate
 from lgvi_warp.studies.rare.rare_event import rare_event as rare_event
 from lgvi_warp.studies.search.tune import tune_gains as tune_gains

@@ -311,10 +311,10 @@ def scene_numbers(scene: Any) -> dict[str, np.ndarray]:
     return scene.parameters() | {f"start.{key}": value for key, value in scene.start.given().items()}
 
 
-def scene_value(scene: Any, name: str) -> np.ndarray:
-    """A single number of a scene."""
+def scene_value(scene: Any, name: str, argument: str = "vary") -> np.ndarray:
+    """A single number of a scene; argument: what names it, for faults."""
     (target,) = variations.targets(name)
-    known, faults = scene_numbers(scene), Faults("vary.")
+    known, faults = scene_numbers(scene), Faults(f"{argument}.")
     if variations.known_target(faults, name, "...", target, known) and (ndim := target.of(known[target.name]).ndim):
         entry = f"{name}[{','.join('0' * ndim)}]"
         faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{entry}"')

@@ -11,6 +11,7 @@ from typing import NoReturn
 from lgvi_warp import __version__
 from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
+from lgvi_warp.cli.derivatives import derivatives
 from lgvi_warp.cli.lists import list_names, new, schema, show_help
 from lgvi_warp.cli.machine import bench, calibrate, info
 from lgvi_warp.cli.plot import plot
@@ -24,8 +25,8 @@ from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import closest
 
 # In the order of the help.
-_VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare, view,
-          info, bench, warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
+_VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
+          derivatives, view, info, bench, warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
 }
@@ -47,6 +48,7 @@ EPILOG = """examples:
   lgvi-warp stability examples/paper.toml --out runs/stability
   lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
   lgvi-warp rare examples/paper.toml --when "position[2] above 690"
+  lgvi-warp derivatives examples/paper.toml --of "position[0]" --by vehicle.mass --by "start.angular_velocity[0]"
   lgvi-warp info runs/large
   lgvi-warp run examples/paper.toml --json -q
 

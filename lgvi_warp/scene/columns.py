@@ -15,19 +15,19 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.variations import MATRICES, Target, Variation, targets
 
 
-def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
-    """Check and normalise a list of names without distributions."""
+def names_of(faults: Faults, vary: Any, argument: str = "vary") -> tuple[str, ...]:
+    """Check and normalise a list of names without distributions; argument: what lists them, for faults."""
     listed = [vary] if isinstance(vary, str) else vary
     if not isinstance(listed, Sequence) or not listed or not all(isinstance(name, str) for name in listed):
         remedy = (
             'give {"vehicle.mass": lw.distributions.Normal(...)} '
             'or a list of names, ["vehicle.mass", "start.position[2]"]'
         )
-        faults.add("vary", vary, "is neither a list of names nor a mapping of names to distributions", remedy)
+        faults.add(argument, vary, "is neither a list of names nor a mapping of names to distributions", remedy)
         return ()
     names = tuple(", ".join(target.label for target in targets(name)) for name in listed)
     for name in sorted({name for name in names if names.count(name) > 1}):
-        faults.add("vary", name, "is named twice", "name each number once")
+        faults.add(argument, name, "is named twice", "name each number once")
     return names
 
 

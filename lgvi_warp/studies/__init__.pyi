@@ -6,6 +6,7 @@ from lgvi_warp.sampling.final import Final as Final
 from lgvi_warp.studies.assimilation.answer import Assimilated as Assimilated
 from lgvi_warp.studies.assimilation.series import Series as Series
 from lgvi_warp.studies.comparison import Candidate as Candidate
+from lgvi_warp.studies.derivatives.answer import Derivatives as Derivatives
 from lgvi_warp.studies.estimating.answer import Estimated as Estimated
 from lgvi_warp.studies.files import Saved as Saved
 from lgvi_warp.studies.rare.answer import RareEvent as RareEvent

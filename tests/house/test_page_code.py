@@ -24,6 +24,7 @@ OF_TESTS = {
         "docs/guide/sensitivity.md docs/guide/statistics.md docs/guide/vehicles.md",
     "control/test_bad_sensors.py": "docs/controllers/faults.md docs/controllers/sensors.md",
     "control/test_gym.py": "docs/controllers/gym.md",
+    "studies/test_derivatives.py": "docs/guide/derivatives.md",
     "studies/test_estimating.py": "docs/guide/least_cost.md",
     "studies/test_margins.py": "docs/controllers/margins.md docs/guide/worst_case.md",
     "house/test_develop_pages.py":

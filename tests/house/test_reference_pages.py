@@ -24,7 +24,7 @@ one holds. A test writes this page.
 ROOT_NAMES = {
     "Describe": "Scene Vehicle Environment Start Ensemble Controller Method SaveAt Store Until",
     "Run": "solve prepare predict resume open_run gather merge export",
-    "Ask": "suggest tradeoff estimate stability_map sweep worst_case tune_gains rare_event assimilate",
+    "Ask": "suggest tradeoff estimate stability_map sweep worst_case tune_gains rare_event assimilate derivatives",
     "See": "show record report select_members",
     "Get back": "Result Prepared Sweep Status Warnings SceneError MembersFailed Interrupted",
 }

@@ -23,7 +23,7 @@ UNCALLED = {
     "Interrupted", "MembersFailed", "Status", "Warnings", "CallbackInput", "Allocation", "ControlLaw", "Guidance",
     "MeasuringPart", "Packed", "PackingContext", "Term", "Event", "NoisyTerm", "Prepared", "Result", "LinearModel",
     "Regulator", "Margins", "Trim", "Tuned", "WorstCase", "StabilityMap", "Sweep", "Prediction", "SceneError", "show",
-    "register", "number", "Cell", "Assimilated", "Estimated", "Final", "RareEvent", "GivenDataIndices",
+    "register", "number", "Cell", "Assimilated", "Estimated", "Derivatives", "Final", "RareEvent", "GivenDataIndices",
 }  # fmt: skip
 
 
@@ -60,7 +60,8 @@ def goods(scene, fleet, result, folder):
         "BodyLift": {"matrix": np.zeros((6, 6))}, "Normal": {"std": 1.0}, "Uniform": {"half_width": 1.0},
         "LogNormal": {"sigma": 0.1}, "TruncatedNormal": {"std": 1.0}, "Choice": {"values": [1.0, 2.0]},
         "Quantity": {"name": "depth2"}, "solve": {"h": 0.1, "t1": 0.2}, "predict": {"h": 0.1, "t1": 0.2},
-        "prepare": {"h": 0.1, "t1": 0.2}, "Ensemble": {"members": 4}, "Case": {"name": "a"},
+        "prepare": {"h": 0.1, "t1": 0.2},
+        "derivatives": {"by": "start.position[2]", "h": 0.1, "t1": 0.2}, "Ensemble": {"members": 4}, "Case": {"name": "a"},
         "KernelDensity": {"draws": [1.0, 2.0, 4.0]}, "gather": {"statistics": [lw.statistics.Mean("depth")]},
         "Copula": {"correlation": np.eye(1), "marginals": [lw.distributions.Normal(std=1.0)]},
         "Derived": {"functions": {"vehicle.mass": lambda k: k}, "k": lw.distributions.Normal(std=1.0)},

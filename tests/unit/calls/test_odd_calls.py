@@ -18,7 +18,7 @@ from tests.unit.studies.test_cost import found as tradeoff_of
 DELIBERATE = (lw.SceneError, NothingToDraw, MissingExtra, OSError)
 # Studies and trials of the disk: seconds each where an odd argument is taken, as None is.
 LONG = {"stability_map", "suggest", "term_cost", "scaling", "linearize", "trim", "tradeoff", "margins", "sweep", "tune_gains",
-        "worst_case", "rare_event", "estimate", "assimilate", "predict", "record", "report", "statistics",
+        "worst_case", "rare_event", "estimate", "derivatives", "assimilate", "predict", "record", "report", "statistics",
         "summary"}  # fmt: skip
 PACKAGE = str(Path(lw.__file__).parent)
 

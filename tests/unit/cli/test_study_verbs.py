@@ -5,6 +5,7 @@ import dataclasses
 import json
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import lgvi_warp as lw
@@ -324,3 +325,24 @@ def test_arguments_of_an_estimate(capsys):
 def test_odd_arguments_of_an_estimate(option, words, capsys):
     assert main(["estimate", PAPER, "--of", "depth", "--error", "1", *option], study=Study(answer())) == 2
     assert words in capsys.readouterr().err
+
+
+def test_arguments_of_derivatives(tmp_path, capsys):
+    slopes = lw.studies.Derivatives(
+        ("depth",), ("m",), ("vehicle.mass",), np.ones(1), np.full((1, 1), np.nan), np.full((1, 1), np.nan),
+        np.full((1, 1), np.nan), {"depth by vehicle.mass": "there is none"},
+    )  # fmt: skip
+    study = Study(slopes)
+    verb = ["derivatives", PAPER, "--of", "depth", "--by", "vehicle.mass", "--out", str(tmp_path)]
+    assert main([*verb, "-q"], study=study) == 0
+    more = ["--of", "max(depth)", "--by", "start.position[2]", "--smooth", "--fleet", "--threads", "2", "--seed", "7"]
+    assert main([*verb, *more], study=study) == 0
+    ((scene, *asked), plain), ((fleet, *others), settings) = study.calls
+    assert (type(scene), asked) == (lw.Scene, [["depth"], ["vehicle.mass"]])
+    assert plain == {"smooth": False, "threads": None, "progress": None}
+    assert (type(fleet), others) == (lw.Ensemble, [["depth", "max(depth)"], ["vehicle.mass", "start.position[2]"]])
+    assert (fleet.seed, settings["smooth"], settings["threads"]) == (7, True, 2)
+    assert "undefined   depth by vehicle.mass: there is none" in capsys.readouterr().out
+    assert lw.studies.Derivatives.load(tmp_path / "derivatives.json").undefined == slopes.undefined
+    content = document([*verb], capsys, study=study)["content"]["derivatives"]
+    assert content["jacobian"] == [[None]]

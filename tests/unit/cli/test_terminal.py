@@ -104,8 +104,8 @@ def test_verbose_says_where_an_error_came_from(capsys):
 
 
 def test_every_verb_is_of_those_that_write_or_of_those_that_do_not():
-    writing = {"run", "resume", "merge", "export", "tradeoff", "sensitivity", "stability", "sweep", "rare", "new", "plot",
-               "report", "view"}  # fmt: skip
+    writing = {"run", "resume", "merge", "export", "tradeoff", "sensitivity", "stability", "sweep", "rare",
+               "derivatives", "new", "plot", "report", "view"}  # fmt: skip
     assert writing | set(command.READING) == set(command.VERBS) == set(cli.parser().verbs)
     assert not writing & set(command.READING)
 

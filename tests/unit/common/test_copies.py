@@ -126,7 +126,7 @@ APART = {"Indices", "Saved", "Policy"}
 OF_RUNS = {"Result", "Final", "Prepared", "Sweep", "Outputs", "ScalarModel"}
 OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned", "StabilityMap", "SobolIndices",
               "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff", "RareEvent", "Assimilated",
-              "Estimated"}  # fmt: skip
+              "Estimated", "Derivatives"}  # fmt: skip
 
 
 def classes():
@@ -269,6 +269,7 @@ def test_what_studies_give():
         "Suggestion": lw.suggest(lw.Ensemble(SPHERE, 16, 0, vary), 1e-2, t1=1.0),
         "Assimilated": lw.assimilate(lw.Ensemble(SPHERE, 16, 0, vary), lw.studies.Series("depth", [0.2], [0.1], 0.5), **run),
         "Estimated": lw.estimate(lw.Ensemble(SPHERE, 1, 0, vary), "mean depth", 0.1, **short),
+        "Derivatives": lw.derivatives(SPHERE, "depth", "start.position[2]", **short),
         "RareEvent": lw.rare_event(lw.Ensemble(SPHERE, 1, 0, vary), "depth - 3.0", **short),
         "Tradeoff": lw.tradeoff(lw.Ensemble(SPHERE, 16, 0, vary), t1=1.0, methods=["psi_s"], members=16, seconds=2.0),
     }  # fmt: skip

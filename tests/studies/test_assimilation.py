@@ -200,6 +200,11 @@ def test_what_is_refused():
             fleet, lw.studies.Series("depth", [0.0], [1.0], 0.1), h=0.05
         ),
         "is no Series": lambda: lw.assimilate(fleet, [1.0], h=0.05),
+        "series = <object": lambda: lw.assimilate(fleet, object(), h=0.05),
+        "h = 0: is not positive": lambda: lw.assimilate(fleet, fixes, h=0),
+        "discount = 'all': is not numeric": lambda: lw.assimilate(fleet, fixes, discount="all", h=0.05),
+        "seed = -1": lambda: lw.assimilate(fleet, fixes, seed=-1, h=0.05),
+        "learn = 3: is no list": lambda: lw.assimilate(fleet, fixes, 3, h=0.05),
         "names no instrument": lambda: lw.assimilate(fleet, [], h=0.05),
         "is not known": lambda: lw.assimilate(fleet, fixes, filter="ukf", h=0.05),
         "series.std = 0": lambda: lw.studies.Series("depth", [1.0], [1.0], 0.0),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.prepared import Prepared, prepare
+from lgvi_warp.common.arguments import listed, names_of, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import failed
@@ -27,8 +29,10 @@ from lgvi_warp.studies.assimilation import filters
 from lgvi_warp.studies.assimilation.answer import Assimilated
 from lgvi_warp.studies.assimilation.members import as_columns, learned_rows, rows_of, states_of
 from lgvi_warp.studies.assimilation.series import Series
+from lgvi_warp.studies.linear.trim import step_of
 
 METHODS = ("etkf", "enkf", "particles")
+MOST_SEED = 2**63
 # Particles are resampled where their effective number is below this part of them.
 RESAMPLE_BELOW = 0.5
 
@@ -87,7 +91,8 @@ def assimilate(
         (2, 3)
     """
     faults, members = Faults(), ensemble_of(fleet)
-    instruments = [series] if isinstance(series, Series) else list(series)
+    draws = np.random.default_rng(whole_number("seed", seed, 0, MOST_SEED))
+    instruments = [series] if isinstance(series, Series) else listed("series", series, "lw.studies.Series")
     for one in instruments:
         if not isinstance(one, Series):
             faults.add("series", one, "is no Series", "give lw.studies.Series(of, time, values, std)")
@@ -95,7 +100,8 @@ def assimilate(
     for label in sorted({label for label in labels if labels.count(label) > 1}):
         faults.add("series", label, "is measured by two of them", "give one of them a name: Series(..., name=...)")
     faults.choice("filter", filter, METHODS)
-    if discount is not None and not 1.0 / 3.0 < discount <= 1.0:
+    kept = None if discount is None else faults.number("discount", discount)
+    if kept is not None and not 1.0 / 3.0 < kept <= 1.0:
         faults.add("discount", discount, "is not between 1/3 and 1", "give 0.98, or None")
     targets = _targets(faults, members, learn)
     faults.raise_if_any()
@@ -108,7 +114,7 @@ def assimilate(
     steps = _Steps(members.scene, settings, {})
     times = np.unique(np.concatenate([one.time for one in instruments]))
     _check_times(times, steps)
-    track = _Track(members, instruments, targets, filter, np.random.default_rng(seed), discount)
+    track = _Track(members, instruments, targets, filter, draws, kept)
     report = callback(progress)
     for i, time in enumerate(times):
         track.run_to(float(time), steps)
@@ -124,7 +130,7 @@ def _targets(faults: Faults, fleet: Ensemble, learn: Sequence[str]) -> list[Targ
     if isinstance(learn, str):
         faults.add("learn", learn, "is no list of names", f"give [{learn!r}]")
         return targets
-    for name in learn:
+    for name in names_of("learn", learn):
         (target,) = variations.targets(name)
         if target.name not in known:
             faults.choice("learn", target.name, known)
@@ -143,13 +149,10 @@ class _Steps:
     settings: dict[str, Any]
     runs: dict[int, Prepared]
 
-    @property
+    @functools.cached_property
     def h(self) -> float:
         """The step [s]."""
-        h = self.settings["h"] if self.settings["h"] is not None else self.scene.run.step
-        if h is None:
-            raise SceneError(["h = None: is missing; give the step in seconds"])
-        return float(h)
+        return step_of(self.scene, self.settings["h"])
 
     def run(self, seconds: float) -> Prepared:
         """The run of so many seconds."""

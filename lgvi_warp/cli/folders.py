@@ -50,19 +50,19 @@ class Content:
         return corrupt_file_as_scene_error(self.path, "not what a verb wrote", "write it again, or see where by -v")
 
 
+# Study -> name of the public class of what it found.
+CLASSES = {"tradeoff": "Tradeoff", "stability": "StabilityMap", "rare": "RareEvent", "derivatives": "Derivatives"}
+
+
 def _study(kind: str) -> Any:
     """The class of what a study found."""
-    if kind == "tradeoff":
-        from lgvi_warp.studies.tradeoff import Tradeoff
-
-        return Tradeoff
     if kind == "sensitivity":
         from lgvi_warp.studies.sensitivity.indices import Indices
 
         return Indices
-    from lgvi_warp.studies.stability.map import StabilityMap
+    from lgvi_warp import studies
 
-    return StabilityMap
+    return getattr(studies, CLASSES[kind])
 
 
 def contents(folder: Path) -> list[Content]:

@@ -54,5 +54,8 @@ def _draw(content: Content, written: Written, out: Path) -> None:
         return
     from lgvi_warp import plots
 
+    if not hasattr(plots, content.kind):
+        written.empty.append(f"{content.path}: has no picture; lgvi-warp info shows what it holds")
+        return
     with content.understood():
         written.draw(getattr(plots, content.kind), numbers, out / content.path.with_suffix(".png").name)

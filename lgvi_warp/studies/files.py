@@ -26,6 +26,8 @@ STUDY_FILES = {
     "sensitivity": "sensitivity.json",
     "stability": "stability*.json",
     "sweep": "sweep.json",
+    "rare": "rare.json",
+    "derivatives": "derivatives.json",
 }
 
 

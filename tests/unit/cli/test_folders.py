@@ -62,7 +62,7 @@ def test_damage_is_listed_to_a_limit(store, options, count, shown, more):
 def test_contents_of_a_folder(tmp_path):
     names = {"result": ["result.npz", "result_part.npz"], "tradeoff": ["tradeoff.json"],
              "sensitivity": ["sensitivity.json"], "stability": ["stability.json", "stability_mass.json"],
-             "sweep": ["sweep.json"]}  # fmt: skip
+             "sweep": ["sweep.json"], "rare": ["rare.json"], "derivatives": ["derivatives.json"]}  # fmt: skip
     expected = [Content(kind, tmp_path / name) for kind, found in names.items() for name in found]
     for content in expected:
         content.path.write_text("{}")
@@ -268,3 +268,24 @@ def test_files_that_were_written_and_why_not(tmp_path):
     written.draw(lambda study, path: calls.append((study, path)), "numbers", tmp_path / "i")
     assert calls == [("numbers", tmp_path / "i")]
     assert written.files[-1] == tmp_path / "i"
+
+
+@pytest.mark.kernel
+def test_what_rare_and_derivatives_wrote_is_shown_and_drawn(tmp_path, capsys):
+    vary = {"start.velocity": lw.distributions.Normal(std=[0.0, 0.0, 0.1])}
+    scene = lw.Scene.named("sphere", start={"position": [0.0, 0.0, 50.0]})
+    settings = {"method": "psi_x", "h": 0.1, "t1": 1.0, "threads": 1}
+    fleet = lw.Ensemble(scene, 100, 1, vary)
+    lw.rare_event(fleet, "position[2] - 50.3", relative_error=0.3, seed=1, **settings).save(tmp_path)
+    lw.derivatives(scene, "depth", "start.velocity[2]", **settings).save(tmp_path)
+    assert cli.main(["info", str(tmp_path)]) == 0
+    text = capsys.readouterr().out
+    assert f"{tmp_path}/rare.json" in text
+    assert "by start.velocity[2]" in text
+    assert cli.main(["plot", str(tmp_path)]) == 0
+    assert (tmp_path / "rare.png").stat().st_size > 1000
+    assert "derivatives.json: has no picture" in capsys.readouterr().err
+    lw.report(tmp_path, tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text()
+    assert "Rare of " in page
+    assert "start.velocity[2]" in page

@@ -71,14 +71,14 @@ class RareCondition:
             if values.ndim != 1:
                 raise refusal("limit", self.label, f"is {values.shape[1]} numbers", "name one of its entries")
             numbers, lost = [values], np.isnan(values)
-        beyond = [_between(values, *ends) for values, ends in zip(numbers, self.limits.values(), strict=True)]
+        beyond = [between(values, *ends) for values, ends in zip(numbers, self.limits.values(), strict=True)]
         if self.of is None and self.statuses:
             ended = Success(self.statuses).passed(status, {})
             beyond = [np.where(ended, SURE, each) for each in beyond]
         return np.stack(beyond), lost
 
 
-def _between(values: np.ndarray, above: float, below: float) -> np.ndarray:
+def between(values: np.ndarray, above: float, below: float) -> np.ndarray:
     """How far numbers are between two bounds, below 0 outside; a number that is NaN fulfils nothing."""
     inside = np.minimum(values - above, below - values)
     return np.asarray(np.clip(np.nan_to_num(inside, nan=-SURE), -SURE, SURE))

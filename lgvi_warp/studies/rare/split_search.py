@@ -97,8 +97,9 @@ class SplitSearch:
         weights = np.concatenate([each.runs[0].size * each.weights for each in rounds])
         paths = tuple(path for each in rounds for path in each.paths)
         starts = sum(each.starts for each in rounds)
-        self.notes.append("splitting: the draws of noise are no numbers here: the likeliest member goes by its numbers alone")
-        if self.walk.d and 0 < starts < FEW_STARTS:
+        if self.walk.d:
+            self.notes.append("draws of noise are no numbers with splitting: the likeliest member goes by its numbers alone")
+        if self.walk.d and starts < FEW_STARTS:
             problem = f"the failing members have {starts} different starts: what varies there is hardly told"
             self.notes.append(f'{problem}; by="chains" moves these numbers, too')
         share = weights / weights.sum() if len(weights) else weights

@@ -209,7 +209,9 @@ def joined(ends: Sequence[Final]) -> Final:
         rows = [end.parameters[name] for end in ends]
         if all(len(each) == 1 and np.array_equal(each, rows[0]) for each in rows) and sum(counts) > 1:
             return np.asarray(rows[0])
-        return np.concatenate([np.broadcast_to(each, (n, *each.shape[1:])) for each, n in zip(rows, counts, strict=True)])
+        return np.concatenate(
+            [np.broadcast_to(each, (n, *each.shape[1:])) for each, n in zip(rows, counts, strict=True)]
+        )
 
     return replace(
         first,

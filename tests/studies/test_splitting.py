@@ -77,7 +77,10 @@ class LinearWalk:
 
     def spread(self):
         """Standard deviation of what is looked at, at the end."""
-        A, B = np.array([[1.0, self.dt * (1.0 - self.dt)], [0.0, 1.0 - self.dt]]), np.array([self.dt, 1.0]) * self.dt**0.5
+        A, B = (
+            np.array([[1.0, self.dt * (1.0 - self.dt)], [0.0, 1.0 - self.dt]]),
+            np.array([self.dt, 1.0]) * self.dt**0.5,
+        )
         C = np.diag([self.start**2, 0.0])
         for _ in range(self.per * self.looks):
             C = A @ C @ A.T + np.outer(B, B)
@@ -194,7 +197,9 @@ def test_pieces_are_whole_units():
 def scene_of(*more, drag=True, **start):
     terms = [lw.terms.Drag(linear=[DRAG] * 3 + [1.0] * 3)] if drag else []
     noise = lw.terms.WrenchNoise(force=(FORCE, 0.0, 0.0))
-    return lw.Scene(VEHICLE, terms=[*terms, noise], start=lw.Start(**{"velocity": [1.0, 0.0, 0.0]} | start), events=more)
+    return lw.Scene(
+        VEHICLE, terms=[*terms, noise], start=lw.Start(**{"velocity": [1.0, 0.0, 0.0]} | start), events=more
+    )
 
 
 def place_of(p, north=0.0):
@@ -215,7 +220,9 @@ def both(**more):
 # A run goes on from one prepared piece, whose samples are at every step: one kernel for all of these tests.
 @pytest.fixture(scope="module")
 def found():
-    return lw.rare_event(both(), f"position[0] - {place_of(1e-5, NORTH):.12g}", by="splitting", relative_error=0.2, **RUN)
+    return lw.rare_event(
+        both(), f"position[0] - {place_of(1e-5, NORTH):.12g}", by="splitting", relative_error=0.2, **RUN
+    )
 
 
 def test_noise_and_numbers_are_both_moved(found):

@@ -111,7 +111,9 @@ class RareEvent(Saved):
         runs = [{name: getattr(run, name) for name in kept} | {"limits": list(run.limits)} for run in self.runs]
         own = {item.name: getattr(self, item.name) for item in fields(self)}
         paths = [list(path) for path in self.paths]
-        return finite_or_none(own | {"failing": failing, "runs": runs, "likeliest": dict(self.likeliest), "paths": paths})
+        return finite_or_none(
+            own | {"failing": failing, "runs": runs, "likeliest": dict(self.likeliest), "paths": paths}
+        )
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Self:

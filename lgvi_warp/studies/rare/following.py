@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.calls.runner import samples_for
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import EndQuantity, OfResult, quantities
-from lgvi_warp.statistics.metrics.nearest import Nearest
-from lgvi_warp.statistics.metrics.tracking_metrics import IAE, ISE, MaxError
+from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values.functional import Functional, functional
 from lgvi_warp.studies.rare.event import RareCondition
@@ -21,8 +21,12 @@ from lgvi_warp.studies.rare.event import RareCondition
 # How the number of a run comes from those of its pieces: greatest, least, sum; None where it is that at the end.
 Combine = Callable[[np.ndarray, np.ndarray], np.ndarray] | None
 OF_PATH: Mapping[str, Combine] = {"max": np.fmax, "min": np.fmin}
-OF_METRICS: tuple[tuple[type, Combine], ...] = ((MaxError, np.fmax), (Nearest, np.fmin), (IAE, np.add), (ISE, np.add))
-REMEDY = 'give a number at the end, its max or min over the path, "max_error depth", or the name of an event; or by="chains"'
+OF_METRICS: Mapping[str, Combine] = {
+    "max_error": np.fmax, "cross_track": np.fmax, "nearest": np.fmin, "iae": np.add, "ise": np.add
+}  # fmt: skip
+REMEDY = (
+    'give a number at the end, its max or min over the path, "max_error depth", or the name of an event; or by="chains"'
+)
 
 
 @dataclass(frozen=True)
@@ -68,23 +72,16 @@ def _of_path(label: str, of: Functional) -> Combine:
     return OF_PATH[name]
 
 
-def _of_metric(name: str, metric: Any) -> Combine:
+def _of_metric(name: str, metric: Statistic) -> Combine:
     if isinstance(metric, MemberValues):
         return _of_path(name, functional("limit", name))
-    # RMSError is an ISE, whose root of a mean does not add up.
-    for kind, combine in OF_METRICS:
-        if isinstance(metric, kind) and metric.type in FOLLOWED:
-            return combine
-    raise refusal("limit", name, "is of the whole path, which pieces of a run do not tell", REMEDY)
-
-
-FOLLOWED = ("max_error", "cross_track", "nearest", "iae", "ise")
+    if metric.type not in OF_METRICS:
+        raise refusal("limit", name, "is of the whole path, which pieces of a run do not tell", REMEDY)
+    return OF_METRICS[metric.type]
 
 
 def looks_of(condition: RareCondition, scene: Any, settings: Mapping[str, Any]) -> SaveAt:
     """The samples that each piece of a run looks at, from the settings of `prepare`."""
-    from lgvi_warp.calls.runner import samples_for
-
     own = settings.get("save")
     if isinstance(own, SaveAt) and own.at is not None:
         raise refusal("save", "SaveAt(at=...)", "names times of a whole run, which goes in pieces", "give every=")

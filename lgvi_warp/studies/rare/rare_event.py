@@ -60,8 +60,8 @@ def rare_event(
             in a sweep's words, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of an event of the
             scene.
         relative_error: Standard deviation wanted of the probability's error, as a part of it, 0.005 to 0.5; 0.1 by default.
-        by: "chains", the default, or "splitting", which takes a scene with noise, and an event that is seen on the way: a number
-            at the end, its max or min over the path, `max_error`, `iae`, or an event of the scene.
+        by: "chains", the default, or "splitting", for a scene with noise and an event that is seen on the way: a number at the
+            end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
         cheaper: Settings that chains may use first, the answer being that of the scene's own: numbers and settings of the run
             that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by default.
         looks: With by="splitting", into how many pieces the time is cut, at most, 2 to 1,000; 50 by default. More of them need

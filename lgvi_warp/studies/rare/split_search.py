@@ -91,14 +91,18 @@ class SplitSearch:
         runs = tuple(run for each in rounds for run in each.runs)
         probability, spread = joined_spread(runs)
         if not probability:
-            raise NoProgress("never", max(float(limits[np.isfinite(limits)].max()) for run in runs for limits in run.limits))
+            raise NoProgress(
+                "never", max(float(limits[np.isfinite(limits)].max()) for run in runs for limits in run.limits)
+            )
         failing = np.concatenate([each.failing for each in rounds])
         limits = np.concatenate([each.limits for each in rounds])
         weights = np.concatenate([each.runs[0].size * each.weights for each in rounds])
         paths = tuple(path for each in rounds for path in each.paths)
         starts = sum(each.starts for each in rounds)
         if self.walk.d:
-            self.notes.append("draws of noise are no numbers with splitting: the likeliest member goes by its numbers alone")
+            self.notes.append(
+                "draws of noise are no numbers with splitting: the likeliest member goes by its numbers alone"
+            )
         if self.walk.d and starts < FEW_STARTS:
             problem = f"the failing members have {starts} different starts: what varies there is hardly told"
             self.notes.append(f'{problem}; by="chains" moves these numbers, too')
@@ -108,7 +112,7 @@ class SplitSearch:
 
 
 def joined_spread(runs: Sequence[SubsetRun]) -> tuple[float, float]:
-    """(probability, spread of its relative error) of independent runs, weighed by their sizes, by the runs about each other."""
+    """(probability, spread of its relative error) of independent runs, weighed by their sizes; by these runs alone."""
     sizes = np.array([run.size for run in runs], float)
     probabilities = np.array([run.probability for run in runs])
     probability = float(sizes @ probabilities / sizes.sum())
@@ -116,4 +120,3 @@ def joined_spread(runs: Sequence[SubsetRun]) -> tuple[float, float]:
         return 0.0, math.inf
     between = float((sizes * (probabilities / probability - 1.0) ** 2).sum() / (len(runs) - 1))
     return probability, math.sqrt(between / sizes.sum())
-

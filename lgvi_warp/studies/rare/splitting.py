@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -240,7 +240,8 @@ def split_runs(
     count = len(generators)
     u = np.concatenate([rng.standard_normal((size, walk.d)) for rng in generators])
     stage: Stage | None = Stage.first(walk, u, np.repeat(np.arange(count), size))
-    bounds, stages, crossed = [*pilot.bounds, math.inf], [], {}
+    bounds, stages = [*pilot.bounds, math.inf], list[Stage]()
+    crossed: AtLook = {}
     for i, bound in enumerate(bounds):
         if stage is None:
             break

@@ -150,7 +150,9 @@ class VehicleWalk(Varying):
         if self._of is not None:
             pieces = [self._of.values(result)]
             if pieces[0].shape[1] != 1:
-                raise refusal("limit", self.condition.label, f"is {pieces[0].shape[1]} numbers", "name one of its entries")
+                raise refusal(
+                    "limit", self.condition.label, f"is {pieces[0].shape[1]} numbers", "name one of its entries"
+                )
             numbers, lost = [pieces[0][:, 0]], failed(status) | np.isnan(pieces[0][:, 0])
         else:
             numbers = [np.asarray(result.statistics[f"each {name}"].value[0, 0]) for name in self.condition.limits]

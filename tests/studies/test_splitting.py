@@ -143,10 +143,10 @@ def test_runs_with_fixed_levels_have_the_right_mean_over_seeds(p, more):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bound", [1.9, 2.6, 3.05])
-def test_runs_with_fixed_levels_have_the_right_mean_of_a_largest_speed(bound):
-    p = passing(bound, 100, 0.97, np.sqrt(0.03))
-    check_mean(shares_of(lambda seed: LinearWalk(seed, bound, 1, True), range(10), 200, 64), p)
+@pytest.mark.parametrize("bound, looks", [(1.9, 20), (2.6, 20), (3.05, 100)])
+def test_runs_with_fixed_levels_have_the_right_mean_of_a_largest_speed(bound, looks):
+    p, per = passing(bound, 100, 0.97, np.sqrt(0.03)), 100 // looks
+    check_mean(shares_of(lambda seed: LinearWalk(seed, bound, 1, True, per=per, looks=looks), range(10), 200, 64), p)
 
 
 def test_the_grid_of_densities_knows_reflection():
@@ -276,6 +276,40 @@ def test_the_same_seed_has_the_same_answer():
     assert first.probability == again.probability != other.probability
     assert first.failing is None
     assert "likeliest" not in str(first)
+
+
+@pytest.mark.parametrize("limit, at_once", [
+    ("position[0] - 1.0", "position[0]"),
+    ("max(position[0]) - 1.0", "max(position[0])"),
+    ({"min(velocity[0])": {"below": -1.0}}, "min(velocity[0])"),
+])  # fmt: skip
+def test_pieces_tell_what_a_whole_run_does(limit, at_once):
+    settings = RUN | {"save": lw.SaveAt(every=H)}
+    walk = VehicleWalk(both(), condition_of(limit, scene_of()), settings, False, 7, 10)
+    u, keys = np.array([[-1.0], [0.2], [2.0]]), walk.keys(3)
+    there = walk.begin(u)
+    for _ in range(walk.looks):
+        there = walk.advance(there, keys)
+    whole = lw.prepare(both(), of=at_once, levels=True, **settings)(ndtr(u), seed=7, indices=keys)
+    np.testing.assert_array_equal(there.values[0], whole)
+    assert (walk.looks, walk.members) == (10, 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limit", ["max_error depth", "iae depth", "ise heading"])
+def test_pieces_tell_what_a_loop_does(limit):
+    scene = lw.Scene.load("examples/scenes/remus_100_autopilot.toml")
+    settings = {"method": "rk4", "h": 0.02, "t1": 6.0, "threads": 1}
+    wind = lw.terms.WrenchNoise(force=(3.0, 3.0, 3.0))
+    scene = lw.Scene(scene.vehicle, terms=[*scene.terms, wind], start=scene.start, controller=scene.controller)
+    walk = VehicleWalk(scene, condition_of({limit: {"above": 1.0}}, scene), settings, False, 7, 13)
+    keys, there = walk.keys(4), walk.begin(np.zeros((4, 0)))
+    for _ in range(walk.looks):
+        there = walk.advance(there, keys)
+    run = lw.prepare(scene, of=limit, **settings)
+    states = {name: np.repeat(getattr(lw.Ensemble(scene).select(0, 1), name), 4, axis=0)
+              for name in ("position", "attitude", "velocity", "angular_velocity")}  # fmt: skip
+    np.testing.assert_allclose(there.values[0], run.states(**states, seed=7, indices=keys), rtol=1e-12)
 
 
 def test_copies_have_noise_of_their_own():

@@ -12,11 +12,11 @@ import numpy as np
 
 from lgvi_warp.common.random import generator
 from lgvi_warp.studies.rare.search import RareAnswer
-from lgvi_warp.studies.rare.splitting import SplitRuns, piloted, split_runs
+from lgvi_warp.studies.rare.splitting import Pilot, SplitRuns, piloted, split_runs
 from lgvi_warp.studies.rare.subset import NoProgress, SubsetRun
 
-# Independent runs of a round; members of a level in the pilot, and of a run at least and at most.
-RUNS, PILOT, LEAST, LARGEST = 16, 1000, 100, 100_000
+# Independent runs of a round; members of a level in pilots, and of a run at least and at most.
+RUNS, PILOTS, LEAST, LARGEST = 16, (1000, 2000, 4000), 100, 100_000
 # Variance beside that of independent members, since copies of one member have much in common.
 RELATED = 2.0
 # The error that a first round is meant for, in that asked; one so much larger is left as it is. Most rounds of runs.
@@ -45,16 +45,13 @@ class SplitSearch:
     most: int = 1_000_000
     report: Callable[[float], None] = lambda fraction: None
     notes: list[str] = field(default_factory=list)
+    _price: float = 1.0
 
     def answer(self) -> SplitAnswer:
         """The probability. Raises NoProgress."""
-        pilot = piloted(self.walk, PILOT, generator(self.seed, "rare splitting pilot"))
-        of_pilot = self.walk.members
+        pilot = self._piloted()
         self.report(0.1)
-        wanted = RELATED * pilot.variance / self.relative_error**2
-        # Members of whole runs for each member of a level.
-        price = of_pilot / PILOT
-        first = self._sized(RELATED * pilot.variance / (FIRST_ERROR * self.relative_error) ** 2, price)
+        first = self._sized(RELATED * pilot.variance / (FIRST_ERROR * self.relative_error) ** 2)
         # What a first round says of the error chooses the number of members alone: an answer that may be kept because it
         # tells a small error is too small.
         spread = joined_spread(self._round(pilot, 0, first).runs)[1]
@@ -62,26 +59,41 @@ class SplitSearch:
         rounds: list[SplitRuns] = []
         wanted = RUNS * first * (spread / self.relative_error) ** 2
         for round_ in range(1, ROUNDS + 1):
-            size = self._sized(wanted, price)
+            size = self._sized(wanted)
             rounds.append(self._round(pilot, round_, size))
             spread = joined_spread([run for each in rounds for run in each.runs])[1]
             total = sum(RUNS * each.runs[0].size for each in rounds)
-            if spread <= LEFT * self.relative_error or self.walk.members + RUNS * LEAST * price > self.most:
+            if spread <= LEFT * self.relative_error or self.walk.members + RUNS * LEAST * self._price > self.most:
                 break
             wanted = total * (min(2.0, spread / self.relative_error) ** 2 - 1.0)
         self.report(1.0)
         return self._answer(rounds)
 
-    def _sized(self, wanted: float, price: float) -> int:
-        """Members of a level of each run, where so many are wanted of all, at a price in whole runs each."""
+    def _piloted(self) -> Pilot:
+        """A pilot, larger ones where few members are left that come nearer. Raises NoProgress."""
+        for attempt, size in enumerate(PILOTS):
+            before = self.walk.members
+            try:
+                pilot = piloted(self.walk, size, generator(self.seed, "rare splitting pilot", attempt))
+            except NoProgress as stuck:
+                if stuck.kind == "steps" or size == PILOTS[-1]:
+                    raise
+                continue
+            # Members of whole runs for each member of a level.
+            self._price = (self.walk.members - before) / size
+            return pilot
+        raise AssertionError
+
+    def _sized(self, wanted: float) -> int:
+        """Members of a level of each run, where so many are wanted of all."""
         size = math.ceil(np.clip(wanted / RUNS, LEAST, LARGEST))
-        afford = int((self.most - self.walk.members) / (RUNS * price))
+        afford = int((self.most - self.walk.members) / (RUNS * self._price))
         note = f"the error asked takes more than the {self.most:,} members that may be run"
         if size > afford and note not in self.notes:
             self.notes.append(note)
         return max(LEAST, min(size, afford))
 
-    def _round(self, pilot: Any, round_: int, size: int) -> SplitRuns:
+    def _round(self, pilot: Pilot, round_: int, size: int) -> SplitRuns:
         generators = [generator(self.seed, "rare splitting", round_, run) for run in range(RUNS)]
         begin, end = (0.1, 0.3) if round_ == 0 else (1.0 - 0.7 / round_, 1.0 - 0.7 / (round_ + 1))
         report = self.report

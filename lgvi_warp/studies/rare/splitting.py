@@ -19,7 +19,7 @@ from lgvi_warp.studies.rare.limit import spreads_of
 from lgvi_warp.studies.rare.subset import FLAT, NoProgress, SubsetRun
 
 # The part of the members that reaches the next level, at least so many, and most levels.
-SHARE, LEAST_SHARE, MOST_LEVELS = 0.2, 0.02, 22
+SHARE, LEAST_SHARE, MOST_LEVELS = 0.2, 0.02, 30
 # The last level is that from which so large a part of the members comes to the event.
 ARRIVED = 0.1
 
@@ -204,13 +204,15 @@ def _next_bound(reach: np.ndarray, bounds: Sequence[float]) -> float | None:
     happened = (reach == math.inf).sum()
     values, first = np.unique(finite, return_index=True)
     shares = (happened + len(finite) - first) / len(reach)
-    # Copies of few members have the same score, in steps.
-    fit = (values > (bounds[-1] if bounds else -math.inf)) & (shares <= FLAT) & (shares >= LEAST_SHARE)
+    fit = (values > (bounds[-1] if bounds else -math.inf)) & (shares < 1.0)
+    # Copies of few members have the same score, in steps: levels among them may be wide; among plain members nothing is told.
+    usual = fit & (shares <= FLAT) & (shares >= LEAST_SHARE)
+    fit = usual if usual.any() or not bounds else fit
     if fit.any() and len(bounds) < MOST_LEVELS:
         return float(values[fit][np.argmin(np.abs(np.log(shares[fit] / SHARE)))])
     if happened:
         return None
-    raise NoProgress("never" if len(bounds) > 2 else "steps", float(finite[-1]) if len(finite) else -math.inf)
+    raise NoProgress("never" if bounds else "steps", float(finite[-1]) if len(finite) else -math.inf)
 
 
 @dataclass(frozen=True, eq=False)

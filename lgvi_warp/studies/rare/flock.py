@@ -75,7 +75,7 @@ class Walk(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class ExpectedLimit:
     """What the limit at the last look is expected to be: linear in what is known of members at a look.
 
     level: the mean. centre, slopes: (f,). missed: standard deviation of what the line misses.
@@ -87,7 +87,7 @@ class Line:
     missed: float
 
     @classmethod
-    def nearest(cls, x: np.ndarray, y: np.ndarray) -> Line:
+    def nearest(cls, x: np.ndarray, y: np.ndarray) -> ExpectedLimit:
         """The line nearest to y (n,) at x (n, f)."""
         centre, spread = x.mean(axis=0), x.std(axis=0)
         varies = spread > LEAST_SPREAD * np.maximum(1.0, np.abs(centre))
@@ -116,7 +116,7 @@ class Score:
 
     spreads: np.ndarray
     lasting: np.ndarray
-    lines: Mapping[int, Line]
+    lines: Mapping[int, ExpectedLimit]
 
     @classmethod
     def fitted(cls, log: Sequence[tuple[np.ndarray, Flock]], walk: Walk, spreads: np.ndarray) -> Score:
@@ -132,7 +132,7 @@ class Score:
             y, x = end[rows], _numbers_of(flock, spreads)
             ordinary = np.isfinite(y) & (np.abs(y) < 1e300) & ~flock.lost & np.isfinite(x).all(axis=1)
             if flock.look < walk.looks and ordinary.sum() > 4 * x.shape[1]:
-                lines[flock.look] = Line.nearest(x[ordinary], y[ordinary])
+                lines[flock.look] = ExpectedLimit.nearest(x[ordinary], y[ordinary])
         return cls(spreads, walk.lasting, lines)
 
     def __call__(self, flock: Flock) -> np.ndarray:

@@ -148,7 +148,11 @@ def _by_splitting(
         problem = f"happens for each of {len(found.limits):,} members"
         raise refusal("limit", condition.label, problem, 'ask for what is rare, as {"max(depth)": {"above": 12.0}}')
     paths = tuple((walk.times[points], keys) for points, keys in found.paths)
-    return replace(_told(found, walk, {}, condition, settings), paths=paths)
+    answer = replace(_told(found, walk, {}, condition, settings), paths=paths)
+    if answer.plain_members < walk.members:
+        note = f'splitting gains nothing here: it took {walk.members:,} members; by="chains", or plain ones'
+        answer = replace(answer, messages=(*answer.messages, note))
+    return answer
 
 
 def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:

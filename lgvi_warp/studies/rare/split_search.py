@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.random import generator
 from lgvi_warp.studies.rare.search import RareAnswer
-from lgvi_warp.studies.rare.splitting import Pilot, SplitRuns, piloted, split_runs
+from lgvi_warp.studies.rare.splitting import LevelPilot, SplitRuns, piloted, split_runs
 from lgvi_warp.studies.rare.subset import NoProgress, SubsetRun
 
 # Independent runs of a round; members of a level in pilots, and of a run at least and at most.
@@ -69,7 +69,7 @@ class SplitSearch:
         self.report(1.0)
         return self._answer(rounds)
 
-    def _piloted(self) -> Pilot:
+    def _piloted(self) -> LevelPilot:
         """A pilot, larger ones where few members are left that come nearer. Raises NoProgress."""
         for attempt, size in enumerate(PILOTS):
             before = self.walk.members
@@ -93,7 +93,7 @@ class SplitSearch:
             self.notes.append(note)
         return max(LEAST, min(size, afford))
 
-    def _round(self, pilot: Pilot, round_: int, size: int) -> SplitRuns:
+    def _round(self, pilot: LevelPilot, round_: int, size: int) -> SplitRuns:
         generators = [generator(self.seed, "rare splitting", round_, run) for run in range(RUNS)]
         begin, end = (0.1, 0.3) if round_ == 0 else (1.0 - 0.7 / round_, 1.0 - 0.7 / (round_ + 1))
         report = self.report

@@ -148,7 +148,7 @@ def _by_look(walk: Walk, crossed: Mapping[int, Log]) -> AtLook:
 
 
 @dataclass(frozen=True, eq=False)
-class Pilot:
+class LevelPilot:
     """What a small run with adaptive levels says. bounds: (m,), of the score; shares: (m + 1,), of members that go on."""
 
     score: Score
@@ -166,7 +166,7 @@ class Pilot:
         return float(((1.0 - self.shares) / self.shares).sum())
 
 
-def piloted(walk: Walk, size: int, rng: np.random.Generator) -> Pilot:
+def piloted(walk: Walk, size: int, rng: np.random.Generator) -> LevelPilot:
     """Go to the event level by level, each reached by a fifth of the members of the one before. Raises NoProgress."""
     stage: Stage | None = Stage.first(walk, rng.standard_normal((size, walk.d)), np.zeros(size, int))
     score: Score | None = None
@@ -183,7 +183,7 @@ def piloted(walk: Walk, size: int, rng: np.random.Generator) -> Pilot:
         happened = float((stage.reach == math.inf).mean())
         bound = None if happened >= ARRIVED else _next_bound(stage.reach, bounds)
         if bound is None:
-            return Pilot(score, np.array(bounds), np.array([*shares, happened]))
+            return LevelPilot(score, np.array(bounds), np.array([*shares, happened]))
         crossed = first_reached(walk, score, stage, log, bound)
         shares.append(float((stage.reach >= bound).mean()))
         bounds.append(bound)
@@ -233,7 +233,7 @@ class SplitRuns:
 
 
 def split_runs(
-    walk: Walk, pilot: Pilot, size: int, generators: Sequence[np.random.Generator],
+    walk: Walk, pilot: LevelPilot, size: int, generators: Sequence[np.random.Generator],
     report: Callable[[float], None] = lambda fraction: None) -> SplitRuns:  # fmt: skip
     """Independent runs of so many members a level, with the levels and the score of a pilot, all of them in one batch.
 

@@ -276,6 +276,9 @@ def test_the_same_seed_has_the_same_answer():
     assert first.probability == again.probability != other.probability
     assert first.failing is None
     assert "likeliest" not in str(first)
+    # What is likely is told by fewer plain members.
+    assert first.plain_members < sum(first.members.values())
+    assert "splitting gains nothing here" in str(first)
 
 
 @pytest.mark.parametrize("limit, at_once", [

@@ -23,6 +23,15 @@ def rare_arguments(verb: Any) -> None:
         "the name of an event of the scene")  # fmt: skip
     add("--error", metavar="E", type=float, default=0.1, help="standard deviation of the probability's error, as a part of "
         "it (default 0.1)")  # fmt: skip
+    add("--by", choices=("chains", "splitting"), default="chains", help="chains of members, or splitting in time, for a scene "
+        "with noise (default chains)")  # fmt: skip
+    add(
+        "--looks",
+        metavar="N",
+        type=int,
+        default=50,
+        help="with splitting, into how many pieces the time is cut (default 50)",
+    )
     add("--cheaper", metavar="A=X,B=Y", action="append", default=[], help="what differs in a setting that chains may use "
         "first, as h=0.1,dtype=float32,controller.delay=0; may be given several times")  # fmt: skip
     add("--failed", choices=("event", "refuse"), default="event", help="what a member that fails is (default event)")
@@ -56,8 +65,8 @@ def rare(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     with progress_bar(chosen.quiet) as progress:
         found = (study or rare_event)(
-            scene, chosen.when, relative_error=chosen.error, cheaper=cheaper, failed=chosen.failed, most=chosen.most,
-            seed=int(seed), threads=chosen.threads, progress=progress,
+            scene, chosen.when, relative_error=chosen.error, by=chosen.by, cheaper=cheaper, looks=chosen.looks,
+            failed=chosen.failed, most=chosen.most, seed=int(seed), threads=chosen.threads, progress=progress,
         )  # fmt: skip
     with progress_bar(chosen.quiet, "writing"):
         written = Written(found.save(out))

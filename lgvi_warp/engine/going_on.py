@@ -18,7 +18,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.engine.arrays import put_rows
 from lgvi_warp.engine.packing import name_of
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.sampling.final import MEMORY, Final
+from lgvi_warp.sampling.final import MEMORY, Final, joined_rows
 
 # A Plan and Packets, whose modules import this one.
 Plan = Any
@@ -209,17 +209,4 @@ def joined(parts: Mapping[int, Mapping[str, np.ndarray]]) -> dict[str, np.ndarra
     ordered = [parts[first] for first in sorted(parts)]
     if len(ordered) == 1:
         return dict(ordered[0])
-    rows: dict[str, np.ndarray] = {}
-    for name in dict.fromkeys(name for part in ordered for name in part):
-        pieces = [part.get(name) for part in ordered]
-        like = next(piece for piece in pieces if piece is not None)
-        longest = max(piece.shape[1] for piece in pieces if piece is not None)
-        whole = np.zeros((sum(len(part["state"]) for part in ordered), longest), like.dtype)
-        at = 0
-        for part, piece in zip(ordered, pieces, strict=True):
-            count = len(part["state"])
-            if piece is not None:
-                whole[at : at + count, : piece.shape[1]] = piece
-            at += count
-        rows[name] = whole
-    return rows
+    return joined_rows(ordered, [len(part["state"]) for part in ordered])

@@ -183,6 +183,46 @@ class Final(Summarized):
         )
 
 
+def joined_rows(parts: Sequence[Mapping[str, np.ndarray]], counts: Sequence[int]) -> dict[str, np.ndarray]:
+    """Rows by name one after the other, of so many members each; those that are shorter, or absent, end in zeros."""
+    rows: dict[str, np.ndarray] = {}
+    for name in dict.fromkeys(name for part in parts for name in part):
+        pieces = [part.get(name) for part in parts]
+        like = next(piece for piece in pieces if piece is not None)
+        longest = max(piece.shape[1] for piece in pieces if piece is not None)
+        whole, at = np.zeros((sum(counts), longest), like.dtype), 0
+        for count, piece in zip(counts, pieces, strict=True):
+            if piece is not None:
+                whole[at : at + count, : piece.shape[1]] = piece
+            at += count
+        rows[name] = whole
+    return rows
+
+
+def joined(ends: Sequence[Final]) -> Final:
+    """The members of several ends of one time, step and scene, one after the other."""
+    if len(ends) == 1:
+        return ends[0]
+    first, counts = ends[0], [end.members for end in ends]
+
+    def of_all(name: str) -> np.ndarray:
+        rows = [end.parameters[name] for end in ends]
+        if all(len(each) == 1 and np.array_equal(each, rows[0]) for each in rows) and sum(counts) > 1:
+            return np.asarray(rows[0])
+        return np.concatenate(
+            [np.broadcast_to(each, (n, *each.shape[1:])) for each, n in zip(rows, counts, strict=True)]
+        )
+
+    return replace(
+        first,
+        states={name: np.concatenate([end.states[name] for end in ends]) for name in first.states},
+        lanes=joined_rows([end.lanes for end in ends], counts),
+        status=np.concatenate([end.status for end in ends]),
+        indices=np.concatenate([end.indices for end in ends]),
+        parameters={name: of_all(name) for name in first.parameters},
+    )
+
+
 # Names in `lanes`: the state as the kernel has it and what belongs to it alone, and the prefix of what a law remembers.
 EXACT = ("state", "scratch")
 MEMORY = "memory of "

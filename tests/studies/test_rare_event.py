@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 
 import lgvi_warp as lw
 from lgvi_warp.calls.prepared import FailedMembers
-from lgvi_warp.statistics.metrics.nearest import LEAST
+from lgvi_warp.statistics.metrics.nearest import LEAST, least_between
 from tests.support.pages import blocks
 from tests.support.refusals import says
 
@@ -170,6 +170,38 @@ def test_the_least_distance_to_an_event():
     np.testing.assert_allclose(basin, [1.0, 1.0, 1.0], atol=1e-9)
     assert basin[1] > LEAST
     assert result.statistics["each nearest floor"].unit == "m"
+
+
+def test_the_least_distance_is_between_looks():
+    # A body falls back from a turning point, v0^2 / 2 g below its start: with looks 2 s apart none is near that.
+    mass, up, rate = float(VEHICLE.mass), 33.0, 0.9
+    pull = lw.terms.Wrench(force=[0.0, 0.0, -up])
+    events = [lw.events.Floor(depth=5.0), lw.events.Surface(depth=-9.0), lw.events.Box(lower=[-9] * 3, upper=[9] * 3)]
+    scene = lw.Scene(VEHICLE, terms=[pull], start=lw.Start(velocity=[0.0, 0.0, rate]), events=events)
+    each = [lw.metrics.Nearest(name, then=lw.statistics.MemberValues()) for name in ("floor", "surface", "box")]
+    settings = RUN | {"save": lw.SaveAt(every=2.0), "t1": 4.0}
+    found = lw.solve(scene, statistics=each, **settings).statistics
+    a = up / (1.5 * mass)
+    deepest, end = 0.5 * rate**2 / a, rate * 4.0 - 8.0 * a
+    np.testing.assert_allclose(found["each nearest floor"].value[0, 0], 5.0 - deepest, rtol=1e-9)
+    np.testing.assert_allclose(found["each nearest surface"].value[0, 0], 9.0 + min(0.0, end), rtol=1e-9)
+    np.testing.assert_allclose(found["each nearest box"].value[0, 0], 9.0 - max(deepest, -end), rtol=1e-9)
+    assert 0.3 < rate / a % 2.0 < 1.7
+
+
+@pytest.mark.parametrize("curve, least", [
+    (lambda s: (s - 0.3) ** 2 + 1.0, 1.0),
+    (lambda s: 1.0 - (s - 0.3) ** 2, 0.51),
+    (lambda s: s**3 - 0.75 * s**2 + 2.0, 1.9375),
+    (lambda s: -(s**3) + 1.5 * s**2 - 0.5625 * s + 1.0, 0.9375),
+    (lambda s: 2.0 - s, 1.0),
+    (lambda s: 0.0 * s + 3.0, 3.0),
+])  # fmt: skip
+def test_the_least_value_of_a_cubic(curve, least):
+    e = 1e-6
+    slopes = [(curve(s + e) - curve(s - e)) / (2.0 * e) for s in (0.0, 1.0)]
+    ends = curve(0.0), curve(1.0)
+    assert least_between(*map(np.array, (*ends, *slopes))) == pytest.approx(least, abs=1e-8)
 
 
 def test_a_metric_of_an_event_that_is_not_there():

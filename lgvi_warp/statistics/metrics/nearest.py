@@ -17,36 +17,56 @@ if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
     from lgvi_warp.statistics.values.samples import Fields
 
+# A number of the event by its name; one of its sides: axis, sign and offset (n or 1,).
+Number = Callable[[str], np.ndarray]
+Side = tuple[int, float, np.ndarray]
 # What is left of a distance that is used up, where the event has not stopped the member.
 LEAST = float(np.nextafter(0.0, 1.0))
 
 
-def _above_floor(b: np.ndarray, number: Callable[[str], np.ndarray]) -> np.ndarray:
-    return np.asarray(number("depth") - b[..., 2])
+def _above_floor(number: Number) -> list[Side]:
+    return [(2, -1.0, number("depth"))]
 
 
-def _below_surface(b: np.ndarray, number: Callable[[str], np.ndarray]) -> np.ndarray:
-    return np.asarray(b[..., 2] - number("depth"))
+def _below_surface(number: Number) -> list[Side]:
+    return [(2, 1.0, -number("depth"))]
 
 
-def _inside_box(b: np.ndarray, number: Callable[[str], np.ndarray]) -> np.ndarray:
-    return np.asarray(np.minimum(b - number("lower"), number("upper") - b).min(axis=-1))
+def _inside_box(number: Number) -> list[Side]:
+    sides = [(axis, 1.0, -number("lower")[:, axis]) for axis in range(3)]
+    return [*sides, *((axis, -1.0, number("upper")[:, axis]) for axis in range(3))]
 
 
-# Type of an event -> its distance (k, n) [m] at positions (k, n, 3), as lgvi_kernels.stops has it.
-DISTANCES: Mapping[str, Callable[..., np.ndarray]] = {
+# Type of an event -> its sides: each has the distance (sign * position[axis] + offset) [m], as lgvi_kernels.stops has it.
+SIDES: Mapping[str, Callable[[Number], list[Side]]] = {
     "floor": _above_floor,
     "surface": _below_surface,
     "box": _inside_box,
 }
+COUNTS = {"floor": 1, "surface": 1, "box": 6}
+
+
+def least_between(a: np.ndarray, b: np.ndarray, rate_a: np.ndarray, rate_b: np.ndarray) -> np.ndarray:
+    """The least value of the cubic from a to b whose slopes at the ends are these, over an interval of 1."""
+    rise = b - a
+    cubic, square = rate_a + rate_b - 2.0 * rise, 3.0 * rise - 2.0 * rate_a - rate_b
+    with np.errstate(all="ignore"):
+        # The root of the slope where the curve is a valley, written so that it is that of a parabola, too.
+        root = np.sqrt(square**2 - 3.0 * cubic * rate_a)
+        at = np.where(square > 0.0, -rate_a / (square + root), (root - square) / (3.0 * cubic))
+        inside = (at > 0.0) & (at < 1.0)
+        valley = a + at * (rate_a + at * (square + at * cubic))
+    ends = np.minimum(a, b)
+    return np.where(inside, np.fmin(ends, valley), ends)
 
 
 @dataclass(frozen=True, eq=False)
 class Nearest(Metric):
     """The least distance of each member to an event over its path [m], 0 where the event stopped it; then statistics of it.
 
-    It looks at every tick of the controller; in a scene without one, at the times of samples. A member that something else
-    stopped, or that failed, has the distance of its time under way.
+    It looks at every tick of the controller; in a scene without one, at the times of samples. Between two looks the way is a
+    cubic with the places and velocities there, so that looks may be some steps apart. A member that something else stopped,
+    or that failed, has the distance of its time under way.
 
     Args:
         of: name of an event of the scene, "floor".
@@ -79,27 +99,33 @@ class Nearest(Metric):
         name, kind = self.of, self.of if self.kind is None else self.kind
         if not isinstance(name, str) or not name:
             raise refusal("nearest.of", name, "is no name", 'give the name of an event, "floor"')
-        if kind not in DISTANCES:
-            remedy = f"say what it is: kind=..., {closest(str(kind), DISTANCES)}"
+        if kind not in SIDES:
+            remedy = f"say what it is: kind=..., {closest(str(kind), SIDES)}"
             raise refusal("nearest.of", name, "is of no type whose distance is known", remedy)
-        distance = DISTANCES[kind]
+        sides = SIDES[kind]
 
         def distances(samples: Fields, members: Members) -> np.ndarray:
-            return distance(
-                samples["position"].astype(np.float64, copy=False), lambda field: members.parameters[f"{name}.{field}"]
-            )
+            place, v = (samples[field].astype(np.float64, copy=False) for field in ("position", "velocity"))
+            rows, rates = [], []
+            for axis, sign, offset in sides(lambda field: members.parameters[f"{name}.{field}"]):
+                rows.append(sign * place[..., axis] + offset)
+                rates.append(sign * (samples["attitude"][..., axis, :] * v).sum(axis=-1))
+            return np.moveaxis(np.stack(rows + rates, axis=1), 1, 2)
 
-        return Quantity(name, distances, "m", ("position",), needs_limit=True)
+        labels = tuple(f"{what} {i} of {name}" for what in ("distance", "rate") for i in range(COUNTS[kind]))
+        return Quantity(name, distances, "m", ("position", "attitude", "velocity"), labels, needs_limit=True)
 
     @property
     def outcomes(self) -> tuple[str, ...]:
         return (self.of,)
 
     def begin(self, x: np.ndarray) -> State:
-        return {"least": x[0].copy()}
+        return {"least": x[: len(x) // 2].min(axis=0)}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        return {"least": np.minimum(state["least"], ticks.of_living(ticks.x[:, 0], np.inf).min(axis=0))}
+        count, before, dt = ticks.x.shape[1] // 2, ticks.before, ticks.dt[:, None, None]
+        each = least_between(before[:, :count], ticks.x[:, :count], dt * before[:, count:], dt * ticks.x[:, count:])
+        return {"least": np.minimum(state["least"], ticks.of_living(each.min(axis=1), np.inf).min(axis=0))}
 
     def finish(self, state: State) -> np.ndarray:
         return np.where(state["ended_so"], 0.0, np.maximum(state["least"], LEAST))

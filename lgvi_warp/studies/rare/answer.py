@@ -20,6 +20,7 @@ ESTIMATORS = {
     "importance": "weights of members drawn about the failing ones of chains",
     "subset": "subset simulation",
     "plain": "plain sampling",
+    "splitting": "splitting in time",
 }
 
 
@@ -32,12 +33,13 @@ class RareEvent(Saved):
         probability: of the event; members that fail count as it, where failed="event".
         interval: (lower, upper), of 95 % by Student's t of the logarithm.
         relative_error: standard deviation of the probability's error, as a part of it.
-        estimator: "importance", "subset" or "plain".
-        members: number of members that were run, by setting: "scene", and what `cheaper` says.
+        estimator: "importance", "subset", "plain" or "splitting".
+        members: number of members that were run, by setting: "scene", and what `cheaper` says; with splitting in whole runs.
         failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None where
-            noise alone varies.
+            noise alone varies. With splitting one may come several times, with other noise.
         normals: (m, d), the numbers that vary of these members as standard normals, in the order of `moved`.
-        draws: (m, k), standard normals of noise of these members, for lw.prepare(..., draws="given"); k = 0 without noise.
+        draws: (m, k), standard normals of noise of these members, for lw.prepare(..., draws="given"); k = 0 without noise, and
+            with splitting.
         weights: (m,), what each of them stands for; they sum to 1.
         failed_share: part of the probability that is of members that failed, or have a number that is not finite.
         likeliest: values by name of the likeliest of these members, that with the least distance from the middle.
@@ -45,12 +47,15 @@ class RareEvent(Saved):
         distance: its distance from the middle, in standard deviations of all that varies.
         moved: by name, the mean of the failing members in standard deviations from the middle.
         noise_moved: by term or sensor, length of the mean of the failing members' normals.
-        runs: the runs of subset simulation: thresholds and limits of each level.
+        runs: the runs of subset simulation: thresholds and limits of each level; with splitting, scores of members: what their
+            limit is expected to be at the end in what is not known of it, infinite where the event happened.
         plain_members: members that plain Monte Carlo would take for this error.
         plain_seconds: how long these would take at the pace of this call [s].
         seconds: how long the runs of members took [s].
         messages: notes for the user.
         provenance: scene, what varies, settings, versions and machine.
+        paths: with splitting, for each of the failing members (times (k + 1,) [s], indices (k,)): from one time to the next it
+            has the noise of an index, by the seed of the call, as in `run.states(final, indices=, seed=)`.
     """
 
     study: ClassVar[str] = "rare"
@@ -78,6 +83,7 @@ class RareEvent(Saved):
     seconds: float
     messages: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    paths: tuple[tuple[np.ndarray, np.ndarray], ...] = field(default=(), repr=False)
 
     def __str__(self) -> str:
         low, high = self.interval
@@ -92,9 +98,9 @@ class RareEvent(Saved):
         ]
         if self.failed_share > 0.0:
             lines.append(f"failed      {self.failed_share:.1%} of the probability is of members that failed")
-        if len(self.weights):
+        if len(self.weights) and (self.moved or self.noise_moved):
             numbers = ", ".join(f"{name} = {_short(value)}" for name, value in self.likeliest.items())
-            noise = " and its noise" if len(self.likeliest_draws) else ""
+            noise = " and its noise" if len(self.likeliest_draws) or self.estimator == "splitting" else ""
             lines.append(f"likeliest   {numbers or 'the scene'}{noise}: {self.distance:.2f} sd from the middle")
             lines.append(f"moved       {_moved_text({**self.moved, **self.noise_moved})}")
         return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
@@ -104,7 +110,10 @@ class RareEvent(Saved):
         kept = ("probability", "spread", "thresholds", "acceptance", "size", "members")
         runs = [{name: getattr(run, name) for name in kept} | {"limits": list(run.limits)} for run in self.runs]
         own = {item.name: getattr(self, item.name) for item in fields(self)}
-        return finite_or_none(own | {"failing": failing, "runs": runs, "likeliest": dict(self.likeliest)})
+        paths = [list(path) for path in self.paths]
+        return finite_or_none(
+            own | {"failing": failing, "runs": runs, "likeliest": dict(self.likeliest), "paths": paths}
+        )
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Self:
@@ -114,7 +123,8 @@ class RareEvent(Saved):
         failing = content["failing"]
         runs = tuple(_run_of(run) for run in content["runs"])
         table = None if failing is None else Table(values={name: np.array(each) for name, each in failing.items()})
-        more = {"interval": tuple(content["interval"]), "messages": tuple(content["messages"])}
+        paths = tuple((np.array(times), np.array(keys, np.int64)) for times, keys in content.get("paths", ()))
+        more = {"interval": tuple(content["interval"]), "messages": tuple(content["messages"]), "paths": paths}
         return cls(**content | arrays | more | {"failing": table, "runs": runs})
 
     def rows(self) -> Iterator[dict[str, Any]]:

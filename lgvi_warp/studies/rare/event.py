@@ -15,7 +15,7 @@ from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.statistics.base import TYPES, Statistic
-from lgvi_warp.statistics.metrics.nearest import DISTANCES, LEAST, named
+from lgvi_warp.statistics.metrics.nearest import LEAST, SIDES, named
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.tracking import check_wanted
 from lgvi_warp.studies.sweeps.setup import kept, metric_of
@@ -71,14 +71,14 @@ class RareCondition:
             if values.ndim != 1:
                 raise refusal("limit", self.label, f"is {values.shape[1]} numbers", "name one of its entries")
             numbers, lost = [values], np.isnan(values)
-        beyond = [_between(values, *ends) for values, ends in zip(numbers, self.limits.values(), strict=True)]
+        beyond = [between(values, *ends) for values, ends in zip(numbers, self.limits.values(), strict=True)]
         if self.of is None and self.statuses:
             ended = Success(self.statuses).passed(status, {})
             beyond = [np.where(ended, SURE, each) for each in beyond]
         return np.stack(beyond), lost
 
 
-def _between(values: np.ndarray, above: float, below: float) -> np.ndarray:
+def between(values: np.ndarray, above: float, below: float) -> np.ndarray:
     """How far numbers are between two bounds, below 0 outside; a number that is NaN fulfils nothing."""
     inside = np.minimum(values - above, below - values)
     return np.asarray(np.clip(np.nan_to_num(inside, nan=-SURE), -SURE, SURE))
@@ -124,7 +124,7 @@ def _of_text(text: str, scene: Any) -> RareCondition:
 
 
 def _of_event(event: Any) -> RareCondition:
-    if event.type not in DISTANCES:
+    if event.type not in SIDES:
         problem = f"is an event whose distance is not known here ({event.type})"
         raise refusal("limit", event.key, problem, "give a quantity, or a function of a Result, that grows towards it")
     key, metric = metric_of("limit", named(event))

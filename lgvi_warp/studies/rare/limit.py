@@ -24,7 +24,52 @@ MOST_NUMBERS = 20_000_000
 NEAREST_LEVEL = 2.0**-53
 
 
-class VehicleLimit:
+class Varying:
+    """The numbers that vary of a scene's members, as standard normals.
+
+    Attributes:
+        names: names of the numbers, one a normal.
+    """
+
+    names: tuple[str, ...] = ()
+
+    def __init__(self, fleet: Any):
+        self.fleet: Ensemble = ensemble_of(fleet)
+        if brought := [*self.fleet.sampling.own_values(), *self.fleet.sampling.distributions()]:
+            problem = f"is a {self.fleet.sampling.kind}, which gives members values and no distribution"
+            remedy = f"give distributions of {', '.join(brought[:4])} in vary"
+            raise refusal("ensemble.sampling", self.fleet.sampling.kind, problem, remedy)
+        if self.fleet.explicit():
+            raise refusal("fleet", "...", "has members that were given one by one", "give distributions in vary")
+
+    def states(self, count: int) -> dict[str, Any]:
+        """So many times the start of a scene where no number varies."""
+        member = self.fleet.select(0, 1)
+        return {name: np.repeat(getattr(member, name), count, axis=0) for name in FIELDS}
+
+    def levels(self, u: np.ndarray) -> np.ndarray:
+        """Levels in (0, 1) of the numbers that vary, in the order of the names."""
+        from scipy.special import ndtr
+
+        return np.asarray(np.clip(ndtr(u[:, : len(self.names)]), NEAREST_LEVEL, 1.0 - NEAREST_LEVEL))
+
+    def values(self, u: np.ndarray) -> dict[str, np.ndarray]:
+        """Values (n, ...) of what varies, by name."""
+        fleet = self.fleet
+        described = as_given(fleet)
+        columns = [column for variation in described for column in columns_of(fleet.space, variation.key)]
+        cube = np.empty((len(u), len(columns)))
+        cube[:, columns] = self.levels(u)
+        levels = fleet.space.split(cube)
+        drawn = [pair for variation in described for pair in variation.values(levels[variation.key])]
+        return {target.label: values for target, values in drawn}
+
+    def table(self, u: np.ndarray) -> Table | None:
+        """Members with these normals as a table for `lw.Ensemble`; None where noise alone varies."""
+        return Table(values=self.values(u)) if self.names and len(u) else None
+
+
+class VehicleLimit(Varying):
     """A scene as a limit: (n, d) standard normals -> (n,), above 0 where the event happens.
 
     fleet: the scene and what varies. condition: the event. settings: of `prepare`. failed: "event", so that a member that
@@ -37,14 +82,8 @@ class VehicleLimit:
     """
 
     def __init__(self, fleet: Any, condition: RareCondition, settings: Mapping[str, Any], failed: str = "event"):
-        self.fleet: Ensemble = ensemble_of(fleet)
+        super().__init__(fleet)
         self.condition, self._refuse = condition, failed == "refuse"
-        if brought := [*self.fleet.sampling.own_values(), *self.fleet.sampling.distributions()]:
-            problem = f"is a {self.fleet.sampling.kind}, which gives members values and no distribution"
-            remedy = f"give distributions of {', '.join(brought[:4])} in vary"
-            raise refusal("ensemble.sampling", self.fleet.sampling.kind, problem, remedy)
-        if self.fleet.explicit():
-            raise refusal("fleet", "...", "has members that were given one by one", "give distributions in vary")
         varies = {"levels": True} if self.fleet.vary else {}
         self.run: Prepared = prepare(
             self.fleet,
@@ -75,11 +114,10 @@ class VehicleLimit:
         distances, lost = self.condition.distances(self._answers(u))
         self.seconds += time.perf_counter() - begin
         self.members += len(u)
-        if self._refuse and lost.any():
-            problem = f"limit: {int(lost.sum())} of {len(lost)} members failed, or have a number that is not finite"
-            raise FailedMembers([f'{problem}; mend what fails, or count them as the event: failed="event"'])
+        if self._refuse:
+            refuse_lost(lost)
         if self._spreads is None:
-            self._spreads = _spreads(distances)
+            self._spreads = spreads_of(distances)
         limits = (distances / self._spreads[:, None]).max(axis=0)
         limits[lost] = FAILED
         return np.asarray(limits)
@@ -90,33 +128,17 @@ class VehicleLimit:
         xi: dict[str, Any] = {"xi": np.ascontiguousarray(u[:, count:])} if self.draws else {}
         if count:
             return self.run(self.levels(u), **xi)
-        member = self.fleet.select(0, 1)
-        states: Any = {name: np.repeat(getattr(member, name), len(u), axis=0) for name in FIELDS}
-        return self.run.states(**states, **xi)
-
-    def levels(self, u: np.ndarray) -> np.ndarray:
-        """Levels in (0, 1) of the numbers that vary, in the order of the names."""
-        from scipy.special import ndtr
-
-        return np.asarray(np.clip(ndtr(u[:, : len(self.names)]), NEAREST_LEVEL, 1.0 - NEAREST_LEVEL))
-
-    def values(self, u: np.ndarray) -> dict[str, np.ndarray]:
-        """Values (n, ...) of what varies, by name."""
-        fleet = self.fleet
-        described = as_given(fleet)
-        columns = [column for variation in described for column in columns_of(fleet.space, variation.key)]
-        cube = np.empty((len(u), len(columns)))
-        cube[:, columns] = self.levels(u)
-        levels = fleet.space.split(cube)
-        drawn = [pair for variation in described for pair in variation.values(levels[variation.key])]
-        return {target.label: values for target, values in drawn}
-
-    def table(self, u: np.ndarray) -> Table | None:
-        """Members with these normals as a table for `lw.Ensemble`; None where noise alone varies."""
-        return Table(values=self.values(u)) if self.names and len(u) else None
+        return self.run.states(**self.states(len(u)), **xi)
 
 
-def _spreads(distances: np.ndarray) -> np.ndarray:
+def refuse_lost(lost: np.ndarray) -> None:
+    """Raise FailedMembers where members (n,) failed."""
+    if lost.any():
+        problem = f"limit: {int(lost.sum())} of {len(lost)} members failed, or have a number that is not finite"
+        raise FailedMembers([f'{problem}; mend what fails, or count them as the event: failed="event"'])
+
+
+def spreads_of(distances: np.ndarray) -> np.ndarray:
     """What each limit (k, n) is measured in: its standard deviation; 1 where it is alone, and stays in its unit."""
     if len(distances) == 1:
         return np.ones(1)

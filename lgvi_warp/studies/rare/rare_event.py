@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,10 +22,13 @@ from lgvi_warp.studies.rare.cheaper import cheaper_of, chosen_chain
 from lgvi_warp.studies.rare.event import RareCondition, condition_of
 from lgvi_warp.studies.rare.limit import VehicleLimit
 from lgvi_warp.studies.rare.search import RareAnswer, RareSearch
+from lgvi_warp.studies.rare.split_search import SplitSearch
 from lgvi_warp.studies.rare.subset import NoProgress
+from lgvi_warp.studies.rare.walk import VehicleWalk
 
 # What members of the scene's own setting are called.
 OWN = "the scene's own"
+WAYS = ("chains", "splitting")
 # The least error that can be asked, and the fewest members.
 LEAST_ERROR, FEWEST = 0.005, 10_000
 
@@ -35,7 +39,9 @@ def rare_event(
     limit: OfInterest | Mapping[str, Any],
     *,
     relative_error: float = 0.1,
+    by: str = "chains",
     cheaper: Sequence[Mapping[str, Any]] = (),
+    looks: int = 50,
     failed: str = "event",
     most: int = 1_000_000,
     seed: int = 0,
@@ -54,8 +60,12 @@ def rare_event(
             in a sweep's words, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of an event of the
             scene.
         relative_error: Standard deviation wanted of the probability's error, as a part of it, 0.005 to 0.5; 0.1 by default.
+        by: "chains", the default, or "splitting", for a scene with noise and an event that is seen on the way: a number at the
+            end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
         cheaper: Settings that chains may use first, the answer being that of the scene's own: numbers and settings of the run
             that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by default.
+        looks: With by="splitting", into how many pieces the time is cut, at most, 2 to 1,000; 50 by default. More of them need
+            fewer members, and each costs a call. Pieces begin at samples and at ticks of a controller.
         failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
         most: Members that may be run, from 10,000; 1,000,000 by default.
         seed: Seed of all that is drawn; 0 by default.
@@ -82,6 +92,9 @@ def rare_event(
     members = ensemble_of(fleet)
     faults = Faults()
     faults.choice("failed", failed, ("event", "refuse"))
+    faults.choice("by", by, WAYS)
+    if by == "splitting" and cheaper:
+        faults.add("cheaper", cheaper, "is of chains", 'leave it out, or by="splitting"')
     error = faults.number("relative_error", relative_error)
     if error is not None and not LEAST_ERROR <= error <= 0.5:
         faults.add(
@@ -94,8 +107,11 @@ def rare_event(
         if name in settings:
             faults.add(name, settings[name], "is what rare_event decides", "leave it out")
     faults.raise_if_any()
-    whole_number("most", most, FEWEST), whole_number("seed", seed, 0)
+    whole_number("most", most, FEWEST), whole_number("seed", seed, 0), whole_number("looks", looks, 2, 1000)
     condition = condition_of(limit, members.scene)
+    report = callback(progress) or (lambda fraction: None)
+    if by == "splitting":
+        return _by_splitting(members, condition, error or 0.1, looks, failed, most, seed, report, settings)
     own = VehicleLimit(members, condition, settings, failed)
     others = {
         each.name: VehicleLimit(each.fleet, condition, each.settings, failed)
@@ -104,7 +120,7 @@ def rare_event(
     chain, notes = chosen_chain(own, others, seed) if others else (None, [])
     search = RareSearch(
         own, own.d, relative_error, seed, most, weighted=not own.draws, chained=chain,
-        margin=chain.margin if chain else 0.0, report=callback(progress) or (lambda fraction: None), notes=notes,
+        margin=chain.margin if chain else 0.0, report=report, notes=notes,
     )  # fmt: skip
     try:
         found = search.answer()
@@ -116,6 +132,27 @@ def rare_event(
         remedy = "mend what fails" if lost else 'ask for what is rare, as {"peak depth": {"above": 12.0}}'
         raise refusal("limit", condition.label, problem, remedy)
     return _told(found, own, others, condition, settings)
+
+
+def _by_splitting(
+    fleet: Ensemble, condition: RareCondition, relative_error: float, looks: int, failed: str, most: int, seed: int,
+    report: Callable[[float], None], settings: Mapping[str, Any]) -> RareEvent:  # fmt: skip
+    """The answer by splitting in time."""
+    walk = VehicleWalk(fleet, condition, settings, failed == "refuse", seed, looks)
+    search = SplitSearch(walk, relative_error, seed, most, report)
+    try:
+        found = search.answer()
+    except NoProgress as stuck:
+        raise _refused(stuck, condition) from None
+    if found.probability >= 1.0:
+        problem = f"happens for each of {len(found.limits):,} members"
+        raise refusal("limit", condition.label, problem, 'ask for what is rare, as {"max(depth)": {"above": 12.0}}')
+    paths = tuple((walk.times[points], keys) for points, keys in found.paths)
+    answer = replace(_told(found, walk, {}, condition, settings), paths=paths)
+    if answer.plain_members < walk.members:
+        note = f'splitting gains nothing here: it took {walk.members:,} members; by="chains", or plain ones'
+        answer = replace(answer, messages=(*answer.messages, note))
+    return answer
 
 
 def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
@@ -132,13 +169,13 @@ def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
 
 def _told(
     found: RareAnswer,
-    own: VehicleLimit,
+    own: VehicleLimit | VehicleWalk,
     others: Mapping[str, VehicleLimit],
     condition: RareCondition,
     settings: Mapping[str, Any],
 ) -> RareEvent:
     """The answer in the scene's numbers."""
-    limits = {OWN: own, **others}
+    limits: dict[str, VehicleLimit | VehicleWalk] = {OWN: own, **others}
     count = len(own.names)
     nearest = int(np.argmin((found.failing**2).sum(axis=1)))
     best = found.failing[nearest : nearest + 1]

@@ -86,7 +86,9 @@ def _scene(*more: lw.terms.Term) -> lw.Scene:
 
 def _starts() -> lw.Ensemble:
     normal = lw.distributions.Normal
-    return lw.Ensemble(_scene(), vary={"start.position": normal(std=[PLACE] * 3), "start.velocity": normal(std=[SPEED] * 3)})
+    return lw.Ensemble(
+        _scene(), vary={"start.position": normal(std=[PLACE] * 3), "start.velocity": normal(std=[SPEED] * 3)}
+    )
 
 
 def _gusts(count: int, p: float) -> Event:

@@ -82,19 +82,12 @@ def rare_event(
     members = ensemble_of(fleet)
     faults = Faults()
     faults.choice("failed", failed, ("event", "refuse"))
-    error = faults.number("relative_error", relative_error)
-    if error is not None and not LEAST_ERROR <= error <= 0.5:
-        faults.add(
-            "relative_error",
-            relative_error,
-            "is not between 0.005 and 0.5",
-            "give a part of the probability, such as 0.1",
-        )
+    check_asked(faults, relative_error, most)
     for name in ("of", "levels", "statistics", "draws", "common_noise"):
         if name in settings:
             faults.add(name, settings[name], "is what rare_event decides", "leave it out")
     faults.raise_if_any()
-    whole_number("most", most, FEWEST), whole_number("seed", seed, 0)
+    whole_number("seed", seed, 0)
     condition = condition_of(limit, members.scene)
     own = VehicleLimit(members, condition, settings, failed)
     others = {
@@ -116,6 +109,20 @@ def rare_event(
         remedy = "mend what fails" if lost else 'ask for what is rare, as {"peak depth": {"above": 12.0}}'
         raise refusal("limit", condition.label, problem, remedy)
     return _told(found, own, others, condition, settings)
+
+
+def check_asked(faults: Faults, relative_error: Any, most: Any) -> None:
+    """Note what is wrong with the error that is asked for, and with the members that may be run."""
+    error = faults.number("relative_error", relative_error)
+    if error is not None and not LEAST_ERROR <= error <= 0.5:
+        faults.add(
+            "relative_error",
+            relative_error,
+            "is not between 0.005 and 0.5",
+            "give a part of the probability, such as 0.1",
+        )
+    with faults.including():
+        whole_number("most", most, FEWEST)
 
 
 def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""lw.rare_event where probabilities are known: error told and seen, members, and seconds of one thread, beside other libraries.
+"""lw.rare_event where probabilities are known: error told and seen, members, seconds of one thread, beside other libraries.
 
 Events of a sphere in linear drag, over runs with other seeds: told_spread and seen_spread are parts of the probability,
 within_three counts the runs within three told spreads. The autopilot's probability is that of a run to 2 %. OpenTURNS and
-UQpy, where they are installed, call lw.uq.model with the same events, with as many members a level as give some 1e5 in all, at the first probability.
+UQpy, where they are installed, call lw.uq.model with the same events at the first probability, with 20,000 members a level.
 """
 
 from __future__ import annotations

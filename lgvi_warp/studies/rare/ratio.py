@@ -30,14 +30,15 @@ class Share:
     def of(cls, happens: np.ndarray, weights: np.ndarray, chains: np.ndarray, related: float = 1.0) -> Share:
         """From members (n,) with weights, of which those of one chain are related; related: times the spread of chains."""
         total = np.bincount(chains, weights)
-        share = float(weights @ happens) / total.sum()
+        alike = bool((happens == happens[0]).all())
+        share = float(happens[0]) if alike else float(weights @ happens) / total.sum()
         # Of a ratio of two sums over independent chains.
         away = np.bincount(chains, weights * (happens - share))
         variance = related**2 * float((away**2).sum()) / total.sum() ** 2
         count = float(total.sum() ** 2 / (total**2).sum()) / related**2
         # Where all or none are seen, chance may have hidden one: no less than half a member is unsure.
         smooth = (share * count + 0.5) / (count + 1.0)
-        variance = max(variance, smooth * (1.0 - smooth) / (count + 2.0) if share in (0.0, 1.0) else 0.0)
+        variance = smooth * (1.0 - smooth) / (count + 2.0) if alike else variance
         return cls(share, math.sqrt(variance) / share if share > 0.0 else math.inf, count)
 
 

@@ -110,8 +110,8 @@ class Sweep(SweepTable):
     def compare_rare(self, first: str, second: str, at: Mapping[str, Any] | None = None) -> list[RareComparison]:
         """Compare the rare failures of two cases, at each point of the grid: how many times as often the second fails.
 
-        Failing members of either are run in both, with the same numbers and noise: P(B) / P(A) = P(B | A) / P(A | B). Where too
-        few fail in both, it is the ratio of the two answers. p is corrected for all of these comparisons by Holm.
+        Failing members of either are run in both, with the same numbers and noise: P(B) / P(A) = P(B | A) / P(A | B). Where
+        too few fail in both, it is the ratio of the two answers. p is corrected for all of these comparisons by Holm.
 
         Args:
             first: name of a case.

@@ -17,6 +17,7 @@ from lgvi_warp.common.npy_files import of_npz, write_npz
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.studies.rare.answer import RareEvent
+from lgvi_warp.studies.rare.cheaper import SETTINGS
 from lgvi_warp.studies.rare.failing import failing_of
 from lgvi_warp.studies.rare.limit import VehicleLimit
 from lgvi_warp.studies.rare.rare_event import check_asked, rare_event
@@ -31,7 +32,7 @@ FOLDER = "rare"
 
 @dataclass(frozen=True, eq=False)
 class RareFailure:
-    """What is known of a cell's rare failure: the answer, and the members that are run in other cases; or why there is none."""
+    """What is known of a cell's rare failure: the answer, and the members that other cases run, too; or why there is none."""
 
     found: RareEvent | None
     members: FailingMembers | None = None
@@ -58,7 +59,7 @@ def _places(u: np.ndarray, among: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class RareComparison:
-    """How many times as often a second case fails as a first, at one point of the grid; p_holm: p corrected for their number."""
+    """How many times as often a second case fails as a first, at one point of the grid; p_holm: p by Holm."""
 
     first: str
     second: str
@@ -91,6 +92,8 @@ class RareFailures:
 
     def __post_init__(self) -> None:
         faults = Faults()
+        for name in self.setup.settings.keys() - SETTINGS:
+            faults.add(name, "...", "is nothing that rare failures can take", "leave it out, or rare")
         for case in self.setup.cases:
             if asked := self.asked(case):
                 own = Faults(f"case {case.name!r}: rare.")
@@ -145,7 +148,7 @@ class RareFailures:
         rows, limits = list[RareComparison](), dict[str, VehicleLimit]()
         for first, second in pairs:
             answers = self.of(first), self.of(second)
-            if first.key == second.key or any(answer is None or answer.found is None for answer in answers):
+            if first.index == second.index or any(answer is None or answer.found is None for answer in answers):
                 continue
             a, b = (answer.found for answer in answers)  # type: ignore[union-attr]
             ratio = ratio_of(a, b, self._share(first, second, limits), self._share(second, first, limits),

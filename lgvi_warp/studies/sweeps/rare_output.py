@@ -79,3 +79,11 @@ def rare_lines(sweep: SweepTable) -> list[str]:
         lines.append(f"- {row.second}{where}: fails {ratio.value:.3g} times as often as {row.first} "
                      f"({ratio.lower:.3g} to {ratio.upper:.3g}), {seen}")  # fmt: skip
     return lines
+
+
+def rare_refused(sweep: SweepTable) -> bool:
+    """Whether rare failures were asked for, and there is none."""
+    if sweep.rares is None:
+        return False
+    answers = [answer for cell in sweep.cells if (answer := sweep.rares.of(cell)) is not None]
+    return all(answer.found is None for answer in answers)

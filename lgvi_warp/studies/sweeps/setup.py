@@ -196,6 +196,10 @@ def plan_text(setup: Setup, threads: int | None = None, *, predict: Callable[...
              f"time        about {duration}, and {prediction.compile:.1f} s for each kernel",
              f"memory      {prediction.memory / 1e6:,.0f} MB",
              f"disk        {8 * len(setup.metrics) * setup.members.members * count / 1e6:,.1f} MB"]  # fmt: skip
+    if asking := sum(bool(case.rare) for case, _ in setup.cells):
+        # As many members as a probability of 1e-5 takes to 10 %, at most.
+        share = prediction.advance / max(1, setup.members.members)
+        lines.append(f"rare        {asking:,} rare failures beside it, each up to some {duration_text(1e5 * share)}")
     return "\n".join(lines)
 
 

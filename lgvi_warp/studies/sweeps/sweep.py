@@ -73,8 +73,8 @@ def sweep(
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
         interval: Of probabilities: "wilson" (default) or "clopper_pearson".
         rare: True for the probability that a member does not pass, however small, by lw.rare_event, in every cell whose case
-            says nothing else; or some of its arguments, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}. Cells
-            that vary and draw alike are compared by the same failing members. None (default) for those whose case asks.
+            says nothing else; or some of its arguments, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}.
+            Cells are compared by failing members of either. None (default) for those whose case asks.
         out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
             whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
             code and what that leads to; by `version` where lw.control.Callback and lw.metrics.CustomMetric have one.

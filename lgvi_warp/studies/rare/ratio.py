@@ -14,8 +14,9 @@ from lgvi_warp.studies.rare.answer import RareEvent
 from lgvi_warp.studies.rare.limit import VehicleLimit
 from lgvi_warp.studies.rare.search import RELATED
 
-# Most failing members of one event that are run in the other; the fewest independent ones, in effect, that happen in both.
-MOST_RUN, FEWEST_SHARED = 1000, 20.0
+# Most failing members of one event that are run in the other, and most of their normals; the fewest independent ones, in
+# effect, that happen in both.
+MOST_RUN, MOST_NUMBERS, FEWEST_SHARED = 4000, 4_000_000, 20.0
 
 
 @dataclass(frozen=True)
@@ -69,12 +70,13 @@ class FailingMembers(NamedTuple):
 
 
 def members_of(found: RareEvent) -> FailingMembers:
-    """An event's failing members: whole chains of them, some 1,000 at most."""
+    """An event's failing members: whole chains of them, some 4,000 at most."""
     rng = generator(0, "rare pairs")
+    most = min(MOST_RUN, max(100, MOST_NUMBERS // max(1, found.normals.shape[1] + found.draws.shape[1])))
     if found.estimator != "subset":
         u, weights = np.concatenate([found.normals, found.draws], axis=1), found.weights
-        if len(u) > MOST_RUN:
-            u, weights = u[np.sort(rng.choice(len(u), MOST_RUN, p=weights))], np.full(MOST_RUN, 1.0 / MOST_RUN)
+        if len(u) > most:
+            u, weights = u[np.sort(rng.choice(len(u), most, p=weights))], np.full(most, 1.0 / most)
         return FailingMembers(u, weights, np.arange(len(u)), 1.0)
     runs = found.runs
     first = np.cumsum([0, *(int(run.failing_chains.max()) + 1 for run in runs)])
@@ -82,7 +84,7 @@ def members_of(found: RareEvent) -> FailingMembers:
     u = np.concatenate([run.failing for run in runs])
     weights = np.concatenate([np.full(len(run.failing), run.size * run.probability / len(run.failing)) for run in runs])
     order = rng.permutation(np.unique(chains))
-    kept = np.isin(chains, order[: max(2, int(np.searchsorted(np.cumsum(np.bincount(chains)[order]), MOST_RUN)))])
+    kept = np.isin(chains, order[: max(2, int(np.searchsorted(np.cumsum(np.bincount(chains)[order]), most)))])
     chains = np.unique(chains[kept], return_inverse=True)[1]
     return FailingMembers(u[kept], weights[kept] / weights[kept].sum(), chains, RELATED)
 

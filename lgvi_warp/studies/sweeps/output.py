@@ -85,7 +85,7 @@ class Sweep(SweepTable):
     def rare(self, case: str, at: Mapping[str, Any] | None = None) -> RareEvent:
         """Return the rare failure of a case that asks for it: the probability that a member does not pass.
 
-        Its failing members are those that are compared with other cases, some 1,000 at most.
+        Its failing members are those that are compared with other cases, some 4,000 at most.
 
         Args:
             case: name of the case.

@@ -14,9 +14,9 @@ from typing import Any
 from benchmarks.cases.rare import case
 from benchmarks.pages import markdown, read, stamp
 
-TEXT = """`lw.rare_event` asked for 10 %, over runs with other seeds. Told and seen are standard deviations of the error, in parts of
-the probability; then how many runs were within three told ones, and the smallest answer over the truth. Seconds are
-processor time of one thread, without compiling. The truth is a closed form, but of the autopilot a run to 2 %.
+TEXT = """`lw.rare_event` asked for 10 %, over runs with other seeds. Told and seen are standard deviations of the error in
+parts of the probability; then how many runs were within three told ones, and the smallest answer over the truth.
+Seconds are processor time of one thread, without compiling. The truth is a closed form, of the autopilot a run to 2 %.
 
 {events}
 

@@ -15,6 +15,7 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.files import place_of
 from lgvi_warp.common.npy_files import of_npz, write_npz
 from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.studies.rare.answer import RareEvent
 from lgvi_warp.studies.rare.cheaper import SETTINGS
@@ -42,13 +43,12 @@ class RareFailure:
     def of(cls, found: RareEvent) -> RareFailure:
         """Keep of an answer the failing members that are compared, so that it is small."""
         members, count = members_of(found), found.normals.shape[1]
-        own = None if found.failing is None else found.failing.own_values()
-        if own is not None:
-            rows = _places(members.u[:, :count], found.normals)
-            own = {name: values[rows] for name, values in own.items()}
-        table = None if own is None else type(found.failing)(values=own)  # type: ignore[misc]
-        smaller = {"normals": members.u[:, :count], "draws": members.u[:, count:], "weights": members.weights}
-        return cls(replace(found, failing=table, **smaller), members)
+        numbers, draws = members.u[:, :count], members.u[:, count:]
+        failing = None
+        if found.failing is not None:
+            rows = _places(numbers, found.normals)
+            failing = Table(values={name: values[rows] for name, values in found.failing.own_values().items()})
+        return cls(replace(found, failing=failing, normals=numbers, draws=draws, weights=members.weights), members)
 
 
 def _places(u: np.ndarray, among: np.ndarray) -> np.ndarray:
@@ -124,7 +124,7 @@ class RareFailures:
         if answer is None:
             assert cell.fleet is not None
             try:
-                condition = failing_of(self.success, self.setup.metrics, cell.fleet.scene)
+                condition: Any = failing_of(self.success, self.setup.metrics, cell.fleet.scene)
                 found = rare_event(cell.fleet, condition, seed=self.setup.members.seed, progress=progress, **asked,
                                    **self._settings())  # fmt: skip
                 answer = RareFailure.of(found)
@@ -147,18 +147,19 @@ class RareFailures:
         """Compare pairs of cells, where both are known; p is corrected for their number by Holm."""
         rows, limits = list[RareComparison](), dict[str, VehicleLimit]()
         for first, second in pairs:
-            answers = self.of(first), self.of(second)
-            if first.index == second.index or any(answer is None or answer.found is None for answer in answers):
+            if first.index == second.index or (a := self._found(first)) is None or (b := self._found(second)) is None:
                 continue
-            a, b = (answer.found for answer in answers)  # type: ignore[union-attr]
-            ratio = ratio_of(a, b, self._share(first, second, limits), self._share(second, first, limits),
-                             self.confidence)  # type: ignore[arg-type]  # fmt: skip
-            rows.append(
-                RareComparison(first.case.name, second.case.name, first.point, (a.probability, b.probability), ratio)
-            )  # type: ignore[union-attr]
+            shares = self._share(first, second, limits), self._share(second, first, limits)
+            names, probabilities = (first.case.name, second.case.name), (a.probability, b.probability)
+            rows.append(RareComparison(*names, first.point, probabilities, ratio_of(a, b, *shares, self.confidence)))
         levels = paired.holm(np.array([row.ratio.p for row in rows]))
         return [replace(row, p_holm=float(p), real=bool(p < 1.0 - self.confidence))
                 for row, p in zip(rows, levels, strict=True)]  # fmt: skip
+
+    def _found(self, cell: SweepCell) -> RareEvent | None:
+        """The answer of a cell; None where there is none."""
+        answer = self.of(cell)
+        return None if answer is None else answer.found
 
     def _share(self, first: SweepCell, second: SweepCell, limits: dict[str, VehicleLimit]) -> Share:
         """The part of a cell's failing members that fail in another cell, too; limits: that were made before, by key."""

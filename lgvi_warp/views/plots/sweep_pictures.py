@@ -311,6 +311,7 @@ PICTURES: dict[str, Callable[[Any, Path], Any]] = {
 
 
 def pictures(sweep: Sweep) -> dict[str, Callable[[Any, Path], Any]]:
-    """Return the functions that draw a sweep, by the name of the file; those of several cases, or rare failures, only there."""
-    there = {plot_differences: len(sweep.cases) > 1, plot_rare: sweep.rares is not None}
-    return {name: draw for name, draw in PICTURES.items() if there.get(draw, True)}
+    """Return the functions that draw a sweep, by the name of the file: of one case no differences."""
+    absent = {"differences.png"} if len(sweep.cases) < 2 else set()
+    absent |= {"rare.png"} if sweep.rares is None else set()
+    return {name: draw for name, draw in PICTURES.items() if name not in absent}

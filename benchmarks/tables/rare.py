@@ -16,11 +16,13 @@ from benchmarks.pages import markdown, read, stamp
 
 TEXT = """`lw.rare_event` asked for 10 %, over runs with other seeds. Told and seen are standard deviations of the error in
 parts of the probability; then how many runs were within three told ones, and the smallest answer over the truth.
-Seconds are processor time of one thread, without compiling. The truth is a closed form, of the autopilot a run to 2 %.
+Seconds are processor time of one thread of a shared machine, without compiling. The truth is a closed form, of the
+autopilot a run to 2 %.
 
 {events}
 
-The same vehicles by `lw.uq.model`, with 20,000 members a level; error is the root mean square of {runs} runs.
+Subset simulation of other libraries over the same vehicles by `lw.uq.model`, with 20,000 members a level: OpenTURNS'
+`SubsetSampling`, UQpy's `SubsetSimulation` by its `MetropolisHastings`. Error is the root mean square of {runs} runs.
 
 {peers}
 

@@ -44,7 +44,7 @@ class Share:
 
 
 @dataclass(frozen=True)
-class Ratio:
+class RareRatio:
     """How many times as often a second event happens as a first; paired: from members of either in both, or from two answers.
 
     p: of the ratio being 1, from the normal law of its logarithm.
@@ -113,7 +113,9 @@ def shared(failing: FailingMembers, own: VehicleLimit, other: VehicleLimit, seed
     return Share.of(happens.astype(float), failing.weights, failing.chains, failing.related)
 
 
-def ratio_of(first: RareEvent, second: RareEvent, of_first: Share, of_second: Share, confidence: float = 0.95) -> Ratio:
+def ratio_of(
+    first: RareEvent, second: RareEvent, of_first: Share, of_second: Share, confidence: float = 0.95
+) -> RareRatio:
     """The ratio of two probabilities; of_first: the part of the first's members for which the second happens; and back.
 
     P(B) / P(A) = P(B | A) / P(A | B), the best bridge between the two laws of failing members (Meng & Wong 1996), where the
@@ -130,4 +132,4 @@ def ratio_of(first: RareEvent, second: RareEvent, of_first: Share, of_second: Sh
             log_ratio = math.log(of_first.value / of_second.value)
     away = float(ndtri(0.5 + 0.5 * confidence)) * spread
     p = 2.0 * float(ndtr(-abs(log_ratio) / spread)) if spread > 0.0 else float(log_ratio == 0.0)
-    return Ratio(math.exp(log_ratio), math.exp(log_ratio - away), math.exp(log_ratio + away), p, paired)
+    return RareRatio(math.exp(log_ratio), math.exp(log_ratio - away), math.exp(log_ratio + away), p, paired)

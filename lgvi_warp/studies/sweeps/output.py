@@ -44,6 +44,7 @@ class Sweep(SweepTable):
         baseline: name of the case that others are compared with.
         confidence: confidence level of all intervals.
         interval: how intervals of probabilities are formed.
+        rares: rare failures of the cells that ask for them; None where none does.
     """
 
     def compare(

@@ -22,7 +22,7 @@ from lgvi_warp.studies.rare.cheaper import SETTINGS
 from lgvi_warp.studies.rare.failing import failing_of
 from lgvi_warp.studies.rare.limit import VehicleLimit
 from lgvi_warp.studies.rare.rare_event import check_asked, rare_event
-from lgvi_warp.studies.rare.ratio import FailingMembers, Ratio, Share, members_of, ratio_of, shared
+from lgvi_warp.studies.rare.ratio import FailingMembers, RareRatio, Share, members_of, ratio_of, shared
 from lgvi_warp.studies.sweeps.record import key_of
 from lgvi_warp.studies.sweeps.setup import Setup, SweepCell
 from lgvi_warp.studies.sweeps.success import Success
@@ -65,7 +65,7 @@ class RareComparison:
     second: str
     point: Mapping[str, Any]
     probabilities: tuple[float, float]
-    ratio: Ratio
+    ratio: RareRatio
     p_holm: float = np.nan
     real: bool = False
 

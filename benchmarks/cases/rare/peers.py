@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -65,9 +65,18 @@ def uqpy(limit: Limit, d: int, size: int, seed: int) -> tuple[float, float]:
 PEERS = {"openturns": openturns, "UQpy": uqpy}
 
 
+def importable(name: str) -> bool:
+    """Whether a library is there, with what it needs."""
+    try:
+        import_module(name)
+    except ImportError:
+        return False
+    return True
+
+
 def records(name: str, event: Event, p: float, runs: int, quick: bool) -> Iterator[dict[str, Any]]:
     """What each peer says of an event; nothing of one with noise, which a model draws anew by row and not by chain."""
-    present = [peer for peer in PEERS if find_spec(peer)]
+    present = [peer for peer in PEERS if importable(peer)]
     if not present or not event.fleet.vary or any(term.type == "wrench_noise" for term in event.fleet.scene.terms):
         return
     model = lw.uq.model(event.fleet.scene, event.fleet.vary, event.of, levels=True, save=lw.SaveAt(at=[T1]), **RUN)

@@ -17,6 +17,7 @@ PAGES = {
     "limits": "docs/guide/when_it_breaks.md",
     "method": "docs/reference/method_costs.md",
     "peers": "docs/guide/accuracy_and_speed.md",
+    "rare": "docs/guide/rare_events.md",
     "roofline": "docs/reference/roofline.md",
     "sampling": "docs/reference/sampling_costs.md",
     "solver": "docs/explain/solvers.md",

@@ -285,9 +285,10 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
     """Run the verb sweep: cases of a closed loop on the same members, what holds and which is better.
 
     plan: From the setup and the threads to the text of --plan.
-    Returns: The exit code: 1 if all cells were refused or a file failed, otherwise 0.
+    Returns: The exit code: 1 if all cells were refused, or all rare failures that were asked for, or a file failed, else 0.
     """
     from lgvi_warp.studies.sweeps.file import arguments_of_file
+    from lgvi_warp.studies.sweeps.rare_output import rare_refused
     from lgvi_warp.studies.sweeps.setup import plan_text, setup_of
     from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
     from lgvi_warp.views.plots.sweep_pictures import pictures
@@ -299,7 +300,8 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
             digits = whole_number_text(text)
             arguments[name] = int(digits) if digits.lstrip("+-").isdigit() else text
     if chosen.plan:
-        about = {name: arguments.pop(name, None) for name in ("cases", "grid", "vary", "members", "seed", "sampling")}
+        known = ("cases", "grid", "vary", "members", "seed", "sampling", "rare")
+        about = {name: arguments.pop(name, None) for name in known}
         for name in ("success", "baseline", "confidence", "interval"):
             arguments.pop(name, None)
         closed_loop = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
@@ -318,7 +320,8 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
         if chosen.record:
             record_worst(compared, chosen.record, out, written)
     code = finish(written, chosen, {"sweep": file_json(out / "sweep.json")}, str(compared))
-    return 1 if all(compared.record(cell).refused for cell in compared.cells) else code
+    nothing = all(compared.record(cell).refused for cell in compared.cells)
+    return 1 if nothing or rare_refused(compared) else code
 
 
 def record_worst(compared: Any, count: int, out: Path, written: Written, *, log: Part = None) -> None:

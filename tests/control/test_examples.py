@@ -52,3 +52,18 @@ def test_gains_for_the_worst_cost_less_there_and_more_on_average(tmp_path):
     mean, worst = printed("sweeps/tune_worst_5_percent", tmp_path)
     assert number(worst, "m s2 in the worst") < 0.9 * number(mean, "m s2 in the worst")
     assert number(worst, "m s2 on average") > number(mean, "m s2 on average")
+
+
+@pytest.mark.slow
+def test_the_likeliest_hit_of_the_floor_is_run_again(tmp_path):
+    pytest.importorskip("rerun")
+    picture = tmp_path / "floor.png"
+    command = [sys.executable, ROOT / "examples" / "estimates" / "autopilot_hits_the_floor.py", picture]
+    run = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path)
+    *told, again, recording, last = run.stdout.splitlines()
+    assert 1e-6 < float(told[0].split()[1].rstrip(",")) < 3e-5
+    assert again.startswith("again: {'floor': 1}, after ")
+    assert recording == str(picture.with_suffix(".rrd"))
+    assert picture.with_suffix(".rrd").stat().st_size > 10_000
+    assert last == str(picture)
+    assert picture.stat().st_size > 10_000

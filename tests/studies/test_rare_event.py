@@ -137,6 +137,13 @@ def test_any_of_several_conditions_is_the_event():
     assert either.moved["start.position[1]"] == pytest.approx(2.3, abs=0.4)
 
 
+def test_a_condition_that_never_differs_hides_no_other():
+    # Nobody moves east, so that half a metre is missing for ever: nearer than most are to the event in their own spreads.
+    limit = {"max(position[0])": {"above": bound_of(1e-5)}, "max(position[1])": {"above": 0.5}}
+    found = lw.rare_event(fleet_of(), limit, save=lw.SaveAt(every=0.1), **RUN)
+    assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.relative_error
+
+
 def test_an_event_of_the_scene_is_named():
     floor, rate = 2.0, 0.15
     p = 1e-5

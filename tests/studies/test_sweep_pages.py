@@ -31,12 +31,16 @@ def test_python(page):
 
 
 def test_toml(tmp_path):
-    (text,) = blocks(GUIDE, "toml")
+    text, rare = blocks(GUIDE, "toml")
     (tmp_path / "sweep.toml").write_text(text)
     (tmp_path / "remus_100_autopilot.toml").write_text(SCENE.read_text())
     arguments = arguments_of_file(tmp_path / "sweep.toml")
     assert [case["name"] for case in arguments["cases"]] == ["pid", "stiff"]
     assert arguments["t1"] == 60.0
+    (tmp_path / "rare.toml").write_text(f'scene = "remus_100_autopilot.toml"\n{rare}')
+    asked = arguments_of_file(tmp_path / "rare.toml")
+    setup = setup_of(asked["scene"], asked["cases"], None, None, 4, 0, None, (), {}, asked["rare"])
+    assert [case.rare for case in setup.cases] == [True, False]
     (text,) = blocks(METRICS, "toml")
     (tmp_path / "scene.toml").write_text(SCENE.read_text() + text)
     assert lw.Scene.load(tmp_path / "scene.toml").run.statistics[0].key == "settling_time depth"

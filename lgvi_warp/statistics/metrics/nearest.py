@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks
 from lgvi_warp.statistics.values.quantity import Quantity
@@ -44,6 +46,15 @@ SIDES: Mapping[str, Callable[[Number], list[Side]]] = {
     "box": _inside_box,
 }
 COUNTS = {"floor": 1, "surface": 1, "box": 6}
+
+
+def distance(kind: str, position: np.ndarray, number: Number) -> np.ndarray:
+    """The distance (...) [m] of positions (..., n, 3) to an event of this type."""
+    return np.asarray(
+        functools.reduce(
+            np.minimum, [sign * position[..., axis] + offset for axis, sign, offset in SIDES[kind](number)]
+        )
+    )
 
 
 def least_between(a: np.ndarray, b: np.ndarray, rate_a: np.ndarray, rate_b: np.ndarray) -> np.ndarray:
@@ -90,7 +101,7 @@ class Nearest(Metric):
 
     def check(self, faults: Faults) -> None:
         super().check(faults)
-        if self.measured:
+        if flag("nearest.measured", self.measured):
             faults.add(
                 "measured", self.measured, "has no meaning for an event, which looks at the truth", "leave it out"
             )

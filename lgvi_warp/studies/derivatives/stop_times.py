@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfResult
 from lgvi_warp.results.result import Result
-from lgvi_warp.statistics.metrics.nearest import DISTANCES
+from lgvi_warp.statistics.metrics.nearest import distance
 from lgvi_warp.studies.derivatives.copies import Copies, CopyEnds, CopyRuns
 
 # Samples about the end, in steps from the one before it, and how often a root is corrected.
@@ -45,9 +45,9 @@ class StopTimeRuns(CopyRuns):
         own = {name: getattr(event, name) for name in event.parameters()}
 
         def number(name: str) -> np.ndarray:
-            return np.asarray(numbers.get(f"{event.key}.{name}", np.asarray(own[name])))
+            return np.asarray(numbers.get(f"{event.key}.{name}", np.asarray(own[name])[None]))
 
-        distances = DISTANCES[event.type](positions, number)
+        distances = distance(event.type, positions, number)
         times = [self._h * (self._first + root) for root in (_root(distances, 3), _root(distances, 2))]
         return replace(ends, values=np.stack(times, axis=1)), added
 

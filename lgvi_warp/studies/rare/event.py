@@ -86,6 +86,8 @@ def between(values: np.ndarray, above: float, below: float) -> np.ndarray:
 
 def condition_of(limit: Any, scene: Any) -> RareCondition:
     """Read the event that is asked for."""
+    if isinstance(limit, RareCondition):
+        return limit
     if isinstance(limit, Mapping):
         return _of_conditions(dict(limit))
     if isinstance(limit, str):

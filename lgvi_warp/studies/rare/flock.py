@@ -9,6 +9,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from lgvi_warp.studies.rare.limit import limits_of
+
 # Features that vary less than this part of themselves are not looked at; cut of small singular values; the least error.
 LEAST_SPREAD, CUT, LEAST_MISSED = 1e-12, 1e-8, 1e-12
 
@@ -145,11 +147,6 @@ class Score:
                 score = np.maximum(score, limits_of(flock.distances[self.lasting], self.spreads[self.lasting]))
             score = np.minimum(score / max(line.missed, LEAST_MISSED), np.finfo(float).max)
         return np.where(flock.happened, np.inf, np.where(flock.over, -np.inf, score))
-
-
-def limits_of(distances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
-    """The limits (n,) of distances (c, n)."""
-    return np.asarray((distances / spreads[:, None]).max(axis=0))
 
 
 def _numbers_of(flock: Flock, spreads: np.ndarray) -> np.ndarray:

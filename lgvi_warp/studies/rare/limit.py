@@ -16,10 +16,12 @@ from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.columns import as_given, columns_of
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.studies.rare.event import FAILED, RareCondition
+from lgvi_warp.studies.rare.event import FAILED, SURE, RareCondition
 
 # Most numbers of the normals of one call: 160 MB.
 MOST_NUMBERS = 20_000_000
+# Spread of a limit that has none.
+NO_SPREAD = 1e-290
 # Levels of the cube are as far from its sides as this.
 NEAREST_LEVEL = 2.0**-53
 
@@ -118,7 +120,7 @@ class VehicleLimit(Varying):
             refuse_lost(lost)
         if self._spreads is None:
             self._spreads = spreads_of(distances)
-        limits = (distances / self._spreads[:, None]).max(axis=0)
+        limits = limits_of(distances, self._spreads)
         limits[lost] = FAILED
         return np.asarray(limits)
 
@@ -138,11 +140,18 @@ def refuse_lost(lost: np.ndarray) -> None:
         raise FailedMembers([f'{problem}; mend what fails, or count them as the event: failed="event"'])
 
 
+def limits_of(distances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
+    """The limits (n,) of distances (c, n), each in what it is measured in."""
+    with np.errstate(over="ignore"):
+        return np.asarray(np.clip(distances / spreads[:, None], -SURE, SURE).max(axis=0))
+
+
 def spreads_of(distances: np.ndarray) -> np.ndarray:
     """What each limit (k, n) is measured in: its standard deviation; 1 where it is alone, and stays in its unit."""
     if len(distances) == 1:
         return np.ones(1)
     ordinary = np.where(np.abs(distances) < 1e300, distances, np.nan)
     with np.errstate(all="ignore"):
-        spreads = np.nanstd(ordinary, axis=1)
-    return np.where(spreads > 0.0, spreads, 1.0)
+        spreads = np.where(np.nanmax(ordinary, axis=1) > np.nanmin(ordinary, axis=1), np.nanstd(ordinary, axis=1), 0.0)
+    # What never differs leads nowhere: it is further away than all that does, until it happens.
+    return np.where(spreads > 0.0, spreads, NO_SPREAD)

@@ -95,23 +95,16 @@ def rare_event(
     faults.choice("by", by, WAYS)
     if by == "splitting" and cheaper:
         faults.add("cheaper", cheaper, "is of chains", 'leave it out, or by="splitting"')
-    error = faults.number("relative_error", relative_error)
-    if error is not None and not LEAST_ERROR <= error <= 0.5:
-        faults.add(
-            "relative_error",
-            relative_error,
-            "is not between 0.005 and 0.5",
-            "give a part of the probability, such as 0.1",
-        )
+    check_asked(faults, relative_error, most)
     for name in ("of", "levels", "statistics", "draws", "common_noise"):
         if name in settings:
             faults.add(name, settings[name], "is what rare_event decides", "leave it out")
     faults.raise_if_any()
-    whole_number("most", most, FEWEST), whole_number("seed", seed, 0), whole_number("looks", looks, 2, 1000)
+    whole_number("seed", seed, 0), whole_number("looks", looks, 2, 1000)
     condition = condition_of(limit, members.scene)
     report = callback(progress) or (lambda fraction: None)
     if by == "splitting":
-        return _by_splitting(members, condition, error or 0.1, looks, failed, most, seed, report, settings)
+        return _by_splitting(members, condition, float(relative_error), looks, failed, most, seed, report, settings)
     own = VehicleLimit(members, condition, settings, failed)
     others = {
         each.name: VehicleLimit(each.fleet, condition, each.settings, failed)
@@ -153,6 +146,20 @@ def _by_splitting(
         note = f'splitting gains nothing here: it took {walk.members:,} members; by="chains", or plain ones'
         answer = replace(answer, messages=(*answer.messages, note))
     return answer
+
+
+def check_asked(faults: Faults, relative_error: Any, most: Any) -> None:
+    """Note what is wrong with the error that is asked for, and with the members that may be run."""
+    error = faults.number("relative_error", relative_error)
+    if error is not None and not LEAST_ERROR <= error <= 0.5:
+        faults.add(
+            "relative_error",
+            relative_error,
+            "is not between 0.005 and 0.5",
+            "give a part of the probability, such as 0.1",
+        )
+    with faults.including():
+        whole_number("most", most, FEWEST)
 
 
 def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lgvi_warp.studies.rare.flock import Flock, Score, Walk, limits_of
-from lgvi_warp.studies.rare.limit import spreads_of
+from lgvi_warp.studies.rare.flock import Flock, Score, Walk
+from lgvi_warp.studies.rare.limit import limits_of, spreads_of
 from lgvi_warp.studies.rare.subset import FLAT, NoProgress, SubsetRun
 
 # The part of the members that reaches the next level, at least so many, and most levels.
@@ -277,7 +277,7 @@ def _with_failing(
     limits: dict[tuple[int, int], float] = {}
     looks: dict[tuple[int, int], int] = {}
     for rows, flock in arrived.values():
-        own = np.where(flock.lost, np.inf, np.minimum(limits_of(flock.distances, score.spreads), np.finfo(float).max))
+        own = np.where(flock.lost, np.inf, limits_of(flock.distances, score.spreads))
         per_run = np.array([runs[run].probability for run in range(len(runs))])
         of_run = stages[-1].run
         happened = np.bincount(of_run[stages[-1].reach == math.inf], minlength=len(runs))

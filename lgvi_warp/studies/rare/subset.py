@@ -68,6 +68,7 @@ class SubsetRun:
         failing_limits: (m,), their limits.
         size: number of members of a level.
         members: number of members that were run.
+        failing_chains: (m,), the chain of each of the failing members.
     """
 
     probability: float
@@ -79,6 +80,7 @@ class SubsetRun:
     failing_limits: np.ndarray
     size: int
     members: int
+    failing_chains: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
 
 @dataclass(eq=False)
@@ -167,6 +169,7 @@ class _Climber:
             failing_limits=level.limits[happens],
             size=self.size,
             members=self.members,
+            failing_chains=np.flatnonzero(happens) // (len(happens) // level.chains),
         )
 
 

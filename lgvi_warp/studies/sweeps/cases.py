@@ -21,6 +21,8 @@ from lgvi_warp.scene.start import NAMES
 
 # Lists of a scene that a case may replace, beside those of the controller.
 LISTS = ("terms", "events", "controller")
+# What may be said of how the probability of a rare failure is found.
+RARE = ("relative_error", "cheaper", "most")
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,8 @@ class Case:
             whose entries replace those of the same name and are added otherwise.
         vehicle: another vehicle: lw.Vehicle(...), or numbers of it by field; None (default) for that of the scene.
         scene: another scene, to which the rest is applied; None (default) for that of the sweep.
+        rare: True for the probability that a member does not pass, however small, by lw.rare_event; or some of its arguments,
+            {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}. None (default) for what the sweep says.
 
     Raises:
         SceneError: something is of the wrong kind.
@@ -51,6 +55,7 @@ class Case:
     replace: Mapping[str, Any] = field(default_factory=dict)
     vehicle: Any = None
     scene: Scene | None = None
+    rare: Any = None
 
     def __post_init__(self) -> None:
         faults = Faults(f"case {self.name!r}: " if isinstance(self.name, str) else "cases: ")
@@ -62,6 +67,7 @@ class Case:
                 faults.add(key, getattr(self, key), "is no table", f"write {example}")
         if self.scene is not None and not isinstance(self.scene, Scene):
             faults.add("scene", self.scene, "is no Scene", "give lw.Scene.load(path)")
+        check_rare(faults, self.rare)
         faults.raise_if_any()
 
     def of(self, scene: Scene) -> Scene:
@@ -119,6 +125,14 @@ def cases_of(tables: Any) -> tuple[Case, ...]:
         faults.add("cases", name, f"is the name of {names.count(name)} cases", "give each a name of its own")
     faults.raise_if_any()
     return tuple(cases)
+
+
+def check_rare(faults: Faults, rare: Any) -> None:
+    """Note what is wrong with what is said of rare failures."""
+    if isinstance(rare, Mapping):
+        faults.keys("rare", rare, RARE)
+    elif rare is not None and not isinstance(rare, bool):
+        faults.add("rare", rare, "is neither true nor a table", "write rare = true, or rare = { relative_error = 0.2 }")
 
 
 def grid_of(grid: Any) -> dict[str, list[Any]]:

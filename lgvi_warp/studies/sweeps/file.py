@@ -16,7 +16,7 @@ from lgvi_warp.scene.file import tables_of_file
 from lgvi_warp.scene.scene import Scene
 
 KEYS = ("scene", "members", "seed", "sampling", "confidence", "interval", "vary", "cases", "grid", "metrics", "success",
-        "compare", "run")  # fmt: skip
+        "compare", "run", "rare")  # fmt: skip
 # Keys of [run], and the arguments that they are.
 RUN = {"method": "method", "step": "h", "duration": "t1", "dtype": "dtype"}
 

@@ -21,7 +21,10 @@ from lgvi_warp.results.result import Result
 from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.studies.files import finite_or_none
+from lgvi_warp.studies.rare.answer import RareEvent
 from lgvi_warp.studies.sweeps.comparisons import PairedComparison, compared, corrected, ranks
+from lgvi_warp.studies.sweeps.rare import RareComparison
+from lgvi_warp.studies.sweeps.rare_output import provenance_of_rare, rare_against_baseline, rare_lines, rare_rows
 from lgvi_warp.studies.sweeps.setup import END, SweepCell, rerun_members_of
 from lgvi_warp.studies.sweeps.success import none_text
 from lgvi_warp.studies.sweeps.sweep_table import SUCCESS, SweepTable
@@ -41,6 +44,7 @@ class Sweep(SweepTable):
         baseline: name of the case that others are compared with.
         confidence: confidence level of all intervals.
         interval: how intervals of probabilities are formed.
+        rares: rare failures of the cells that ask for them; None where none does.
     """
 
     def compare(
@@ -78,6 +82,51 @@ class Sweep(SweepTable):
             The same with `p` corrected, and `real` by that and the sweep's confidence.
         """
         return corrected(rows, self.confidence)
+
+    def rare(self, case: str, at: Mapping[str, Any] | None = None) -> RareEvent:
+        """Return the rare failure of a case that asks for it: the probability that a member does not pass.
+
+        Its failing members are those that are compared with other cases, some 4,000 at most.
+
+        Args:
+            case: name of the case.
+            at: values of the grid by name; may be left out where there is no grid.
+
+        Returns:
+            The answer of `lw.rare_event`: probability, interval, failing members, the likeliest of them.
+
+        Raises:
+            SceneError: there is no such case or point, it did not ask, or it was refused.
+        """
+        cell = self.cell(case, at)
+        answer = None if self.rares is None else self.rares.of(cell)
+        if answer is None:
+            raise refusal("case", cell.name, "did not ask for its rare failure", "give the case rare = true")
+        if answer.found is None:
+            raise refusal(
+                "case", cell.name, f"has no rare failure: {answer.refused}", "mend it, or ask for another one"
+            )
+        return answer.found
+
+    def compare_rare(self, first: str, second: str, at: Mapping[str, Any] | None = None) -> list[RareComparison]:
+        """Compare the rare failures of two cases, at each point of the grid: how many times as often the second fails.
+
+        Failing members of either are run in both, with the same numbers and noise: P(B) / P(A) = P(B | A) / P(A | B). Where
+        too few fail in both, it is the ratio of the two answers. p is corrected for all of these comparisons by Holm.
+
+        Args:
+            first: name of a case.
+            second: name of another case; ratios are second over first.
+            at: values of the grid by name; None (default) for all points.
+
+        Returns:
+            The comparisons, of points where both have a rare failure; `row()` of one is a record of a table.
+
+        Raises:
+            SceneError: there is no such case or point.
+        """
+        pairs = [(a, b) for a in self.cells_of(first, at) for b in self.cells_of(second, at) if a.point == b.point]
+        return [] if self.rares is None else self.rares.compare(pairs)
 
     def ranking(self, at: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
         """Rank the cases by success, and say of which others each is better than chance explains, and by how much.
@@ -192,6 +241,8 @@ class Sweep(SweepTable):
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write table.csv, comparison.csv, ranking.csv, worst.csv, causes.csv, sweep.json and summary.md into a folder.
 
+        Where rare failures were asked for, rare.csv and rare_comparison.csv too.
+
         Args:
             folder: of the files, made if needed.
 
@@ -208,6 +259,9 @@ class Sweep(SweepTable):
         tables["causes"] = [{"case": cell.case.name, **cell.point, "of": of, **row} for cell in self.cells
                             if not self.record(cell).refused for of in (SUCCESS, *self.metrics) if of != END
                             for row in self.causes(cell.case.name, cell.point, of)]  # fmt: skip
+        if self.rares is not None:
+            tables["rare"] = rare_rows(self)
+            tables["rare_comparison"] = [row.row() for row in rare_against_baseline(self)]
         files = [write_csv(rows, target / f"{name}.csv", target) for name, rows in tables.items()]
         texts = {"sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1), "summary.md": str(self)}
         return files + [write_text(target / name, text, target) for name, text in texts.items()]
@@ -231,7 +285,7 @@ def provenance(table: SweepTable) -> dict[str, Any]:
     setup = table.setup
     cells = [{"case": cell.case.name, "at": {name: as_json(value) for name, value in cell.point.items()}, "key": cell.key,
               "fixed": list(cell.fixed), "refused": table.record(cell).refused, "messages": list(table.record(cell).messages)}
-             for cell in table.cells]  # fmt: skip
+             | provenance_of_rare(table, cell) for cell in table.cells]  # fmt: skip
     scene = setup.scene.to_dict()
     scene.pop("ensemble", None)
     metrics = {name: metric.to_dict() | {"unit": table.unit(name)} for name, metric in setup.metrics.items()}
@@ -274,6 +328,8 @@ def _summary(sweep: Sweep) -> str:
         real = [row for row in against_baseline(sweep) if row.real and (row.of == SUCCESS or not sweep.setup.axes)]
         lines += [f"- {_compared_text(sweep, row)}" for row in real] or ["- No difference of success is real."]
         lines += ["", "comparison.csv has the differences of all metrics."]
+    if sweep.rares is not None:
+        lines += ["", "## Rare failures", "", *rare_lines(sweep)]
     lines += ["", "## What failures go with", ""]
     causes = [text for cell in sweep.cells if (text := _causes_text(sweep, cell))]
     lines += causes or ["- With nothing that varies, as far as seen."]

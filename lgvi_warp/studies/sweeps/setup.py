@@ -27,7 +27,7 @@ from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.member_metrics import metric_of, numbers_of_members
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure
 from lgvi_warp.statistics.values.tracking import check_wanted
-from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of
+from lgvi_warp.studies.sweeps.cases import Case, cases_of, check_rare, ensemble_of, grid_of, known_names, points_of
 from lgvi_warp.studies.sweeps.record import Record, key_of
 
 # Most cells, cases times points of the grid, of a sweep.
@@ -134,8 +134,8 @@ def kept(metrics: Mapping[str, Statistic], controller: Any) -> dict[str, Any]:
 
 def setup_of(
     scene: Any, cases: Any, grid: Any, vary: Any, members: Any, seed: Any, sampling: Any, metrics: Any,
-    settings: Mapping[str, Any], *, predict: Callable[..., Prediction] = predict) -> Setup:  # fmt: skip
-    """What a sweep would run; `settings` are those of solve, all before them as of `sweep`."""
+    settings: Mapping[str, Any], rare: Any = None, *, predict: Callable[..., Prediction] = predict) -> Setup:  # fmt: skip
+    """What a sweep would run; `settings` are those of solve, all others as of `sweep`."""
     faults = Faults()
     base, together = _base(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
@@ -145,7 +145,9 @@ def setup_of(
     for name in ("save", "statistics", "keep", "until", "store", "only"):
         if name in settings:
             faults.add(name, "...", "is what a sweep decides", "leave it out")
+    check_rare(faults, rare)
     faults.raise_if_any()
+    parts["cases"] = tuple(replace(case, rare=rare) if case.rare is None else case for case in parts["cases"])
     assert isinstance(base.scene, Scene)
     fleet = _fleet(base, members, seed, sampling, together, parts["cases"])
     if fleet.weights(0, 1) is not None:
@@ -194,6 +196,10 @@ def plan_text(setup: Setup, threads: int | None = None, *, predict: Callable[...
              f"time        about {duration}, and {prediction.compile:.1f} s for each kernel",
              f"memory      {prediction.memory / 1e6:,.0f} MB",
              f"disk        {8 * len(setup.metrics) * setup.members.members * count / 1e6:,.1f} MB"]  # fmt: skip
+    if asking := sum(bool(case.rare) for case, _ in setup.cells):
+        # As many members as a probability of 1e-5 takes to 10 %, at most.
+        share = prediction.advance / max(1, setup.members.members)
+        lines.append(f"rare        {asking:,} rare failures beside it, each up to some {duration_text(1e5 * share)}")
     return "\n".join(lines)
 
 

@@ -14,10 +14,14 @@ from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.sweeps.output import Sweep
+from lgvi_warp.studies.sweeps.rare import RareFailures
+from lgvi_warp.studies.sweeps.rare_output import rare_against_baseline
 from lgvi_warp.studies.sweeps.record import Record, Records
 from lgvi_warp.studies.sweeps.setup import Setup, SweepCell, setup_of
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
 
+# Parts of the progress of a rare failure, where a cell's own members are one.
+RARE_PARTS = 20
 # Said of a cell whose function holds what cannot be compared.
 NOT_KEPT = "cannot be told from other functions, so this cell runs in every call; give version=1 where it takes one"
 
@@ -37,6 +41,7 @@ def sweep(
     baseline: str | None = None,
     confidence: float = 0.95,
     interval: str = "wilson",
+    rare: Any = None,
     out: str | os.PathLike[str] | None = None,
     threads: int | None = None,
     executor: Any = "threads",
@@ -67,6 +72,9 @@ def sweep(
         baseline: Name of the case that others are compared with; default the first one.
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
         interval: Of probabilities: "wilson" (default) or "clopper_pearson".
+        rare: True for the probability that a member does not pass, however small, by lw.rare_event, in every cell whose case
+            says nothing else; or some of its arguments, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}.
+            Cells are compared by failing members of either. None (default) for those whose case asks.
         out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
             whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
             code and what that leads to; by `version` where lw.control.Callback and lw.metrics.CustomMetric have one.
@@ -104,7 +112,7 @@ def sweep(
         >>> table.cases, table.members_count
         (('slow', 'quick'), 16)
     """
-    setup = setup_of(scene, cases, grid, vary, members, seed, sampling, metrics, settings)
+    setup = setup_of(scene, cases, grid, vary, members, seed, sampling, metrics, settings, rare)
     execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
     return swept(setup, success, baseline, confidence, interval, out, callback(progress), execution)
 
@@ -127,14 +135,38 @@ def swept(
     faults.raise_if_any()
     assert conditions is not None
     records = Records(None if out is None else path_of("out", out), list(setup.metrics), setup.members.members)
+    rares = None
+    if asking := sum(bool(case.rare) for case, _ in setup.cells):
+        with faults.including():
+            rares = RareFailures(setup, conditions, records.folder, float(confidence), execution["threads"])
+        faults.raise_if_any()
     records.check()
-    cells = list(_run(setup, records, progress, execution))
-    return Sweep(setup, cells, records, conditions, baseline, float(confidence), interval)
+    total = len(setup.cells) + RARE_PARTS * asking
+    cells = list(_run(setup, records, progress, total, execution))
+    found = Sweep(setup, cells, records, conditions, baseline, float(confidence), interval, rares)
+    if rares is not None:
+        _run_rare(rares, found, progress, total)
+    return found
 
 
-def _run(setup: Setup, records: Records, progress: Any, execution: Mapping[str, Any]) -> Iterator[SweepCell]:
-    """Run the cells that are not recorded yet, and note those that are refused."""
-    total = len(setup.cells)
+def _run_rare(rares: RareFailures, found: Sweep, progress: Any, total: int) -> None:
+    """Find the rare failures that are asked for, and compare them with those of the baseline."""
+    asking = [cell for cell in found.cells if cell.case.rare and not found.record(cell).refused]
+    done = total - RARE_PARTS * len(asking)
+    for i, cell in enumerate(asking):
+        at = done + RARE_PARTS * i
+        share = progress and (lambda part, at=at: progress((at + RARE_PARTS * part) / total))
+        assert cell.fleet is not None
+        rares.run(cell, found.records.folder is not None and not found.setup.unknown(cell.fleet), share)
+    rare_against_baseline(found)
+    if progress:
+        progress(1.0)
+
+
+def _run(
+    setup: Setup, records: Records, progress: Any, total: int, execution: Mapping[str, Any]
+) -> Iterator[SweepCell]:
+    """Run the cells that are not recorded yet, and note those that are refused; total: parts of the progress in all."""
     setup.note_functions()
     for i, (case, point) in enumerate(setup.cells):
         share = progress and (lambda part, i=i: progress((i + part) / total))

@@ -12,6 +12,7 @@ import numpy as np
 from lgvi_warp.common.errors import MissingExtra, closest, refusal
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.scene.columns import as_given
+from lgvi_warp.studies.sweeps.rare import RareFailures
 from lgvi_warp.studies.sweeps.record import Record, Records
 from lgvi_warp.studies.sweeps.setup import END, Setup, SweepCell
 from lgvi_warp.studies.sweeps.success import Probability, Success, probability
@@ -24,8 +25,8 @@ __all__ = ["SweepTable"]
 
 # Quantiles of each metric in the table.
 LEVELS = {"q05": 0.05, "median": 0.5, "q95": 0.95}
-# Name of the comparison of successes.
-SUCCESS = "success"
+# Name of the comparison of successes, and of the columns of rare failures.
+SUCCESS, RARE = "success", "rare"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,6 +40,7 @@ class SweepTable:
     baseline: str
     confidence: float
     interval: str
+    rares: RareFailures | None = None
 
     def __repr__(self) -> str:
         points = len(self.cells) // len(self.cases)
@@ -264,7 +266,18 @@ class SweepTable:
             row |= {f"{name} std": float(good.std(ddof=1)) if len(good) > 1 else np.nan}
             row |= {f"{name} {word}": float(np.quantile(good, at)) if some else np.nan for word, at in LEVELS.items()}
             row |= {f"{name} missing": len(x) - len(good)}
-        return row
+        return row | self._rare_row(cell)
+
+    def _rare_row(self, cell: SweepCell) -> dict[str, Any]:
+        """What is known of a cell's rare failure, where it was asked for."""
+        answer = None if self.rares is None else self.rares.of(cell)
+        if answer is None:
+            return {}
+        if (found := answer.found) is None:
+            return {f"{RARE} refused": answer.refused}
+        return {RARE: found.probability, f"{RARE} lower": found.interval[0], f"{RARE} upper": found.interval[1],
+                f"{RARE} error": found.relative_error, f"{RARE} members": sum(found.members.values()),
+                f"{RARE} refused": ""}  # fmt: skip
 
     @property
     def table(self) -> xarray.Dataset:
@@ -281,7 +294,7 @@ class SweepTable:
         shape = (len(self.cases), *(len(values) for values in axes.values()))
         data = {}
         for name in dict.fromkeys(name for row in rows for name in row if name not in ("case", *axes)):
-            kind = object if name == "refused" else np.float64
+            kind = object if name in ("refused", f"{RARE} refused") else np.float64
             data[name] = ("case", *axes), np.array([row.get(name, np.nan) for row in rows], dtype=kind).reshape(shape)
         return xr.Dataset(data, {"case": list(self.cases)} | {name: coordinates(x) for name, x in axes.items()})
 

@@ -72,7 +72,8 @@ def survival(run: SubsetRun) -> tuple[np.ndarray, np.ndarray]:
     ends = [*run.thresholds[1:], np.inf]
     for own, bound in zip(run.limits, ends, strict=True):
         ranked = np.sort(own[np.isfinite(own)])
-        above = chance * (len(own) - np.arange(len(ranked))) / len(own)
+        # Members with the same limit, such as all that an event stopped, are all of them at it or above.
+        above = chance * (len(own) - np.searchsorted(ranked, ranked)) / len(own)
         inside = ranked < bound
         limits.append(ranked[inside])
         chances.append(above[inside])

@@ -280,6 +280,25 @@ def _response(axes: Any, sweep: Sweep, cell: SweepCell, of: str, count: int) -> 
         axes.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
 
 
+def plot_rare(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
+    """Draw the probabilities of rare failures with their intervals, on a logarithmic axis."""
+    rows = [(cell, answer.found) for cell in sweep.cells if sweep.rares is not None
+            and (answer := sweep.rares.of(cell)) is not None and answer.found is not None]  # fmt: skip
+    if not rows:
+        raise NothingToDraw("no cell has a rare failure")
+    with panels(figure, path, (1, 1), (8.0, 1.4 + 0.4 * len(rows))) as grid:
+        axes = grid[0, 0]
+        for i, (cell, found) in enumerate(rows):
+            bars = np.array([[found.probability - found.interval[0]], [found.interval[1] - found.probability]])
+            color = COLORS[sweep.cases.index(cell.case.name) % len(COLORS)]
+            axes.errorbar([found.probability], [i], xerr=bars, fmt="o", capsize=4.0, color=color)
+        axes.set_yticks(range(len(rows)), [_short(sweep, cell.case.name, cell.point) for cell, _ in rows])
+        axes.set(ylim=(len(rows) - 0.5, -0.5), ylabel=_meaning(sweep), xscale="log")
+        axes.set_xlabel("probability that a member fails, 95 % interval")
+        axes.grid(alpha=0.3, axis="x")
+    return grid.ravel()
+
+
 # Functions that draw a sweep, by the name of the file.
 PICTURES: dict[str, Callable[[Any, Path], Any]] = {
     "success.png": plot_success,
@@ -287,9 +306,12 @@ PICTURES: dict[str, Callable[[Any, Path], Any]] = {
     "differences.png": plot_differences,
     "causes.png": plot_causes,
     "responses.png": plot_responses,
+    "rare.png": plot_rare,
 }
 
 
 def pictures(sweep: Sweep) -> dict[str, Callable[[Any, Path], Any]]:
-    """Return the functions that draw a sweep, by the name of the file; paired differences where there are cases to compare."""
-    return {name: draw for name, draw in PICTURES.items() if draw is not plot_differences or len(sweep.cases) > 1}
+    """Return the functions that draw a sweep, by the name of the file: of one case no differences."""
+    absent = {"differences.png"} if len(sweep.cases) < 2 else set()
+    absent |= {"rare.png"} if sweep.rares is None else set()
+    return {name: draw for name, draw in PICTURES.items() if name not in absent}

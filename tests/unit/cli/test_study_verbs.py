@@ -165,6 +165,8 @@ def test_an_interrupted_stability_study_says_which_maps_are_finished(tmp_path, c
 class Swept:
     """What a sweep of three cells found, of which some were refused."""
 
+    rares = None
+
     def __init__(self, refused):
         cases = [SimpleNamespace(name=name) for name in "ab"]
         self.setup = SimpleNamespace(axes={"delay": [1, 2]})

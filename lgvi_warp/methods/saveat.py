@@ -10,7 +10,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.control.signals import check_names
 from lgvi_warp.physics.fields import FIELDS
 
@@ -53,7 +53,7 @@ class SaveAt:
 
     def __post_init__(self) -> None:
         faults = Faults()
-        if self.final not in (None, True, False):
+        if not among(self.final, (None, True, False)):
             faults.add("save.final", self.final, "is neither True nor False", "give one of them, or leave it out")
         if self.every is not None and self.at is not None:
             faults.add("save", "every and at", "are both given", "give one of them")

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.methods.method import Method
 from lgvi_warp.studies.estimating import bias as biases_of
 from lgvi_warp.studies.estimating.bias import AGREE, Bias, StepChange, difference
 from lgvi_warp.studies.estimating.choice import Observed
@@ -43,6 +44,8 @@ class Pilot:
 
     noise: "none", "grid" where settings may share a path, "free" where they cannot.
     error: asked for; of the value where relative.
+    single: whether coarse levels may be in single precision.
+    estimator: the only one that may be chosen; None for any.
     """
 
     runs: Runs
@@ -50,6 +53,8 @@ class Pilot:
     noise: str
     error: float
     relative: bool = False
+    single: bool = False
+    estimator: str | None = None
     numbers: dict[tuple[Setting, float | None], np.ndarray] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
 
@@ -106,6 +111,7 @@ class Ladder:
     """Steps of one method that were run, the coarsest first; refused: why others were not.
 
     halvings: the difference of each step to the next.
+    order: of the method, 1 in noise.
     end: why it ended: "agree", "apart", "members" (their number leaves the difference open) or "steps".
     """
 
@@ -113,10 +119,11 @@ class Ladder:
     halvings: list[StepChange] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     end: str = "steps"
+    order: int = 1
 
     def biases(self) -> list[Bias]:
         """The bias of each step."""
-        return biases_of.biases(self.halvings)
+        return biases_of.biases(self.halvings, self.order)
 
     def settled(self, error: float) -> int:
         """The coarsest step whose bias takes at most half of the error; where there is none the finest but one."""
@@ -126,14 +133,15 @@ class Ladder:
         return found[0] if found else len(self.settings) - (1 if self.end == "steps" else 2)
 
 
-def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None) -> Ladder:
+def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None, most: float = math.inf) -> Ladder:
     """Run ever finer steps until two agree or members are apart.
 
     Each step costs 64 members, all together the 128 of the finest: a tenth of plain Monte Carlo where that takes 1,280.
 
     fixed: a setting that the caller asked for: the ladder goes on to the one after it and ends.
+    most: a member's cost from which on a step is no gain [s].
     """
-    ladder = Ladder()
+    ladder = Ladder(order=Method(steps[0].method).order if pilot.noise == "none" else 1)
     for setting in steps:
         if not runs_at(pilot, setting, ladder):
             continue
@@ -144,6 +152,8 @@ def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None) 
         ladder.halvings.append(_compared(pilot, ladder))
         if fixed is None and (end := _ended(pilot, ladder)):
             ladder.end = end
+            break
+        if pilot.runs.cost(setting, pilot.grid(setting)) > most:
             break
     return ladder
 

@@ -191,7 +191,9 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solve
     allowed = max(chosen.error**2 - chosen.bias.mean_square, 0.25 * chosen.error**2)
     if part.variance <= allowed:
         return solved, part
-    share = min(ROOM * part.variance / allowed - 1.0, MOST_MORE)
+    # A quantile's density, which its error stands on, is known by the same members.
+    least = 1.0 if pilot.target.kind == "quantile" else 0.0
+    share = min(max(ROOM * part.variance / allowed - 1.0, least), MOST_MORE)
     for level in levels:
         level.grow(pilot.runs, level.more(share))
         if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):

@@ -28,8 +28,8 @@ WORTH = 0.3
 LOOKS = (*STAGES[1:], 4 * STAGES[-1])
 # Coarse levels are in single precision, whose kernel is another one, where plain Monte Carlo costs at least this [s].
 WORTH_A_KERNEL = 0.5
-# Members that a second run adds, in those of the first.
-MOST_MORE = 3.0
+# Runs that add members where the error told is beyond the one asked for, and how many in those that there are.
+ROUNDS, MOST_MORE = 2, 3.0
 # Noise of the pilot has indices from 0, that of the levels from here on, so many for each.
 INDICES = 2**27
 # Members of a level at most.
@@ -180,7 +180,7 @@ def run(runs: Runs, levels: Sequence[Level], report: Callable[[float], None]) ->
 
 
 def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solved, MeanEstimate]:
-    """The estimate; where its error is beyond the one asked for, once more with what it takes, up to four times.
+    """The estimate; where its error is beyond the one asked for, with what it takes, up to four times the members, twice.
 
     The variance is then at least what the first one lets expect of so many members, over as much again: a stop by chance
     must not tell too small an error.
@@ -189,18 +189,17 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solve
         refuse_heavy(pilot.runs.question.label, np.concatenate(levels[0].y))
     solved, part = estimated(levels, pilot.target)
     allowed = max(chosen.error**2 - chosen.bias.mean_square, 0.25 * chosen.error**2)
-    if part.variance <= allowed:
-        return solved, part
-    # A quantile's density, which its error stands on, is known by the same members.
-    least = 1.0 if pilot.target.kind == "quantile" else 0.0
-    share = min(max(ROOM * part.variance / allowed - 1.0, least), MOST_MORE)
-    for level in levels:
-        level.grow(pilot.runs, level.more(share))
-        if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):
-            raise failing(level.fine, level.y[-1])
-    before = part.variance
-    solved, part = estimated(levels, pilot.target)
-    return solved, replace(part, variance=max(part.variance, before / (1.0 + share) ** 2))
+    for _ in range(ROUNDS):
+        if part.variance <= allowed:
+            break
+        before, share = part.variance, min(ROOM * part.variance / allowed - 1.0, MOST_MORE)
+        for level in levels:
+            level.grow(pilot.runs, level.more(share))
+            if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):
+                raise failing(level.fine, level.y[-1])
+        solved, part = estimated(levels, pilot.target)
+        part = replace(part, variance=max(part.variance, before / (1.0 + share) ** 2))
+    return solved, part
 
 
 def told(

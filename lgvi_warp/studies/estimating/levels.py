@@ -207,10 +207,10 @@ class Level:
         self.points.append(points if self.kind == "regression" else points[:, :0])
 
     def more(self, share: float) -> int:
-        """A part of the members of the level, in whole replicates; as many or three times that where points are balanced."""
-        points = self.members // REPLICATES
+        """A part of the members of the level so far, in whole replicates; as many or three times that where points are balanced."""
+        points = sum(map(len, self.y)) // REPLICATES
         if self.kind == "sobol" and points & (points - 1) == 0:
-            return self.members if share <= 1.0 else 3 * self.members
+            return REPLICATES * points * (1 if share <= 1.0 else 3)
         return REPLICATES * math.ceil(share * points)
 
     def weighted(self) -> list[Weighted]:

@@ -189,10 +189,12 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solve
         refuse_heavy(pilot.runs.question.label, np.concatenate(levels[0].y))
     solved, part = estimated(levels, pilot.target)
     allowed = max(chosen.error**2 - chosen.bias.mean_square, 0.25 * chosen.error**2)
+    # A quantile's density, which its error stands on, is known by the same members.
+    least = 1.0 if pilot.target.kind == "quantile" else 0.0
     for _ in range(ROUNDS):
         if part.variance <= allowed:
             break
-        before, share = part.variance, min(ROOM * part.variance / allowed - 1.0, MOST_MORE)
+        before, share = part.variance, min(max(ROOM * part.variance / allowed - 1.0, least), MOST_MORE)
         for level in levels:
             level.grow(pilot.runs, level.more(share))
             if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):

@@ -158,7 +158,8 @@ def suggest(
         fleet: the ensemble, or a Scene with one.
         error: largest error allowed, over members and path, in the unit of `of`; above 0. Default 1e-3.
         of: quantity that the error is of: any that statistics know, such as "position" [m], "attitude" [rad], "depth" [m],
-            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity. Default "position".
+            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity; or the mean of a number, such as
+            "mean position[0]", whose bias at the end is told with its interval, as `lw.estimate` does. Default "position".
         t1: end time [s]. Default: run.duration of the scene.
         methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
         members: size of the sample that is searched. Default 128.
@@ -192,6 +193,8 @@ def suggest(
     names = chosen_methods(methods, CANDIDATES)
     report = callback(progress) or void
     sample = Sample(fleet, t1, members, TIMES)
+    if compared.mean and compared.functional is not None and compared.functional.size == 1 and redrawn(sample.whole):
+        return suggestion_of_mean(sample, compared, error, methods and names, seconds, report, threads)
     return suggestion_on(sample, compared, error, names, seconds, report, methods is not None, threads=threads)
 
 
@@ -252,6 +255,58 @@ def suggestion_on(
         worst=worst_of(best, reference, compared.name),
         asked=compared,
         messages=tuple(notes),
+    )
+
+
+def redrawn(fleet: Ensemble) -> bool:
+    """Whether other members can be drawn from what varies in a fleet."""
+    from lgvi_warp.studies.estimating.estimate import drawn
+
+    try:
+        drawn(fleet)
+    except SceneError:
+        return False
+    return True
+
+
+def suggestion_of_mean(
+    sample: Sample, compared: Distance, error: float, methods: Sequence[str] | None, seconds: float,
+    report: Callable[[float], None], threads: int | None,
+) -> Suggestion:  # fmt: skip
+    """The cheapest setting whose mean has a bias below an error, by the ladders of `lw.estimate`."""
+    from lgvi_warp.studies.estimating.mean_setting import MeanSetting, mean_settings
+
+    def candidate(each: MeanSetting) -> Candidate:
+        return Candidate(each.setting.method, each.setting.h, each.setting.dtype)
+
+    def run_seconds(each: MeanSetting) -> float:
+        return seconds_of(ensemble, candidate(each), sample.t1, kernels=sample.kernels)
+
+    ensemble = sample.whole
+    kept = mean_settings(ensemble, compared.name, error, sample.t1, methods, report, seconds, threads)[:FINALISTS]
+    prices = {each.setting: run_seconds(each) for each in kept}
+    best, *others = sorted(kept, key=lambda each: prices[each.setting])
+    us = {setting: 1e6 * price / (sample.t1 * ensemble.members) for setting, price in prices.items()}
+    setting = candidate(best)
+    used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
+    return Suggestion(
+        settings=setting.options(),
+        setting=setting,
+        error=float(error),
+        of=compared.name,
+        unit=compared.unit,
+        expected=best.largest,
+        us_per_vehicle_second=us[best.setting],
+        run_seconds=prices[best.setting] / used,
+        threads=used,
+        memory_bytes=memory_of(ensemble, setting, sample.t1),
+        members=best.members,
+        t1=sample.t1,
+        reference=f"{best.reference} on {best.members} members drawn anew",
+        reference_error=best.beyond,
+        rivals=tuple((candidate(each), us[each.setting], each.largest) for each in others),
+        asked=compared,
+        messages=("of a mean the bias at the end is told, with its 95 % interval, as lw.estimate does",),
     )
 
 

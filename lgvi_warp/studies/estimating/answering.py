@@ -89,6 +89,9 @@ def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed
     few = only is None and pilot.plain_members(top, FIRST) <= FEW
     seen = observed(pilot, top, [] if few else in_single(pilot, top, coarser), FIRST)
     seen = with_coarsest(pilot, seen, variance)
+    if pilot.settled and only is not None and not only.startswith("levels"):
+        few = LOOKS[0] > SHARE * pilot.plain_members(top, FIRST)
+        return seen if few else observed(pilot, top, [], LOOKS[0])
     for members in LOOKS:
         best = candidates(seen, variance, only)[0]
         kept = worth_more(seen, variance, only)

@@ -67,7 +67,7 @@ def estimate(
     are fixed beforehand.
 
     What is chosen follows costs as they are measured, so that two calls may choose differently. The same seed gives the same
-    bits where `method`, `h` and `estimator` are fixed, but for the numbers of members that costs decide: those of levels.
+    bits where `h` and `estimator` are fixed, but for levels, whose numbers of members costs decide.
 
     Args:
         fleet: the ensemble, or a Scene with one. Its distributions are drawn from anew; members and sampling do not matter.
@@ -138,9 +138,10 @@ def estimate(
     asked = error if error is not None else relative_error
     assert asked is not None
     steps = [spacing_of(each.scene, float(t1)) for each in fleets]
-    ladders, noise = ladders_of(whole, float(t1), steps[0], method, h, dtype)
+    ladders, noise = ladders_of(whole, float(t1), steps[0], None if method is None else [method], h, dtype)
     single = dtype is None and ladders[0][0].dtype == "float64"
-    pilot = Pilot(runs, question.target, noise, float(asked), error is None, single, estimator)
+    fixed = h is not None and estimator is not None
+    pilot = Pilot(runs, question.target, noise, float(asked), error is None, single, estimator, settled=fixed)
     coarse = [coarse_of(spacing, i, ladders[0][0]) for i, spacing in enumerate(steps) if i]
     content = {"scene": whole.scene.to_dict(), "ensemble": whole.to_dict(), "seed": seed, "t1": float(t1)}
     content |= {"versions": machine.versions(), "machine": machine.describe()}
@@ -206,7 +207,7 @@ def spacing_of(scene: Any, t1: float) -> Fraction:
 
 
 def ladders_of(
-    fleet: Ensemble, t1: float, spacing: Fraction, method: Any, h: float | None, dtype: str | None
+    fleet: Ensemble, t1: float, spacing: Fraction, methods: Sequence[Any] | None, h: float | None, dtype: str | None
 ) -> tuple[list[list[Setting]], str]:
     """Settings to try by method, the coarsest step first, the asked one last but one; and how noise acts.
 
@@ -218,7 +219,8 @@ def ladders_of(
     rate = float(np.nanmax(np.linalg.norm(few.select(0, few.members).angular_velocity, axis=1)))
     m = max(1, math.ceil(float(spacing) * max(rate, 2.0 * math.pi / t1)))
     coarsest = spacing / m
-    names: list[Any] = [method] if method is not None else list(short_and_own(fleet, h is not None))
+    names = short_and_own(fleet, h is not None) if methods is None else methods
+    most = 1 if h is not None else METHODS if methods is None else len(methods)
     taken, refused, noise = list[Any](), list[str](), "none"
     for name in names:
         try:
@@ -231,7 +233,7 @@ def ladders_of(
         if noisy:
             noise = "grid" if all(isinstance(term, NoisyTerm) for term in noisy) else "free"
         taken.append(name if isinstance(name, str | Method) else plan.method)
-        if len(taken) == METHODS or h is not None:
+        if len(taken) == most:
             break
     if not taken:
         raise SceneError(refused)

@@ -207,7 +207,7 @@ class Level:
         self.points.append(points if self.kind == "regression" else points[:, :0])
 
     def more(self, share: float) -> int:
-        """A part of the members of the level so far, in whole replicates; as many or three times that where points are balanced."""
+        """A part of the members of the level so far, in whole replicates; all or three times that where balanced."""
         points = sum(map(len, self.y)) // REPLICATES
         if self.kind == "sobol" and points & (points - 1) == 0:
             return REPLICATES * points * (1 if share <= 1.0 else 3)

@@ -46,6 +46,8 @@ class Pilot:
     error: asked for; of the value where relative.
     single: whether coarse levels may be in single precision.
     estimator: the only one that may be chosen; None for any.
+    most: processor time that the pilot may take in any case [s].
+    settled: whether no cost that is measured may change the numbers of members.
     """
 
     runs: Runs
@@ -55,6 +57,8 @@ class Pilot:
     relative: bool = False
     single: bool = False
     estimator: str | None = None
+    most: float = math.inf
+    settled: bool = False
     numbers: dict[tuple[Setting, float | None], np.ndarray] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
 
@@ -91,7 +95,9 @@ class Pilot:
 
     def most_seconds(self, setting: Setting, members: int) -> float:
         """What the pilot may cost [s]."""
-        return SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting))
+        return min(
+            SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting)), self.most
+        )
 
     def pair(self, coarse: Setting, fine: Setting, members: int) -> StepChange:
         """How much the target changes from one setting to a finer one."""
@@ -226,6 +232,8 @@ def _stalls(ladder: Ladder, found: StepChange, small: float) -> bool:
 
 def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
     """Whether three times as many pairs more would cost too much."""
+    if pilot.settled:
+        return 4.0 * members > SHARE * pilot.plain_members(ladder.settings[-2], FIRST)
     last = ladder.settings[-1]
     more = 3.0 * members * 1.5 * pilot.runs.cost(last, pilot.grid(last))
     return pilot.runs.seconds + more > pilot.most_seconds(ladder.settings[-2], FIRST)

@@ -183,7 +183,16 @@ def test_an_estimator_may_be_fixed(name):
     assert abs(found.value - truth) <= 4.0 * found.error_reached
     again = estimated("fall", estimator=name, h=0.5)[0]
     assert (found.value, found.interval) == (again.value, again.interval)
-    says(refused(estimated, "fall", estimator="levels", h=0.5), "estimator = 'levels'", "cannot be had", "leave it out")
+
+
+def test_levels_may_be_fixed_and_what_cannot_be_had_is_refused():
+    found, truth = estimated("north", error=0.02, estimator="levels", h=0.5)
+    assert found.estimator == "levels"
+    assert abs(found.value - truth) <= 4.0 * found.error_reached
+    still = lw.Ensemble(closed.pushed().scene, 4)
+    fault = refused(lw.estimate, still, "mean position[0]", 0.05, estimator="sobol", **RUN)
+    says(fault, "estimator = 'sobol'", "cannot be had", "leave it out")
+    says(refused(estimated, "fall", estimator="best"), "estimator = 'best'")
 
 
 def test_processes_have_the_bits_of_threads():

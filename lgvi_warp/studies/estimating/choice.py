@@ -78,7 +78,8 @@ class Observed:
 
 def candidates(seen: Observed, variance: float, only: str | None = None) -> list[Way]:
     """All ways to reach a variance, the cheapest first; only: of an estimator, in front of all others where there is any."""
-    chains = [(0,)] + [chain for k in (2, 3) for chain in coupled(seen, k)]
+    asked = only is not None and only.startswith("levels")
+    chains = [(0,)] + [chain for k in (2, 3) for chain in coupled(seen, k, asked)]
     kinds = ["plain"] + (["sobol"] if seen.normals.shape[1] else [])
     ways = [_candidate(seen, kind, chain, variance) for chain in chains for kind in kinds]
     if 0 < 8 * (seen.normals.shape[1] + 1) <= len(seen.z[0]) and seen.normals.shape[1]:
@@ -91,13 +92,13 @@ def candidates(seen: Observed, variance: float, only: str | None = None) -> list
     return [best, *(way for way in ways if way is not best)]
 
 
-def coupled(seen: Observed, count: int) -> list[tuple[int, ...]]:
-    """Chains of so many settings of which each is much cheaper than the one before, and follows it."""
+def coupled(seen: Observed, count: int, asked: bool = False) -> list[tuple[int, ...]]:
+    """Chains of so many settings of which each is much cheaper than the one before, and follows it; asked: at any cost."""
     chains = []
     for rest in itertools.combinations(range(1, len(seen.z)), count - 1):
         chain = (0, *sorted(rest, key=lambda i: -seen.costs[i]))
         links = list(itertools.pairwise(chain))
-        cheap = all(seen.costs[c] < CHEAPER * seen.costs[f] for f, c in links)
+        cheap = asked or all(seen.costs[c] < CHEAPER * seen.costs[f] for f, c in links)
         if cheap and all(slope(seen.z[f], seen.z[c])[1] <= APART for f, c in links):
             chains.append(chain)
     return chains

@@ -197,7 +197,7 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solve
     for _ in range(ROUNDS):
         if part.variance <= allowed:
             break
-        before, share = part.variance, min(max(ROOM * part.variance / allowed - 1.0, least), MOST_MORE)
+        before, share = part.variance, min(max(ROOM[levels[0].kind] * part.variance / allowed - 1.0, least), MOST_MORE)
         for level in levels:
             level.grow(pilot.runs, level.more(share))
             if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):

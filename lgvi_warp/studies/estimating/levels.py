@@ -52,7 +52,7 @@ class Runs:
     """Runs of one question in any setting, each prepared once.
 
     fleets: the user's ensemble, then the cheaper scenes' with the same variation.
-    seconds: processor time of all runs so far, prepared and called, without that of the first run of each kernel, which
+    seconds: processor time of all runs so far, prepared and called, without preparing the first run of each kernel, which
         loads or compiles it [s].
     execution: threads, executor and scheduler, as of `lw.prepare`.
     """
@@ -80,12 +80,10 @@ class Runs:
                 fleet, levels=self.dimensions > 0, t1=self._t1, **self._execution, **setting.options(), **asked
             )
             kernel = run.noise.plan.spec
+            # What loads a kernel, or compiles it, is no cost of later calls.
             if kernel in self._loaded:
                 self.seconds += max(self._clock() - begun, 0.0)
-            else:
-                # What the first call of a kernel makes once is no cost of later ones.
-                self._loaded.add(kernel)
-                self._call(run, setting, np.full((1, self.dimensions), 0.5), np.zeros(1, np.int64))
+            self._loaded.add(kernel)
         return self._prepared[key]
 
     def __call__(self, setting: Setting, grid: float | None, points: np.ndarray, indices: np.ndarray) -> np.ndarray:

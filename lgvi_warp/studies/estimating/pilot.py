@@ -7,6 +7,7 @@ plain Monte Carlo is predicted to cost.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -247,7 +248,12 @@ def _ended(pilot: Pilot, ladder: Ladder) -> str:
     if any(bias.mean_square <= (0.5 * error) ** 2 for bias in ladder.biases()):
         return "agree"
     last = halvings[-1]
-    stalls = len(halvings) > 1 and last.half > STALLED * halvings[-2].half and abs(last.value) <= last.half
+    # Near where a step is too long some pairs are far apart: a stall is believed where it comes twice.
+    needed = 2 if pilot.noise == "free" else 3
+    lately = list(itertools.pairwise(halvings[-needed:]))
+    stalls = (
+        len(halvings) >= needed and all(b.half > STALLED * a.half for a, b in lately) and abs(last.value) <= last.half
+    )
     return "members" if stalls and last.half > AGREE * error else ""
 
 

@@ -258,7 +258,7 @@ def test_numbers_reach_the_variance():
     way = next(way for way in ways if way.name == "levels" and len(way.chain) == 2)
     factor = way.slopes[0]
     left = np.var(fine - factor * coarse, ddof=1) / way.members[0] + factor**2 * np.var(coarse, ddof=1) / way.members[1]
-    assert left == pytest.approx(1e-4 / choice.ROOM, rel=0.05)
+    assert left == pytest.approx(1e-4 / choice.ROOM["plain"], rel=0.05)
     assert way.variance == pytest.approx(left)
 
 

@@ -24,6 +24,8 @@ from lgvi_warp.studies.estimating.target import Solved
 
 # More members in the pilot pay where they cost at most this part of the run.
 WORTH = 0.3
+# Where members of two steps are apart, Sobol points that do not gain at least this with few members are not looked at.
+CLEAR = 2.0
 # Members that show what settings share and how much Sobol points gain, where that is worth its cost.
 LOOKS = (*STAGES[1:], 4 * STAGES[-1])
 # Coarse levels are in single precision, whose kernel is another one, where plain Monte Carlo costs at least this [s].
@@ -89,6 +91,8 @@ def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed
     few = only is None and pilot.plain_members(top, FIRST) <= FEW
     seen = observed(pilot, top, [] if few else in_single(pilot, top, coarser), FIRST)
     seen = with_coarsest(pilot, seen, variance)
+    if only is None and chosen.ladder.end == "apart" and gains(candidates(seen, variance)).get("sobol", 1.0) < CLEAR:
+        return replace(seen, normals=seen.normals[:, :0])
     if pilot.settled and only is not None and not only.startswith("levels"):
         few = LOOKS[0] > SHARE * pilot.plain_members(top, FIRST)
         return seen if few else observed(pilot, top, [], LOOKS[0])

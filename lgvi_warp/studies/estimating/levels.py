@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.prepared import Prepared, prepare
+from lgvi_warp.common import machine
 from lgvi_warp.common.random import generator
 from lgvi_warp.sampling.designs.sequences import SOBOL_BITS, sobol_points
 from lgvi_warp.scene.ensemble import Ensemble
@@ -20,8 +21,8 @@ from lgvi_warp.studies.estimating.estimators import REPLICATES, MeanEstimate, pl
 from lgvi_warp.studies.estimating.question import Question
 from lgvi_warp.studies.estimating.target import Solved, Sought, Weighted
 
-# Members of one call.
-AT_ONCE = 65_536
+# Members of one call for each thread, whose numbers stay in its cache, and threads that count.
+AT_ONCE, MOST_THREADS = 8192, 8
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,8 @@ class Runs:
         self._prepared: dict[tuple[Setting, float | None], Prepared] = {}
         self._calls: list[Call] = []
         self._loaded, self._costs = set[Any](), dict[Any, float]()
+        threads = self._execution.get("threads") or machine.thread_count()
+        self._at_once = AT_ONCE * min(threads, MOST_THREADS)
         self.dimensions = fleets[0].space.dimensions
 
     def prepared(self, setting: Setting, grid: float | None) -> Prepared:
@@ -90,8 +93,8 @@ class Runs:
         """The numbers of members (n,) at points (n, d), with the noise of these indices; NaN for those that failed."""
         run, n = self.prepared(setting, grid), len(points)
         groups = []
-        for first in range(0, n, AT_ONCE):
-            some = slice(first, first + AT_ONCE)
+        for first in range(0, n, self._at_once):
+            some = slice(first, first + self._at_once)
             begun = self._clock()
             groups.append(self.question.numbers(self._call(run, setting, points[some], indices[some])))
             taken = max(self._clock() - begun, 1e-9)

@@ -100,6 +100,7 @@ def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed
         best = candidates(seen, variance, only)[0]
         kept = worth_more(seen, variance, only)
         more = 0.75 * members * sum(seen.costs[seen.settings.index(setting)] for setting in (top, *kept))
+        more += (1 + len(kept)) * seen.call
         within_share = pilot.runs.seconds + more <= pilot.most_seconds(top, FIRST)
         if few or more > (WORTH if within_share else SHARE) * best.seconds:
             break

@@ -65,6 +65,7 @@ class Observed:
     z: (settings, n). normals: (n, d) of the members' numbers. least: smallest change of a contribution.
     costs: of a member alone [s]. pair: cost of a member of two settings, by their numbers [s]. settings: in the same order.
     at: the target, by which contributions were formed. alone: by the number of a setting, contributions of more members.
+    call: what a call takes by itself [s].
     """
 
     z: Sequence[np.ndarray]
@@ -75,6 +76,7 @@ class Observed:
     settings: Sequence[Setting]
     at: Solved
     alone: Mapping[int, np.ndarray] = field(default_factory=dict)
+    call: float = 0.0
 
 
 def candidates(seen: Observed, variance: float, only: str | None = None) -> list[Way]:
@@ -120,6 +122,7 @@ def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: floa
         rounded(kind, ROOM[kind] * n, dimensions, spread.power) for n, spread in zip(numbers, spreads, strict=True)
     )
     seconds = float(sum(max(ROOM[kind] * n, FEWEST) * spread.cost for n, spread in zip(numbers, spreads, strict=True)))
+    seconds += (2 * len(chain) - 1) * seen.call
     left = sum(spread.at(n) for spread, n in zip(spreads, members, strict=True))
     return Way(kind, chain, tuple(slopes), members, seconds, left)
 

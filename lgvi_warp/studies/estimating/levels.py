@@ -111,6 +111,13 @@ class Runs:
         return run.states(*many, indices=indices, seed=self.seed)
 
     @property
+    def call_seconds(self) -> float:
+        """Processor time that a call takes by itself [s]."""
+        kind = self._calls[0].setting.kind
+        like = [call for call in self._calls if call.setting.kind == kind]
+        return float(fitted(like, [call for call in self._calls if call.setting.kind != kind])[0])
+
+    @property
     def members(self) -> int:
         """How many members were run so far."""
         return sum(call.members for call in self._calls)
@@ -136,9 +143,14 @@ class Call:
 
 
 def member_cost(calls: Sequence[Call], h: float, draw: float, others: Sequence[Call] = ()) -> float:
-    """The processor time of a member [s] by least squares over calls: per call, member, step and draw, none below 0.
+    """The processor time of a member [s], as `fitted`; what a call takes by itself is no cost of a member."""
+    cost = float(fitted(calls, others)[1:4] @ (1.0, 1.0 / h, 1.0 / draw))
+    # Where all is taken for the calls' own, the cheapest call bounds it.
+    return max(cost, 1e-2 * min(call.seconds / call.members for call in calls))
 
-    Relative residuals count. What a call takes by itself is no cost of a member.
+
+def fitted(calls: Sequence[Call], others: Sequence[Call] = ()) -> np.ndarray:
+    """Processor time by least squares over calls: per call, member, step and draw, none below 0 [s]. Relative residuals count.
 
     others: calls of other kinds, which take as much by themselves.
     """
@@ -152,10 +164,7 @@ def member_cost(calls: Sequence[Call], h: float, draw: float, others: Sequence[C
     columns = np.column_stack([np.ones(len(apart)), apart])
     seconds = np.array([c.seconds for c in (*calls, *others)])
     size = np.maximum(np.abs(columns).max(axis=0), 1e-300)
-    numbers = nnls(columns / size / seconds[:, None], np.ones(len(seconds)))[0] / size
-    cost = float(numbers[1:4] @ (1.0, 1.0 / h, 1.0 / draw))
-    # Where all is taken for the calls' own, the cheapest call bounds it.
-    return max(cost, 1e-2 * float(np.min(seconds[: len(mine)] / mine[:, 0])))
+    return np.asarray(nnls(columns / size / seconds[:, None], np.ones(len(seconds)))[0] / size)
 
 
 def design(seed: int, name: str, dimensions: int, first: int, count: int, replicates: int = REPLICATES) -> np.ndarray:

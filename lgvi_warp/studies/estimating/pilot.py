@@ -283,6 +283,7 @@ def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: in
         pilot.target.least(at),
         [settings[i] for i in kept],
         at,
+        call=pilot.runs.call_seconds,
     )
 
 

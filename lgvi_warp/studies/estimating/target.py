@@ -110,8 +110,8 @@ def quantile_of(samples: Sequence[Weighted], level: float) -> float:
 
 
 def density_of(samples: Sequence[Weighted], level: float) -> float:
-    """The density at the quantile of a level, from the quantiles a third of the nearer tail, at most 0.05, on both sides."""
-    apart = min(level, 1.0 - level, 0.15) / 3.0
+    """The density at the quantile of a level, from the quantiles two thirds of the nearer tail, at most 0.1, on both sides."""
+    apart = min(level, 1.0 - level, 0.15) / 1.5
     low, high = quantile_of(samples, level - apart), quantile_of(samples, level + apart)
     rise = mean_of(samples, lambda y: y <= high) - mean_of(samples, lambda y: y <= low)
     return rise / (high - low) if high > low and rise > 0.0 else float(np.inf)

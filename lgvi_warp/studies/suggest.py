@@ -30,8 +30,10 @@ from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget, rounded_up
 from lgvi_warp.studies.comparison import Candidate, Sample
 from lgvi_warp.studies.distance import Distance, compared_in
+from lgvi_warp.studies.estimating.estimate import drawn
+from lgvi_warp.studies.estimating.mean_setting import MeanSetting, mean_settings
 from lgvi_warp.studies.kernels import KERNELS, Kernels
-from lgvi_warp.studies.ladders import ROUNDS, Ladders
+from lgvi_warp.studies.ladders import ROUNDS, SHORT, Ladders
 from lgvi_warp.studies.reference import Growth, Reference, make_reference, time_over
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.tradeoff import chosen_methods, growth_of, growth_text, noise_text
@@ -43,13 +45,6 @@ SAFETY = 1.15
 TIMES = 5
 # Methods in the order in which they are tried; those that are seldom the cheapest are left out.
 CANDIDATES = tuple(name for name in tradeoffs.CANDIDATES if name not in ("phi", "psi", "psi_w"))
-# Those that nearly always have the cheapest among them (`python -m benchmarks run suggest`): each kernel takes seconds to
-# compile. The others are tried where these do not keep the error, or where the search has their kernel already.
-SHORT = {
-    "conservative": ("rk8", "kl8(psi_x)", "psi_x", "psi_1"),
-    "damped": ("rk4", "rk8"),
-    "noisy": ("psi_x", "psi_s", "rk4"),
-}
 # Tried as well for drag by its exact flow, and where damping limits the step.
 STIFFLY_DAMPED = ("psi_x", "rkw3")
 # Number of members that the choice is checked on, and how many times as many times, where steps become no shorter than this.
@@ -260,8 +255,6 @@ def suggestion_on(
 
 def redrawn(fleet: Ensemble) -> bool:
     """Whether other members can be drawn from what varies in a fleet."""
-    from lgvi_warp.studies.estimating.estimate import drawn
-
     try:
         drawn(fleet)
     except SceneError:
@@ -274,7 +267,6 @@ def suggestion_of_mean(
     report: Callable[[float], None], threads: int | None,
 ) -> Suggestion:  # fmt: skip
     """The cheapest setting whose mean has a bias below an error, by the ladders of `lw.estimate`."""
-    from lgvi_warp.studies.estimating.mean_setting import MeanSetting, mean_settings
 
     def candidate(each: MeanSetting) -> Candidate:
         return Candidate(each.setting.method, each.setting.h, each.setting.dtype)

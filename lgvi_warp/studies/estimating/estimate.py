@@ -31,8 +31,8 @@ from lgvi_warp.studies.estimating.choice import ESTIMATORS
 from lgvi_warp.studies.estimating.levels import Runs, Setting
 from lgvi_warp.studies.estimating.pilot import Pilot
 from lgvi_warp.studies.estimating.question import question_of
+from lgvi_warp.studies.ladders import SHORT
 from lgvi_warp.studies.speed import void
-from lgvi_warp.studies.suggest import SHORT
 
 # Methods whose steps are tried: the scene's own, and the first of those that are cheapest by what acts.
 METHODS = 2

@@ -16,7 +16,7 @@ import numpy as np
 import lgvi_warp as lw
 from benchmarks.cases.estimate.case import SCENES
 
-# Method, step [s] and members of the reference; its error is an eighth of 1e-2 spreads, or less; of the autopilot a twelfth of 1e-3.
+# Method, step [s] and members of the reference; its error is an eighth of 1e-2 spreads, or less.
 REFERENCES = {
     "paper": ({"method": "rk8", "h": 0.125}, 1 << 17),
     "autopilot": ({"method": "rk4", "h": 0.02}, 1 << 16),

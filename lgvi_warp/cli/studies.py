@@ -99,7 +99,8 @@ def estimate(chosen: argparse.Namespace, *, study: Part = None) -> int:
 
     # load_scene puts step, method and dtype into the scene: what is asked for by name is fixed.
     fixed: dict[str, Any] = {"method": scene.run.method if chosen.method is not None else None,
-             "h": scene.run.step if chosen.step is not None else None, "dtype": scene.run.dtype}  # fmt: skip
+             "h": scene.run.step if chosen.step is not None else None,
+             "dtype": scene.run.dtype if chosen.dtype is not None else None}  # fmt: skip
     with progress_bar(chosen.quiet) as progress:
         found = (study or answer)(
             scene, chosen.of, chosen.error, relative_error=chosen.relative_error, risk=risk, cheaper=cheaper,

@@ -121,6 +121,9 @@ class Sample:
             faults.add("t1", t1, "is missing", "give the end in seconds: t1=150.0 or [run] duration")
         else:
             faults.positive("t1", t1)
+        if ensemble.weights(0, 1) is not None:
+            problem = "has members with weights, and errors are compared over members that count alike"
+            faults.add("fleet", ensemble.sampling.kind, problem, "leave the weights out")
         faults.raise_if_any()
         assert t1 is not None
         self.whole, self.t1, self.samples, self.kernels = ensemble, float(t1), samples, kernels

@@ -23,6 +23,13 @@ from lgvi_warp.studies.trials import PRECISIONS, Trial, tried
 LEAST_FLOAT32 = 0.4
 # The step times the fastest rate of damping above which damping limits it.
 STIFF = 2.0
+# Those that nearly always have the cheapest among them (`python -m benchmarks run suggest`): each kernel takes seconds to
+# compile. The others are tried where these do not keep the error, or where the search has their kernel already.
+SHORT = {
+    "conservative": ("rk8", "kl8(psi_x)", "psi_x", "psi_1"),
+    "damped": ("rk4", "rk8"),
+    "noisy": ("psi_x", "psi_s", "rk4"),
+}
 # Number of readings of each cost.
 ROUNDS = 7
 

@@ -30,8 +30,10 @@ from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget, rounded_up
 from lgvi_warp.studies.comparison import Candidate, Sample
 from lgvi_warp.studies.distance import Distance, compared_in
+from lgvi_warp.studies.estimating.estimate import drawn
+from lgvi_warp.studies.estimating.mean_setting import MeanSetting, mean_settings
 from lgvi_warp.studies.kernels import KERNELS, Kernels
-from lgvi_warp.studies.ladders import ROUNDS, Ladders
+from lgvi_warp.studies.ladders import ROUNDS, SHORT, Ladders
 from lgvi_warp.studies.reference import Growth, Reference, make_reference, time_over
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.tradeoff import chosen_methods, growth_of, growth_text, noise_text
@@ -43,13 +45,6 @@ SAFETY = 1.15
 TIMES = 5
 # Methods in the order in which they are tried; those that are seldom the cheapest are left out.
 CANDIDATES = tuple(name for name in tradeoffs.CANDIDATES if name not in ("phi", "psi", "psi_w"))
-# Those that nearly always have the cheapest among them (`python -m benchmarks run suggest`): each kernel takes seconds to
-# compile. The others are tried where these do not keep the error, or where the search has their kernel already.
-SHORT = {
-    "conservative": ("rk8", "kl8(psi_x)", "psi_x", "psi_1"),
-    "damped": ("rk4", "rk8"),
-    "noisy": ("psi_x", "psi_s", "rk4"),
-}
 # Tried as well for drag by its exact flow, and where damping limits the step.
 STIFFLY_DAMPED = ("psi_x", "rkw3")
 # Number of members that the choice is checked on, and how many times as many times, where steps become no shorter than this.
@@ -158,7 +153,8 @@ def suggest(
         fleet: the ensemble, or a Scene with one.
         error: largest error allowed, over members and path, in the unit of `of`; above 0. Default 1e-3.
         of: quantity that the error is of: any that statistics know, such as "position" [m], "attitude" [rad], "depth" [m],
-            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity. Default "position".
+            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity; or the mean of a number, such as
+            "mean position[0]", whose bias at the end is told with its interval, as `lw.estimate` does. Default "position".
         t1: end time [s]. Default: run.duration of the scene.
         methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
         members: size of the sample that is searched. Default 128.
@@ -192,6 +188,8 @@ def suggest(
     names = chosen_methods(methods, CANDIDATES)
     report = callback(progress) or void
     sample = Sample(fleet, t1, members, TIMES)
+    if compared.mean and compared.functional is not None and compared.functional.size == 1 and redrawn(sample.whole):
+        return suggestion_of_mean(sample, compared, error, methods and names, seconds, report, threads)
     return suggestion_on(sample, compared, error, names, seconds, report, methods is not None, threads=threads)
 
 
@@ -252,6 +250,55 @@ def suggestion_on(
         worst=worst_of(best, reference, compared.name),
         asked=compared,
         messages=tuple(notes),
+    )
+
+
+def redrawn(fleet: Ensemble) -> bool:
+    """Whether other members can be drawn from what varies in a fleet."""
+    try:
+        drawn(fleet)
+    except SceneError:
+        return False
+    return True
+
+
+def suggestion_of_mean(
+    sample: Sample, compared: Distance, error: float, methods: Sequence[str] | None, seconds: float,
+    report: Callable[[float], None], threads: int | None,
+) -> Suggestion:  # fmt: skip
+    """The cheapest setting whose mean has a bias below an error, by the ladders of `lw.estimate`."""
+
+    def candidate(each: MeanSetting) -> Candidate:
+        return Candidate(each.setting.method, each.setting.h, each.setting.dtype)
+
+    def run_seconds(each: MeanSetting) -> float:
+        return seconds_of(ensemble, candidate(each), sample.t1, kernels=sample.kernels)
+
+    ensemble = sample.whole
+    kept = mean_settings(ensemble, compared.name, error, sample.t1, methods, report, seconds, threads)[:FINALISTS]
+    prices = {each.setting: run_seconds(each) for each in kept}
+    best, *others = sorted(kept, key=lambda each: prices[each.setting])
+    us = {setting: 1e6 * price / (sample.t1 * ensemble.members) for setting, price in prices.items()}
+    setting = candidate(best)
+    used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
+    return Suggestion(
+        settings=setting.options(),
+        setting=setting,
+        error=float(error),
+        of=compared.name,
+        unit=compared.unit,
+        expected=best.largest,
+        us_per_vehicle_second=us[best.setting],
+        run_seconds=prices[best.setting] / used,
+        threads=used,
+        memory_bytes=memory_of(ensemble, setting, sample.t1),
+        members=best.members,
+        t1=sample.t1,
+        reference=f"{best.reference} on {best.members} members drawn anew",
+        reference_error=best.beyond,
+        rivals=tuple((candidate(each), us[each.setting], each.largest) for each in others),
+        asked=compared,
+        messages=("of a mean the bias at the end is told, with its 95 % interval, as lw.estimate does",),
     )
 
 

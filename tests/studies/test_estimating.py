@@ -176,6 +176,69 @@ def test_refusals():
     says(ask(fleet=fails, h=0.5), "64 of 64 members fail", "give a shorter step")
 
 
+@pytest.mark.parametrize("name", ["plain Monte Carlo", "sobol", "regression"])
+def test_an_estimator_may_be_fixed(name):
+    found, truth = estimated("fall", estimator=name, h=0.5)
+    assert found.estimator == name
+    assert abs(found.value - truth) <= 4.0 * found.error_reached
+    again = estimated("fall", estimator=name, h=0.5)[0]
+    assert (found.value, found.interval) == (again.value, again.interval)
+
+
+def test_levels_may_be_fixed_and_what_cannot_be_had_is_refused():
+    found, truth = estimated("north", error=0.02, estimator="levels", h=0.5)
+    assert found.estimator == "levels"
+    assert abs(found.value - truth) <= 4.0 * found.error_reached
+    still = lw.Ensemble(closed.pushed().scene, 4)
+    fault = refused(lw.estimate, still, "mean position[0]", 0.05, estimator="sobol", **RUN)
+    says(fault, "estimator = 'sobol'", "cannot be had", "leave it out")
+    says(refused(estimated, "fall", estimator="best"), "estimator = 'best'")
+
+
+def test_processes_have_the_bits_of_threads():
+    how = {"estimator": "sobol", "h": 0.5}
+    assert estimated("fall", executor="processes", **how)[0].value == estimated("fall", **how)[0].value
+
+
+def test_progress_ends_at_one_and_an_interrupt_says_how_far_it_was():
+    parts = []
+    estimated("fall", progress=parts.append)
+    assert parts == sorted(parts)
+    assert parts[-1] == 1.0
+
+    def stop(part):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="there is no answer yet"):
+        estimated("fall", progress=stop)
+
+
+def test_a_suggestion_for_a_mean_stands_on_the_same_bias():
+    """An order-4 method on a fall that relaxes in 10 s: the mean of a run at the suggested step is as near as told."""
+    fleet = closed.falling()
+    found = lw.suggest(fleet, 1e-3, "mean position[2]", t1=closed.TIME, methods=[closed.METHOD])
+    assert found.expected <= 1e-3
+    many = lw.Ensemble(fleet.scene, 256, 0, fleet.vary)
+    coarse, fine = (lw.solve(many, t1=closed.TIME, save=lw.SaveAt(fields=("position",)), threads=1,
+                             **found.settings | {"h": found.settings["h"] / k}) for k in (1, 8))  # fmt: skip
+    apart = (coarse.position[-1, :, 2].astype(float) - fine.position[-1, :, 2]).mean()
+    assert abs(apart) <= found.expected
+    says(refused(lw.suggest, fleet, 1e-14, "mean position[2]", t1=closed.TIME, methods=["rk4"]), "its bias is known to")
+
+
+def test_a_suggestion_for_a_mean_in_noise():
+    found = lw.suggest(closed.pushed(), 0.02, "mean position[0]", t1=closed.TIME, methods=[closed.METHOD])
+    assert 0.0 < found.expected <= 0.02
+
+
+def test_studies_of_errors_refuse_weights():
+    values = {"vehicle.buoyancy": [950.0, 955.0]}
+    fleet = lw.Ensemble(closed.sphere(), sampling=lw.designs.Table(values, weights=[0.2, 0.8]))
+    says(refused(lw.suggest, fleet, 1e-3, t1=1.0), "members with weights", "leave the weights out")
+    says(refused(lw.tradeoff, fleet, 1.0), "members with weights", "leave the weights out")
+    says(refused(lw.worst_case, fleet, {"vehicle.mass": (90.0, 110.0)}, "depth"), "weights", "give the scene alone")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_intervals_hold_over_seeds(name):

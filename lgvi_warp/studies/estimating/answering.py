@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,32 +14,24 @@ from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.studies.estimating import bias as biases
 from lgvi_warp.studies.estimating.answer import Estimated
-from lgvi_warp.studies.estimating.bias import APART, Bias
-from lgvi_warp.studies.estimating.choice import Observed, Way, candidates, gains
+from lgvi_warp.studies.estimating.bias import Bias
+from lgvi_warp.studies.estimating.choice import ROOM, Observed, Way, candidates, gains
+from lgvi_warp.studies.estimating.chosen import Chosen, coarser_than, constant, finer, setting_of
 from lgvi_warp.studies.estimating.estimators import MeanEstimate, plain
 from lgvi_warp.studies.estimating.levels import Level, Runs, Setting, estimated
-from lgvi_warp.studies.estimating.pilot import (
-    FEW,
-    FIRST,
-    SHARE,
-    STAGES,
-    Ladder,
-    Pilot,
-    at_once,
-    climb,
-    failing,
-    observed,
-    refuse_heavy,
-    runs_at,
-)
+from lgvi_warp.studies.estimating.pilot import FEW, FIRST, SHARE, STAGES, Pilot, failing, observed, refuse_heavy
 from lgvi_warp.studies.estimating.target import Solved
 
 # More members in the pilot pay where they cost at most this part of the run.
 WORTH = 0.3
+# Where members of two steps are apart, Sobol points that do not gain at least this with few members are not looked at.
+CLEAR = 2.0
 # Members that show what settings share and how much Sobol points gain, where that is worth its cost.
 LOOKS = (*STAGES[1:], 4 * STAGES[-1])
-# Coarser settings that levels are sought among.
-MOST_COARSER = 4
+# Coarse levels are in single precision, whose kernel is another one, where plain Monte Carlo costs at least this [s].
+WORTH_A_KERNEL = 0.5
+# Runs that add members where the error told is beyond the one asked for, and how many in those that there are.
+ROUNDS, MOST_MORE = 2, 3.0
 # Noise of the pilot has indices from 0, that of the levels from here on, so many for each.
 INDICES = 2**27
 # Members of a level at most.
@@ -48,42 +40,18 @@ MOST = 2**26
 PART, LEAST = 16, 16
 
 
-@dataclass(frozen=True)
-class Chosen:
-    """A setting, its bias, how that was told, and the error that is left to sampling.
-
-    place: of the setting in the ladder.
-    """
-
-    ladder: Ladder
-    place: int
-    bias: Bias
-    error: float
-    reference: str
-
-    @property
-    def setting(self) -> Setting:
-        """The setting whose statistic is estimated."""
-        return self.ladder.settings[self.place]
-
-    @property
-    def variance(self) -> float:
-        """The variance of sampling that the error leaves; a quarter of its square where the bias takes it all."""
-        return max(self.error**2 - self.bias.mean_square, 0.25 * self.error**2, 1e-300)
-
-
 def answered(
     pilot: Pilot, ladders: Sequence[Sequence[Setting]], coarse: Sequence[Sequence[Setting]], fixed: bool,
-    own_step: float | None, report: Callable[[float], None], content: Mapping[str, Any],
+    own: Setting | None, report: Callable[[float], None], content: Mapping[str, Any],
 ) -> Estimated:  # fmt: skip
     """Run the pilot, choose, run, and tell."""
-    chosen = setting_of(pilot, ladders, fixed, own_step)
+    chosen = setting_of(pilot, ladders, fixed, own)
     report(0.1)
     if constant(pilot, chosen.setting):
-        return told(pilot, chosen, [], None, None, own_step, content)
+        return told(pilot, chosen, [], None, None, own, content)
     while True:
         top = chosen.setting
-        seen = looked(pilot, top, coarser_than(pilot, chosen, coarse), chosen.variance)
+        seen = looked(pilot, chosen, coarser_than(pilot, chosen, coarse))
         pilot_seconds = pilot.runs.seconds
         report(0.2)
         levels, ways, failed = tried(pilot, seen, chosen, report)
@@ -94,7 +62,8 @@ def answered(
             raise failing(top, np.concatenate(levels[0].y))
         chosen = finer(chosen)
     solved, part = enough(pilot, chosen, levels)
-    return told(pilot, chosen, levels, (seen, ways, pilot_seconds), (solved, part), own_step, content)
+    report(1.0)
+    return told(pilot, chosen, levels, (seen, ways, pilot_seconds), (solved, part), own, content)
 
 
 def tried(
@@ -102,7 +71,12 @@ def tried(
 ) -> tuple[list[Level], list[Way], Setting | None]:
     """Run the best way that does not stand on a setting at which members fail; the top setting where they fail at it."""
     while True:
-        ways = candidates(seen, chosen.variance)
+        ways = candidates(seen, chosen.variance, pilot.estimator)
+        if pilot.estimator not in (None, ways[0].name):
+            problem = (
+                f"cannot be had of {chosen.setting}: no setting that is much cheaper follows it, or nothing varies"
+            )
+            raise refusal("estimator", pilot.estimator, problem, "leave it out, or give a shorter h")
         levels = levels_of(pilot, seen, ways[0])
         failed = run(pilot.runs, levels, lambda part: report(0.2 + 0.7 * part))
         if failed is None or failed == chosen.setting:
@@ -111,138 +85,63 @@ def tried(
         seen = without(seen, failed)
 
 
-def finer(chosen: Chosen) -> Chosen:
-    """The next step of the ladder."""
-    place = chosen.place + 1
-    return replace(chosen, place=place, bias=chosen.ladder.biases()[place])
-
-
-def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, own_step: float | None) -> Chosen:
-    """Climb the ladders and choose the setting that is predicted to cost least; the own step where members are few."""
-    climbed = []
-    own = ladders[0][-2] if fixed else None if own_step is None else replace(ladders[0][0], h=own_step)
-    for i, steps in enumerate(ladders):
-        if i == 0 and own is not None and seems_few(pilot, steps) and (ladder := at_once(pilot, own)):
-            return choice_of(pilot, ladder, own)
-        asked = own if fixed else None
-        ladder = climb(pilot, steps, asked)
-        if asked is not None and asked not in ladder.settings:
-            why = ladder.refused.get(str(asked), "it was not run")
-            raise SceneError([f"setting = {asked}: {why}; give a shorter step, or leave h out"])
-        if ladder.settings:
-            climbed.append(choice_of(pilot, ladder, asked))
-        elif i == len(ladders) - 1 and not climbed:
-            causes = "; ".join(f"{name}: {why}" for name, why in list(ladder.refused.items())[-2:])
-            raise SceneError([f"setting: no step was taken: {causes}; mend what fails, or fix method= and h="])
-        if climbed and climbed[-1].ladder.end == "apart":
-            break
-    best = min(climbed, key=lambda each: (each.bias.mean_square > each.error**2, price(pilot, each)))
-    return compared(pilot, best, [each for each in climbed if each is not best])
-
-
-def seems_few(pilot: Pilot, steps: Sequence[Setting]) -> bool:
-    """Whether plain Monte Carlo needs few members, by the coarsest step that runs."""
-    for setting in steps:
-        ladder = Ladder()
-        if runs_at(pilot, setting, ladder):
-            return pilot.plain_members(setting, FIRST) <= FEW
-    return False
-
-
-def price(pilot: Pilot, chosen: Chosen) -> float:
-    """What a member costs over the variance that is left [s]."""
-    return pilot.runs.cost(chosen.setting, pilot.grid(chosen.setting)) / chosen.variance
-
-
-def choice_of(pilot: Pilot, ladder: Ladder, fixed: Setting | None) -> Chosen:
-    """The setting of a ladder, and its bias."""
-    last = ladder.settings[-1]
-    error = pilot.asked(pilot.solved(last, FIRST))
-    if not error > 0.0:
-        problem = f"asks for a part of {pilot.runs.question.label}, which is 0"
-        raise refusal("relative_error", pilot.error, problem, "give error=, in the unit of the statistic")
-    place = ladder.settings.index(fixed) if fixed is not None else ladder.settled(error)
-    bias = ladder.biases()[place]
-    pairs = ladder.halvings[-1].members if ladder.halvings else FIRST
-    return Chosen(ladder, place, bias, error, f"{last} on {pairs} members" if place < len(ladder.settings) - 1
-                  else f"the halving before, from {ladder.settings[max(place - 1, 0)]}, on {pairs} members")  # fmt: skip
-
-
-def compared(pilot: Pilot, best: Chosen, others: Sequence[Chosen]) -> Chosen:
-    """The same with what another method differs by: where the two disagree the bias may be as large; and notes."""
-    ladder, messages = best.ladder, pilot.messages
-    messages += [f"{name} is left out: {why}" for name, why in ladder.refused.items()]
-    for other in others if pilot.noise == "none" else ():
-        mine, theirs = ladder.settings[-1], other.ladder.settings[-1]
-        found = pilot.pair(theirs, mine, FIRST)
-        unknown = found.half + best.ladder.biases()[-1].half + other.ladder.biases()[-1].half
-        if abs(found.value) > unknown:
-            messages.append(f"{theirs} and {mine} differ by {found.value:.2g}, more than their halvings do")
-            best = replace(best, bias=replace(best.bias, half=best.bias.half + abs(found.value)))
-    lefts = [each.left for each in ladder.halvings]
-    if ladder.end == "apart" or (lefts and lefts[-1] > APART and pilot.noise == "free"):
-        cause = ("noise acts whose path no two steps share" if pilot.noise == "free"
-                 else "small differences grow over the run until they fill its spread, as in chaos")  # fmt: skip
-        messages.append(
-            f"levels gain nothing: members of two steps are apart (1 - rho^2 is {lefts[-1]:.2g}), since {cause}"
-        )
-    if math.sqrt(best.bias.mean_square) > 0.87 * best.error:
-        messages.append(
-            f"the bias is known to {math.sqrt(best.bias.mean_square):.2g} alone, the error asked for is {best.error:.2g}: "
-            + {"apart": "members of all steps are apart", "members": "more members of the pilot would cost too much"}.get(
-                ladder.end, "ask for a shorter t1 or a larger error")
-        )  # fmt: skip
-    return best
-
-
-def constant(pilot: Pilot, setting: Setting) -> bool:
-    """Whether all members have one number since nothing varies."""
-    return pilot.runs.dimensions == 0 and pilot.noise == "none" and bool(
-        np.ptp(pilot.y(setting, pilot.grid(setting), FIRST)) == 0.0
-    )  # fmt: skip
-
-
-def coarser_than(pilot: Pilot, chosen: Chosen, coarse: Sequence[Sequence[Setting]]) -> list[Setting]:
-    """Coarser settings that levels may stand on: of the ladder, and the longest steps of the cheaper scenes."""
-    top, found = chosen.setting, list[Setting]()
-    if chosen.ladder.end == "apart" or pilot.noise == "free":
-        return []
-    # Steps that are too long spread otherwise than the next one.
-    pairs = zip(chosen.ladder.settings[: chosen.place], chosen.ladder.halvings, strict=False)
-    below = [setting for setting, halving in pairs if halving.alike]
-    found += below[:: max(1, math.ceil(len(below) / MOST_COARSER))]
-    for steps in coarse:
-        for step in steps:
-            multiple = step.h / top.h
-            if multiple < 1.0 - 1e-9 or abs(multiple - round(multiple)) > 1e-9 * multiple:
-                continue
-            try:
-                if not np.isnan(pilot.y(replace(step, method=top.method), pilot.grid(top), FIRST)).any():
-                    found.append(replace(step, method=top.method))
-                    break
-            except SceneError as error:
-                pilot.messages.append(f"{step} is left out: {error.faults[0]}")
-    return found
-
-
-def looked(pilot: Pilot, top: Setting, coarser: Sequence[Setting], variance: float) -> Observed:
+def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed:
     """What the settings have in common, of as many members as are worth their cost."""
-    few = pilot.plain_members(top, FIRST) <= FEW
-    seen = observed(pilot, top, [] if few else coarser, FIRST)
+    top, variance, only = chosen.setting, chosen.variance, pilot.estimator
+    few = only is None and pilot.plain_members(top, FIRST) <= FEW
+    seen = observed(pilot, top, [] if few else in_single(pilot, top, coarser), FIRST)
+    seen = with_coarsest(pilot, seen, variance)
+    if only is None and chosen.ladder.end == "apart" and gains(candidates(seen, variance)).get("sobol", 1.0) < CLEAR:
+        return replace(seen, normals=seen.normals[:, :0])
+    if pilot.settled and only is not None and not only.startswith("levels"):
+        few = LOOKS[0] > SHARE * pilot.plain_members(top, FIRST)
+        return seen if few else observed(pilot, top, [], LOOKS[0])
     for members in LOOKS:
-        best = candidates(seen, variance)[0]
-        kept = worth_more(seen, variance)
+        best = candidates(seen, variance, only)[0]
+        kept = worth_more(seen, variance, only)
         more = 0.75 * members * sum(seen.costs[seen.settings.index(setting)] for setting in (top, *kept))
+        more += (1 + len(kept)) * seen.call
         within_share = pilot.runs.seconds + more <= pilot.most_seconds(top, FIRST)
         if few or more > (WORTH if within_share else SHARE) * best.seconds:
             break
-        seen = observed(pilot, top, kept, members)
+        seen = with_coarsest(pilot, observed(pilot, top, kept, members), variance)
     return seen
 
 
-def worth_more(seen: Observed, variance: float) -> list[Setting]:
+def in_single(pilot: Pilot, top: Setting, coarser: Sequence[Setting]) -> list[Setting]:
+    """Coarse settings in single precision, where plain Monte Carlo costs so much that another kernel pays."""
+    plain_seconds = pilot.plain_members(top, FIRST) * pilot.runs.cost(top, pilot.grid(top))
+    if not pilot.single or plain_seconds < WORTH_A_KERNEL:
+        return list(coarser)
+    found = list[Setting]()
+    for setting in coarser:
+        twin = replace(setting, dtype="float32")
+        try:
+            same = np.isfinite(pilot.y(twin, pilot.grid(top), FIRST)).all()
+        except SceneError:
+            return list(coarser)
+        found.append(twin if same else setting)
+    return found
+
+
+def with_coarsest(pilot: Pilot, seen: Observed, variance: float) -> Observed:
+    """The same with more members of the best way's coarsest setting, which cost little and most are run of."""
+    best = candidates(seen, variance, pilot.estimator)[0]
+    last = best.chain[-1]
+    worth = [n for n in LOOKS if n * seen.costs[last] <= SHARE * best.seconds and n > len(seen.z[last])]
+    if last == 0 or not worth:
+        return seen
+    setting = seen.settings[last]
+    y = pilot.y(setting, pilot.grid(setting), worth[-1])
+    if np.isnan(y).any():
+        return seen
+    costs = [pilot.runs.cost(each, pilot.grid(each)) for each in seen.settings]
+    return replace(seen, costs=costs, alone={**seen.alone, last: pilot.target.contributions(y, seen.at)})
+
+
+def worth_more(seen: Observed, variance: float, only: str | None = None) -> list[Setting]:
     """The coarser settings of ways that cost at most twice the least."""
-    ways = candidates(seen, variance)
+    ways = candidates(seen, variance, only)
     near = {i for way in ways if way.seconds <= 2.0 * ways[0].seconds for i in way.chain}
     return [seen.settings[i] for i in sorted(near - {0})]
 
@@ -254,8 +153,8 @@ def without(seen: Observed, failed: Setting) -> Observed:
     def chosen(values: Sequence[Any]) -> list[Any]:
         return [values[i] for i in kept]
 
-    pair = seen.pair
-    return replace(seen, z=chosen(seen.z), costs=chosen(seen.costs), settings=chosen(seen.settings),
+    pair, alone = seen.pair, {kept.index(i): z for i, z in seen.alone.items() if i in kept}
+    return replace(seen, z=chosen(seen.z), costs=chosen(seen.costs), settings=chosen(seen.settings), alone=alone,
                    pair=lambda f, c: pair(kept[f], kept[c]))  # fmt: skip
 
 
@@ -289,27 +188,33 @@ def run(runs: Runs, levels: Sequence[Level], report: Callable[[float], None]) ->
 
 
 def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solved, MeanEstimate]:
-    """The estimate; where its error is beyond the one asked for, once more with twice the members.
+    """The estimate; where its error is beyond the one asked for, with what it takes, up to four times the members, twice.
 
-    The variance is then at least a quarter of the first: a stop by chance must not tell too small an error.
+    The variance is then at least what the first one lets expect of so many members, over as much again: a stop by chance
+    must not tell too small an error.
     """
     if pilot.target.kind in ("mean", "cvar"):
         refuse_heavy(pilot.runs.question.label, np.concatenate(levels[0].y))
     solved, part = estimated(levels, pilot.target)
-    if part.variance <= max(chosen.error**2 - chosen.bias.mean_square, 0.25 * chosen.error**2):
-        return solved, part
-    for level in levels:
-        level.grow(pilot.runs, level.members)
-        if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):
-            raise failing(level.fine, level.y[-1])
-    before = part.variance
-    solved, part = estimated(levels, pilot.target)
-    return solved, replace(part, variance=max(part.variance, 0.25 * before))
+    allowed = max(chosen.error**2 - chosen.bias.mean_square, 0.25 * chosen.error**2)
+    # A quantile's density, which its error stands on, is known by the same members.
+    least = 1.0 if pilot.target.kind == "quantile" else 0.0
+    for _ in range(ROUNDS):
+        if part.variance <= allowed:
+            break
+        before, share = part.variance, min(max(ROOM[levels[0].kind] * part.variance / allowed - 1.0, least), MOST_MORE)
+        for level in levels:
+            level.grow(pilot.runs, level.more(share))
+            if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):
+                raise failing(level.fine, level.y[-1])
+        solved, part = estimated(levels, pilot.target)
+        part = replace(part, variance=max(part.variance, before / (1.0 + share) ** 2))
+    return solved, part
 
 
 def told(
     pilot: Pilot, chosen: Chosen, levels: Sequence[Level], found: tuple[Observed, Sequence[Way], float] | None,
-    reached: tuple[Solved, MeanEstimate] | None, own_step: float | None, content: Mapping[str, Any],
+    reached: tuple[Solved, MeanEstimate] | None, own: Setting | None, content: Mapping[str, Any],
 ) -> Estimated:  # fmt: skip
     """The answer in full."""
     top, target, runs = chosen.setting, pilot.target, pilot.runs
@@ -336,13 +241,13 @@ def told(
         low, high = within(part, low, high, chosen.bias, sum(members.values()))
     plain_members = variance_of_one / max(chosen.variance, 1e-300)
     cost = runs.cost(top, pilot.grid(top))
-    own = None if own_step is None else variance_of_one / max(chosen.error, 1e-300) ** 2 * cost * top.h / own_step
+    own_seconds = None if own is None else variance_of_one / max(chosen.error, 1e-300) ** 2 * cost * top.h / own.h
     return Estimated(
         of=question.label, unit=question.unit, value=part.value, interval=(low, high), error=chosen.error,
         sampling_error=math.sqrt(part.variance), bias=chosen.bias.value,
         bias_interval=(chosen.bias.value - chosen.bias.half, chosen.bias.value + chosen.bias.half),
         setting=str(top), settings=top.options(), reference=chosen.reference, estimator=name, members=members,
-        seconds=runs.seconds, pilot_seconds=pilot_seconds, plain_seconds=plain_members * cost, own_seconds=own,
+        seconds=runs.seconds, pilot_seconds=pilot_seconds, plain_seconds=plain_members * cost, own_seconds=own_seconds,
         rivals=rivals, messages=tuple(messages), provenance=dict(content) | {"settings": top.options()},
     )  # fmt: skip
 

@@ -74,26 +74,29 @@ def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_r
     return StepChange(part.value, half, left if np.isfinite(left) else 1.0, n, a <= ALIKE * b and b <= ALIKE * a)
 
 
-def beyond(halvings: Sequence[StepChange]) -> float:
+def beyond(halvings: Sequence[StepChange], order: int = 1) -> float:
     """What is left beyond the finest step: the last halving bounds it for order one; a third where halvings fall faster.
 
-    A difference that happens to be near 0 says little: the one before, divided by four, is taken where that is larger.
+    A difference that happens to be near 0 says little: the one before, divided by four, is taken where that is larger; by
+    sixteen for a method of order 8, whose halvings fall by 256.
     """
     sizes = [abs(each.value) for each in halvings]
-    last = max(sizes[-1], 0.25 * sizes[-2]) if len(sizes) > 1 else sizes[-1]
+    last = max(sizes[-1], sizes[-2] / max(4.0, 2.0 ** (0.5 * order))) if len(sizes) > 1 else sizes[-1]
     fell = len(sizes) > 1 and sizes[-2] >= FALLING * sizes[-1]
     return last / 3.0 if fell else last
 
 
-def biases(halvings: Sequence[StepChange]) -> list[Bias]:
+def biases(halvings: Sequence[StepChange], order: int = 1) -> list[Bias]:
     """The bias of every step of a ladder, the coarsest first, from the difference of each to the next.
 
     The differences of one ladder are of the same members and are added as they come, halves too, which bounds their sum.
+
+    order: of the method, 1 in noise.
     """
     if not halvings:
         return [Bias(0.0, float("inf"))]
-    rest, found = beyond(halvings), [Bias(0.0, beyond(halvings) + halvings[-1].half)]
-    value = half = 0.0
+    rest = beyond(halvings, order)
+    found, value, half = [Bias(0.0, rest + halvings[-1].half)], 0.0, 0.0
     for each in reversed(halvings):
         value, half = value + each.value, half + each.half
         found.append(Bias(value, half + rest))

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,12 +23,14 @@ from lgvi_warp.studies.estimating.estimators import (
 from lgvi_warp.studies.estimating.levels import Setting
 from lgvi_warp.studies.estimating.target import Solved
 
-# Numbers of members are larger than predicted by this factor: variances are known to a third.
-ROOM = 1.3
+# Numbers of members are larger than predicted by this factor: variances are known to a third by 16 replicates, and better by
+# independent members.
+ROOM = {"sobol": 1.3, "plain": 1.05, "regression": 1.1}
 # Replicates must beat independent members by this, whose spread is known better.
 CLEARLY = 1.1
 # A coarse setting must cost less than this part of the fine one.
 CHEAPER = 0.6
+ESTIMATORS = ("plain Monte Carlo", "sobol", "regression", "levels", "levels of sobol")
 # Least members of a level.
 FEWEST = 4 * REPLICATES
 
@@ -62,7 +64,8 @@ class Observed:
 
     z: (settings, n). normals: (n, d) of the members' numbers. least: smallest change of a contribution.
     costs: of a member alone [s]. pair: cost of a member of two settings, by their numbers [s]. settings: in the same order.
-    at: the target, by which contributions were formed.
+    at: the target, by which contributions were formed. alone: by the number of a setting, contributions of more members.
+    call: what a call takes by itself [s].
     """
 
     z: Sequence[np.ndarray]
@@ -72,29 +75,33 @@ class Observed:
     least: float
     settings: Sequence[Setting]
     at: Solved
+    alone: Mapping[int, np.ndarray] = field(default_factory=dict)
+    call: float = 0.0
 
 
-def candidates(seen: Observed, variance: float) -> list[Way]:
-    """All ways to reach a variance, the cheapest first."""
-    chains = [(0,)] + [chain for k in (2, 3) for chain in coupled(seen, k)]
+def candidates(seen: Observed, variance: float, only: str | None = None) -> list[Way]:
+    """All ways to reach a variance, the cheapest first; only: of an estimator, in front of all others where there is any."""
+    asked = only is not None and only.startswith("levels")
+    chains = [(0,)] + [chain for k in (2, 3) for chain in coupled(seen, k, asked)]
     kinds = ["plain"] + (["sobol"] if seen.normals.shape[1] else [])
     ways = [_candidate(seen, kind, chain, variance) for chain in chains for kind in kinds]
     if 0 < 8 * (seen.normals.shape[1] + 1) <= len(seen.z[0]) and seen.normals.shape[1]:
         ways.append(_candidate(seen, "regression", (0,), variance))
     ways.sort(key=lambda way: way.seconds * (CLEARLY if way.kind == "sobol" else 1.0))
+    ways.sort(key=lambda way: only is not None and way.name != only)
     # Of those that cost about the same, as where few members do, the one with the least variance.
-    near = [way for way in ways if way.seconds <= CLEARLY * ways[0].seconds]
+    near = [way for way in ways if way.seconds <= CLEARLY * ways[0].seconds and only in (None, way.name)] or ways[:1]
     best = min(near, key=lambda way: way.variance)
     return [best, *(way for way in ways if way is not best)]
 
 
-def coupled(seen: Observed, count: int) -> list[tuple[int, ...]]:
-    """Chains of so many settings of which each is much cheaper than the one before, and follows it."""
+def coupled(seen: Observed, count: int, asked: bool = False) -> list[tuple[int, ...]]:
+    """Chains of so many settings of which each is much cheaper than the one before, and follows it; asked: at any cost."""
     chains = []
     for rest in itertools.combinations(range(1, len(seen.z)), count - 1):
         chain = (0, *sorted(rest, key=lambda i: -seen.costs[i]))
         links = list(itertools.pairwise(chain))
-        cheap = all(seen.costs[c] < CHEAPER * seen.costs[f] for f, c in links)
+        cheap = asked or all(seen.costs[c] < CHEAPER * seen.costs[f] for f, c in links)
         if cheap and all(slope(seen.z[f], seen.z[c])[1] <= APART for f, c in links):
             chains.append(chain)
     return chains
@@ -107,13 +114,15 @@ def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: floa
         spreads.append(_spread(seen, kind, weight * (seen.z[f] - factor * seen.z[c]), seen.pair(f, c), weight))
         slopes.append(factor)
         weight *= factor
-    spreads.append(_spread(seen, kind, weight * seen.z[chain[-1]], seen.costs[chain[-1]], weight))
+    last = chain[-1]
+    spreads.append(_spread(seen, kind, weight * seen.alone.get(last, seen.z[last]), seen.costs[last], weight))
     numbers = best_numbers(spreads, variance)
     dimensions = seen.normals.shape[1]
     members = tuple(
-        rounded(kind, ROOM * n, dimensions, spread.power) for n, spread in zip(numbers, spreads, strict=True)
+        rounded(kind, ROOM[kind] * n, dimensions, spread.power) for n, spread in zip(numbers, spreads, strict=True)
     )
-    seconds = float(sum(max(ROOM * n, FEWEST) * spread.cost for n, spread in zip(numbers, spreads, strict=True)))
+    seconds = float(sum(max(ROOM[kind] * n, FEWEST) * spread.cost for n, spread in zip(numbers, spreads, strict=True)))
+    seconds += (2 * len(chain) - 1) * seen.call
     left = sum(spread.at(n) for spread, n in zip(spreads, members, strict=True))
     return Way(kind, chain, tuple(slopes), members, seconds, left)
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
@@ -26,11 +27,12 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import EnsembleSettings
 from lgvi_warp.studies.estimating import answering
 from lgvi_warp.studies.estimating.answer import Estimated
+from lgvi_warp.studies.estimating.choice import ESTIMATORS
 from lgvi_warp.studies.estimating.levels import Runs, Setting
 from lgvi_warp.studies.estimating.pilot import Pilot
 from lgvi_warp.studies.estimating.question import question_of
+from lgvi_warp.studies.ladders import SHORT
 from lgvi_warp.studies.speed import void
-from lgvi_warp.studies.suggest import SHORT
 
 # Methods whose steps are tried: the scene's own, and the first of those that are cheapest by what acts.
 METHODS = 2
@@ -51,8 +53,11 @@ def estimate(
     method: str | Method | None = None,
     h: float | None = None,
     dtype: str | None = None,
+    estimator: str | None = None,
     seed: int | None = None,
     threads: int | None = None,
+    executor: Any = "threads",
+    scheduler: str | None = None,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Estimated:
     """Estimate a statistic at an error, for the least work that a small pilot finds.
@@ -60,6 +65,9 @@ def estimate(
     A pilot runs few members at several steps. It tells the bias of each, and what plain Monte Carlo, Sobol points, regression
     and levels (paired differences of fine and coarse settings) would take. The cheapest is run with numbers of members that
     are fixed beforehand.
+
+    What is chosen follows costs as they are measured, so that two calls may choose differently. The same seed gives the same
+    bits where `h` and `estimator` are fixed, but for levels, whose numbers of members costs decide.
 
     Args:
         fleet: the ensemble, or a Scene with one. Its distributions are drawn from anew; members and sampling do not matter.
@@ -74,9 +82,15 @@ def estimate(
             They serve as coarse levels alone. Default none.
         method: fixes the method. Default: the scene's own, and one that suits what acts.
         h: fixes the step [s], whose bias is told all the same; with the scene's method unless `method` is given.
-        dtype: precision. Default: that of the scene.
+        dtype: fixes the precision, of coarse levels too. Default: that of the scene, and "float32" of coarse levels that gain
+            by it.
+        estimator: fixes the estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol". Default:
+            the one that is predicted to cost least.
         seed: of points and noise. Default: that of the ensemble.
         threads: threads of the runs. Default: as of `lw.solve`.
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Of those that are no threads the
+            time that passes is taken for the cost.
+        scheduler: address of Dask's scheduler.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             from 0 to 1.
 
@@ -84,8 +98,9 @@ def estimate(
         The value, its interval and what it took; `print` shows it.
 
     Raises:
-        SceneError: for faulty arguments, for a statistic of another kind or without finite variance, and where members fail
-            at the finest setting.
+        SceneError: for faulty arguments, for a statistic of another kind or without finite variance, where members fail at the
+            finest setting, and where the estimator that is fixed cannot be had.
+        KeyboardInterrupt: if Ctrl-C ends it, which tells how far it was; there is no answer then.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -102,6 +117,8 @@ def estimate(
         if value is not None:
             faults.positive(name, value, "in the unit of the statistic")
     check_threads(faults, threads)
+    if estimator is not None:
+        faults.choice("estimator", estimator, ESTIMATORS)
     question = None
     with faults.including():
         question = question_of(of, risk)
@@ -115,17 +132,34 @@ def estimate(
     faults.raise_if_any()
     seed = whole.seed if seed is None else int(EnsembleSettings(1, seed).seed)
     fleets = [whole, *cheaper_fleets(whole, cheaper)]
-    runs = Runs(fleets, question, float(t1), seed=seed, threads=threads)
+    clock = time.process_time if executor == "threads" else time.perf_counter
+    execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
+    runs = Runs(fleets, question, float(t1), seed=seed, execution=execution, clock=clock)
     asked = error if error is not None else relative_error
     assert asked is not None
     steps = [spacing_of(each.scene, float(t1)) for each in fleets]
-    ladders, noise = ladders_of(whole, float(t1), steps[0], method, h, dtype)
-    pilot = Pilot(runs, question.target, noise, float(asked), error is None)
+    ladders, noise = ladders_of(whole, float(t1), steps[0], None if method is None else [method], h, dtype)
+    single = dtype is None and ladders[0][0].dtype == "float64"
+    fixed = h is not None and estimator is not None
+    pilot = Pilot(runs, question.target, noise, float(asked), error is None, single, estimator, settled=fixed)
     coarse = [coarse_of(spacing, i, ladders[0][0]) for i, spacing in enumerate(steps) if i]
     content = {"scene": whole.scene.to_dict(), "ensemble": whole.to_dict(), "seed": seed, "t1": float(t1)}
     content |= {"versions": machine.versions(), "machine": machine.describe()}
-    fixed = h is not None
-    return answering.answered(pilot, ladders, coarse, fixed, whole.scene.run.step, callback(progress) or void, content)
+    own = own_setting(whole.scene, ladders)
+    report = callback(progress) or void
+    try:
+        return answering.answered(pilot, ladders, coarse, h is not None, own, report, content)
+    except KeyboardInterrupt as stop:
+        text = f"interrupted after {runs.seconds:.2g} s and {runs.members:,} members; there is no answer yet"
+        raise KeyboardInterrupt(text) from stop
+
+
+def own_setting(scene: Any, ladders: Sequence[Sequence[Setting]]) -> Setting | None:
+    """The scene's own step with its own method, or the first one's; None where the scene has none."""
+    if scene.run.step is None:
+        return None
+    named = [steps[0] for steps in ladders if steps[0].method == scene.run.method]
+    return replace((named or [ladders[0][0]])[0], h=scene.run.step)
 
 
 def drawn(fleet: Ensemble) -> Ensemble:
@@ -164,16 +198,16 @@ def spacing_of(scene: Any, t1: float) -> Fraction:
     if every is not None and every <= t1:
         times.append(saveat.exact(every))
     if controller is not None:
-        times += [saveat.exact(float(time)) for time in (controller.period, controller.delay) if time > 0.0]
+        times += [saveat.exact(float(each)) for each in (controller.period, controller.delay) if each > 0.0]
     spacing = times[0]
-    for time in times[1:]:
-        shared = math.gcd(spacing.numerator * time.denominator, time.numerator * spacing.denominator)
-        spacing = Fraction(shared, spacing.denominator * time.denominator)
+    for other in times[1:]:
+        shared = math.gcd(spacing.numerator * other.denominator, other.numerator * spacing.denominator)
+        spacing = Fraction(shared, spacing.denominator * other.denominator)
     return spacing / 20 if len(times) == 1 else spacing
 
 
 def ladders_of(
-    fleet: Ensemble, t1: float, spacing: Fraction, method: Any, h: float | None, dtype: str | None
+    fleet: Ensemble, t1: float, spacing: Fraction, methods: Sequence[Any] | None, h: float | None, dtype: str | None
 ) -> tuple[list[list[Setting]], str]:
     """Settings to try by method, the coarsest step first, the asked one last but one; and how noise acts.
 
@@ -185,7 +219,8 @@ def ladders_of(
     rate = float(np.nanmax(np.linalg.norm(few.select(0, few.members).angular_velocity, axis=1)))
     m = max(1, math.ceil(float(spacing) * max(rate, 2.0 * math.pi / t1)))
     coarsest = spacing / m
-    names: list[Any] = [method] if method is not None else list(own_and_short(fleet, h is not None))
+    names = short_and_own(fleet, h is not None) if methods is None else methods
+    most = 1 if h is not None else METHODS if methods is None else len(methods)
     taken, refused, noise = list[Any](), list[str](), "none"
     for name in names:
         try:
@@ -198,9 +233,10 @@ def ladders_of(
         if noisy:
             noise = "grid" if all(isinstance(term, NoisyTerm) for term in noisy) else "free"
         taken.append(name if isinstance(name, str | Method) else plan.method)
+        if len(taken) == most:
+            break
     if not taken:
         raise SceneError(refused)
-    taken = taken[:1] if h is not None else taken[:METHODS]
     if h is None:
         return [[Setting(name, float(coarsest / 2**k), dtype) for k in range(HALVINGS)] for name in taken], noise
     exact = saveat.exact(h)
@@ -208,14 +244,15 @@ def ladders_of(
     return [[Setting(taken[0], float(step), dtype) for step in (*longer, exact, exact / 2)]], noise
 
 
-def own_and_short(fleet: Ensemble, alone: bool) -> Sequence[Any]:
-    """The scene's own method, and the first ones of those that are cheapest by what acts; alone: the scene's own if any."""
+def short_and_own(fleet: Ensemble, alone: bool) -> Sequence[Any]:
+    """The method that is cheapest mostly by what acts, the scene's own, and more; alone: the scene's own if any."""
     own, noisy = fleet.scene.run.method, any(isinstance(term, NoisyTerm) for term in fleet.scene.terms)
     kind = "noisy" if noisy else "damped" if is_damped(fleet) else "conservative"
     if own is None:
         return SHORT[kind]
     named = own if not fleet.scene.run.method_options else fleet.scene.run.method_of(None)
-    return [named] if alone else [named, *(name for name in SHORT[kind] if name != own)]
+    first, *others = SHORT[kind]
+    return [named] if alone else [*([first] if first != own else []), named, *(name for name in others if name != own)]
 
 
 def coarse_of(spacing: Fraction, scene: int, like: Setting) -> list[Setting]:

@@ -3,24 +3,26 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.calls.prepared import Prepared, prepare
+from lgvi_warp.common import machine
 from lgvi_warp.common.random import generator
-from lgvi_warp.sampling.designs.sequences import sobol_points
+from lgvi_warp.sampling.designs.sequences import SOBOL_BITS, sobol_points
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies.comparison import drawn_every
 from lgvi_warp.studies.estimating.estimators import REPLICATES, MeanEstimate, plain, regressed, replicated, together
 from lgvi_warp.studies.estimating.question import Question
 from lgvi_warp.studies.estimating.target import Solved, Sought, Weighted
 
-# Members of one call.
-AT_ONCE = 65_536
+# Members of one call for each thread, whose numbers stay in its cache, and threads that count.
+AT_ONCE, MOST_THREADS = 8192, 8
 
 
 @dataclass(frozen=True)
@@ -51,40 +53,48 @@ class Runs:
     """Runs of one question in any setting, each prepared once.
 
     fleets: the user's ensemble, then the cheaper scenes' with the same variation.
-    seconds: processor time of all calls so far, without preparing and compiling [s].
+    seconds: processor time of all runs so far, prepared and called, without preparing the first run of each kernel, which
+        loads or compiles it [s].
+    execution: threads, executor and scheduler, as of `lw.prepare`.
     """
 
     def __init__(
-        self, fleets: Sequence[Ensemble], question: Question, t1: float, *, seed: int, threads: int | None = None,
-        clock: Callable[[], float] = time.process_time,
+        self, fleets: Sequence[Ensemble], question: Question, t1: float, *, seed: int,
+        execution: Mapping[str, Any] | None = None, clock: Callable[[], float] = time.process_time,
     ):  # fmt: skip
         self.question, self.seed, self.seconds = question, seed, 0.0
-        self._fleets, self._t1, self._threads, self._clock = fleets, t1, threads, clock
+        self._fleets, self._t1, self._execution, self._clock = fleets, t1, execution or {}, clock
         self._prepared: dict[tuple[Setting, float | None], Prepared] = {}
         self._calls: list[Call] = []
+        self._loaded, self._costs = set[Any](), dict[Any, float]()
+        threads = self._execution.get("threads") or machine.thread_count()
+        self._at_once = AT_ONCE * min(threads, MOST_THREADS)
         self.dimensions = fleets[0].space.dimensions
 
     def prepared(self, setting: Setting, grid: float | None) -> Prepared:
         """The run of a setting, with noise on a grid [s], None for draws once a step; SceneError where it is refused."""
         key = setting, grid
         if key not in self._prepared:
-            fleet = self._fleets[setting.scene]
+            begun, fleet = self._clock(), self._fleets[setting.scene]
             fleet = Ensemble(fleet.scene, 1, self.seed, fleet.vary)
             fleet = fleet if grid is None else drawn_every(fleet, grid)
             asked = self.question.settings(fleet.scene)
-            self._prepared[key] = prepare(
-                fleet, levels=self.dimensions > 0, t1=self._t1, threads=self._threads, **setting.options(), **asked
+            run = self._prepared[key] = prepare(
+                fleet, levels=self.dimensions > 0, t1=self._t1, **self._execution, **setting.options(), **asked
             )
-            # What a first call makes once is no cost of later ones.
-            self._call(self._prepared[key], setting, np.full((1, self.dimensions), 0.5), np.zeros(1, np.int64))
+            kernel = run.noise.plan.spec
+            # What loads a kernel, or compiles it, is no cost of later calls.
+            if kernel in self._loaded:
+                self.seconds += max(self._clock() - begun, 0.0)
+            self._loaded.add(kernel)
         return self._prepared[key]
 
     def __call__(self, setting: Setting, grid: float | None, points: np.ndarray, indices: np.ndarray) -> np.ndarray:
         """The numbers of members (n,) at points (n, d), with the noise of these indices; NaN for those that failed."""
         run, n = self.prepared(setting, grid), len(points)
         groups = []
-        for first in range(0, n, AT_ONCE):
-            some = slice(first, first + AT_ONCE)
+        for first in range(0, n, self._at_once):
+            some = slice(first, first + self._at_once)
             begun = self._clock()
             groups.append(self.question.numbers(self._call(run, setting, points[some], indices[some])))
             taken = max(self._clock() - begun, 1e-9)
@@ -100,10 +110,26 @@ class Runs:
         many = (np.repeat(state, len(points), axis=0) for state in states)
         return run.states(*many, indices=indices, seed=self.seed)
 
+    @property
+    def call_seconds(self) -> float:
+        """Processor time that a call takes by itself [s]."""
+        kind = self._calls[0].setting.kind
+        like = [call for call in self._calls if call.setting.kind == kind]
+        return float(fitted(like, [call for call in self._calls if call.setting.kind != kind])[0])
+
+    @property
+    def members(self) -> int:
+        """How many members were run so far."""
+        return sum(call.members for call in self._calls)
+
     def cost(self, setting: Setting, grid: float | None = None) -> float:
         """Processor time of a member in a large call [s], from all calls so far of its kind."""
-        like = [call for call in self._calls if call.setting.kind == setting.kind]
-        return member_cost(like, setting.h, setting.h if grid is None else grid)
+        key = setting, grid, len(self._calls)
+        if key not in self._costs:
+            like = [call for call in self._calls if call.setting.kind == setting.kind]
+            others = [call for call in self._calls if call.setting.kind != setting.kind]
+            self._costs[key] = member_cost(like, setting.h, setting.h if grid is None else grid, others)
+        return self._costs[key]
 
 
 @dataclass(frozen=True)
@@ -116,35 +142,44 @@ class Call:
     seconds: float
 
 
-def member_cost(calls: Sequence[Call], h: float, draw: float) -> float:
-    """The processor time of a member [s] by least squares over calls: per call, member, step and draw, none below 0.
+def member_cost(calls: Sequence[Call], h: float, draw: float, others: Sequence[Call] = ()) -> float:
+    """The processor time of a member [s], as `fitted`; what a call takes by itself is no cost of a member."""
+    cost = float(fitted(calls, others)[1:4] @ (1.0, 1.0 / h, 1.0 / draw))
+    # Where all is taken for the calls' own, the cheapest call bounds it.
+    return max(cost, 1e-2 * min(call.seconds / call.members for call in calls))
 
-    Relative residuals count. What a call takes by itself is no cost of a member.
+
+def fitted(calls: Sequence[Call], others: Sequence[Call] = ()) -> np.ndarray:
+    """Processor time by least squares over calls: per call, member, step and draw, none below 0 [s]. Relative residuals count.
+
+    others: calls of other kinds, which take as much by themselves.
     """
     from scipy.optimize import nnls
 
-    rows = np.array([[1.0, c.members, c.members / c.setting.h, c.members / c.draw] for c in calls])
-    seconds = np.array([c.seconds for c in calls])
-    size = np.abs(rows).max(axis=0)
-    numbers = nnls(rows / size / seconds[:, None], np.ones(len(calls)))[0] / size
-    cost = float(numbers[1:] @ (1.0, 1.0 / h, 1.0 / draw))
-    # Where all is taken for the calls' own, the cheapest call bounds it.
-    return max(cost, 1e-2 * float(np.min(seconds / rows[:, 1])))
+    def rows(some: Sequence[Call]) -> np.ndarray:
+        return np.array([[c.members, c.members / c.setting.h, c.members / c.draw] for c in some]).reshape(-1, 3)
+
+    mine, theirs = rows(calls), rows(others)
+    apart = np.block([[mine, np.zeros_like(mine)], [np.zeros_like(theirs), theirs]])
+    columns = np.column_stack([np.ones(len(apart)), apart])
+    seconds = np.array([c.seconds for c in (*calls, *others)])
+    size = np.maximum(np.abs(columns).max(axis=0), 1e-300)
+    return np.asarray(nnls(columns / size / seconds[:, None], np.ones(len(seconds)))[0] / size)
 
 
 def design(seed: int, name: str, dimensions: int, first: int, count: int, replicates: int = REPLICATES) -> np.ndarray:
     """Members of replicates of Sobol points (count, d), from a member on: member i is point i // R of replicate i mod R.
 
+    A replicate is one scrambled sequence with a digital shift of its own.
+
     replicates: 0 for independent points, of which a count of each name is drawn once.
     """
     if not replicates:
         return np.asarray(generator(seed, f"{name} {first}").random((count, dimensions)))
-    members = np.arange(first, first + count)
-    levels = np.empty((count, dimensions))
-    for r in range(replicates):
-        mine = members % replicates == r
-        levels[mine] = sobol_points(seed, f"{name} {r}", dimensions, members[mine] // replicates)
-    return levels
+    members, parts = np.arange(first, first + count), 2.0**SOBOL_BITS
+    words = (sobol_points(seed, name, dimensions, members // replicates) * parts).astype(np.uint64)
+    shifts = generator(seed, f"{name} shifts").integers(2**SOBOL_BITS, size=(replicates, dimensions), dtype=np.uint64)
+    return np.asarray(((words ^ shifts[members % replicates]) + 0.5) / parts)
 
 
 @dataclass
@@ -180,6 +215,13 @@ class Level:
         if self.coarse is not None:
             self.below.append(runs(self.coarse, self.grid, points, indices))
         self.points.append(points if self.kind == "regression" else points[:, :0])
+
+    def more(self, share: float) -> int:
+        """A part of the members of the level so far, in whole replicates; all or three times that where balanced."""
+        points = sum(map(len, self.y)) // REPLICATES
+        if self.kind == "sobol" and points & (points - 1) == 0:
+            return REPLICATES * points * (1 if share <= 1.0 else 3)
+        return REPLICATES * math.ceil(share * points)
 
     def weighted(self) -> list[Weighted]:
         """The level's part in the sum of levels."""

@@ -7,6 +7,7 @@ plain Monte Carlo is predicted to cost.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -14,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.methods.method import Method
 from lgvi_warp.studies.estimating import bias as biases_of
 from lgvi_warp.studies.estimating.bias import AGREE, Bias, StepChange, difference
 from lgvi_warp.studies.estimating.choice import Observed
@@ -43,6 +45,10 @@ class Pilot:
 
     noise: "none", "grid" where settings may share a path, "free" where they cannot.
     error: asked for; of the value where relative.
+    single: whether coarse levels may be in single precision.
+    estimator: the only one that may be chosen; None for any.
+    most: processor time that the pilot may take in any case [s].
+    settled: whether no cost that is measured may change the numbers of members.
     """
 
     runs: Runs
@@ -50,6 +56,10 @@ class Pilot:
     noise: str
     error: float
     relative: bool = False
+    single: bool = False
+    estimator: str | None = None
+    most: float = math.inf
+    settled: bool = False
     numbers: dict[tuple[Setting, float | None], np.ndarray] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
 
@@ -86,7 +96,9 @@ class Pilot:
 
     def most_seconds(self, setting: Setting, members: int) -> float:
         """What the pilot may cost [s]."""
-        return SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting))
+        return min(
+            SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting)), self.most
+        )
 
     def pair(self, coarse: Setting, fine: Setting, members: int) -> StepChange:
         """How much the target changes from one setting to a finer one."""
@@ -106,6 +118,7 @@ class Ladder:
     """Steps of one method that were run, the coarsest first; refused: why others were not.
 
     halvings: the difference of each step to the next.
+    order: of the method, 1 in noise.
     end: why it ended: "agree", "apart", "members" (their number leaves the difference open) or "steps".
     """
 
@@ -113,10 +126,11 @@ class Ladder:
     halvings: list[StepChange] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     end: str = "steps"
+    order: int = 1
 
     def biases(self) -> list[Bias]:
         """The bias of each step."""
-        return biases_of.biases(self.halvings)
+        return biases_of.biases(self.halvings, self.order)
 
     def settled(self, error: float) -> int:
         """The coarsest step whose bias takes at most half of the error; where there is none the finest but one."""
@@ -126,14 +140,15 @@ class Ladder:
         return found[0] if found else len(self.settings) - (1 if self.end == "steps" else 2)
 
 
-def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None) -> Ladder:
+def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None, most: float = math.inf) -> Ladder:
     """Run ever finer steps until two agree or members are apart.
 
     Each step costs 64 members, all together the 128 of the finest: a tenth of plain Monte Carlo where that takes 1,280.
 
     fixed: a setting that the caller asked for: the ladder goes on to the one after it and ends.
+    most: a member's cost from which on a step is no gain [s].
     """
-    ladder = Ladder()
+    ladder = Ladder(order=Method(steps[0].method).order if pilot.noise == "none" else 1)
     for setting in steps:
         if not runs_at(pilot, setting, ladder):
             continue
@@ -144,6 +159,8 @@ def climb(pilot: Pilot, steps: Sequence[Setting], fixed: Setting | None = None) 
         ladder.halvings.append(_compared(pilot, ladder))
         if fixed is None and (end := _ended(pilot, ladder)):
             ladder.end = end
+            break
+        if pilot.runs.cost(setting, pilot.grid(setting)) > most:
             break
     return ladder
 
@@ -216,6 +233,8 @@ def _stalls(ladder: Ladder, found: StepChange, small: float) -> bool:
 
 def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
     """Whether three times as many pairs more would cost too much."""
+    if pilot.settled:
+        return 4.0 * members > SHARE * pilot.plain_members(ladder.settings[-2], FIRST)
     last = ladder.settings[-1]
     more = 3.0 * members * 1.5 * pilot.runs.cost(last, pilot.grid(last))
     return pilot.runs.seconds + more > pilot.most_seconds(ladder.settings[-2], FIRST)
@@ -229,7 +248,12 @@ def _ended(pilot: Pilot, ladder: Ladder) -> str:
     if any(bias.mean_square <= (0.5 * error) ** 2 for bias in ladder.biases()):
         return "agree"
     last = halvings[-1]
-    stalls = len(halvings) > 1 and last.half > STALLED * halvings[-2].half and abs(last.value) <= last.half
+    # Near where a step is too long some pairs are far apart: a stall is believed where it comes twice.
+    needed = 2 if pilot.noise == "free" else 3
+    lately = list(itertools.pairwise(halvings[-needed:]))
+    stalls = (
+        len(halvings) >= needed and all(b.half > STALLED * a.half for a, b in lately) and abs(last.value) <= last.half
+    )
     return "members" if stalls and last.half > AGREE * error else ""
 
 
@@ -259,6 +283,7 @@ def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: in
         pilot.target.least(at),
         [settings[i] for i in kept],
         at,
+        call=pilot.runs.call_seconds,
     )
 
 

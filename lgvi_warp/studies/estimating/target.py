@@ -14,6 +14,8 @@ import numpy as np
 
 # A weight, and the numbers (n,) of members whose mean has it.
 Weighted = tuple[float, np.ndarray]
+# A density is of the nearer tail's part, at most 0.15, over this: of few members, and of many; their fifth root between.
+LEAST_PARTS, MOST_PARTS, FEW = 1.5, 3.0, 200
 # Halvings of the interval in which a quantile is.
 HALVINGS = 60
 
@@ -110,8 +112,10 @@ def quantile_of(samples: Sequence[Weighted], level: float) -> float:
 
 
 def density_of(samples: Sequence[Weighted], level: float) -> float:
-    """The density at the quantile of a level, from the quantiles a third of the nearer tail, at most 0.05, on both sides."""
-    apart = min(level, 1.0 - level, 0.15) / 3.0
+    """The density at the quantile of a level, from the quantiles a part of the nearer tail on both sides."""
+    members = sum(len(y) for _, y in samples)
+    parts = min(max(LEAST_PARTS * (members / FEW) ** 0.2, LEAST_PARTS), MOST_PARTS)
+    apart = min(level, 1.0 - level, 0.15) / parts
     low, high = quantile_of(samples, level - apart), quantile_of(samples, level + apart)
     rise = mean_of(samples, lambda y: y <= high) - mean_of(samples, lambda y: y <= low)
     return rise / (high - low) if high > low and rise > 0.0 else float(np.inf)

@@ -111,6 +111,9 @@ def worst_case(
     """
     scene = scene_of(fleet)
     faults = Faults()
+    if isinstance(fleet, Ensemble) and fleet.weights(0, 1) is not None:
+        problem = "has members with weights, which a search within bounds has no use for"
+        faults.add("fleet", fleet.sampling.kind, problem, "give the scene alone")
     faults.choice("worst", worst, WORST)
     box = None
     with faults.including():

@@ -258,7 +258,7 @@ def test_numbers_reach_the_variance():
     way = next(way for way in ways if way.name == "levels" and len(way.chain) == 2)
     factor = way.slopes[0]
     left = np.var(fine - factor * coarse, ddof=1) / way.members[0] + factor**2 * np.var(coarse, ddof=1) / way.members[1]
-    assert left == pytest.approx(1e-4 / choice.ROOM, rel=0.05)
+    assert left == pytest.approx(1e-4 / choice.ROOM["plain"], rel=0.05)
     assert way.variance == pytest.approx(left)
 
 
@@ -325,18 +325,21 @@ LIMITS = [{"above": 0.5}, {"below": 0.5}, {"above": -0.2, "below": 0.5}]
 
 @pytest.mark.parametrize("target", [*(Sought("probability", **at) for at in LIMITS), Sought("quantile", 0.7)], ids=str)
 def test_smoothed_changes_of_probabilities(target):
-    """A shift of 0.01 moves what the density says, and 64 members tell it, of which hardly one jumps."""
-    y = stats.norm.ppf(cubed(1, 64, 1)[:, 0])
+    """A shift of 0.01 moves what the density says, and 64 members tell it, of which hardly one jumps; 20 designs' mean."""
     at = Solved(0.0, stats.norm.ppf(0.7), stats.norm.pdf(stats.norm.ppf(0.7)))
-    found = bias.difference(target.smoothed(y + 0.01, at, 0.2), target.smoothed(y, at, 0.2))
+    changes = []
+    for seed in range(20):
+        y = stats.norm.ppf(cubed(seed, 64, 1)[:, 0])
+        changes.append(bias.difference(target.smoothed(y + 0.01, at, 0.2), target.smoothed(y, at, 0.2)))
     if target.kind == "quantile":
         truth = 0.01
     else:
         ends = [np.inf if target.below is None else target.below, -np.inf if target.above is None else target.above]
         truth = float(np.subtract(*stats.norm.cdf(np.subtract(ends, 0.01))) - np.subtract(*stats.norm.cdf(ends)))
     # A tenth of what the density and the shift move: of the quantile 0.01, of a probability 0.004.
-    assert found.value == pytest.approx(truth, abs=1e-3 if target.kind == "quantile" else 4e-4)
-    assert found.half < 4e-3
+    mean = np.mean([found.value for found in changes])
+    assert mean == pytest.approx(truth, abs=1e-3 if target.kind == "quantile" else 4e-4)
+    assert max(found.half for found in changes) < 6e-3
 
 
 def answer():

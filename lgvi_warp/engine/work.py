@@ -116,6 +116,8 @@ def run_block(
         at_once = max(1, NUMBERS_AT_ONCE // block.count)
         tick_takers = [tick_taker for keeper in block_keepers if (tick_taker := getattr(keeper, "take_ticks", None))]
 
+        slope_takers = [slope_taker for keeper in block_keepers if (slope_taker := getattr(keeper, "take_slopes", None))]
+
         def keep(when: slice, values: Mapping[str, np.ndarray], ends: Ends) -> None:
             samples = samples_of(plan, plan.grid, when, values, ends)
             for block_keeper in block_keepers:
@@ -135,6 +137,8 @@ def run_block(
         def keep_start() -> None:
             running = np.zeros(block.count, np.uint8), np.zeros(block.count, np.int64)
             keep(slice(0, 1), at_start(plan, members, packets), lambda: running)
+            for slope_taker in slope_takers:
+                slope_taker(slice(0, 1), packets.slopes_at_start())
 
         if not plan.layout.signals:
             keep_start()
@@ -156,6 +160,8 @@ def run_block(
             if when.start < when.stop and block_keepers:
                 values = unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table)
                 keep(when, {name: values[name] for name in plan.fields}, packets.ended)
+                for slope_taker in slope_takers:
+                    slope_taker(when, packets.slopes_in_advance(k0, k1))
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome(warned)
         for block_keeper in block_keepers:

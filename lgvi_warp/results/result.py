@@ -89,6 +89,9 @@ class Result(Summarized):
         kept: Samples of the members in kept_members, where not those of all members were kept; else None.
         kept_members: Indices of these members, shape (m,).
         store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
+        jacobian: Derivatives of the samples by the numbers in `tangents`, by name, each of the samples' shape and one
+            dimension more: (k, n, ..., tangents); NaN from where a member ended. Empty without `tangents`.
+        tangents: Names of these numbers, as `solve(tangents=...)` got them.
         end: What `final` returns, or a function without arguments that reads it; None where it was not kept.
         compile_seconds: Time to load the kernel [s].
         compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
@@ -126,6 +129,8 @@ class Result(Summarized):
     event: np.ndarray | None = None
     starts: Mapping[str, np.ndarray] = field(default_factory=dict)
     weights: np.ndarray | None = None
+    jacobian: Mapping[str, np.ndarray] = field(default_factory=dict)
+    tangents: tuple[str, ...] = ()
     end: Final | Callable[[], Final] | None = field(default=None, compare=False)
     compile_seconds: float = field(default=0.0, compare=False)
     compile_phases: Phases = field(default=Phases(), compare=False)

@@ -14,12 +14,24 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
+class Shifted:
+    """Members beside which others stand with one number shifted, those of each in a row: what derivatives are taken of.
+
+    members: each of m members, then the same with a number shifted by OFFSETS steps, for one number after the other.
+    steps: (m, numbers), the unit of the shifts, in that of each number.
+    """
+
+    members: Members
+    steps: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Members:
     """Parameters by name, with a leading dimension of 1 (shared) or m (varied), and initial states of m members.
 
     Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
     angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole,
-    unless its normals are given. `starts` has the numbers of the start that vary, (m, ...) as the scene names them:
+    unless its normals are given. `shifted`: of a run with tangents. `starts` has the numbers of the start that vary, (m, ...) as the scene names them:
     "start.euler_deg"; `weight` (m,) what each counts for in statistics, None where all count alike.
     final: where they ended in the run that they go on from; None where they start.
     """
@@ -35,6 +47,7 @@ class Members:
     weight: np.ndarray | None = None
     final: Final | None = None
     given: GivenDraws | None = None
+    shifted: Shifted | None = None
 
     @property
     def count(self) -> int:

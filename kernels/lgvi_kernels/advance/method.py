@@ -162,7 +162,7 @@ def maps_of(spec, letters):
 
 def make_method(spec):
     """The functions of a method for this Spec."""
-    width, real = spec.width, spec.real
+    width, real = spec.lanes, spec.real
     View = view_struct(width, real, spec.shared_rows)
     Wrench, Flow, Damping = (make(width, real) for make in (wrench_struct, flow_struct, damping_struct))
     coupled, shifted = "coupled" in spec.parts, "origin" in spec.parts

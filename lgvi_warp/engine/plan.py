@@ -189,7 +189,7 @@ def choose_plan(
     facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
     if ensemble.copies is not None:
         # The kernel must have what a number changes that is nothing now.
-        facts = replace(survey(ensemble.copies.ensemble, method, shared), odd=facts.odd)
+        facts = replace(survey(ensemble.copies.surveyed, method, shared), odd=facts.odd)
     # Before anything is packed, which depends on more than the scene and the method.
     shared.note(scene, varied, method)
     choice = choose_kernel(ensemble, method, facts, built_in, checks, shared.user_axes)

@@ -76,12 +76,12 @@ def run_with_tangents(
 ) -> Result:
     """The run of a request with the derivatives of its samples by these numbers; plan: that of the same without them."""
     _check_plan(plan)
-    request.fleet.with_copies(tangents)  # all names are known to be right before the first pass
+    every = request.fleet.with_copies(tangents)
     result: Result | None = None
     columns: dict[str, list[np.ndarray]] = {}
-    passes = range(0, len(tangents), AT_ONCE)
-    for i, first in enumerate(passes):
-        part = _plan_of(plan, tangents[first : first + AT_ONCE])
+    passes = _passes(tangents)
+    for i, names in enumerate(passes):
+        part = _plan_of(plan, names, every)
         kept = Jacobians(part)
         settings: dict[str, Any] = {"fields": request.saved, "executor": request.executor, "slopes": kept}
         settings["progress"] = _share(progress, i, len(passes))
@@ -91,13 +91,28 @@ def run_with_tangents(
         result = of_pass if result is None else result
         for name, slopes in kept.fields.items():
             columns.setdefault(name, []).append(slopes)
+        if i > 0:
+            result = replace(result, compile_seconds=result.compile_seconds + of_pass.compile_seconds,
+                             run_seconds=result.run_seconds + of_pass.run_seconds)  # fmt: skip
         part.free_packets.clear()
     assert result is not None
-    jacobian = {name: np.concatenate(parts, axis=-1) for name, parts in columns.items() if name in request.saved}
+    jacobian = {
+        name: np.concatenate(parts, axis=-1)[..., : len(tangents)]
+        for name, parts in columns.items()
+        if name in request.saved
+    }
     gone = _without(result, jacobian)
     remarks = (*_remarks(request.fleet, plan), *_of_members(gone, jacobian, len(result.status)))
     result = replace(result, jacobian=jacobian, tangents=tuple(tangents), messages=(*result.messages, *remarks))
     return refuse_failed(result, plan)
+
+
+def _passes(tangents: Sequence[str]) -> list[Sequence[str]]:
+    """The names of each pass; where one is left over, another stands behind it, so that one kernel serves all passes."""
+    passes = [tangents[first : first + AT_ONCE] for first in range(0, len(tangents), AT_ONCE)]
+    if len(passes) > 1 and len(passes[-1]) < AT_ONCE:
+        passes[-1] = [*passes[-1], tangents[0]]
+    return passes
 
 
 def _share(progress: Callable[[float], None] | None, i: int, passes: int) -> Callable[[float], None] | None:
@@ -114,10 +129,10 @@ def _check_plan(plan: Plan) -> None:
         raise refusal("method", method.name, problem, 'give "psi_s", "psi_x" or "rk8" for tangents')
 
 
-def _plan_of(plan: Plan, tangents: Sequence[str]) -> Plan:
-    """The same run with slopes by these numbers."""
+def _plan_of(plan: Plan, tangents: Sequence[str], every: Ensemble) -> Plan:
+    """The same run with slopes by these numbers; every: with those by all, which the kernel serves."""
     return choose_plan(
-        plan.ensemble.with_copies(tangents),
+        plan.ensemble.with_copies(tangents, every),
         plan.method,
         plan.grid,
         plan.fields,

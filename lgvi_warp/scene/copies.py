@@ -36,11 +36,13 @@ class Copies:
     """The shifted copies of an ensemble's members.
 
     targets: the numbers, in order. ensemble: each member, then its copies. steps: (members, targets), as of `Shifted`.
+    surveyed: the copies by which the kernel is chosen, where it is to serve other numbers too; else those of `ensemble`.
     """
 
     targets: tuple[Target, ...]
     ensemble: Ensemble
     steps: np.ndarray
+    surveyed: Ensemble
 
     def of(self, first: int, stop: int) -> Shifted:
         """The copies of some members."""
@@ -98,7 +100,8 @@ def copies_of(fleet: Ensemble, keys: Sequence[str]) -> Copies:
         array[:, places, *index] += shift
         if target.name in variations.MATRICES and index != index[::-1]:
             array[:, places, *index[::-1]] += shift
-    return Copies(targets, fleet.given_as_arrays(arrays, each), steps)
+    ensemble = fleet.given_as_arrays(arrays, each)
+    return Copies(targets, ensemble, steps, ensemble)
 
 
 def _step(values: np.ndarray, target: Target, members: int) -> np.ndarray:

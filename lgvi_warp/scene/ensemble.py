@@ -414,7 +414,7 @@ class Ensemble(Summarized):
     def varied_names(self) -> set[str]:
         """Names of what members have of their own: drawn, from columns or explicit."""
         varied = self._draws.varied_names
-        return varied if self.copies is None else varied | self.copies.ensemble.varied_names
+        return varied if self.copies is None else varied | self.copies.surveyed.varied_names
 
     @property
     def starts_vary(self) -> bool:
@@ -467,11 +467,12 @@ class Ensemble(Summarized):
         ensemble.given = given
         return ensemble
 
-    def with_copies(self, keys: Sequence[str]) -> Ensemble:
+    def with_copies(self, keys: Sequence[str], surveyed: Ensemble | None = None) -> Ensemble:
         """Return the same members, beside which others stand with some numbers shifted.
 
         Args:
             keys: Names of the numbers, each one number: "vehicle.mass", "start.velocity[0]".
+            surveyed: The same with more numbers, which one kernel is to serve; None for these alone (default).
 
         Returns:
             The ensemble, of as many members.
@@ -483,6 +484,8 @@ class Ensemble(Summarized):
 
         ensemble = copy.copy(self)
         ensemble.copies = copies_of(self, keys)
+        if surveyed is not None and surveyed.copies is not None:
+            ensemble.copies = replace(ensemble.copies, surveyed=surveyed.copies.ensemble)
         return ensemble
 
     def given_as_arrays(self, arrays: Mapping[str, np.ndarray], repeats: int) -> Ensemble:

@@ -59,14 +59,9 @@ def spec_of(
     )
 
 
-# Newton steps for an iteration to a tolerance: slopes follow the values, and a tolerance sees values alone.
-MOST_STEPS_ASKED = 5
-
-
 def with_tangents(spec: Spec, tangents: int) -> Spec:
-    """The Spec whose numbers carry slopes: a lane for two vehicles or more, and a Newton step more, which slopes take."""
-    iterations = MOST_STEPS_ASKED if spec.adaptive else spec.iterations + 1
-    return spec._replace(tangents=tangents, width=max(2, spec.width), iterations=iterations)
+    """The Spec whose numbers carry slopes; a lane is then one of two vehicles or more."""
+    return spec._replace(tangents=tangents, width=max(2, spec.width))
 
 
 def lengths_of(method: Method, choice: KernelChoice) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -81,7 +81,7 @@ def run_with_tangents(
     columns: dict[str, list[np.ndarray]] = {}
     passes = _passes(tangents)
     for i, names in enumerate(passes):
-        part = _plan_of(plan, names, every)
+        part = plan_of(plan, names, every)
         kept = Jacobians(part)
         settings: dict[str, Any] = {"fields": request.saved, "executor": request.executor, "slopes": kept}
         settings["progress"] = _share(progress, i, len(passes))
@@ -129,7 +129,7 @@ def _check_plan(plan: Plan) -> None:
         raise refusal("method", method.name, problem, 'give "psi_s", "psi_x" or "rk8" for tangents')
 
 
-def _plan_of(plan: Plan, tangents: Sequence[str], every: Ensemble) -> Plan:
+def plan_of(plan: Plan, tangents: Sequence[str], every: Ensemble) -> Plan:
     """The same run with slopes by these numbers; every: with those by all, which the kernel serves."""
     return choose_plan(
         plan.ensemble.with_copies(tangents, every),

@@ -200,7 +200,7 @@ def make_method(spec):
     V = None
     if damping is not None and spec.averages is None:
         V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
-    solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked)
+    solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked, spec.tangents)
     used = {letter for letter, _ in spec.maps} | ({spec.lead[0]} if spec.lead else set())
     letters = {
         "Ab": make_Ab(velocity, spec.timed),

@@ -58,8 +58,18 @@ STEP_TOO_LARGE = 1
 NOT_CONVERGED = 2
 
 
+def _polished(value, newton, rotation):
+    """(F, u, a, J) -> the rotation of u after one Newton step more: slopes are then as good as the value was before."""
+
+    @wp.func
+    def polished(F: Any, u: Any, a: Any, J: Any):
+        return rotation(F, newton(u, value(u, a, J), a, J), a, J)
+
+    return polished
+
+
 @functools.cache
-def make_solve(real, solver, iterations, adaptive, checked):
+def make_solve(real, solver, iterations, adaptive, checked, tangents=0):
     """(solve, solve_within), functions that solve equation (24) in every lane.
 
     solve: (F, alarm, a, J, tolerance) -> (F, alarm). solve_within: the same with one argument more after J, the square of a
@@ -72,6 +82,8 @@ def make_solve(real, solver, iterations, adaptive, checked):
     """
     fixed_start, adaptive_start, value, newton, excess, residual2, rotation = SOLVERS[solver]
     start = adaptive_start if adaptive else fixed_start
+    if tangents:
+        rotation = _polished(value, newton, rotation)
     # The largest number below 1: tests are "> 0", and so 1 itself is beyond.
     below_one = 1.0 - 2.0**-53 if real == wp.float64 else 1.0 - 2.0**-24
 

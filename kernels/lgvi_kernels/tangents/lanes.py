@@ -64,7 +64,8 @@ RULES = {
     "sub": ("AB", "A - B", "dA - dB"),
     "neg": ("A", "-A", "-dA"),
     "mul": ("AB", "A * B", "dA * B + A * dB"),
-    "div": ("AB", "A / B", "(dA - R * dB) * Y", "V Y = (S)1 / B;"),
+    # One division, which takes as long as ten products, for the value and all slopes.
+    "div": ("AB", "A * Y", "(dA - R * dB) * Y", "V Y = (S)1 / B;"),
     # At 0 it falls, as `positive` takes 0 for one of the others: a |a| and tanh a so have their slopes there.
     "absolute": ("A", "A < (S)0 ? -A : A", "A > (S)0 ? dA : -dA"),
     "least": ("AB", "A < B ? A : B", "A < B ? dA : dB"),

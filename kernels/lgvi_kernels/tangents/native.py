@@ -12,6 +12,10 @@ import warp as wp
 
 from lgvi_kernels.lanes import native, series
 
+# Slopes are long sums of products: in any order the compiler makes two joined operations of what else are three. Values keep
+# their order, in which tests for what is no number and differences of near numbers are meant.
+REORDERED = '_Pragma("clang fp reassociate(on)")'
+
 # Most tangents of one kernel: with more, the numbers of a step no longer fit into the registers.
 MOST = 2
 
@@ -45,7 +49,8 @@ def function(shape, arguments, value, slope, statements=""):
         store += [f"V R{t} = {of_tangent(slope, t)}; memcpy(&r.c[{t * shape.width}], &R{t}, sizeof(V));"]
     value = f"V R = {value};" if value else ""
     begin = f"{series._types(shape.width, shape.real, arguments)} {' '.join(load)} {statements} {value}"
-    return f"{begin} wp::vec_t<{shape.length}, S> r; memcpy(&r, &R, sizeof(V)); {' '.join(store)} return r;"
+    slopes = f"{{ {REORDERED} {' '.join(store)} }}"
+    return f"{begin} wp::vec_t<{shape.length}, S> r; memcpy(&r, &R, sizeof(V)); {slopes} return r;"
 
 
 def of_tangent(expression, tangent):

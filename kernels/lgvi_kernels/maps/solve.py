@@ -58,14 +58,20 @@ STEP_TOO_LARGE = 1
 NOT_CONVERGED = 2
 
 
-def _polished(value, newton, rotation):
-    """(F, u, a, J) -> the rotation of u after one Newton step more: slopes are then as good as the value was before."""
+def _sloped(value, newton, rotation):
+    """(F, u, a, J) -> the rotation of u after one Newton step more, from u without its slopes.
+
+    Of a root the step leaves nothing but its slopes, by the equation alone: they are as good as the root, and what led to it
+    needs none.
+    """
+    from lgvi_kernels.tangents.lanes import without_slopes
 
     @wp.func
-    def polished(F: Any, u: Any, a: Any, J: Any):
-        return rotation(F, newton(u, value(u, a, J), a, J), a, J)
+    def sloped(F: Any, u: Any, a: Any, J: Any):
+        known = without_slopes(u)
+        return rotation(F, newton(known, value(known, a, J), a, J), a, J)
 
-    return polished
+    return sloped
 
 
 @functools.cache
@@ -83,7 +89,7 @@ def make_solve(real, solver, iterations, adaptive, checked, tangents=0):
     fixed_start, adaptive_start, value, newton, excess, residual2, rotation = SOLVERS[solver]
     start = adaptive_start if adaptive else fixed_start
     if tangents:
-        rotation = _polished(value, newton, rotation)
+        rotation = _sloped(value, newton, rotation)
     # The largest number below 1: tests are "> 0", and so 1 itself is beyond.
     below_one = 1.0 - 2.0**-53 if real == wp.float64 else 1.0 - 2.0**-24
 

@@ -22,6 +22,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401  (families, to which o
     entry_of,
     gathered,
     int_lane,
+    lane3,
     largest,
     least,
     mul,
@@ -52,6 +53,8 @@ from lgvi_kernels.lanes.functions import (  # noqa: F401
 )
 from lgvi_kernels.tangents import native
 from lgvi_kernels.tangents.native import Shape
+
+without_slopes = overloads.family("without_slopes", "The values of a, a lane or a vector, with slopes of 0.")
 
 # What a kernel with dual lanes is hashed by, since overloads do not count (see lanes/overloads.py).
 DIGEST = hashlib.sha256(
@@ -84,9 +87,9 @@ def declare(width, tangents, real):
         if (shape.length, real) not in overloads._types:
             # From here on a lane of this length is a type like any other, which nobody else declares.
             overloads._types.append((shape.length, real))
-            for part in (_declare_rules, _declare_functions, _declare_rows, _declare_normals):
+            for part in (_declare_rules, _declare_functions, _declare_vectors, _declare_rows, _declare_normals):
                 part(shape)
-            for generic in (arithmetic._declare_vectors, noise._declare, sums._declare_plain):
+            for generic in (noise._declare, sums._declare_plain):
                 generic(shape.length, real)
     return shape.length
 
@@ -151,6 +154,9 @@ def _declare_functions(shape):
 
     @overloads.func_native(native.function(shape, "A", floor, "V()"))
     def below(a: L) -> L: ...
+
+    @overloads.func_native(native.function(shape, "A", "A", "V()"))
+    def without_slopes(a: L) -> L: ...
 
     @overloads.func_native(native.root(shape))
     def root(a: L) -> L: ...
@@ -218,6 +224,15 @@ def _declare_rows(shape):
 
     arithmetic._declare_pieces(L)
     arithmetic._declare_pieces(real)
+
+
+def _declare_vectors(shape):
+    arithmetic._declare_vectors(shape.length, shape.real)
+    L3 = lane3(shape.length, shape.real)
+
+    @overloads.func
+    def without_slopes(a: L3):
+        return vec3(without_slopes(a.x), without_slopes(a.y), without_slopes(a.z))
 
 
 def _declare_normals(shape):

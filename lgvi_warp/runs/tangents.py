@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.engine.executors.threads import Threads
@@ -131,18 +132,21 @@ def _check_plan(plan: Plan) -> None:
 
 def plan_of(plan: Plan, tangents: Sequence[str], every: Ensemble) -> Plan:
     """The same run with slopes by these numbers; every: with those by all, which the kernel serves."""
+    asked = plan.width_source == "asked for"
+    # Slopes give the core enough to do beside each other: values of one register leave more of these free.
+    width = plan.spec.width if asked else max(2, machine.register_width(plan.dtype))
     return choose_plan(
         plan.ensemble.with_copies(tangents, every),
         plan.method,
         plan.grid,
         plan.fields,
         plan.dtype,
-        None if plan.width_source != "asked for" else plan.spec.width,
+        width,
         plan.checks,
         plan.on_failure,
         ticks=plan.launches.ticks,
         read_at_ticks=plan.layout.read_at_ticks,
-        width_source=plan.width_source,
+        width_source=plan.width_source if asked else "one register",
     )
 
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a derivative by dual lanes costs beside the run without: plain simulations a tangent, kernels alone.
 
-The paper's vehicle and REMUS 100, one thread, in turn. error: of the derivatives of all samples, the largest difference from
-those at half the step, over the largest of each; central differences cost 2. heyoka's variational equations in its batch
-integrator, on the paper's vehicle, where that package is there.
+The paper's vehicle and REMUS 100, one thread, by its time, in turn; with one tangent and with two. Central differences cost
+2. heyoka's variational equations in its batch integrator, on the paper's vehicle, where that package is there.
 """
+
+import time
 
 import numpy as np
 
@@ -38,7 +39,7 @@ def run(quick):
         every = fleet.with_copies(names)
         dual = [tangents.plan_of(plan, names[:count], every) for count in (1, 2)]
         calls = [speed.stepper(each) for each in (plan, *dual)]
-        plain, *carried = speed.least(calls, rounds, clock=_clock)
+        plain, *carried = speed.least(calls, rounds, clock=time.thread_time)
         yield {
             "scene": name,
             "method": method,
@@ -46,13 +47,7 @@ def run(quick):
             "simulations_a_tangent": [round((each / plain - 1.0) / k, 2) for k, each in enumerate(carried, 1)],
             "compile_seconds": [round(sum(each.phases), 1) for each in (plan, *dual)],
         }
-    #yield heyoka(quick)
-
-
-def _clock():
-    import time
-
-    return time.thread_time()
+    yield heyoka(quick)
 
 
 def heyoka(quick):
@@ -62,9 +57,9 @@ def heyoka(quick):
     except ImportError:
         return {"peer": "heyoka is not installed"}
     from benchmarks.peers.peer_heyoka import SIZE, system
-    from benchmarks.peers.problem import Problem
+    from benchmarks.peers.problem import make_problem
 
-    problem = PROBLEM
+    problem = make_problem(8, END)
     equations = system(problem)
     width = 2 * hy.recommended_simd_size(float)
     start = np.repeat(problem.matrix_state()[:1].T, width, axis=1)
@@ -84,6 +79,6 @@ def heyoka(quick):
         return propagate
 
     calls = [call(*pair) for pair in zip(integrators, begins, strict=True)]
-    plain, *carried = speed.least(calls, 1 if quick else 15, clock=_clock)
+    plain, *carried = speed.least(calls, 1 if quick else 15, clock=time.thread_time)
     ratios = [round((each / plain - 1.0) / k, 2) for k, each in enumerate(carried, 1)]
     return {"peer": f"heyoka {hy.__version__}, batch, tol {HEYOKA_TOLERANCE:g}", "simulations_a_tangent": ratios}

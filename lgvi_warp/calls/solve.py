@@ -133,7 +133,7 @@ def solve(
         faults.add("only", only, "runs in parts, where until looks at the whole", "leave out one of them")
     faults.raise_if_any()
     if tangents is not None:
-        check(request, tangents, store, start)
+        check(request, tangents, store, start, on_block)
     plan = request.plan(survey_all=store is not None)
     # Parts of a run, and other processes and machines, must agree on a width.
     if only is None and isinstance(request.executor, Threads) and tangents is None:

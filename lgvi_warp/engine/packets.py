@@ -270,7 +270,8 @@ class Packets:
     def slopes_at_start(self) -> list[dict[str, np.ndarray]]:
         """The slopes, by each number, of the samples (1, m, ...) at the start."""
         plan, shifted = self.plan, self.members.shifted
-        assert self.slopes is not None and shifted is not None
+        assert self.slopes is not None
+        assert shifted is not None
         motion = [name for name in plan.fields if name not in SIGNALS]
         slopes = {name: self.slopes.of(getattr(shifted.members, name))[1] for name in motion}
         each = [{name: slopes[name][i][None] for name in motion} for i in range(plan.spec.tangents)]
@@ -407,7 +408,8 @@ class Packets:
             return np.zeros(members.count, np.uint16), np.zeros(0)
         rows, water = self.state_lanes.rows(), self._packing.water
         if isinstance(self._packing, CopiesPacking):
-            rows, water = self._packing.of_members(rows), self._packing.of_members(water)
+            rows = self._packing.of_members(rows)
+            water = None if water is None else self._packing.of_members(water)
         return at_start(plan, members, self.frame, rows[:, 12:15] * self.scale[:, None], water)
 
     def _with_departed(

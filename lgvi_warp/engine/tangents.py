@@ -135,15 +135,15 @@ class CopiesPacking(Packing):
     def frame_of_members(self) -> Frame:
         """The frame of the members themselves."""
         own = {
-            item.name: value if value is None or len(value) == 1 else value[:: self._repeats]
+            item.name: None if value is None else self.of_members(value)
             for item in dataclasses.fields(Frame)
             for value in (getattr(self.frame, item.name),)
         }
         return Frame(**own)
 
-    def of_members(self, values: np.ndarray | None) -> np.ndarray | None:
+    def of_members(self, values: np.ndarray) -> np.ndarray:
         """Those of the members themselves among values of members and copies."""
-        return values if values is None or len(values) == 1 else values[:: self._repeats]
+        return values if len(values) == 1 else values[:: self._repeats]
 
 
 def slopes_of_frame(slopes: Slopes, frame: Frame) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -157,7 +157,12 @@ def slopes_of_frame(slopes: Slopes, frame: Frame) -> list[tuple[np.ndarray, np.n
 
 
 def slopes_of_samples(
-    fields: Mapping[str, int], raw: np.ndarray, raw_slope: np.ndarray, frame: Frame, turn: Any, table: Mapping[str, Field]
+    fields: Mapping[str, int],
+    raw: np.ndarray,
+    raw_slope: np.ndarray,
+    frame: Frame,
+    turn: Any,
+    table: Mapping[str, Field],
 ) -> dict[str, np.ndarray]:
     """The slopes of `unpacked` by one number, in the user's axes, from his origin.
 
@@ -165,7 +170,7 @@ def slopes_of_samples(
     """
     slopes = divided(fields, raw_slope, table)
     values = divided(fields, raw, table)
-    Q, dQ, d_origin = frame.Q, *turn
+    Q, (dQ, d_origin) = frame.Q, turn
     if frame.turned or dQ.any():
         for name in slopes.keys() - {"position", *SIGNALS}:
             if name == "attitude":
@@ -219,4 +224,3 @@ class _BlockJacobians:
 
     def close(self, outcome: Any) -> None:
         """Nothing is left to do."""
-

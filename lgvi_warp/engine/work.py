@@ -116,7 +116,9 @@ def run_block(
         at_once = max(1, NUMBERS_AT_ONCE // block.count)
         tick_takers = [tick_taker for keeper in block_keepers if (tick_taker := getattr(keeper, "take_ticks", None))]
 
-        slope_takers = [slope_taker for keeper in block_keepers if (slope_taker := getattr(keeper, "take_slopes", None))]
+        slope_takers = [
+            slope_taker for keeper in block_keepers if (slope_taker := getattr(keeper, "take_slopes", None))
+        ]
 
         def keep(when: slice, values: Mapping[str, np.ndarray], ends: Ends) -> None:
             samples = samples_of(plan, plan.grid, when, values, ends)

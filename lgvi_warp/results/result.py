@@ -279,12 +279,14 @@ class Result(Summarized):
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
         starts = {name: values[places] for name, values in self.starts.items()}
+        slopes = {name: values[:, places] for name, values in self.jacobian.items()}
         of_members = {name: values[places] for name, values in self._of_members().items()}
         # That of a store is read when it is asked for.
         end = (
             functools.partial(_part_of, self.end, places) if callable(self.end) else self.end and self.end.part(places)
         )
-        return replace(self, samples=samples, parameters=parameters, starts=starts, end=end, **of_members)
+        own: dict[str, Any] = {"samples": samples, "jacobian": slopes, "parameters": parameters, "starts": starts, "end": end}
+        return replace(self, **own, **of_members)
 
     def _of_members(self) -> dict[str, np.ndarray]:
         """What is recorded of each member, (n,) by name."""
@@ -350,6 +352,9 @@ class Result(Summarized):
         if self.samples and self.end is not None:
             of_end, texts["final"] = final_files.to_file(self.final)
             arrays |= of_end
+        if self.tangents:
+            arrays |= {f"jacobian/{name}": slopes for name, slopes in self.jacobian.items()}
+            texts["tangents"] = json.dumps(self.tangents)
         if self.statistics:
             estimates, texts["statistics"] = self.statistics.to_arrays()
             arrays |= {f"statistics/{name}": value for name, value in estimates.items()}
@@ -413,6 +418,8 @@ class Result(Summarized):
             provenance=provenance,
             terms=terms_of(provenance["scene"]),
             statistics=estimates,
+            jacobian=_below("jacobian/", content),
+            tangents=texts["tangents"],
         )
         result = replace(result, end=final_files.from_file(content, result.samples, result.parameters))
         kept = _below("kept/", content)

@@ -37,7 +37,7 @@ UNDEFINED = {
 }
 
 
-def check(request: Request, tangents: Sequence[str], store: Any, start: Any) -> None:
+def check(request: Request, tangents: Sequence[str], store: Any, start: Any, on_block: Any) -> None:
     """Refuse what a run with tangents cannot do, before anything is computed."""
     faults, fleet = Faults(), request.fleet
     if isinstance(tangents, str) or not all(isinstance(name, str) for name in tangents) or not len(tangents):
@@ -53,6 +53,10 @@ def check(request: Request, tangents: Sequence[str], store: Any, start: Any) -> 
         faults.add("tangents", "...", "are derivatives of samples, of which none are kept", 'give keep="all"')
     if request.observed.until is not None:
         faults.add("tangents", "...", "are of all members, and not until an interval is narrow", "leave until out")
+    if on_block is not None:
+        faults.add("on_block", "...", "is called with samples alone, and tangents come with the result", "leave it out")
+    if request.save is not None and getattr(request.save, "final", None):
+        faults.add("save.final", True, "is the end of a run without slopes, from which none can go on", "leave it out")
     if request.width == 1:
         faults.add("width", 1, "is too narrow for tangents", "give 2 or more, or leave it out")
     controller = fleet.scene.controller
@@ -164,16 +168,16 @@ def _of_members(ended: np.ndarray, jacobian: dict[str, np.ndarray], members: int
     texts = []
     if ended.any():
         texts.append(
-            f"tangents: {ended.sum():,} of {members:,} members ended on the way: from there on their derivatives are NaN, since "
-            "the time at which a member ends changes too"
+            f"tangents: {ended.sum():,} of {members:,} members ended on the way: from there on their derivatives are NaN, "
+            "since the time at which a member ends changes too"
         )
     unknown = np.zeros(members, bool)
     for slopes in jacobian.values():
         unknown |= ~np.isfinite(slopes).all(axis=(0, *range(2, slopes.ndim)))
     if (unknown & ~ended).any():
         texts.append(
-            f"tangents: {(unknown & ~ended).sum():,} of {members:,} members have derivatives that are no numbers: they come to a "
-            "point where something that acts has none"
+            f"tangents: {(unknown & ~ended).sum():,} of {members:,} members have derivatives that are no numbers: they come "
+            "to a point where something that acts has none"
         )
     return texts
 

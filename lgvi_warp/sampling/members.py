@@ -31,8 +31,9 @@ class Members:
 
     Positions (m, 3) [m] are in inertial axes, attitudes (m, 3, 3) from body to inertial axes, velocities (m, 3) [m/s] and
     angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole,
-    unless its normals are given. `shifted`: of a run with tangents. `starts` has the numbers of the start that vary, (m, ...) as the scene names them:
+    unless its normals are given. `starts` has the numbers of the start that vary, (m, ...) as the scene names them:
     "start.euler_deg"; `weight` (m,) what each counts for in statistics, None where all count alike.
+    shifted: of a run with tangents, what these are taken of.
     final: where they ended in the run that they go on from; None where they start.
     """
 

@@ -66,7 +66,9 @@ def heyoka(quick):
     systems = [equations] + [
         hy.var_ode_sys(equations, [variable for variable, _ in equations[-count:]], order=1) for count in (1, 2)
     ]
-    integrators = [hy.taylor_adaptive_batch(each, np.ascontiguousarray(start), tol=HEYOKA_TOLERANCE) for each in systems]
+    integrators = [
+        hy.taylor_adaptive_batch(each, np.ascontiguousarray(start), tol=HEYOKA_TOLERANCE) for each in systems
+    ]
     begins = [each.state.copy() for each in integrators]
     assert len(begins[0]) == SIZE
 

@@ -329,4 +329,6 @@ def make_explicit(spec, types, everything, velocities, slope):
     if not method.adaptive:
         return make_fixed(stages, finish, push, timed, last)
     errors = make_errors(Rates, [make_moves(along, row, None) for row in method.errors])
-    return make_adaptive(stages, finish, errors, method.estimate, spec.width, real, timed, copy_memory if kept else None)
+    return make_adaptive(
+        stages, finish, errors, method.estimate, spec.width, real, timed, copy_memory if kept else None
+    )

@@ -5,13 +5,12 @@ Laws, maps, methods and controllers are written over lanes of any type: with the
 changes. Plain lanes do not know this module: their text, which is a part of the hash of every kernel, stays.
 """
 
-import functools
 import hashlib
 from pathlib import Path
 
 import warp as wp
 
-from lgvi_kernels.lanes import arithmetic, functions, noise, overloads, sums
+from lgvi_kernels.lanes import arithmetic, noise, overloads, sums
 from lgvi_kernels.lanes.arithmetic import (  # noqa: F401  (families, to which overloads are added by name)
     absolute,
     add,
@@ -57,9 +56,9 @@ from lgvi_kernels.tangents.native import Shape
 without_slopes = overloads.family("without_slopes", "The values of a, a lane or a vector, with slopes of 0.")
 
 # What a kernel with dual lanes is hashed by, since overloads do not count (see lanes/overloads.py).
-DIGEST = hashlib.sha256(
-    b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
-).hexdigest()[:16]
+DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))).hexdigest()[
+    :16
+]
 
 # Function -> its arguments, its value, and its slope by a tangent (see native.py).
 RULES = {

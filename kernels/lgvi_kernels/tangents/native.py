@@ -142,7 +142,9 @@ def gather(shape, is_shared):
         each += f"[j + t * {shape.width}];"
     row = native._OWN_ROW.replace("offset", "offset + step")
     begin = "const wp::int64 begin = (wp::int64)entry * rows.rows.shape[1];"
-    loop = f"for (int j = 0; j < {shape.width}; ++j) {{ const int step = index[j]; {row} if (at <= last) {{ {each} }} }}"
+    loop = (
+        f"for (int j = 0; j < {shape.width}; ++j) {{ const int step = index[j]; {row} if (at <= last) {{ {each} }} }}"
+    )
     return f"{kind} r; {begin} {loop} return r;"
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from typing import Any
 
@@ -18,7 +18,6 @@ from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, 
 from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
-from lgvi_warp.control.signals import SIGNALS
 from lgvi_warp.engine import going_on
 from lgvi_warp.engine.arrays import PLAIN, Group, LawArrays, Structs
 from lgvi_warp.engine.outcome import MemberStatus
@@ -34,8 +33,7 @@ from lgvi_warp.engine.step_warnings import (
     orthogonality_limit,
     row_limits,
 )
-from lgvi_warp.engine.tangents import CopiesPacking, Slopes, slopes_of_frame, slopes_of_samples
-from lgvi_warp.engine.work import divided
+from lgvi_warp.engine.tangents import CopiesPacking, Slopes, slopes_of_frame
 from lgvi_warp.sampling.members import Members
 
 # What the kernel notes of members that end.
@@ -253,35 +251,30 @@ class Packets:
         """Make the steps k0 to k1; a copy of the samples due in them, (samples, count * width, numbers of a sample)."""
         return by_members(self._values(self.launch(k0, k1)))
 
-    def slopes_in_advance(self, k0: int, k1: int) -> list[dict[str, np.ndarray]]:
-        """The slopes, by each number, of the samples that the last launch wrote in these steps, in the user's axes."""
-        plan, m = self.plan, self.members.count
-        assert self.slopes is not None
-        s0, s1 = plan.launches.samples_due(k0, k1)
-        lanes = self._launched_samples(s1 - s0)
-        raw, turns = by_members(self._values(lanes))[:, :m], slopes_of_frame(self.slopes, self._packing.frame)
-        each = [by_members(lanes[..., place])[:, :m] for place in self.slopes.places()]
-        fields, table = plan.layout.sizes, plan.layout.table
-        return [
-            slopes_of_samples(fields, raw, slope, self.frame, turn, table)
-            for slope, turn in zip(each, turns, strict=True)
-        ]
+    def raw_slopes(self, k0: int, k1: int) -> tuple[np.ndarray, list[np.ndarray], list[Any]]:
+        """The samples that the last launch wrote in these steps, and, by each number, their slopes and those of the frame.
 
-    def slopes_at_start(self) -> list[dict[str, np.ndarray]]:
-        """The slopes, by each number, of the samples (1, m, ...) at the start."""
-        plan, shifted = self.plan, self.members.shifted
+        Returns: (samples, members, numbers of a sample), as many slopes of that shape, and slopes of the frame's Q and origin.
+        """
+        assert self.slopes is not None
+        s0, s1 = self.plan.launches.samples_due(k0, k1)
+        lanes, m = self._launched_samples(s1 - s0), self.members.count
+        each = [by_members(lanes[..., place])[:, :m] for place in self.slopes.places()]
+        return by_members(self._values(lanes))[:, :m], each, slopes_of_frame(self.slopes, self._packing.frame)
+
+    def slopes_of_start(self, names: Sequence[str]) -> list[dict[str, np.ndarray]]:
+        """The slopes, by each number, of the motion (1, m, ...) at the start."""
+        shifted = self.members.shifted
         assert self.slopes is not None
         assert shifted is not None
-        motion = [name for name in plan.fields if name not in SIGNALS]
-        slopes = {name: self.slopes.of(getattr(shifted.members, name))[1] for name in motion}
-        each = [{name: slopes[name][i][None] for name in motion} for i in range(plan.spec.tangents)]
-        if not plan.layout.signals:
-            return each
-        rows, m = self.monitor.first_signals.numpy()[:, : len(plan.layout.signal_rows)], self.members.count
-        sizes = {name: plan.layout.sizes[name] for name in plan.layout.signals}
-        for place, by_name in zip(self.slopes.places(), each, strict=True):
-            by_name |= divided(sizes, by_members(rows[:, None, :, place])[:, :m], plan.layout.table)
-        return each
+        slopes = {name: self.slopes.of(getattr(shifted.members, name))[1] for name in names}
+        return [{name: slopes[name][i][None] for name in names} for i in range(self.plan.spec.tangents)]
+
+    def slopes_of_first_signals(self) -> list[np.ndarray]:
+        """The slopes, by each number, of the signals at the start, (1, m, numbers of the signals)."""
+        assert self.slopes is not None
+        rows, m = self.monitor.first_signals.numpy()[:, : len(self.plan.layout.signal_rows)], self.members.count
+        return [by_members(rows[:, None, :, place])[:, :m] for place in self.slopes.places()]
 
     def launch(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps k0 to k1, and return the samples due after k0 and no later than k1.

@@ -7,19 +7,15 @@ All that is packed is packed for members and copies alike, at once; the differen
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.control.signals import SIGNALS
 from lgvi_warp.engine import arrays
 from lgvi_warp.engine.arrays import Writing
 from lgvi_warp.engine.packing import Packing
-from lgvi_warp.engine.work import divided, unpacked
-from lgvi_warp.physics import notation
-from lgvi_warp.physics.fields import Field
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.sampling.members import Members, Shifted
 from lgvi_warp.scene.copies import FOUR_POINTS, OFFSETS, SIX_POINTS, repeats
@@ -134,7 +130,7 @@ class CopiesPacking(Packing):
 
     def frame_of_members(self) -> Frame:
         """The frame of the members themselves."""
-        own = {
+        own: dict[str, Any] = {
             item.name: None if value is None else self.of_members(value)
             for item in dataclasses.fields(Frame)
             for value in (getattr(self.frame, item.name),)
@@ -154,40 +150,6 @@ def slopes_of_frame(slopes: Slopes, frame: Frame) -> list[tuple[np.ndarray, np.n
     return [
         (still[0] if each[0] is None else each[0][i], still[1] if each[1] is None else each[1][i]) for i in range(count)
     ]
-
-
-def slopes_of_samples(
-    fields: Mapping[str, int],
-    raw: np.ndarray,
-    raw_slope: np.ndarray,
-    frame: Frame,
-    turn: Any,
-    table: Mapping[str, Field],
-) -> dict[str, np.ndarray]:
-    """The slopes of `unpacked` by one number, in the user's axes, from his origin.
-
-    raw, raw_slope: (samples, members, numbers) in the kernel's. turn: slopes of the frame's Q and origin, (1 or m, ...).
-    """
-    slopes = divided(fields, raw_slope, table)
-    values = divided(fields, raw, table)
-    Q, (dQ, d_origin) = frame.Q, turn
-    if frame.turned or dQ.any():
-        for name in slopes.keys() - {"position", *SIGNALS}:
-            if name == "attitude":
-                Qt, dQt = (np.swapaxes(q, -1, -2) for q in (Q, dQ))
-                slopes[name] = slopes[name] @ Qt + values[name] @ dQt
-            else:
-                slopes[name] = notation.rotate_out(Q, slopes[name]) + notation.rotate_out(dQ, values[name])
-    if frame.shifted or d_origin.any():
-        user = unpacked(fields, raw, frame, table)
-        o, do = (np.broadcast_to(v, (raw.shape[1], 3)) for v in (frame.origin, d_origin))
-        if "position" in slopes:
-            moved = np.einsum("knij,nj->kni", slopes["attitude"], o) + np.einsum("knij,nj->kni", user["attitude"], do)
-            slopes["position"] = slopes["position"] - moved
-        if "velocity" in slopes:
-            turned = notation.cross(slopes["angular_velocity"], o) + notation.cross(user["angular_velocity"], do)
-            slopes["velocity"] = slopes["velocity"] - turned
-    return slopes
 
 
 class Jacobians:

@@ -285,7 +285,13 @@ class Result(Summarized):
         end = (
             functools.partial(_part_of, self.end, places) if callable(self.end) else self.end and self.end.part(places)
         )
-        own: dict[str, Any] = {"samples": samples, "jacobian": slopes, "parameters": parameters, "starts": starts, "end": end}
+        own: dict[str, Any] = {
+            "samples": samples,
+            "jacobian": slopes,
+            "parameters": parameters,
+            "starts": starts,
+            "end": end,
+        }
         return replace(self, **own, **of_members)
 
     def _of_members(self) -> dict[str, np.ndarray]:

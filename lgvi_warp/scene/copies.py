@@ -96,7 +96,7 @@ def copies_of(fleet: Ensemble, keys: Sequence[str]) -> Copies:
         shift = np.outer(steps[:, i], OFFSETS)
         array = arrays[target.name].reshape(n, each, *arrays[target.name].shape[1:])
         places = slice(1 + i * len(OFFSETS), 1 + (i + 1) * len(OFFSETS))
-        index = target.index or ()
+        index: tuple[Any, ...] = target.index or ()
         array[:, places, *index] += shift
         if target.name in variations.MATRICES and index != index[::-1]:
             array[:, places, *index[::-1]] += shift
@@ -107,5 +107,6 @@ def copies_of(fleet: Ensemble, keys: Sequence[str]) -> Copies:
 def _step(values: np.ndarray, target: Target, members: int) -> np.ndarray:
     """Steps (members,) of a number."""
     largest = np.abs(values).reshape(len(values), -1).max(axis=1)
-    size = np.maximum(np.abs(values[:, *(target.index or ())]), LEAST_PART * largest)
+    index: tuple[Any, ...] = target.index or ()
+    size = np.maximum(np.abs(values[:, *index]), LEAST_PART * largest)
     return np.broadcast_to(STEP * np.where(size > 0.0, size, 1.0), members)

@@ -10,7 +10,10 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
+from lgvi_kernels.lanes import arithmetic, functions, noise, sums
 from lgvi_kernels.lanes.arithmetic import lane, mul  # noqa: F401
+from lgvi_kernels.tangents.lanes import declare
+from lgvi_kernels.tangents.native import DualShape, snippets
 from tests.control.test_analytic import FAR, INERTIA, MASS, NONE, PERIOD
 from tests.support.tools import slope
 
@@ -286,6 +289,22 @@ def test_a_sensor_that_rounds_is_told():
     scene = looped(quantum=0.05)
     result = lw.solve(scene, "rk8", h=PERIOD / 2, t1=1.0, tangents=["pose_pid.kp[0]"], threads=1)
     assert "fix rounds" in result.messages[-1]
+
+
+def test_no_function_of_lanes_is_without_a_rule():
+    # What is written in C++ is replaced, or it moves lanes as a whole, whatever they hold; all else is made of such.
+    shape = DualShape(4, 2, wp.float64)
+    L = lane(declare(shape), wp.float64)
+    moved = {"element", "entry_of", "set_element", "gathered"}
+    unknown = set()
+    for module in (arithmetic, functions, noise, sums):
+        for name, family in vars(module).items():
+            overloads = getattr(family, "user_overloads", {}).values() if isinstance(family, wp.Function) else ()
+            for overload in overloads:
+                own = overload.native_snippet in snippets(shape).values()
+                if overload.native_snippet and L in overload.input_types.values() and not own:
+                    unknown.add(name)
+    assert unknown == moved
 
 
 def test_warps_adjoint_gives_silent_zeros():

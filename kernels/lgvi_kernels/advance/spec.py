@@ -74,8 +74,9 @@ class Spec(NamedTuple):
             return self.width
         # Where a kernel has slopes, here: other runs do without this code.
         from lgvi_kernels.tangents.lanes import declare
+        from lgvi_kernels.tangents.native import DualShape
 
-        return declare(self.width, self.tangents, self.real)
+        return declare(DualShape(self.width, self.tangents, self.real))
 
     @property
     def watched(self) -> bool:
@@ -170,7 +171,7 @@ def make_types(spec):
         **({"events": Events} if spec.events else {}),
         **({"drag": DragFlow} if spec.dragged else {}),
         **({"loop": Loop} if spec.control else {}),
-        **_rules(spec.tangents),
+        **_rules(spec),
     )
     return Types(
         Lane,
@@ -192,10 +193,10 @@ def make_types(spec):
     )
 
 
-def _rules(tangents):
+def _rules(spec):
     """A field that nothing reads: its name puts the text of the rules for slopes into the kernel's hash."""
-    if not tangents:
+    if not spec.tangents:
         return {}
-    from lgvi_kernels.tangents.lanes import DIGEST
+    from lgvi_kernels.tangents.native import DualShape, digest
 
-    return {f"rules_{DIGEST}": wp.uint8}
+    return {f"rules_{digest(DualShape(spec.width, spec.tangents, spec.real))}": wp.uint8}

@@ -5,6 +5,8 @@ In an expression A, B, C are the vectors of the values of the lanes a, b, c; dA,
 R is the value of the result.
 """
 
+import functools
+import hashlib
 import re
 from typing import NamedTuple
 
@@ -16,11 +18,32 @@ from lgvi_kernels.lanes import native, series
 # their order, in which tests for what is no number and differences of near numbers are meant.
 REORDERED = '_Pragma("clang fp reassociate(on)")'
 
-# Most tangents of one kernel: with more, the numbers of a step no longer fit into the registers.
-MOST = 2
+# Function -> its arguments, its value, and its slope by a tangent.
+RULES = {
+    "add": ("AB", "A + B", "dA + dB"),
+    "sub": ("AB", "A - B", "dA - dB"),
+    "neg": ("A", "-A", "-dA"),
+    "mul": ("AB", "A * B", "dA * B + A * dB"),
+    "mul by a number": ("A", "s * A", "s * dA"),
+    # One division, which takes as long as ten products, for the value and all slopes.
+    "div": ("AB", "A * Y", "(dA - R * dB) * Y", "V Y = (S)1 / B;"),
+    # At 0 it falls, as `positive` takes 0 for one of the others: a |a| and tanh a so have their slopes there.
+    "absolute": ("A", "A < (S)0 ? -A : A", "A > (S)0 ? dA : -dA"),
+    "least": ("AB", "A < B ? A : B", "A < B ? dA : dB"),
+    "largest": ("AB", "A < B ? B : A", "A < B ? dB : dA"),
+    "greatest": ("AB", "A > B ? A : B", "A > B ? dA : dB"),
+    "clamp": ("ABC", "A < B ? B : (A > C ? C : A)", "A < B ? dB : (A > C ? dC : dA)"),
+    "positive": ("ABC", "A > (S)0 ? B : C", "A > (S)0 ? dB : dC"),
+    "fused": ("ABC", "__builtin_elementwise_fma(A, B, C)", "dA * B + (A * dB + dC)"),
+    # Of a number that is 0 and stays 0 the slope is 0: a speed at rest is the root of a sum of squares.
+    "root": ("A", "__builtin_elementwise_sqrt(A)", "dA == (S)0 ? dA : dA * ((S)0.5 / R)"),
+    "ones": ("", "V() + (S)1", "V()"),
+    "below": ("A", "__builtin_elementwise_floor(A)", "V()"),
+    "without_slopes": ("A", "A", "V()"),
+}
 
 
-class Shape(NamedTuple):
+class DualShape(NamedTuple):
     """The shape of a dual lane: how many vehicles, how many tangents, and the type of the numbers."""
 
     width: int
@@ -29,28 +52,42 @@ class Shape(NamedTuple):
 
     @property
     def length(self):
-        return length(self.width, self.tangents)
+        """How many numbers a lane is to Warp: the values, the slopes by each tangent, and what pads them.
 
+        By its length alone Warp tells a dual lane from a plain one, a power of two long, and from one with more tangents. So
+        with one tangent half a width more follows, which nothing reads: 5 times a power of two; with two it is 3 times one.
+        """
+        return self.width * (1 + self.tangents) + (self.width // 2 if self.tangents == 1 else 0)
 
-def length(width, tangents):
-    """How many numbers a lane of `width` vehicles is to Warp: the values, the slopes by each tangent, and what pads them.
-
-    By its length alone Warp tells a dual lane from a plain one, a power of two long, and from one with more tangents. So with
-    one tangent half a width more follows, which nothing reads: 5 times a power of two; with two it is 3 times one.
-    """
-    return width * (1 + tangents) + (width // 2 if tangents == 1 else 0)
+    @property
+    def kind(self):
+        """C++ of the lane's type."""
+        return f"wp::vec_t<{self.length}, wp::{self.real.__name__}>"
 
 
 def function(shape, arguments, value, slope, statements=""):
-    """C++ of a function of the lanes a, b, c: its value, and its slope by a tangent, as expressions (see the module)."""
+    """C++ of a function of the lanes a, b, c: its value, and its slope by a tangent, as expressions (see the module).
+
+    statements: come before the value; without a value they leave it in R.
+    """
     load, store = [], []
     for t in range(1, shape.tangents + 1):
         load += [f"V {v}{t}; memcpy(&{v}{t}, &{v.lower()}.c[{t * shape.width}], sizeof(V));" for v in arguments]
         store += [f"V R{t} = {of_tangent(slope, t)}; memcpy(&r.c[{t * shape.width}], &R{t}, sizeof(V));"]
     value = f"V R = {value};" if value else ""
-    begin = f"{series._types(shape.width, shape.real, arguments)} {' '.join(load)} {statements} {value}"
-    slopes = f"{{ {REORDERED} {' '.join(store)} }}"
-    return f"{begin} wp::vec_t<{shape.length}, S> r; memcpy(&r, &R, sizeof(V)); {slopes} return r;"
+    finish = f"{shape.kind} r; memcpy(&r, &R, sizeof(V)); {{ {REORDERED} {' '.join(store)} }} return r;"
+    begin = f"{native.head(shape.width, shape.real, arguments)} {integers(shape)} {' '.join(load)}"
+    return f"{begin} {statements} {value} {finish}"
+
+
+def integers(shape):
+    """C++ of vectors of integers of the numbers' size, as `series` names them: I with sign, U without."""
+    bits = 64 if shape.real == wp.float64 else 32
+    size = shape.width * bits // 8
+    return "".join(
+        f"typedef wp::{word}{bits} {name} __attribute__((vector_size({size})));"
+        for name, word in (("I", "int"), ("U", "uint"))
+    )
 
 
 def of_tangent(expression, tangent):
@@ -58,28 +95,13 @@ def of_tangent(expression, tangent):
     return re.sub(r"\bd([A-C])\b", rf"\g<1>{tangent}", expression)
 
 
-def exponential(shape):
-    return function(shape, "A", "", "dA * R", series.exponential(shape.real))
-
-
-def _waves(shape, value, slope):
-    """C++ of a function of A whose value and slope are the sine after so many quarter turns."""
-    reduced = series.sine(shape.real, value)
-    turned = f"{series._turned('D', slope)} V O = Y;"
-    # `series` calls the reduced angle R.
-    return function(shape, "A", "", "dA * D", f"{reduced} {turned} R = O;")
-
-
-def sine(shape):
-    return _waves(shape, "N", "N + 1")
-
-
-def cosine(shape):
-    return _waves(shape, "N + 1", "N + 2")
-
-
-def logarithm(shape):
-    return function(shape, "A", "", "dA / A", series.logarithm(shape.real))
+def waves(shape, quadrant, next_quadrant):
+    """C++ of the sine of A after so many quarter turns, whose slope is that after one more; what both share is made once."""
+    # In braces, since `series` has names of its own, R among them.
+    each = (
+        f"{{ {series.sine(shape.real, turns)} {to} = Y; }}" for turns, to in ((quadrant, "O"), (next_quadrant, "D"))
+    )
+    return function(shape, "A", "", "dA * D", f"V O, D; {' '.join(each)} V R = O;")
 
 
 def arctangent2(shape):
@@ -90,82 +112,66 @@ def arctangent2(shape):
 
 
 def decay(shape):
-    """The slope of (1 - e^-a) / a: (1 - f) / a - f, and near 0, where that cancels, its Taylor series."""
-    terms = 16 if shape.real == wp.float64 else 8
-    near = series._horner("A", [(-1.0) ** (k + 1) * (k + 1) / series._factorial(k + 2) for k in range(terms)])
+    """The slope of f = (1 - e^-a) / a: (1 - f) / a - f, and near 0, where that cancels, its Taylor series."""
+    near, factorial = "(S)0", 1.0
+    terms = []
+    for k in range(16 if shape.real == wp.float64 else 8):
+        factorial *= k + 2
+        terms.append((-1.0) ** (k + 1) * (k + 1) / factorial)
+    for term in reversed(terms):
+        near = f"((S){term!r} + A * {near})"
     by_a = f"V E = A < (S)0 ? -A : A; V D = E < (S)0.5 ? {near} : ((S)1 - R) / (E < (S)0.5 ? V() + (S)1 : A) - R;"
     return function(shape, "A", "", "dA * D", f"{series.decay(shape.real)} {by_a}")
 
 
-def root(shape):
-    # Of a number that is 0 and stays 0 the slope is 0: a speed at rest is the root of a sum of squares.
-    slope = "dA == (S)0 ? dA : dA * ((S)0.5 / R)"
-    return function(shape, "A", series.root(shape.width).format("A"), slope)
-
-
-def rounded(shape):
-    return function(shape, "A", "", "V()", series.nearest(shape.real))
-
-
-def any_positive(shape):
-    """C++ of: some value is positive."""
-    return native.any_positive(shape.width, shape.real)
-
-
-def spread(shape, number):
-    """C++ of a number in all values, without slopes."""
-    return f"for (int j = 0; j < {shape.width}; ++j) r[j] = {number};"
-
-
-def shared(shape):
-    """C++ that reads one number of a two-dimensional array into all lanes."""
-    name = f"wp::{shape.real.__name__}"
-    place = f"(({name}*)rows.data)[(wp::int64)(entry * rows.shape[1] + row) + offset]"
-    return f"wp::vec_t<{shape.length}, {name}> r; {spread(shape, place)} return r;"
-
-
-def own_shared(shape):
-    """C++ that reads one number, of a row that a law may see, into all lanes."""
-    name = f"wp::{shape.real.__name__}"
-    number = f"(({name}*)rows.rows.data)[(wp::int64)entry * rows.rows.shape[1] + at]"
-    kind = f"wp::vec_t<{shape.length}, {name}>"
-    return f"{kind} r; {native._OWN_ROW} if (at <= last) {spread(shape, number)} return r;"
-
-
-def gather(shape, is_shared):
-    """C++ that reads, for each vehicle, the row of its own index among those that a law may see, with its slopes."""
-    name = f"wp::{shape.real.__name__}"
-    kind = f"wp::vec_t<{shape.length}, {name}>"
-    each = f"r[j] = (({name}*)rows.rows.data)[begin + at];"
-    if not is_shared:
-        each = f"for (int t = 0; t <= {shape.tangents}; ++t) r[j + t * {shape.width}] = (({kind}*)rows.rows.data)[begin + at]"
-        each += f"[j + t * {shape.width}];"
-    row = native._OWN_ROW.replace("offset", "offset + step")
-    begin = "const wp::int64 begin = (wp::int64)entry * rows.rows.shape[1];"
-    loop = (
-        f"for (int j = 0; j < {shape.width}; ++j) {{ const int step = index[j]; {row} if (at <= last) {{ {each} }} }}"
-    )
-    return f"{kind} r; {begin} {loop} return r;"
-
-
 def whole(shape):
-    """C++ of the whole numbers at or below the values (see native.whole), which have no slopes."""
+    """C++ of the whole numbers at or below the values (see native.whole), which the places of the slopes repeat.
+
+    So a row that a vehicle gathers by its own index is gathered with its slopes.
+    """
     of_values = native.whole(shape.width, shape.real)
-    kind = f"wp::vec_t<{shape.width}, wp::int32> r;"
-    assert kind in of_values
-    return of_values.replace(kind, f"wp::vec_t<{shape.length}, wp::int32> r;")
+    plain = f"wp::vec_t<{shape.width}, wp::int32> r;"
+    assert plain in of_values
+    repeat = f"for (int j = {shape.width}; j < {shape.width * (1 + shape.tangents)}; ++j) r[j] = r[j - {shape.width}];"
+    return of_values.replace(plain, f"wp::vec_t<{shape.length}, wp::int32> r;").replace(
+        "return r;", f"{repeat} return r;"
+    )
 
 
 def normals(shape):
     """C++ of `series.normals` of the vehicles, in a vector of four dual lanes' length; random numbers have no slopes."""
     of_values = series.normals(shape.width, shape.real)
-    kind = f"wp::vec_t<{4 * shape.width}, S> r;"
-    assert kind in of_values
-    return of_values.replace(kind, f"wp::vec_t<{4 * shape.length}, S> r;")
+    plain = f"wp::vec_t<{4 * shape.width}, S> r;"
+    assert plain in of_values
+    return of_values.replace(plain, f"wp::vec_t<{4 * shape.length}, S> r;")
 
 
 def quarter(shape):
     """C++ of one of four lanes of random numbers."""
-    kind = f"wp::vec_t<{shape.length}, wp::{shape.real.__name__}>"
     size = f"{shape.width} * sizeof(wp::{shape.real.__name__})"
-    return f"{kind} r; memcpy(&r, &a.c[k * {shape.width}], {size}); return r;"
+    return f"{shape.kind} r; memcpy(&r, &a.c[k * {shape.width}], {size}); return r;"
+
+
+@functools.cache
+def snippets(shape):
+    """C++ of all that has a rule of its own, by name."""
+    own = {name: function(shape, *parts) for name, parts in RULES.items()}
+    return own | {
+        "any_positive": native.any_positive(shape.width, shape.real),
+        "rounded": function(shape, "A", "", "V()", series.nearest(shape.real)),
+        "exponential": function(shape, "A", "", "dA * R", series.exponential(shape.real)),
+        "logarithm": function(shape, "A", "", "dA / A", series.logarithm(shape.real)),
+        "sine": waves(shape, "N", "N + 1"),
+        "cosine": waves(shape, "N + 1", "N + 2"),
+        "arctangent2": arctangent2(shape),
+        "decay": decay(shape),
+        "whole": whole(shape),
+        "normals": normals(shape),
+        "quarter": quarter(shape),
+    }
+
+
+@functools.cache
+def digest(shape):
+    """What a kernel with dual lanes is hashed by, since overloads do not count (see lanes/overloads.py)."""
+    return hashlib.sha256("".join(f"{name} {text}" for name, text in snippets(shape).items()).encode()).hexdigest()[:16]

@@ -19,6 +19,7 @@ from lgvi_warp.engine.tangents import Jacobians
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.request import Request
 from lgvi_warp.runs.run import refuse_failed, run_plan
+from lgvi_warp.scene.copies import with_copies
 from lgvi_warp.scene.ensemble import Ensemble
 
 # Tangents of one pass: with more, the numbers of a step no longer fit into a core's registers.
@@ -81,7 +82,7 @@ def run_with_tangents(
 ) -> Result:
     """The run of a request with the derivatives of its samples by these numbers; plan: that of the same without them."""
     _check_plan(plan)
-    every = request.fleet.with_copies(tangents)
+    every = with_copies(request.fleet, tangents)
     result: Result | None = None
     columns: dict[str, list[np.ndarray]] = {}
     passes = _passes(tangents)
@@ -140,7 +141,7 @@ def plan_of(plan: Plan, tangents: Sequence[str], every: Ensemble) -> Plan:
     # Slopes give the core enough to do beside each other: values of one register leave more of these free.
     width = plan.spec.width if asked else max(2, machine.register_width(plan.dtype))
     return choose_plan(
-        plan.ensemble.with_copies(tangents, every),
+        with_copies(plan.ensemble, tangents, every),
         plan.method,
         plan.grid,
         plan.fields,

@@ -7,8 +7,9 @@ taken by central differences of six points, whose error at a step of 0.2 % is th
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,6 +49,17 @@ class Copies:
         """The copies of some members."""
         each = repeats(len(self.targets))
         return Shifted(self.ensemble.select(first * each, stop * each), self.steps[first:stop])
+
+
+def with_copies(fleet: Ensemble, keys: Sequence[str], surveyed: Ensemble | None = None) -> Ensemble:
+    """The same members, beside which others stand with some numbers shifted.
+
+    keys: names of the numbers, each one number. surveyed: the same with more numbers, which one kernel is to serve.
+    """
+    ensemble = copy.copy(fleet)
+    copies = copies_of(fleet, keys)
+    ensemble.copies = copies if surveyed is None else replace(copies, surveyed=surveyed.copies.ensemble)
+    return ensemble
 
 
 def repeats(targets: int) -> int:

@@ -30,7 +30,6 @@ from lgvi_warp.scene.variations import Target, Variation
 if TYPE_CHECKING:
     from lgvi_warp.physics.given_draws import GivenDraws
     from lgvi_warp.sampling.final import Final
-    from lgvi_warp.scene.copies import Copies
 
 
 class Ensemble(Summarized):
@@ -198,8 +197,8 @@ class Ensemble(Summarized):
         self.final, self.start_time = None, 0.0
         # Standard normals of the members' noise, in place of those that counters give; None for these.
         self.given: GivenDraws | None = None
-        # The same members with numbers shifted, of a run that is to tell the derivatives by these; None for none.
-        self.copies: Copies | None = None
+        # The same members with numbers shifted, of a run that is to tell the derivatives by these (see scene/copies.py).
+        self.copies: Any = None
         self._check_physical(checked)
 
     @property
@@ -465,27 +464,6 @@ class Ensemble(Summarized):
         """
         ensemble = copy.copy(self)
         ensemble.given = given
-        return ensemble
-
-    def with_copies(self, keys: Sequence[str], surveyed: Ensemble | None = None) -> Ensemble:
-        """Return the same members, beside which others stand with some numbers shifted.
-
-        Args:
-            keys: Names of the numbers, each one number: "vehicle.mass", "start.velocity[0]".
-            surveyed: The same with more numbers, which one kernel is to serve; None for these alone (default).
-
-        Returns:
-            The ensemble, of as many members.
-
-        Raises:
-            SceneError: If a name is none of the scene, or names several numbers.
-        """
-        from lgvi_warp.scene.copies import copies_of
-
-        ensemble = copy.copy(self)
-        ensemble.copies = copies_of(self, keys)
-        if surveyed is not None and surveyed.copies is not None:
-            ensemble.copies = replace(ensemble.copies, surveyed=surveyed.copies.ensemble)
         return ensemble
 
     def given_as_arrays(self, arrays: Mapping[str, np.ndarray], repeats: int) -> Ensemble:

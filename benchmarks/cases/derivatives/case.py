@@ -12,6 +12,7 @@ import numpy as np
 import lgvi_warp as lw
 from lgvi_warp.runs import tangents
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.copies import with_copies
 from lgvi_warp.studies import speed
 
 NAMES = {
@@ -36,7 +37,7 @@ def run(quick):
     for name, method, h in ENTRIES[:1] if quick else ENTRIES:
         fleet, names = fleet_of(name, members), NAMES[name]
         plan = make_plan(fleet, method, h=h, t1=steps * h)
-        every = fleet.with_copies(names)
+        every = with_copies(fleet, names)
         dual = [tangents.plan_of(plan, names[:count], every) for count in (1, 2)]
         calls = [speed.stepper(each) for each in (plan, *dual)]
         plain, *carried = speed.least(calls, rounds, clock=time.thread_time)

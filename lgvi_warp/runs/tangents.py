@@ -16,6 +16,7 @@ from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.kernel_spec import COMPENSATED
 from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.engine.tangents import Jacobians
+from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.request import Request
 from lgvi_warp.runs.run import refuse_failed, run_plan
@@ -108,8 +109,13 @@ def run_with_tangents(
         if name in request.saved
     }
     gone = _without(result, jacobian)
+    # What carries the copies would keep them as long as the result.
+    own: dict[str, Any] = {
+        "parameters": DrawnParameters(request.fleet, result.members),
+        "starts": DrawnStarts(request.fleet, result.members),
+    }
     remarks = (*_remarks(request.fleet, plan), *_of_members(gone, jacobian, len(result.status)))
-    result = replace(result, jacobian=jacobian, tangents=tuple(tangents), messages=(*result.messages, *remarks))
+    result = replace(result, jacobian=jacobian, tangents=tuple(tangents), messages=(*result.messages, *remarks), **own)
     return refuse_failed(result, plan)
 
 

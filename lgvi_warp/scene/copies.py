@@ -99,6 +99,7 @@ def copies_of(fleet: Ensemble, keys: Sequence[str]) -> Copies:
     targets = targets_of(fleet, keys)
     each, n = repeats(len(targets)), fleet.members
     values = fleet.numbers(0, n)
+    _check_finite(values, targets)
     names = [name for name in values if name in fleet.varied_names or any(name == t.name for t in targets)]
     arrays = {
         name: np.repeat(np.broadcast_to(values[name], (n, *values[name].shape[1:])), each, axis=0) for name in names
@@ -114,6 +115,15 @@ def copies_of(fleet: Ensemble, keys: Sequence[str]) -> Copies:
             array[:, places, *index[::-1]] += shift
     ensemble = fleet.given_as_arrays(arrays, each)
     return Copies(targets, ensemble, steps, ensemble)
+
+
+def _check_finite(values: dict[str, np.ndarray], targets: Sequence[Target]) -> None:
+    faults = Faults("tangents.")
+    for target in targets:
+        index: tuple[Any, ...] = target.index or ()
+        if not np.isfinite(values[target.name][:, *index]).all():
+            faults.add(f'"{target.label}"', "...", "is infinite, or no number, for some member", "leave it out")
+    faults.raise_if_any()
 
 
 def _step(values: np.ndarray, target: Target, members: int) -> np.ndarray:

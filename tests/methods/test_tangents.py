@@ -115,8 +115,13 @@ def looped(**sensor):
     kp, kd, F, mass, x, v = GAINS.values()
     law = lw.control.PosePID(**dict.fromkeys(("kr", "kw"), NONE), kp=(kp, 0.0, 0.0), kd=(kd, 0.0, 0.0))
     sensors = [lw.control.Sensor(of="position", name="fix", **sensor)] if sensor else []
+    stuck = lw.control.Fault(of="control_wrench", channel=0, name="stuck", time=np.inf, gain=0.5)
     controller = lw.Controller(
-        period=PERIOD, sensors=sensors, guidance=[lw.control.SetPoint(position=NONE, heading=0.0)], laws=[law]
+        faults=[stuck] if sensor else [],
+        period=PERIOD,
+        sensors=sensors,
+        guidance=[lw.control.SetPoint(position=NONE, heading=0.0)],
+        laws=[law],
     )
     vehicle = lw.Vehicle(mass, inertia=INERTIA, added_mass=NONE, buoyancy=mass * GRAVITY, center_of_buoyancy=NONE)
     terms = [lw.terms.ControlWrench(limit=FAR), lw.terms.Wrench(force=(F, 0.0, 0.0))]
@@ -263,7 +268,9 @@ def test_refused(tangents, settings, message):
         lw.solve(falling(), words.pop("method"), tangents=tangents, **words)
 
 
-@pytest.mark.parametrize("name", ["controller.delay", "fix.every", "fix.latency", "fix.dropout", "fix.quantum"])
+@pytest.mark.parametrize(
+    "name", ["controller.delay", "fix.every", "fix.latency", "fix.dropout", "fix.quantum", "stuck.time"]
+)
 def test_what_acts_by_whole_steps_has_no_derivative(name):
     with pytest.raises(lw.SceneError, match=f"{name}.*no derivative"):
         lw.solve(looped(noise=0.1), "rk8", h=PERIOD / 2, t1=1.0, tangents=[name])

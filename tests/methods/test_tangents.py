@@ -10,6 +10,7 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
+from benchmarks import problems
 from lgvi_kernels.lanes import arithmetic, functions, noise, sums
 from lgvi_kernels.lanes.arithmetic import lane, mul  # noqa: F401
 from lgvi_kernels.tangents.lanes import declare
@@ -180,26 +181,80 @@ def test_psi_s_is_symplectic():
     assert np.abs(result.jacobian["position"][-1]).max() > 1.0
 
 
+def differences(scene, name, size, method, **settings):
+    """Derivatives of the last samples by central differences of four points, 1e-4 of `size` apart, with the same noise."""
+    whole, _, place = name.partition("[")
+    index = tuple(int(k) for k in place[:-1].split(",")) if place else ()
+    value = lw.Ensemble(scene).numbers(0, 1)[whole][0][index]
+    e = 1e-4 * size
+    around = lw.Ensemble(scene, sampling=lw.designs.Table({name: value + e * np.array([-2.0, -1.0, 1.0, 2.0])}))
+    around.indices = np.zeros(4, np.int64)
+    weights = np.array([1.0, -8.0, 8.0, -1.0]) / (12.0 * e)
+    samples = lw.solve(around, method, **settings).samples
+    return {field: np.einsum("j,j...->...", weights, values[-1]) for field, values in samples.items()}
+
+
+def assert_agree(scene, sizes, method, part, **settings):
+    """part: how far differences may be off, of the largest."""
+    result = lw.solve(scene, method, tangents=list(sizes), **settings)
+    for i, (name, size) in enumerate(sizes.items()):
+        for field, expected in differences(scene, name, size, method, **settings).items():
+            got = result.jacobian[field][-1, 0, ..., i]
+            np.testing.assert_allclose(got, expected, rtol=0.0, atol=part * np.abs(expected).max() + 1e-9)
+
+
 def test_remus_against_differences():
-    # Central differences of four points at steps of 1e-4: an error of 1e-16 / 1e-4 in sizes of 10, and of the 4th power of
-    # the step, but where drag has a kink: 1e-7 of the largest.
+    # Steps of 1e-4: an error of 1e-16 / 1e-4 in sizes of 10, and of the 4th power of the step, but where drag has a kink.
     start = {"velocity": [1.5, 0.05, 0.1], "euler_deg": [2.0, 3.0, 4.0], "angular_velocity": [0.01, 0.02, 0.03]}
     scene = lw.Scene.named("remus_100", start=start)
     sizes = {"start.euler_deg[1]": 3.0, "control_fins.lift_slope[0]": 3.0, "start.velocity[0]": 1.5,
              "drag_matrix.quadratic[0,0]": 1.0}  # fmt: skip
-    settings = {"h": 0.05, "t1": 3.0, "threads": 1}
-    result = lw.solve(scene, "rk4", tangents=list(sizes), **settings)
-    known = lw.Ensemble(scene).numbers(0, 1)
-    for i, (name, size) in enumerate(sizes.items()):
-        whole, _, place = name.partition("[")
-        value = known[whole][0][tuple(int(k) for k in place[:-1].split(","))]
-        e = 1e-4 * size
-        table = lw.designs.Table({name: value + e * np.array([-2.0, -1.0, 1.0, 2.0])})
-        around = lw.solve(lw.Ensemble(scene, sampling=table), "rk4", **settings)
-        for field, samples in around.samples.items():
-            expected = np.einsum("j,j...->...", np.array([1.0, -8.0, 8.0, -1.0]) / (12.0 * e), samples[-1])
-            got = result.jacobian[field][-1, 0, ..., i]
-            np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-7 * np.abs(expected).max() + 1e-10)
+    assert_agree(scene, sizes, "rk4", 1e-7, h=0.05, t1=3.0, threads=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "method", ["psi", "psi_1", "psi_x8", "phi", "phi_adjoint", "cg3", "rkmk4", "rk5", "rkn4_6", "rkn6_14", "kl8(psi_s)"]
+)
+def test_each_method_against_differences(method):
+    paper = lw.Scene.load("examples/paper.toml")
+    start = lw.Start(NONE, euler_deg=(40.0, -30.0, 70.0), velocity=(0.1, 0.2, 1.0), angular_velocity=(0.3, 0.2, 0.1))
+    scene = lw.Scene(paper.vehicle, paper.environment, paper.terms, start)
+    sizes = {"start.velocity[0]": 1.0, "vehicle.inertia[1,1]": 5.0}
+    assert_agree(scene, sizes, method, 1e-7, h=0.05, t1=2.0, threads=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("method", "noise"), [("psi_x", True), ("rk4", False)])
+def test_all_terms_against_differences(method, noise):
+    sizes = {"vehicle.mass": 20.0, "current_profile.velocities[2,2]": 0.1, "waves.amplitudes[6]": 0.1, "waves.periods[3]": 5.0,
+             "tether.attachment[0]": 0.3, "thrusters.dead_band[1]": 1.0, "fins.area[1]": 0.01, "control_fins.drag[0]": 0.1,
+             "cross_flow.diameters[0]": 0.1, "stratification.gradient": 1e-3, "start.rotation_vector[0]": 1.0}  # fmt: skip
+    if noise:
+        sizes |= {"gauss_markov_current.time_constant": 10.0, "wrench_noise.torque[2]": 0.1}
+    # Kinks of |v| v and of dead bands are passed at slightly other times.
+    assert_agree(problems.all_terms(noise), sizes, method, 1e-4, h=0.02, t1=2.0, threads=1)
+
+
+@pytest.mark.slow
+def test_float32_has_its_own_digits():
+    settings = {"h": 0.02, "t1": TIME, "tangents": list(FALL), "threads": 1}
+    single, double = (lw.solve(falling(), "rk4", dtype=dtype, **settings) for dtype in ("float32", "float64"))
+    for name, slopes in double.jacobian.items():
+        # A hundred steps, each rounded to 1e-7 of the largest number in it.
+        np.testing.assert_allclose(single.jacobian[name], slopes, rtol=0.0, atol=1e-5 * max(1.0, np.abs(slopes).max()))
+
+
+@pytest.mark.slow
+def test_threads_and_blocks_change_no_bit():
+    vary = {"start.velocity": lw.distributions.Normal(std=0.1)}
+    fleet = lw.Ensemble(falling(), 700, 1, vary)
+    settings = {"h": 0.02, "t1": 0.2, "tangents": ["vehicle.mass", "start.velocity[2]"]}
+    several, single = (lw.solve(fleet, "rk8", threads=threads, **settings) for threads in (3, 1))
+    alone = lw.solve(fleet.subset([5, 699]), "rk8", threads=1, **settings)
+    for name, slopes in single.jacobian.items():
+        np.testing.assert_array_equal(several.jacobian[name], slopes)
+        np.testing.assert_array_equal(alone.jacobian[name], slopes[:, [5, 699]])
 
 
 def test_values_are_those_of_the_run_without_tangents():

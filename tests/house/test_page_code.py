@@ -37,7 +37,10 @@ ELSEWHERE = {page: test for test, pages in OF_TESTS.items() for page in pages.sp
 TERMS = [f"docs/guide/terms/{path.name}" for path in sorted((DOCS / "guide" / "terms").glob("[a-z]*.md"))]
 PARTS = ["docs/controllers/guidance.md", "docs/controllers/laws.md"]
 OF_A_RESULT = ["docs/guide/pictures.md", "docs/guide/recordings.md"]
-SCRIPT_NAMES = "assimilation choose_method_and_step compare_with_your_simulator current going_on notebooks resume tangents your_vehicle"
+SCRIPT_NAMES = (
+    "assimilation choose_method_and_step compare_with_your_simulator current going_on notebooks resume tangents "
+    "your_vehicle"
+)
 SCRIPTS = [f"docs/guide/{name}.md" for name in SCRIPT_NAMES.split()]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ctypes
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,7 +42,17 @@ def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
         target[full_packets, :, len(rows) - full_packets * width :] = rows[-1][:, None]
 
 
-def fill(target: np.ndarray, value: Any) -> None:
+class Writing(NamedTuple):
+    """How numbers of members are written into lanes: as `put`, and as `put_rows`."""
+
+    put: Callable[[np.ndarray, Any], None]
+    put_rows: Callable[[np.ndarray, np.ndarray], None]
+
+
+PLAIN = Writing(put, put_rows)
+
+
+def fill(target: np.ndarray, value: Any, put: Callable[[np.ndarray, Any], None] = put) -> None:
     """Write the numbers of members into a field (packets or 1,) of a structured array.
 
     value: a number, whole numbers (m,), numbers (1 or m,), vectors (1 or m, 3), matrices (1 or m, 3, 3), a pair of diagonal
@@ -51,16 +61,16 @@ def fill(target: np.ndarray, value: Any) -> None:
     names = target.dtype.names or ()
     if isinstance(value, dict):
         for name, entry in value.items():
-            fill(target[name], entry)
+            fill(target[name], entry, put)
     elif isinstance(value, tuple):
         for name, entry in zip(("diagonal", "off_diagonal"), value, strict=True):
-            fill(target[name], entry)
+            fill(target[name], entry, put)
     elif names == ("x", "y", "z"):
         for i, axis in enumerate(names):
             put(target[axis], value[:, i])
     elif names:
         for i, name in enumerate(("row0", "row1", "row2")):
-            fill(target[name], value[:, i])
+            fill(target[name], value[:, i], put)
     else:
         put(target, value)
 
@@ -80,9 +90,9 @@ class Structs:
     array: of one struct, or of one a packet where a number varies; None before `write`. view: the same memory in NumPy.
     """
 
-    def __init__(self, struct: Any, dtype: np.dtype):
+    def __init__(self, struct: Any, dtype: np.dtype, writing: Writing = PLAIN):
         assert dtype.itemsize == ctypes.sizeof(struct.ctype)
-        self._struct, self._dtype = struct, dtype
+        self._struct, self._dtype, self._put = struct, dtype, writing.put
         self.view = np.empty(0, dtype)
         self.array: Any = None
         self._written: Any = None
@@ -104,7 +114,7 @@ class Structs:
             template = np.zeros(1, self._dtype)
             for path, fields, shared in parts:
                 if shared:
-                    fill(_at(template, path), fields)
+                    fill(_at(template, path), fields, self._put)
             self.array = wp.empty(count, dtype=self._struct, device="cpu")
             # The array's own memory: wp.array(values) lets NumPy parse the struct's type from text, which in several
             # threads occasionally fails (Python before 3.11.8 and 3.12.2, python/cpython#106905).
@@ -112,7 +122,7 @@ class Structs:
             self.view = np.ndarray(count, self._dtype, memory)
             self.view[:] = np.repeat(template, count)
         for path, fields in varying:
-            fill(_at(self.view, path), fields)
+            fill(_at(self.view, path), fields, self._put)
 
 
 def _at(target: np.ndarray, path: tuple[str, ...]) -> np.ndarray:
@@ -155,9 +165,17 @@ class LawArrays:
     remembered: list[slice]
     scratch: int
 
-    def __init__(self, packets: int, kinds: Sequence[tuple[Any, np.dtype]], Lane: Any, Number: Any = None):
+    def __init__(
+        self,
+        packets: int,
+        kinds: Sequence[tuple[Any, np.dtype]],
+        Lane: Any,
+        Number: Any = None,
+        writing: Writing = PLAIN,
+    ):
         self._packets, self._Lane, self._Number = packets, Lane, Number or Lane
-        self.structs = [Structs(*kind) for kind in kinds]
+        self._put_rows = writing.put_rows
+        self.structs = [Structs(*kind, writing) for kind in kinds]
         self._bounded = [_bounded(dtype) for _, dtype in kinds]
         self.places: list[Any] = []
         self._sizes: Any = None
@@ -214,7 +232,7 @@ class LawArrays:
                 before = self._written.get(at) if len(part) == 1 else None
                 if before is not None and (known or np.array_equal(before, part)):
                     continue
-                put_rows(self.table.view[:, at:first], part)
+                self._put_rows(self.table.view[:, at:first], part)
                 self._written[at] = part.copy() if len(part) == 1 else None
 
     def _write_memory(self, laws: Sequence[Packed], first: int, scratch: int, moved: bool) -> None:
@@ -227,7 +245,7 @@ class LawArrays:
         view[...] = 0.0
         for law in laws:
             if law.memory is not None:
-                put_rows(view[:, first : first + law.memory.shape[1]], law.memory)
+                self._put_rows(view[:, first : first + law.memory.shape[1]], law.memory)
             first += memory_rows(law)
         view[:, half:] = view[:, :half]
 

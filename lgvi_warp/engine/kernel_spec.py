@@ -59,6 +59,11 @@ def spec_of(
     )
 
 
+def with_tangents(spec: Spec, tangents: int) -> Spec:
+    """The Spec whose numbers carry slopes; a lane is then one of two vehicles or more."""
+    return spec._replace(tangents=tangents, width=max(2, spec.width))
+
+
 def lengths_of(method: Method, choice: KernelChoice) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Lengths of the stages and of the leads, in units of the step h [1]."""
     return method.lengths(choice.lead[1] if choice.lead else None)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from typing import Any
 
@@ -19,7 +19,7 @@ from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import going_on
-from lgvi_warp.engine.arrays import Group, LawArrays, Structs
+from lgvi_warp.engine.arrays import PLAIN, Group, LawArrays, Structs
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.plan import Plan
@@ -33,6 +33,7 @@ from lgvi_warp.engine.step_warnings import (
     orthogonality_limit,
     row_limits,
 )
+from lgvi_warp.engine.tangents import CopiesPacking, Slopes, slopes_of_frame
 from lgvi_warp.sampling.members import Members
 
 # What the kernel notes of members that end.
@@ -54,18 +55,18 @@ class Packets:
         structs = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
         inertia, params, events, limits, *loop = zip(structs, plan.kernel.dtypes, strict=True)
         self._controlled = bool(loop)
-        self.inertia, self._limits = (Structs(*kind) for kind in (inertia, limits))
-        self.laws = LawArrays(self.count, (params, *loop, events), types.Lane, types.Number)
-        self.state_lanes = StateLanes(plan.spec, self.count, kernel_for(plan.spec, plan.ensemble.members))
-        self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
-        self.failed_step = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
+        self.slopes = Slopes(plan) if plan.spec.tangents else None
+        writing = PLAIN if self.slopes is None else self.slopes.writing
+        self.inertia, self._limits = (Structs(*kind, writing) for kind in (inertia, limits))
+        self.laws = LawArrays(self.count, (params, *loop, events), types.Lane, types.Number, writing)
+        self.state_lanes = StateLanes(plan.spec, self.count, kernel_for(plan.spec, plan.ensemble.members), writing)
+        self.status = wp.zeros(self.count, dtype=int_lane(plan.spec.lanes), device="cpu")
+        self.failed_step = wp.zeros(self.count, dtype=int_lane(plan.spec.lanes), device="cpu")
         self.failed_size = wp.zeros(self.count, dtype=types.Lane, device="cpu")
         self.out: wp.array | None = None
         self.monitor = self._monitor()
         self._place_ticks(plan)
         self.noted = {name: array.numpy() for name, array in self._written_by_the_kernel().items()}
-        # The same memory as NumPy has it, by member: asking an array for it takes longer than what is done with it.
-        self._status, self._failed_step, self._failed_size = (self.noted[name].reshape(-1) for name in ENDS)
         self._launch: Any = None
         self._launched, self._written = (0, 0, 0), False
         self.refill(members)
@@ -83,6 +84,23 @@ class Packets:
                 packets.refill(members)
                 return packets
         return cls(plan, members)
+
+    def _values(self, lanes: np.ndarray) -> np.ndarray:
+        """The numbers of members in lanes (..., numbers of a lane), without slopes; of plain lanes all there are."""
+        return lanes if self.slopes is None else lanes[..., : self.plan.spec.width]
+
+    # The same memory as NumPy has it, by member: asking an array for it takes longer than what is done with it.
+    @property
+    def _status(self) -> np.ndarray:
+        return self._values(self.noted["status"]).reshape(-1)
+
+    @property
+    def _failed_step(self) -> np.ndarray:
+        return self._values(self.noted["failed_step"]).reshape(-1)
+
+    @property
+    def _failed_size(self) -> np.ndarray:
+        return self._values(self.noted["failed_size"]).reshape(-1)
 
     def serve(self, plan: Plan) -> None:
         """Take another plan with the same kernel, which may begin at another step."""
@@ -104,8 +122,7 @@ class Packets:
     def refill(self, members: Members) -> None:
         """Take other members in place of these, from their starts on."""
         plan, self.members = self.plan, members
-        packing = Packing(plan, members)
-        self.frame, self.scale, self._packing = packing.frame, packing.scale, packing
+        packing = self._packed(members)
         shared, before = plan.shared.keeps, self._arrays() if self._written else []
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
         each = {"law": packing.laws(), "part": packing.control(), "event": packing.events()}
@@ -119,7 +136,9 @@ class Packets:
         if plan.spec.warning_rows:
             self._limits.write(self.count, [((), self._watched_limits(), False)])
             self.monitor.limits = self._limits.array
-        self.state_lanes.write(packing.starts(), members.count)
+        self.state_lanes.write(packing.starts(), packing.members.count)
+        if self.slopes is not None:
+            self.slopes.check_moved()
         self._warned: tuple[np.ndarray, np.ndarray] | None = None
         if self._written:
             for view in self.noted.values():
@@ -131,6 +150,18 @@ class Packets:
             going_on.take(self, members.final)
             if plan.launches.goes_on_exactly:
                 self._warned = going_on.start_warnings(members.final, members.count)
+
+    def _packed(self, members: Members) -> Packing:
+        """The packing of members, of their copies too where numbers carry slopes; frame, scale and water are the members'."""
+        if self.slopes is None or members.shifted is None:
+            packing = Packing(self.plan, members)
+            self.frame, self.scale, self._packing = packing.frame, packing.scale, packing
+            return packing
+        self.slopes.begin(members.shifted)
+        copies = CopiesPacking(self.plan, members.shifted.members)
+        self.frame, self.scale = copies.frame_of_members(), copies.of_members(copies.scale)
+        self._packing = copies
+        return copies
 
     @property
     def state(self) -> Any:
@@ -178,7 +209,7 @@ class Packets:
     def _monitor(self) -> Any:
         """The arrays where the kernel notes what it saw at intervals."""
         plan, monitor = self.plan, self.plan.kernel.advance.types.Monitor()
-        Lane, Ints = plan.kernel.advance.types.Lane, int_lane(plan.spec.width)
+        Lane, Ints = plan.kernel.advance.types.Lane, int_lane(plan.spec.lanes)
         if plan.spec.warning_rows:
             for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
                 setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
@@ -218,9 +249,32 @@ class Packets:
 
     def advance(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps k0 to k1; a copy of the samples due in them, (samples, count * width, numbers of a sample)."""
-        packed = self.launch(k0, k1)
-        packets, samples, numbers, width = packed.shape
-        return packed.transpose(1, 0, 3, 2).copy().reshape(samples, packets * width, numbers)
+        return by_members(self._values(self.launch(k0, k1)))
+
+    def raw_slopes(self, k0: int, k1: int) -> tuple[np.ndarray, list[np.ndarray], list[Any]]:
+        """The samples that the last launch wrote in these steps, and, by each number, their slopes and those of the frame.
+
+        Returns: (samples, members, numbers of a sample), as many slopes of that shape, and slopes of the frame's Q and origin.
+        """
+        assert self.slopes is not None
+        s0, s1 = self.plan.launches.samples_due(k0, k1)
+        lanes, m = self._launched_samples(s1 - s0), self.members.count
+        each = [by_members(lanes[..., place])[:, :m] for place in self.slopes.places()]
+        return by_members(self._values(lanes))[:, :m], each, slopes_of_frame(self.slopes, self._packing.frame)
+
+    def slopes_of_start(self, names: Sequence[str]) -> list[dict[str, np.ndarray]]:
+        """The slopes, by each number, of the motion (1, m, ...) at the start."""
+        shifted = self.members.shifted
+        assert self.slopes is not None
+        assert shifted is not None
+        slopes = {name: self.slopes.of(getattr(shifted.members, name))[1] for name in names}
+        return [{name: slopes[name][i][None] for name in names} for i in range(self.plan.spec.tangents)]
+
+    def slopes_of_first_signals(self) -> list[np.ndarray]:
+        """The slopes, by each number, of the signals at the start, (1, m, numbers of the signals)."""
+        assert self.slopes is not None
+        rows, m = self.monitor.first_signals.numpy()[:, : len(self.plan.layout.signal_rows)], self.members.count
+        return [by_members(rows[:, None, :, place])[:, :m] for place in self.slopes.places()]
 
     def launch(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps k0 to k1, and return the samples due after k0 and no later than k1.
@@ -230,7 +284,6 @@ class Packets:
         plan = self.plan
         s0, s1 = plan.launches.samples_due(k0, k1)
         numbers = sum(plan.layout.sizes.values())
-        width = plan.spec.width
         waste = WASTE if SAMPLE_FIELDS.keys() - plan.layout.sizes.keys() else 0
         shape = (self.count, max(1, (s1 - s0) * numbers) + waste)
         if self.out is None or self.out.shape != shape:
@@ -246,7 +299,12 @@ class Packets:
                 self._launch.set_param_at_index(name, value)
         self._launched = k0, k1, s0
         self._launch.launch()
-        return self._samples[:, : (s1 - s0) * numbers].reshape(self.count, s1 - s0, numbers, width)
+        return self._launched_samples(s1 - s0)
+
+    def _launched_samples(self, count: int) -> np.ndarray:
+        """So many samples of the last launch, (packets, samples, numbers of a sample, numbers of a lane)."""
+        numbers = sum(self.plan.layout.sizes.values())
+        return self._samples[:, : count * numbers].reshape(self.count, count, numbers, self.plan.spec.lanes)
 
     def _recorded(self, tolerances: Any, k0: int, k1: int, s0: int) -> Any:
         """Record a launch of the kernel without launching it."""
@@ -266,13 +324,13 @@ class Packets:
         """
         slots, numbers = self.monitor.slots, self.monitor.numbers
         first = self.plan.launches.slot_of(when.start, slots)
-        rows = self.monitor.ticks.numpy()[first * numbers : (first + when.stop - when.start) * numbers]
+        rows = self._values(self.monitor.ticks.numpy()[first * numbers : (first + when.stop - when.start) * numbers])
         by_tick = rows.reshape(when.stop - when.start, numbers, math.prod(rows.shape[1:]))[..., : self.members.count]
         return by_tick.transpose(0, 2, 1)
 
     def first_signals(self) -> np.ndarray:
         """The signals at t = 0 once the first launch has made them, (1, count * width, numbers of the signals), a copy."""
-        rows = self.monitor.first_signals.numpy()[:, : len(self.plan.layout.signal_rows)]
+        rows = self._values(self.monitor.first_signals.numpy()[:, : len(self.plan.layout.signal_rows)])
         packets, numbers, width = rows.shape
         return rows.transpose(0, 2, 1).reshape(1, packets * width, numbers).copy()
 
@@ -284,7 +342,7 @@ class Packets:
         if self.untroubled and not (warnings[0].any() or self.plan.method.adaptive or self.plan.spec.substep):
             return MemberStatus.clear(m, 0)
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
-        pace = self.state_lanes.view[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
+        pace = self._values(self.state_lanes.view[:, STATE_FIELDS + 2 : STATE_FIELDS + kept])
         code = self._status[:m].astype(np.uint8)
         status, stopped_by = code.copy(), np.zeros(m, np.uint8)
         for number, (event, _) in enumerate(self.plan.kernel_choice.events):
@@ -315,7 +373,7 @@ class Packets:
 
     def _of_members(self, lanes: Any, kind: Any) -> np.ndarray:
         """One number of each member, from an array of lanes."""
-        return np.asarray(lanes.numpy().reshape(-1)[: self.members.count].astype(kind))
+        return np.asarray(self._values(lanes.numpy()).reshape(-1)[: self.members.count].astype(kind))
 
     def _warnings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(bits, step, value) of the warnings at the start and of those the kernel noted.
@@ -344,19 +402,28 @@ class Packets:
             peaks is not None and calm(plan, members, self.frame, peaks.max(axis=0).max(axis=1))
         ):
             return np.zeros(members.count, np.uint16), np.zeros(0)
-        momentum = self.state_lanes.rows()[:, 12:15] * self.scale[:, None]
-        return at_start(plan, members, self.frame, momentum, self._packing.water)
+        rows, water = self.state_lanes.rows(), self._packing.water
+        if isinstance(self._packing, CopiesPacking):
+            rows = self._packing.of_members(rows)
+            water = None if water is None else self._packing.of_members(water)
+        return at_start(plan, members, self.frame, rows[:, 12:15] * self.scale[:, None], water)
 
     def _with_departed(
         self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The same with a warning of the members whose last attitude is no rotation: some end between two ticks."""
-        size = departure(self.state_lanes.view[:, :9])[: len(bits)]
+        size = departure(self._values(self.state_lanes.view[:, :9]))[: len(bits)]
         warning = np.uint16(Warnings.ORTHOGONALITY)
         over = size > orthogonality_limit(self.plan)
         first = over & (warning > bits)
         steps_made = np.where(self._status[: len(bits)] == 0, self._launched[1], self._failed_step[: len(bits)])
         return bits | warning * over, np.where(first, steps_made, step), np.where(first, size, value)
+
+
+def by_members(lanes: np.ndarray) -> np.ndarray:
+    """Samples (packets, samples, numbers, width) by member, (samples, packets times width, numbers), a copy."""
+    packets, samples, numbers, width = lanes.shape
+    return lanes.transpose(1, 0, 3, 2).copy().reshape(samples, packets * width, numbers)
 
 
 def columns_of(sizes: Mapping[str, int]) -> Any:

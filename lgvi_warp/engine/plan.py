@@ -21,7 +21,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.going_on import begun
 from lgvi_warp.engine.kernel import Kernel
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel
-from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of
+from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of, with_tangents
 from lgvi_warp.engine.launches import Launches
 from lgvi_warp.engine.packing import rows_shared
 from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, check_substep, check_ticks
@@ -187,6 +187,9 @@ def choose_plan(
     varied = ensemble.varied_names
     shared.take(scene, varied, method)
     facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
+    if ensemble.copies is not None:
+        # The kernel must have what a number changes that is nothing now.
+        facts = replace(survey(ensemble.copies.surveyed, method, shared), odd=facts.odd)
     # Before anything is packed, which depends on more than the scene and the method.
     shared.note(scene, varied, method)
     choice = choose_kernel(ensemble, method, facts, built_in, checks, shared.user_axes)
@@ -200,6 +203,8 @@ def choose_plan(
         width, width_source = default_width(kind_of(method, choice), dtype)
     layout = SampleLayout(choice, ordered(fields), dtype == COMPENSATED, read_at_ticks)
     spec = spec_of(choice, method, layout, width, dtype, checks, on_failure)
+    if ensemble.copies is not None:
+        spec = with_tangents(spec, len(ensemble.copies.targets))
     plan = Plan(
         ensemble=ensemble,
         method=method,
@@ -220,13 +225,13 @@ def choose_plan(
     )
     settings = method, grid.h, dtype, width, checks, on_failure, layout.fields, facts.decisive
     shared.take(scene, varied, settings)
-    many_rows = rows_shared(plan)
+    many_rows = ensemble.copies is None and rows_shared(plan)
     shared.note(scene, varied, settings)
     if many_rows:
         spec = spec._replace(shared_rows=True)
         plan = replace(plan, spec=spec, kernel=Kernel(spec, choice))
     # A kernel's hash takes its source: only where some kernel was measured here.
-    best = measured().get(plan.kernel.hash) if chosen and measured() else None
+    best = measured().get(plan.kernel.hash) if chosen and measured() and not spec.tangents else None
     plan = plan if best is None else plan.of_width(best, "measured")
     return begun(plan)
 

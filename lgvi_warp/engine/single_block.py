@@ -21,7 +21,9 @@ Rows = dict[str, np.ndarray]
 
 def fits(plan: Plan, blocks: Sequence[Block]) -> bool:
     """Whether a run can be made so: in one block, without a function of the host and without what is gathered at ticks."""
-    return len(blocks) == 1 and not (plan.launches.has_callback or plan.launches.gathered or plan.layout.signals)
+    return len(blocks) == 1 and not (
+        plan.spec.tangents or plan.launches.has_callback or plan.launches.gathered or plan.layout.signals
+    )
 
 
 def run_single_block(

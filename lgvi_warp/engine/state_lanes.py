@@ -16,7 +16,7 @@ from lgvi_kernels.lanes.arithmetic import lane
 from lgvi_kernels.packing.states import PEAKS, PLACES, make_pack_states
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
-from lgvi_warp.engine.arrays import Lanes, put_rows
+from lgvi_warp.engine.arrays import PLAIN, Lanes, Writing
 from lgvi_warp.engine.states import Starts, write_rows
 
 # Members of a run for which it pays to load the kernel, which takes some tens of milliseconds once it is compiled.
@@ -32,9 +32,9 @@ class StateLanes(Lanes):
         None where the twin wrote the states.
     """
 
-    def __init__(self, spec: Spec, packets: int, kernel: Any = None):
-        super().__init__(packets, spec.state_fields, lane(spec.width, spec.real))
-        self._spec = spec
+    def __init__(self, spec: Spec, packets: int, kernel: Any = None, writing: Writing = PLAIN):
+        super().__init__(packets, spec.state_fields, lane(spec.lanes, spec.real))
+        self._spec, self._put_rows = spec, writing.put_rows
         self._kernel, self._packets = kernel, packets
         self._launch: Any = None
         self._starts: Any = None
@@ -56,7 +56,7 @@ class StateLanes(Lanes):
         """Write the states of some members; lanes beyond the last of them get its own."""
         first, self._starts, self._members = self._starts is None, starts, members
         if self._kernel is None or (first and members < FEW):
-            put_rows(self.view, self.rows())
+            self._put_rows(self.view, self.rows())
             return
         if self._launch is None:
             self._record(self._kernel, self._packets)
@@ -80,7 +80,7 @@ _loaded: set[tuple[int, Any]] = set()
 
 def kernel_for(spec: Spec, members: int) -> Any:
     """The kernel that packs the states of a run of so many members; None where its twin should."""
-    if (spec.width, spec.real) not in _loaded and members < MANY:
+    if spec.tangents or ((spec.width, spec.real) not in _loaded and members < MANY):
         return None
     with contextlib.suppress(OSError):  # a cache that cannot be written, and has no such kernel
         return kernel_of(spec.width, spec.real)

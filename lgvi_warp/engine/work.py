@@ -116,6 +116,10 @@ def run_block(
         at_once = max(1, NUMBERS_AT_ONCE // block.count)
         tick_takers = [tick_taker for keeper in block_keepers if (tick_taker := getattr(keeper, "take_ticks", None))]
 
+        slope_takers = [
+            slope_taker for keeper in block_keepers if (slope_taker := getattr(keeper, "take_slopes", None))
+        ]
+
         def keep(when: slice, values: Mapping[str, np.ndarray], ends: Ends) -> None:
             samples = samples_of(plan, plan.grid, when, values, ends)
             for block_keeper in block_keepers:
@@ -135,6 +139,8 @@ def run_block(
         def keep_start() -> None:
             running = np.zeros(block.count, np.uint8), np.zeros(block.count, np.int64)
             keep(slice(0, 1), at_start(plan, members, packets), lambda: running)
+            for slope_taker in slope_takers:
+                slope_taker(slice(0, 1), slopes_at_start(packets, plan.layout.fields))
 
         if not plan.layout.signals:
             keep_start()
@@ -156,6 +162,8 @@ def run_block(
             if when.start < when.stop and block_keepers:
                 values = unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table)
                 keep(when, {name: values[name] for name in plan.fields}, packets.ended)
+                for slope_taker in slope_takers:
+                    slope_taker(when, slopes_in_advance(packets, k0, k1))
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome(warned)
         for block_keeper in block_keepers:
@@ -235,6 +243,58 @@ def divided(
         samples[name] = values.reshape(*raw.shape[:2], *shape)
         column += size
     return samples
+
+
+def slopes_of_samples(
+    fields: Mapping[str, int],
+    raw: np.ndarray,
+    raw_slope: np.ndarray,
+    frame: Frame,
+    turn: Any,
+    table: Mapping[str, Field],
+) -> dict[str, np.ndarray]:
+    """The slopes of `unpacked` by one number, in the user's axes, from his origin.
+
+    raw, raw_slope: (samples, members, numbers) in the kernel's. turn: slopes of the frame's Q and origin, (1 or m, ...).
+    """
+    slopes = divided(fields, raw_slope, table)
+    values = divided(fields, raw, table)
+    Q, (dQ, d_origin) = frame.Q, turn
+    if frame.turned or dQ.any():
+        for name in slopes.keys() - {"position", *SIGNALS}:
+            if name == "attitude":
+                Qt, dQt = (np.swapaxes(q, -1, -2) for q in (Q, dQ))
+                slopes[name] = slopes[name] @ Qt + values[name] @ dQt
+            else:
+                slopes[name] = notation.rotate_out(Q, slopes[name]) + notation.rotate_out(dQ, values[name])
+    if frame.shifted or d_origin.any():
+        user = unpacked(fields, raw, frame, table)
+        o, do = (np.broadcast_to(v, (raw.shape[1], 3)) for v in (frame.origin, d_origin))
+        if "position" in slopes:
+            moved = np.einsum("knij,nj->kni", slopes["attitude"], o) + np.einsum("knij,nj->kni", user["attitude"], do)
+            slopes["position"] = slopes["position"] - moved
+        if "velocity" in slopes:
+            turned = notation.cross(slopes["angular_velocity"], o) + notation.cross(user["angular_velocity"], do)
+            slopes["velocity"] = slopes["velocity"] - turned
+    return slopes
+
+
+def slopes_at_start(packets: Packets, fields: Sequence[str]) -> list[dict[str, np.ndarray]]:
+    """The slopes, by each number, of the samples (1, m, ...) at the start."""
+    layout = packets.plan.layout
+    each = packets.slopes_of_start([name for name in fields if name not in SIGNALS])
+    if not layout.signals:
+        return each
+    sizes, raw = {name: layout.sizes[name] for name in layout.signals}, packets.slopes_of_first_signals()
+    return [motion | divided(sizes, rows, layout.table) for motion, rows in zip(each, raw, strict=True)]
+
+
+def slopes_in_advance(packets: Packets, k0: int, k1: int) -> list[dict[str, np.ndarray]]:
+    """The slopes, by each number, of the samples that the last launch wrote in these steps, in the user's axes."""
+    layout = packets.plan.layout
+    raw, each, turns = packets.raw_slopes(k0, k1)
+    pairs = zip(each, turns, strict=True)
+    return [slopes_of_samples(layout.sizes, raw, rows, packets.frame, turn, layout.table) for rows, turn in pairs]
 
 
 def samples_of(plan: Plan, grid: TimeGrid, when: slice, fields: Mapping[str, np.ndarray], ends: Ends) -> Fields:

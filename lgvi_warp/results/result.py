@@ -89,6 +89,9 @@ class Result(Summarized):
         kept: Samples of the members in kept_members, where not those of all members were kept; else None.
         kept_members: Indices of these members, shape (m,).
         store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
+        jacobian: Derivatives of the samples by the numbers in `tangents`, by name, each of the samples' shape and one
+            dimension more: (k, n, ..., tangents); NaN from where a member ended. Empty without `tangents`.
+        tangents: Names of these numbers, as `solve(tangents=...)` got them.
         end: What `final` returns, or a function without arguments that reads it; None where it was not kept.
         compile_seconds: Time to load the kernel [s].
         compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
@@ -126,6 +129,8 @@ class Result(Summarized):
     event: np.ndarray | None = None
     starts: Mapping[str, np.ndarray] = field(default_factory=dict)
     weights: np.ndarray | None = None
+    jacobian: Mapping[str, np.ndarray] = field(default_factory=dict)
+    tangents: tuple[str, ...] = ()
     end: Final | Callable[[], Final] | None = field(default=None, compare=False)
     compile_seconds: float = field(default=0.0, compare=False)
     compile_phases: Phases = field(default=Phases(), compare=False)
@@ -274,12 +279,20 @@ class Result(Summarized):
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
         starts = {name: values[places] for name, values in self.starts.items()}
+        slopes = {name: values[:, places] for name, values in self.jacobian.items()}
         of_members = {name: values[places] for name, values in self._of_members().items()}
         # That of a store is read when it is asked for.
         end = (
             functools.partial(_part_of, self.end, places) if callable(self.end) else self.end and self.end.part(places)
         )
-        return replace(self, samples=samples, parameters=parameters, starts=starts, end=end, **of_members)
+        own: dict[str, Any] = {
+            "samples": samples,
+            "jacobian": slopes,
+            "parameters": parameters,
+            "starts": starts,
+            "end": end,
+        }
+        return replace(self, **own, **of_members)
 
     def _of_members(self) -> dict[str, np.ndarray]:
         """What is recorded of each member, (n,) by name."""
@@ -345,6 +358,9 @@ class Result(Summarized):
         if self.samples and self.end is not None:
             of_end, texts["final"] = final_files.to_file(self.final)
             arrays |= of_end
+        if self.tangents:
+            arrays |= {f"jacobian/{name}": slopes for name, slopes in self.jacobian.items()}
+            texts["tangents"] = json.dumps(self.tangents)
         if self.statistics:
             estimates, texts["statistics"] = self.statistics.to_arrays()
             arrays |= {f"statistics/{name}": value for name, value in estimates.items()}
@@ -408,6 +424,8 @@ class Result(Summarized):
             provenance=provenance,
             terms=terms_of(provenance["scene"]),
             statistics=estimates,
+            jacobian=_below("jacobian/", content),
+            tangents=texts["tangents"],
         )
         result = replace(result, end=final_files.from_file(content, result.samples, result.parameters))
         kept = _below("kept/", content)

@@ -12,7 +12,7 @@ from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.control.signals import IN_FILES, has_shape
 from lgvi_warp.results import member_fields
 
-TEXTS = ("messages", "provenance", "statistics", "final")
+TEXTS = ("messages", "provenance", "statistics", "final", "tangents")
 
 
 def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
@@ -28,6 +28,10 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
         if base in IN_FILES:
             good = array.shape[:2] == (k, n if base == name else m) and array.dtype.kind == "f"
             good = good and has_shape(base, array.shape[2:])
+        elif name.startswith("jacobian/"):
+            base = name.removeprefix("jacobian/")
+            good = base in IN_FILES and array.dtype.kind == "f" and array.shape[:2] == (k, n) and "tangents" in content
+            good = good and has_shape(base, array.shape[2:-1])
         elif name in TEXTS:
             good = array.dtype.kind == "U" and array.shape == ()
         elif name == "time":
@@ -54,7 +58,18 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
         raise ValueError("its messages are no texts")
     _provenance(texts["provenance"])
     _final(content)
+    texts["tangents"] = _tangents(content)
     return texts
+
+
+def _tangents(content: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    """The names of the numbers of the derivatives. Raises ValueError."""
+    names = parsed(str(content["tangents"])) if "tangents" in content else []
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise ValueError("its tangents are no names")
+    if any(content[name].shape[-1] != len(names) for name in content if name.startswith("jacobian/")):
+        raise ValueError(f"it has derivatives by other numbers than {len(names)}")
+    return tuple(names)
 
 
 def _final(content: Mapping[str, np.ndarray]) -> None:

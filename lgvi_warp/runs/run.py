@@ -57,6 +57,7 @@ def run_plan(
     warned: bool = True,
     on_block: Callable[[Result], None] | None = None,
     final: bool = False,
+    slopes: Any = None,
 ) -> Result:
     """Run the blocks of a plan, all or as many as its statistics need, and gather the result in memory.
 
@@ -64,6 +65,7 @@ def run_plan(
     known: Function from the plan to provenance and messages, where many runs share them; by default they are made for this
         run.
     final: Whether the result holds what another run needs to go on.
+    slopes: The keeper of the slopes of a run with tangents.
     """
     total, runner, merged = plan.ensemble.members, executor or Threads(threads), Merged()
     compile_seconds = plan.compile()
@@ -83,7 +85,7 @@ def run_plan(
     if not joined and on_block is None and single_block.fits(plan, runs):
         gathered.take_all(*single_block.run_single_block(plan, gathered.names, warned, overall.at, final))
         return ended(total)
-    work = Work(plan, gathered.keepers, warned=warned)
+    work = Work(plan, gathered.keepers if slopes is None else (*gathered.keepers, slopes), warned=warned)
     try:
         n = run_blocks(
             work, runs, runner, overall.at, enough=gathered.observing.enough, merged=merged,

@@ -14,6 +14,18 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
+class Shifted:
+    """Members beside which others stand with one number shifted, those of each in a row: what derivatives are taken of.
+
+    members: each of m members, then the same with a number shifted by OFFSETS steps, for one number after the other.
+    steps: (m, numbers), the unit of the shifts, in that of each number.
+    """
+
+    members: Members
+    steps: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Members:
     """Parameters by name, with a leading dimension of 1 (shared) or m (varied), and initial states of m members.
 
@@ -21,6 +33,7 @@ class Members:
     angular velocities (m, 3) [rad/s] in body axes. Seed and index key a member's random numbers, in a subset as in the whole,
     unless its normals are given. `starts` has the numbers of the start that vary, (m, ...) as the scene names them:
     "start.euler_deg"; `weight` (m,) what each counts for in statistics, None where all count alike.
+    shifted: of a run with tangents, what these are taken of.
     final: where they ended in the run that they go on from; None where they start.
     """
 
@@ -35,6 +48,7 @@ class Members:
     weight: np.ndarray | None = None
     final: Final | None = None
     given: GivenDraws | None = None
+    shifted: Shifted | None = None
 
     @property
     def count(self) -> int:

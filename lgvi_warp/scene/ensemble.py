@@ -197,6 +197,8 @@ class Ensemble(Summarized):
         self.final, self.start_time = None, 0.0
         # Standard normals of the members' noise, in place of those that counters give; None for these.
         self.given: GivenDraws | None = None
+        # The same members with numbers shifted, of a run that is to tell the derivatives by these (see scene/copies.py).
+        self.copies: Any = None
         self._check_physical(checked)
 
     @property
@@ -296,6 +298,18 @@ class Ensemble(Summarized):
         """
         return self._values(first, stop, start=False)
 
+    def numbers(self, first: int, stop: int) -> dict[str, np.ndarray]:
+        """Return all numbers of some members, those of the start too.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            Values by name, (stop - first, ...) or, where all members share them, (1, ...).
+        """
+        return self._values(first, stop)
+
     def select(self, first: int, stop: int) -> Members:
         """Return parameters and initial states of some members.
 
@@ -315,6 +329,8 @@ class Ensemble(Summarized):
         given = None if self.given is None else self.given.of_members(slice(first, stop))
         values, indices = self._values(first, stop), self.indices_of(first, stop)
         members = self._draws.members_of(values, indices, self.seed, self.weights(first, stop), given)
+        if self.copies is not None:
+            return replace(members, shifted=self.copies.of(int(first), int(stop)))
         if self.final is None:
             return members
         everyone = (first, stop) == (0, self.members)
@@ -396,7 +412,8 @@ class Ensemble(Summarized):
     @property
     def varied_names(self) -> set[str]:
         """Names of what members have of their own: drawn, from columns or explicit."""
-        return self._draws.varied_names
+        varied = self._draws.varied_names
+        return varied if self.copies is None else varied | self.copies.surveyed.varied_names
 
     @property
     def starts_vary(self) -> bool:
@@ -447,6 +464,24 @@ class Ensemble(Summarized):
         """
         ensemble = copy.copy(self)
         ensemble.given = given
+        return ensemble
+
+    def given_as_arrays(self, arrays: Mapping[str, np.ndarray], repeats: int) -> Ensemble:
+        """Return each member several times in a row, with numbers that nobody checks.
+
+        Args:
+            arrays: (members times repeats, ...) by name, of every number that differs from member to member.
+            repeats: How often each member stands there, with the same noise.
+
+        Returns:
+            The ensemble.
+        """
+        total = self.members * repeats
+        changes = {"explicit": arrays, "columns": (), "variations": (), "places": None, "weights": None}
+        ensemble = self._drawing(total=total, **changes)
+        ensemble._indices, ensemble.checked = np.repeat(self.indices, repeats), total
+        if self.given is not None:
+            ensemble.given = self.given.of_members(np.repeat(np.arange(self.members), repeats))
         return ensemble
 
     def with_columns(self, columns: Mapping[str, np.ndarray]) -> Ensemble:

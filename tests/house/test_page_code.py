@@ -39,7 +39,8 @@ TERMS = [f"docs/guide/terms/{path.name}" for path in sorted((DOCS / "guide" / "t
 PARTS = ["docs/controllers/guidance.md", "docs/controllers/laws.md"]
 OF_A_RESULT = ["docs/guide/pictures.md", "docs/guide/recordings.md"]
 SCRIPT_NAMES = (
-    "assimilation choose_method_and_step compare_with_your_simulator current going_on notebooks resume your_vehicle"
+    "assimilation choose_method_and_step compare_with_your_simulator current going_on notebooks resume tangents "
+    "your_vehicle"
 )
 SCRIPTS = [f"docs/guide/{name}.md" for name in SCRIPT_NAMES.split()]
 

@@ -41,7 +41,7 @@ def make_feed(spec, types, method, at_step, opened):
     method: see Step; at_step, opened: see Stepping.
     """
     State, Constants, Monitor = types.State, types.Constants, types.Monitor
-    Reference, truth = reference_struct(spec.width, spec.real), make_truth(spec, types, method)
+    Reference, truth = reference_struct(spec.lanes, spec.real), make_truth(spec, types, method)
     seen, acted = make_seen(spec, types, method, truth, at_step, opened), make_acted(spec, types)
     gather = make_gather(spec, types, at_step)
 
@@ -90,7 +90,7 @@ def make_feed(spec, types, method, at_step, opened):
 def make_truth(spec, types, method):
     """(x, c, monitor, k, h) -> the motion in the user's axes, about his origin, as a Measurement."""
     State, Constants, Monitor, real = types.State, types.Constants, types.Monitor, spec.real
-    Measurement = measurement_struct(spec.width, real, spec.shared_rows)
+    Measurement = measurement_struct(spec.lanes, real, spec.shared_rows)
     velocities, water_velocity = method.velocities, method.water_velocity
     drifts = superpose(spec.laws, "flow") is not None
     turned, moved = "axes" in spec.parts, "origin" in spec.parts
@@ -141,7 +141,7 @@ def make_truth(spec, types, method):
 def make_seen(spec, types, method, truth, at_step, opened):
     """(x, c, monitor, k, h, opening) -> what is measured and what is wanted after k steps, both noted."""
     State, Constants, Monitor, real = types.State, types.Constants, types.Monitor, spec.real
-    Reference, momentum = reference_struct(spec.width, real), method.momentum
+    Reference, momentum = reference_struct(spec.lanes, real), method.momentum
     measure, guide = (in_turn(spec.control.parts, role) for role in ("measure", "guide"))
     gather_motion = make_gather_motion(spec.compensated, "origin" in spec.parts)
     put_measured, put_reference = make_put_measured(spec.control.headings), make_put_reference(spec.control.headings)
@@ -180,8 +180,8 @@ def make_seen(spec, types, method, truth, at_step, opened):
 def make_acted(spec, types):
     """(x, y, r, c, monitor): control, allocate and send; x gets the alarm of lanes whose commands are no numbers."""
     State, Constants, Monitor, real, checked = types.State, types.Constants, types.Monitor, spec.real, spec.checked
-    Wrench, Reference = wrench_struct(spec.width, real), reference_struct(spec.width, real)
-    Measurement = measurement_struct(spec.width, real, spec.shared_rows)
+    Wrench, Reference = wrench_struct(spec.lanes, real), reference_struct(spec.lanes, real)
+    Measurement = measurement_struct(spec.lanes, real, spec.shared_rows)
     act, allocate, send = (in_turn(spec.control.parts, role) for role in ("control", "allocate", "send"))
 
     @wp.func

@@ -162,7 +162,7 @@ def maps_of(spec, letters):
 
 def make_method(spec):
     """The functions of a method for this Spec."""
-    width, real = spec.width, spec.real
+    width, real = spec.lanes, spec.real
     View = view_struct(width, real, spec.shared_rows)
     Wrench, Flow, Damping = (make(width, real) for make in (wrench_struct, flow_struct, damping_struct))
     coupled, shifted = "coupled" in spec.parts, "origin" in spec.parts
@@ -200,7 +200,7 @@ def make_method(spec):
     V = None
     if damping is not None and spec.averages is None:
         V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
-    solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked)
+    solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked, spec.tangents)
     used = {letter for letter, _ in spec.maps} | ({spec.lead[0]} if spec.lead else set())
     letters = {
         "Ab": make_Ab(velocity, spec.timed),

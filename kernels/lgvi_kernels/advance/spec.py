@@ -65,6 +65,18 @@ class Spec(NamedTuple):
     substep: bool = False  # a step that has no solution is divided
     control: Control | None = None
     shared_rows: bool = False  # all members share the rows of the laws' table (see table_number)
+    tangents: int = 0  # slopes that each number carries; with any, lanes are those of lgvi_kernels.tangents
+
+    @property
+    def lanes(self) -> int:
+        """Numbers in a lane as Warp knows it: one for each vehicle, and those of its slopes."""
+        if not self.tangents:
+            return self.width
+        # Where a kernel has slopes, here: other runs do without this code.
+        from lgvi_kernels.tangents.lanes import declare
+        from lgvi_kernels.tangents.native import DualShape
+
+        return declare(DualShape(self.width, self.tangents, self.real))
 
     @property
     def watched(self) -> bool:
@@ -139,7 +151,7 @@ class Types(NamedTuple):
 @functools.cache
 def make_types(spec):
     """The types for this Spec."""
-    width, real = spec.width, spec.real
+    width, real = spec.lanes, spec.real
     Lane, Number = lane(width, real), table_number(width, real, spec.shared_rows)
     Inertia = inertia_struct(width, real, spec.mass, spec.parts)
     Params = params_of(spec.laws, spec.numbers, width, real)
@@ -159,6 +171,7 @@ def make_types(spec):
         **({"events": Events} if spec.events else {}),
         **({"drag": DragFlow} if spec.dragged else {}),
         **({"loop": Loop} if spec.control else {}),
+        **_rules(spec),
     )
     return Types(
         Lane,
@@ -178,3 +191,12 @@ def make_types(spec):
         ),
         Loop,
     )
+
+
+def _rules(spec):
+    """A field that nothing reads: its name puts the text of the rules for slopes into the kernel's hash."""
+    if not spec.tangents:
+        return {}
+    from lgvi_kernels.tangents.native import DualShape, digest
+
+    return {f"rules_{digest(DualShape(spec.width, spec.tangents, spec.real))}": wp.uint8}

@@ -106,7 +106,7 @@ def make_watching(spec):
 
 def _looks(spec, method):
     """(look_at, energies, supplies, growth) of monitor.py; the step stands in for those that a Spec does not ask for."""
-    width, real, laws = spec.width, spec.real, spec.laws
+    width, real, laws = spec.lanes, spec.real, spec.laws
     types = make_types(spec)
     directions = bool(laws) and laws[0] is drag_directions
     velocities, of_forces = method.velocities, method.velocities_of_forces

@@ -53,7 +53,7 @@ def bounded_law(law, width, real, shared=False):
 
 def bounded_spec(spec):
     """The Spec with its laws and events held to their rows."""
-    hold = functools.partial(bounded_law, width=spec.width, real=spec.real, shared=spec.shared_rows)
+    hold = functools.partial(bounded_law, width=spec.lanes, real=spec.real, shared=spec.shared_rows)
     return spec._replace(laws=tuple(map(hold, spec.laws)), events=tuple(map(hold, spec.events)))
 
 

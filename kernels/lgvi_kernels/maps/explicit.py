@@ -262,7 +262,7 @@ def make_implicit_stages(spec, rates, states, velocities, slope):
 
     states: those of the stages (see make_stage); slope: the matrix of damping (see make_forces).
     """
-    method, width, real, coupled = spec.explicit, spec.width, spec.real, "coupled" in spec.parts
+    method, width, real, coupled = spec.explicit, spec.lanes, spec.real, "coupled" in spec.parts
     Rates = rates_struct(width, real, method.kind)
     damped = [make_damped(Rates, make_moves, row, coupled) for row in method.implicit]
     implicit = make_implicit(damping_struct(width, real), factor_struct(width, real), coupled)
@@ -294,7 +294,7 @@ def make_explicit(spec, types, everything, velocities, slope):
 
     types: of the kernel's state and constants (see advance/spec.py).
     """
-    method, width, real, timed = spec.explicit, spec.width, spec.real, spec.timed
+    method, width, real, timed = spec.explicit, spec.lanes, spec.real, spec.timed
     Wrench = wrench_struct(width, real)
     Rates = rates_struct(width, real, method.kind)
     turned = make_turned(rotation_struct(width, real), real)
@@ -329,4 +329,6 @@ def make_explicit(spec, types, everything, velocities, slope):
     if not method.adaptive:
         return make_fixed(stages, finish, push, timed, last)
     errors = make_errors(Rates, [make_moves(along, row, None) for row in method.errors])
-    return make_adaptive(stages, finish, errors, method.estimate, width, real, timed, copy_memory if kept else None)
+    return make_adaptive(
+        stages, finish, errors, method.estimate, spec.width, real, timed, copy_memory if kept else None
+    )

@@ -58,8 +58,24 @@ STEP_TOO_LARGE = 1
 NOT_CONVERGED = 2
 
 
+def _sloped(value, newton, rotation):
+    """(F, u, a, J) -> the rotation of u after one Newton step more, from u without its slopes.
+
+    Of a root the step leaves nothing but its slopes, by the equation alone: they are as good as the root, and what led to it
+    needs none.
+    """
+    from lgvi_kernels.tangents.lanes import without_slopes
+
+    @wp.func
+    def sloped(F: Any, u: Any, a: Any, J: Any):
+        known = without_slopes(u)
+        return rotation(F, newton(known, value(known, a, J), a, J), a, J)
+
+    return sloped
+
+
 @functools.cache
-def make_solve(real, solver, iterations, adaptive, checked):
+def make_solve(real, solver, iterations, adaptive, checked, tangents=0):
     """(solve, solve_within), functions that solve equation (24) in every lane.
 
     solve: (F, alarm, a, J, tolerance) -> (F, alarm). solve_within: the same with one argument more after J, the square of a
@@ -72,6 +88,8 @@ def make_solve(real, solver, iterations, adaptive, checked):
     """
     fixed_start, adaptive_start, value, newton, excess, residual2, rotation = SOLVERS[solver]
     start = adaptive_start if adaptive else fixed_start
+    if tangents:
+        rotation = _sloped(value, newton, rotation)
     # The largest number below 1: tests are "> 0", and so 1 itself is beyond.
     below_one = 1.0 - 2.0**-53 if real == wp.float64 else 1.0 - 2.0**-24
 

@@ -29,7 +29,7 @@ EVERYTHING = {"vehicle.mass": Normal(relative=0.01),
 
 def numbers(m):
     """Everything in a Members, by name."""
-    others = ("parameters", "indices", "seed", "starts", "weight", "final", "given")
+    others = ("parameters", "indices", "seed", "starts", "weight", "final", "given", "shifted")
     names = [f.name for f in dataclasses.fields(m) if f.name not in others]
     return m.parameters | m.starts | {name: getattr(m, name) for name in names}
 

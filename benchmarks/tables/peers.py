@@ -86,8 +86,10 @@ def table(records: list[dict[str, Any]], problem: str, others: list[str]) -> str
         cells = [f"1e{exponent}", cell(home, method), cell(single, method32)]
         for name in others:
             time, _ = front(records, problem, "float64", name, target)
-            cells.append(f"{time:.3g} ({ratio(time / home)})" if math.isfinite(time + home) else "")
-        rows.append(cells)
+            beside = f" ({ratio(time / home)})" if math.isfinite(home) else ""
+            cells.append(f"{time:.3g}{beside}" if math.isfinite(time) else "")
+        if any(cells[1:]):
+            rows.append(cells)
     return markdown(head, rows) + "\n"
 
 
@@ -114,7 +116,8 @@ def behind(records: list[dict[str, Any]], problem: str, others: list[str]) -> st
             wanted = most if target >= until else 1.0
             if math.isfinite(time) and time < wanted * home:
                 also = f", float32 {ratio(time / single)}" if math.isfinite(single) else ""
-                short.append(f"1e{exponent} ({ratio(time / home)}{also})")
+                how = f"{ratio(time / home)}{also}" if math.isfinite(home) else "where none was measured of lgvi_warp"
+                short.append(f"1e{exponent} ({how})")
         if short:
             what = "faster, or not slower," if most == 1.0 else f"less than {most:g} times slower"
             what = what if most >= 1.0 else f"more than {1.0 / most:g} times faster"

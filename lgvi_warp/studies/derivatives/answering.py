@@ -14,7 +14,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.variations import Target
 from lgvi_warp.studies.derivatives import undefined
 from lgvi_warp.studies.derivatives.answer import Derivatives
-from lgvi_warp.studies.derivatives.copies import Copies, CopyRuns, Neighbours, neighbours
+from lgvi_warp.studies.derivatives.copies import CopyRuns, MovedCopies, Neighbours, neighbours
 from lgvi_warp.studies.derivatives.extrapolation import FINE, Extrapolated, extrapolated, relative_increments
 from lgvi_warp.studies.derivatives.stop_times import StopTimeRuns
 from lgvi_warp.studies.reference import ROUND_OFF
@@ -62,7 +62,7 @@ class Answering:
         pairs = [[question.known_against(each, target) for each in question.interests] for target in question.targets]
         self._live = [j for j, reasons in enumerate(pairs) if not all(reasons)]
         moved = tuple(question.targets[j] for j in self._live)
-        self._copies = Copies(question.fleet, question.scene, moved, question.smoothed)
+        self._copies = MovedCopies(question.fleet, question.scene, moved, question.smoothed)
         self._runs = CopyRuns(self._copies, question.interests, settings)
         self._eps = ROUND_OFF[self._runs.dtype.partition("_")[0]]
         self._reasons: dict[tuple[int, int], dict[str, list[int]]] = {}

@@ -30,7 +30,7 @@ ABOVE, BELOW = 0, 1
 
 
 @dataclass(frozen=True, eq=False)
-class Copies:
+class MovedCopies:
     """Copies of the members of a fleet, of which some numbers are moved.
 
     scene: of the copies, whose events and quanta may be others. targets: the numbers (k) that are moved. left_out: names of
@@ -159,7 +159,7 @@ class CopyRuns:
         members: copies that were run.
     """
 
-    def __init__(self, copies: Copies, interests: Sequence[OfResult], settings: Mapping[str, Any]):
+    def __init__(self, copies: MovedCopies, interests: Sequence[OfResult], settings: Mapping[str, Any]):
         self.copies, self.interests = copies, tuple(interests)
         every = np.arange(copies.fleet.members)
         first = copies.ensemble(every, copies.numbers)

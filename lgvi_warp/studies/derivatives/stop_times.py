@@ -13,7 +13,7 @@ from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfResult
 from lgvi_warp.results.result import Result
 from lgvi_warp.statistics.metrics.nearest import distance
-from lgvi_warp.studies.derivatives.copies import Copies, CopyEnds, CopyRuns
+from lgvi_warp.studies.derivatives.copies import CopyEnds, CopyRuns, MovedCopies
 
 # Samples about the end, in steps from the one before it, and how often a root is corrected.
 NODES, CORRECTIONS = (-1, 0, 1, 2), 8
@@ -25,7 +25,7 @@ class StopTimeRuns(CopyRuns):
     event: of which. step: the last whole step before it stopped the members. settings: with method, step size and precision.
     """
 
-    def __init__(self, copies: Copies, event: Any, step: int, settings: Mapping[str, Any]):
+    def __init__(self, copies: MovedCopies, event: Any, step: int, settings: Mapping[str, Any]):
         h = float(settings["h"])
         self._event, self._h, self._first = event, h, max(0, step + NODES[0])
         steps = self._first + np.arange(len(NODES))

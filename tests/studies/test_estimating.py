@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.special import ndtri
 
 import lgvi_warp as lw
 from tests.support import closed_answers as closed
@@ -255,3 +256,28 @@ def test_intervals_hold_over_seeds(name):
     assert np.mean(held) >= 0.91
     assert np.sqrt(np.mean(np.square(apart))) <= KNOWN[name][3]
     assert np.sqrt(np.mean(np.square(apart))) <= 1.25 * np.sqrt(np.mean(np.square(told)))
+
+
+@pytest.mark.parametrize("risk", [0.99, 0.999, 0.01, lw.metrics.CVaR(0.05), lw.metrics.CVaR(0.01)], ids=str)
+def test_tails_have_members_in_them(risk):
+    # A sphere that sinks against linear drag: its depth is linear in its normal start.
+    scene = lw.Scene.named("sphere", terms=[lw.terms.Drag(linear=[20.0, 20.0, 20.0, 1.0, 1.0, 1.0])])
+    fleet = lw.Ensemble(scene, vary={"start.velocity[2]": lw.distributions.Normal(std=0.3)})
+    time = 1.5 * float(scene.vehicle.mass) / 20.0
+    spread = 0.3 * time * (1.0 - np.exp(-3.0 / time))
+    if isinstance(risk, float):
+        truth = ndtri(risk) * spread
+    else:
+        truth = np.exp(-0.5 * ndtri(risk.share) ** 2) / np.sqrt(2.0 * np.pi) / risk.share * spread
+    found = lw.estimate(fleet, "depth", error=0.05 * spread, risk=risk, t1=3.0, threads=1, seed=3, method="rk4")
+    assert 0.0 < found.sampling_error < 0.06 * spread
+    # Four errors, of a sampling error that 16 replicates know to a fifth.
+    assert abs(found.value - truth) < 4.0 * found.sampling_error + 1e-3 * spread
+
+
+def test_a_level_beyond_what_a_pilot_sees_is_refused():
+    fleet = lw.Ensemble(lw.Scene.named("sphere"), vary={"start.velocity[2]": lw.distributions.Normal(std=0.3)})
+    with pytest.raises(
+        lw.SceneError, match=r"risk = .*members of the pilot, too few to know its error; ask for a level"
+    ):
+        lw.estimate(fleet, "depth", error=0.05, risk=0.99999, t1=1.0, threads=1, method="rk4")

@@ -420,7 +420,7 @@ def test_two_sides():
 
 
 @pytest.mark.parametrize("limit, words", [
-    ("position[0] - 1000.0", "has a probability below 1e-15, or none"),
+    ("position[0] - 1000.0", "was reached by none of some"),
     ("position[1] - 1.0", "has the same value for most members"),
     ("mean(depth) - 1.0", "is of the whole path"),
     (lambda result: result.position[-1, :, 0], "is a function of a whole Result"),

@@ -19,7 +19,7 @@ from lgvi_warp.studies.estimating.choice import ROOM, Observed, Way, candidates,
 from lgvi_warp.studies.estimating.chosen import Chosen, coarser_than, constant, finer, setting_of
 from lgvi_warp.studies.estimating.estimators import MeanEstimate, plain
 from lgvi_warp.studies.estimating.levels import Level, Runs, Setting, estimated
-from lgvi_warp.studies.estimating.pilot import FEW, FIRST, SHARE, STAGES, Pilot, failing, observed, refuse_heavy
+from lgvi_warp.studies.estimating.pilot import FEW, SHARE, STAGES, Pilot, failing, observed, refuse_heavy
 from lgvi_warp.studies.estimating.target import Solved
 
 # More members in the pilot pay where they cost at most this part of the run.
@@ -88,20 +88,20 @@ def tried(
 def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed:
     """What the settings have in common, of as many members as are worth their cost."""
     top, variance, only = chosen.setting, chosen.variance, pilot.estimator
-    few = only is None and pilot.plain_members(top, FIRST) <= FEW
-    seen = observed(pilot, top, [] if few else in_single(pilot, top, coarser), FIRST)
+    few = only is None and pilot.plain_members(top, pilot.first) <= FEW
+    seen = observed(pilot, top, [] if few else in_single(pilot, top, coarser), pilot.first)
     seen = with_coarsest(pilot, seen, variance)
     if only is None and chosen.ladder.end == "apart" and gains(candidates(seen, variance)).get("sobol", 1.0) < CLEAR:
         return replace(seen, normals=seen.normals[:, :0])
     if pilot.settled and only is not None and not only.startswith("levels"):
-        few = LOOKS[0] > SHARE * pilot.plain_members(top, FIRST)
+        few = LOOKS[0] > SHARE * pilot.plain_members(top, pilot.first)
         return seen if few else observed(pilot, top, [], LOOKS[0])
     for members in LOOKS:
         best = candidates(seen, variance, only)[0]
         kept = worth_more(seen, variance, only)
         more = 0.75 * members * sum(seen.costs[seen.settings.index(setting)] for setting in (top, *kept))
         more += (1 + len(kept)) * seen.call
-        within_share = pilot.runs.seconds + more <= pilot.most_seconds(top, FIRST)
+        within_share = pilot.runs.seconds + more <= pilot.most_seconds(top, pilot.first)
         if few or more > (WORTH if within_share else SHARE) * best.seconds:
             break
         seen = with_coarsest(pilot, observed(pilot, top, kept, members), variance)
@@ -110,14 +110,14 @@ def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed
 
 def in_single(pilot: Pilot, top: Setting, coarser: Sequence[Setting]) -> list[Setting]:
     """Coarse settings in single precision, where plain Monte Carlo costs so much that another kernel pays."""
-    plain_seconds = pilot.plain_members(top, FIRST) * pilot.runs.cost(top, pilot.grid(top))
+    plain_seconds = pilot.plain_members(top, pilot.first) * pilot.runs.cost(top, pilot.grid(top))
     if not pilot.single or plain_seconds < WORTH_A_KERNEL:
         return list(coarser)
     found = list[Setting]()
     for setting in coarser:
         twin = replace(setting, dtype="float32")
         try:
-            same = np.isfinite(pilot.y(twin, pilot.grid(top), FIRST)).all()
+            same = np.isfinite(pilot.y(twin, pilot.grid(top), pilot.first)).all()
         except SceneError:
             return list(coarser)
         found.append(twin if same else setting)
@@ -167,6 +167,9 @@ def levels_of(pilot: Pilot, seen: Observed, way: Way) -> list[Level]:
             raise refusal("error", pilot.error, problem, "give a larger one")
         top = seen.settings[place]
         coarse = seen.settings[way.chain[i + 1]] if i + 1 < len(way.chain) else None
+        if coarse is None and pilot.target.tail < 1.0:
+            # Fewer have none in the tail; the worst ones are skewed, and replicates have a 16th of them each.
+            members = max(members, pilot.first * (4 if pilot.target.kind == "cvar" else 1))
         slope = way.slopes[i] if coarse is not None else 0.0
         name = f"estimate level {i} {way.kind}"
         levels.append(
@@ -197,8 +200,8 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solve
         refuse_heavy(pilot.runs.question.label, np.concatenate(levels[0].y))
     solved, part = estimated(levels, pilot.target)
     allowed = max(chosen.error**2 - chosen.bias.mean_square, 0.25 * chosen.error**2)
-    # A quantile's density, which its error stands on, is known by the same members.
-    least = 1.0 if pilot.target.kind == "quantile" else 0.0
+    # A quantile's density, and how many are beyond it, on which the error stands, are known by the same members.
+    least = 1.0 if pilot.target.kind in ("quantile", "cvar") else 0.0
     for _ in range(ROUNDS):
         if part.variance <= allowed:
             break
@@ -220,7 +223,7 @@ def told(
     top, target, runs = chosen.setting, pilot.target, pilot.runs
     question, messages = runs.question, list(pilot.messages)
     if reached is None or found is None:
-        y = pilot.y(top, pilot.grid(top), FIRST)
+        y = pilot.y(top, pilot.grid(top), pilot.first)
         part, name, members, rivals, pilot_seconds = (
             MeanEstimate(float(y[0]), 0.0, math.inf),
             "one run",

@@ -132,7 +132,7 @@ def _spread(seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float
     if kind == "sobol":
         return spread_of_replicates(z, cost, least)
     if kind == "regression":
-        return VarianceModel(regressed(z, seen.normals).variance * len(z), cost)
+        return VarianceModel(regressed(z, seen.normals, least).variance * len(z), cost)
     return spread_of_plain(z, cost, least)
 
 

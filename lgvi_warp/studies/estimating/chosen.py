@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.studies.estimating.bias import APART, Bias
 from lgvi_warp.studies.estimating.choice import candidates
 from lgvi_warp.studies.estimating.levels import Setting
-from lgvi_warp.studies.estimating.pilot import FEW, FIRST, Ladder, Pilot, at_once, climb, observed, runs_at
+from lgvi_warp.studies.estimating.pilot import FEW, Ladder, Pilot, at_once, climb, observed, runs_at
 
 # Coarser settings that levels are sought among.
 MOST_COARSER = 4
@@ -76,7 +76,7 @@ def worth_another(pilot: Pilot, first: Chosen) -> bool:
     """Whether another method's ladder pays: where the first does not keep the error, or costs little beside the run."""
     if first.bias.mean_square > first.error**2:
         return True
-    best = candidates(observed(pilot, first.setting, [], FIRST), first.variance)[0]
+    best = candidates(observed(pilot, first.setting, [], pilot.first), first.variance)[0]
     return pilot.runs.seconds <= ANOTHER * best.seconds
 
 
@@ -85,7 +85,7 @@ def seems_few(pilot: Pilot, steps: Sequence[Setting]) -> bool:
     for setting in steps:
         ladder = Ladder()
         if runs_at(pilot, setting, ladder):
-            return pilot.plain_members(setting, FIRST) <= FEW
+            return pilot.plain_members(setting, pilot.first) <= FEW
     return False
 
 
@@ -97,13 +97,13 @@ def price(pilot: Pilot, chosen: Chosen) -> float:
 def choice_of(pilot: Pilot, ladder: Ladder, fixed: Setting | None) -> Chosen:
     """The setting of a ladder, and its bias."""
     last = ladder.settings[-1]
-    error = pilot.asked(pilot.solved(last, FIRST))
+    error = pilot.asked(pilot.solved(last, pilot.first))
     if not error > 0.0:
         problem = f"asks for a part of {pilot.runs.question.label}, which is 0"
         raise refusal("relative_error", pilot.error, problem, "give error=, in the unit of the statistic")
     place = ladder.settings.index(fixed) if fixed is not None else ladder.settled(error)
     bias = ladder.biases()[place]
-    pairs = ladder.halvings[-1].members if ladder.halvings else FIRST
+    pairs = ladder.halvings[-1].members if ladder.halvings else pilot.first
     return Chosen(ladder, place, bias, error, f"{last} on {pairs} members" if place < len(ladder.settings) - 1
                   else f"the halving before, from {ladder.settings[max(place - 1, 0)]}, on {pairs} members")  # fmt: skip
 
@@ -114,7 +114,7 @@ def compared(pilot: Pilot, best: Chosen, others: Sequence[Chosen]) -> Chosen:
     messages += [f"{name} is left out: {why}" for name, why in ladder.refused.items()]
     for other in others if pilot.noise == "none" else ():
         mine, theirs = ladder.settings[-1], other.ladder.settings[-1]
-        found = pilot.pair(theirs, mine, FIRST)
+        found = pilot.pair(theirs, mine, pilot.first)
         unknown = found.half + best.ladder.biases()[-1].half + other.ladder.biases()[-1].half
         if abs(found.value) > unknown:
             messages.append(f"{theirs} and {mine} differ by {found.value:.2g}, more than their halvings do")
@@ -138,7 +138,7 @@ def compared(pilot: Pilot, best: Chosen, others: Sequence[Chosen]) -> Chosen:
 def constant(pilot: Pilot, setting: Setting) -> bool:
     """Whether all members have one number since nothing varies."""
     return pilot.runs.dimensions == 0 and pilot.noise == "none" and bool(
-        np.ptp(pilot.y(setting, pilot.grid(setting), FIRST)) == 0.0
+        np.ptp(pilot.y(setting, pilot.grid(setting), pilot.first)) == 0.0
     )  # fmt: skip
 
 
@@ -163,7 +163,7 @@ def coarser_than(pilot: Pilot, chosen: Chosen, coarse: Sequence[Sequence[Setting
             if multiple < 1.0 - 1e-9 or abs(multiple - round(multiple)) > 1e-9 * multiple:
                 continue
             try:
-                if not np.isnan(pilot.y(replace(step, method=top.method), pilot.grid(top), FIRST)).any():
+                if not np.isnan(pilot.y(replace(step, method=top.method), pilot.grid(top), pilot.first)).any():
                     found.append(replace(step, method=top.method))
                     break
             except SceneError as error:

@@ -60,15 +60,18 @@ def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) 
     return MeanEstimate(float(means.mean()), variance, replicates - 1.0)
 
 
-def regressed(y: np.ndarray, normals: np.ndarray) -> MeanEstimate:
-    """The mean of independent members (n,) by least squares on standard normals (n, d), whose means are known to be 0."""
+def regressed(y: np.ndarray, normals: np.ndarray, least: float = 0.0) -> MeanEstimate:
+    """The mean of independent members (n,) by least squares on standard normals (n, d), whose means are known to be 0.
+
+    least: as of `plain`.
+    """
     n, d = normals.shape
     columns = np.column_stack([np.ones(n), normals])
     factors = np.linalg.lstsq(columns, y, rcond=None)[0]
     freedom = n - d - 1.0
     left = float(np.sum((y - columns @ factors) ** 2)) / freedom
     # The spread of the mean of the normals about 0 adds d / n of it, to first order.
-    return MeanEstimate(float(factors[0]), left / n * (1.0 + d / n), freedom)
+    return MeanEstimate(float(factors[0]), left / n * (1.0 + d / n) + (least / n) ** 2, freedom)
 
 
 def together(parts: Sequence[MeanEstimate]) -> MeanEstimate:

@@ -236,7 +236,7 @@ class Level:
         if self.kind == "sobol":
             return replicated(z, least).times(self.weight)
         if self.kind == "regression":
-            return regressed(z, normals(np.concatenate(self.points))).times(self.weight)
+            return regressed(z, normals(np.concatenate(self.points)), least).times(self.weight)
         return plain(z, least).times(self.weight)
 
 
@@ -252,5 +252,7 @@ def estimated(levels: Sequence[Level], target: Sought) -> tuple[Solved, MeanEsti
     samples = [sample for level in levels for sample in level.weighted()]
     at = target.solved(samples)
     parts = together([level.part(target, at) for level in levels])
-    value = parts.value if target.kind in ("mean", "probability") else at.value
+    # What regression takes away of a quantile's error is in the mean of the contributions.
+    adjusted = target.kind in ("mean", "probability") or any(level.kind == "regression" for level in levels)
+    value = parts.value if adjusted else at.value
     return at, replace(parts, value=value)

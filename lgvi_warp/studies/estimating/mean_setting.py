@@ -14,7 +14,7 @@ from lgvi_warp.scene.settings import EnsembleSettings
 from lgvi_warp.studies.estimating.bias import Bias, beyond
 from lgvi_warp.studies.estimating.estimate import drawn, ladders_of, spacing_of
 from lgvi_warp.studies.estimating.levels import Runs, Setting
-from lgvi_warp.studies.estimating.pilot import FIRST, Ladder, Pilot, climb
+from lgvi_warp.studies.estimating.pilot import Ladder, Pilot, climb
 from lgvi_warp.studies.estimating.question import question_of
 
 # A ladder ends by the root mean square, of which value and interval together are 1.12 times at most.
@@ -99,9 +99,9 @@ def in_single(pilot: Pilot, each: MeanSetting) -> MeanSetting | None:
         return None
     twin = Setting(each.setting.method, each.setting.h, "float32", each.setting.scene)
     try:
-        if not np.isfinite(pilot.y(twin, pilot.grid(each.setting), FIRST)).all():
+        if not np.isfinite(pilot.y(twin, pilot.grid(each.setting), pilot.first)).all():
             return None
-        apart = pilot.pair(twin, each.setting, FIRST)
+        apart = pilot.pair(twin, each.setting, pilot.first)
     except SceneError:
         return None
     bias = Bias(each.bias.value + apart.value, each.bias.half + apart.half)

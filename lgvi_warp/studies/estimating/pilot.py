@@ -25,6 +25,8 @@ from lgvi_warp.studies.estimating.target import Solved, Sought
 
 # Members of the first stage, and how many stages there are, each of four times the members of the one before.
 FIRST, STAGES = 64, (64, 256, 1024)
+# Larger first stages, for tails.
+TAIL_STAGES = (4096, 16384)
 # MeanEstimate of plain Monte Carlo's predicted cost that the pilot may take.
 SHARE = 0.1
 # Where plain Monte Carlo needs at most so many members, a pilot is not worth its cost.
@@ -79,6 +81,17 @@ class Pilot:
     def solved(self, setting: Setting, members: int) -> Solved:
         """The target by one setting."""
         return self.target.solved([(1.0, self.y(setting, self.grid(setting), members))])
+
+    @property
+    def first(self) -> int:
+        """Members of the first stage: so many that some of them are in the tail of a quantile, or in the worst part."""
+        tail = self.target.tail
+        for members in (*STAGES, *TAIL_STAGES):
+            if members * tail >= HITS:
+                return members
+        problem = f"stands on {members * tail:.2g} of {members:,} members of the pilot, too few to know its error"
+        remedy = "ask for a level nearer the middle, or for the probability of a limit by lw.rare_event"
+        raise refusal("risk", self.runs.question.label, problem, remedy)
 
     def asked(self, at: Solved) -> float:
         """The error asked for, in the unit of the statistic."""
@@ -173,10 +186,11 @@ def at_once(pilot: Pilot, own: Setting) -> Ladder | None:
     ladder, half = Ladder(), replace(own, h=0.5 * own.h)
     if not runs_at(pilot, own, ladder):
         return None
-    members = pilot.plain_members(own, FIRST)
+    members = pilot.plain_members(own, pilot.first)
     if members > FEW:
         return None
     some = REPLICATES * math.ceil(max(members, 1.0) / REPLICATES**2)
+    some = some if pilot.target.tail == 1.0 else max(some, pilot.first)
     try:
         found = pilot.pair(own, half, some)
     except SceneError:
@@ -187,9 +201,9 @@ def at_once(pilot: Pilot, own: Setting) -> Ladder | None:
 def runs_at(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
     """Whether a setting is taken and no member fails at it."""
     try:
-        y = pilot.y(setting, pilot.grid(setting), FIRST)
+        y = pilot.y(setting, pilot.grid(setting), pilot.first)
         if pilot.grid(setting) is not None and ladder.settings:
-            pilot.y(ladder.settings[-1], pilot.grid(setting), FIRST)
+            pilot.y(ladder.settings[-1], pilot.grid(setting), pilot.first)
     except SceneError as error:
         ladder.refused[str(setting)] = error.faults[0]
         return False
@@ -217,9 +231,9 @@ def _first_look(pilot: Pilot, setting: Setting) -> None:
 
 def _compared(pilot: Pilot, ladder: Ladder) -> StepChange:
     """The last halving, of as many members as it takes to know whether it is small, and as are worth their cost."""
-    for members in STAGES:
+    for members in (n for n in (*STAGES, *TAIL_STAGES) if pilot.first <= n <= max(pilot.first, STAGES[-1])):
         found = pilot.pair(ladder.settings[-2], ladder.settings[-1], members)
-        small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
+        small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], pilot.first))
         known = found.half <= small or abs(found.value) > max(found.half, small)
         if known or found.apart or not _stalls(ladder, found, small) or _too_dear(pilot, ladder, members):
             break
@@ -234,15 +248,15 @@ def _stalls(ladder: Ladder, found: StepChange, small: float) -> bool:
 def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
     """Whether three times as many pairs more would cost too much."""
     if pilot.settled:
-        return 4.0 * members > SHARE * pilot.plain_members(ladder.settings[-2], FIRST)
+        return 4.0 * members > SHARE * pilot.plain_members(ladder.settings[-2], pilot.first)
     last = ladder.settings[-1]
     more = 3.0 * members * 1.5 * pilot.runs.cost(last, pilot.grid(last))
-    return pilot.runs.seconds + more > pilot.most_seconds(ladder.settings[-2], FIRST)
+    return pilot.runs.seconds + more > pilot.most_seconds(ladder.settings[-2], pilot.first)
 
 
 def _ended(pilot: Pilot, ladder: Ladder) -> str:
     """Why no finer step is run; "" to go on."""
-    halvings, error = ladder.halvings, pilot.asked(pilot.solved(ladder.settings[-1], FIRST))
+    halvings, error = ladder.halvings, pilot.asked(pilot.solved(ladder.settings[-1], pilot.first))
     if len(halvings) > 1 and all(each.apart for each in halvings[-2:]):
         return "apart"
     if any(bias.mean_square <= (0.5 * error) ** 2 for bias in ladder.biases()):
@@ -268,7 +282,7 @@ def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: in
         refuse_heavy(pilot.runs.question.label, y[0])
     at = pilot.target.solved([(1.0, y[0])])
     for i in kept:
-        pilot.y(settings[i], pilot.grid(settings[i]), FIRST)  # which tells what it costs alone
+        pilot.y(settings[i], pilot.grid(settings[i]), pilot.first)  # which tells what it costs alone
 
     def pair(f: int, c: int) -> float:
         # Both costs are known with the draws of the top step, which are as many or more.

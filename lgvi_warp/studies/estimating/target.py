@@ -70,6 +70,12 @@ class Sought:
         return np.where(np.isnan(y), np.nan, holds)
 
     @property
+    def tail(self) -> float:
+        """The part of the members that tells the value: 1, but of a quantile the nearer tail, of a cvar a fourth of it."""
+        # Numbers in a tail are skewed: of a mean of the worst members four times as many are needed.
+        return {"quantile": min(self.level, 1.0 - self.level), "cvar": 0.25 * self.level}.get(self.kind, 1.0)
+
+    @property
     def smooth(self) -> bool:
         """Whether contributions jump where a number passes a threshold, and may be smoothed to see small changes of it."""
         return self.kind == "quantile" or self.above is not None or self.below is not None

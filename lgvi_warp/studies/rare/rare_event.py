@@ -67,7 +67,7 @@ def rare_event(
         looks: With by="splitting", into how many pieces the time is cut, at most, 2 to 1,000; 50 by default. More of them need
             fewer members, and each costs a call. Pieces begin at samples and at ticks of a controller.
         failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
-        most: Members that may be run, from 10,000; 1,000,000 by default.
+        most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
         seed: Seed of all that is drawn; 0 by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             as far as that is known. None, the default, for nobody.
@@ -94,7 +94,7 @@ def rare_event(
     faults.choice("failed", failed, ("event", "refuse"))
     faults.choice("by", by, WAYS)
     if by == "splitting" and cheaper:
-        faults.add("cheaper", cheaper, "is of chains", 'leave it out, or by="splitting"')
+        faults.add("cheaper", cheaper, "is of chains", 'leave it out, or give by="chains"')
     check_asked(faults, relative_error, most)
     for name in ("of", "levels", "statistics", "draws", "common_noise"):
         if name in settings:
@@ -136,7 +136,11 @@ def _by_splitting(
     try:
         found = search.answer()
     except NoProgress as stuck:
-        raise _refused(stuck, condition) from None
+        if stuck.kind != "never":
+            raise _refused(stuck, condition) from None
+        problem = f"was reached by none of some {walk.members:,} members, whatever its probability"
+        remedy = 'give by="chains", which moves numbers that vary, too; or move the bound'
+        raise refusal("limit", condition.label, problem, remedy) from None
     if found.probability >= 1.0:
         problem = f"happens for each of {len(found.limits):,} members"
         raise refusal("limit", condition.label, problem, 'ask for what is rare, as {"max(depth)": {"above": 12.0}}')

@@ -110,17 +110,26 @@ class SplitSearch:
         limits = np.concatenate([each.limits for each in rounds])
         weights = np.concatenate([each.runs[0].size * each.weights for each in rounds])
         paths = tuple(path for each in rounds for path in each.paths)
-        starts = sum(each.starts for each in rounds)
         if self.walk.d:
             self.notes.append(
                 "draws of noise are no numbers with splitting: the likeliest member goes by its numbers alone"
             )
-        if self.walk.d and starts < FEW_STARTS:
-            problem = f"the failing members have {starts} different starts: what varies there is hardly told"
-            self.notes.append(f'{problem}; by="chains" moves these numbers, too')
         share = weights / weights.sum() if len(weights) else weights
+        if self.walk.d and (starts := different(failing, share)) < FEW_STARTS:
+            problem = (
+                f"the failing members stand on some {starts:.0f} different starts: what varies there is hardly told, "
+                "and the interval is too narrow"
+            )
+            self.notes.append(f'{problem}; by="chains" moves these numbers, too')
         return SplitAnswer(probability, spread, len(runs) - 1.0, "splitting", self.walk.members, failing, limits, share, runs,
                            tuple(self.notes), paths)  # fmt: skip
+
+
+def different(rows: np.ndarray, weights: np.ndarray) -> float:
+    """The effective number of different rows (n, d): 1 over the sum of the squares of their shares (Kish 1965)."""
+    _, place = np.unique(rows, axis=0, return_inverse=True)
+    share = np.bincount(np.ravel(place), weights=weights)
+    return float(1.0 / np.sum(share**2)) if len(share) else 0.0
 
 
 def joined_spread(runs: Sequence[SubsetRun]) -> tuple[float, float]:

@@ -221,7 +221,6 @@ class SplitRuns:
 
     runs: one each. failing: (m, d), normals at the start of members for which the event happens. limits: (m,), theirs.
     weights: (m,), probabilities. paths: for each of them (looks (k,), keys (k,)), from which look on it has which noise.
-    starts: number of different starts among them.
     """
 
     runs: tuple[SubsetRun, ...]
@@ -229,7 +228,6 @@ class SplitRuns:
     limits: np.ndarray
     weights: np.ndarray
     paths: tuple[tuple[np.ndarray, np.ndarray], ...]
-    starts: int
 
 
 def split_runs(
@@ -293,8 +291,7 @@ def _with_failing(
         paths.append(_path(stages, level, leaf, looks[level, leaf]))
         root = int(stages[level].start[leaf])
         starts.append(root)
-    return SplitRuns(runs, u[starts], np.array(list(limits.values())), np.array(list(weights.values())), tuple(paths),
-                     len(set(starts)))  # fmt: skip
+    return SplitRuns(runs, u[starts], np.array(list(limits.values())), np.array(list(weights.values())), tuple(paths))
 
 
 def _path(stages: Sequence[Stage], level: int, row: int, end: int) -> tuple[np.ndarray, np.ndarray]:

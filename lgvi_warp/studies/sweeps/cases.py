@@ -131,6 +131,8 @@ def check_rare(faults: Faults, rare: Any) -> None:
     """Note what is wrong with what is said of rare failures."""
     if isinstance(rare, Mapping):
         faults.keys("rare", rare, RARE)
+        if not rare:
+            faults.add("rare", "{}", "says nothing", "write rare = true")
     elif rare is not None and not isinstance(rare, bool):
         faults.add("rare", rare, "is neither true nor a table", "write rare = true, or rare = { relative_error = 0.2 }")
 

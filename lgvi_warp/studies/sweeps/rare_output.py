@@ -70,7 +70,12 @@ def rare_lines(sweep: SweepTable) -> list[str]:
         lines.append(
             f"- {cell.name}: fails with probability {found.probability:.3g} ({low:.3g} to {high:.3g}), by {taken}"
         )
-    for row in rare_against_baseline(sweep):
+    rows = rare_against_baseline(sweep)
+    if lines and not rows and sum(_has_answer(sweep, cell) for cell in sweep.cells) > 1:
+        lines.append(
+            f"- no comparisons: the baseline {sweep.baseline} has no rare failure; name another, or ask compare_rare"
+        )
+    for row in rows:
         at = ", ".join(f"{name} = {value}" for name, value in row.point.items())
         ratio, where = row.ratio, f" at {at}" if at else ""
         seen = ("seen on failing members of either" if ratio.paired else "from the two answers") + (
@@ -79,6 +84,11 @@ def rare_lines(sweep: SweepTable) -> list[str]:
         lines.append(f"- {row.second}{where}: fails {ratio.value:.3g} times as often as {row.first} "
                      f"({ratio.lower:.3g} to {ratio.upper:.3g}), {seen}")  # fmt: skip
     return lines
+
+
+def _has_answer(sweep: SweepTable, cell: Any) -> bool:
+    answer = sweep.rares.of(cell) if sweep.rares is not None else None
+    return answer is not None and answer.found is not None
 
 
 def rare_refused(sweep: SweepTable) -> bool:

@@ -5,6 +5,8 @@ A closed form is differentiated by a complex step, f'(x) = Im f(x + i e) / e, ex
 rules of the kernel nor with the differences of what is packed.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import warp as wp
@@ -15,6 +17,8 @@ from lgvi_kernels.lanes import arithmetic, functions, noise, sums
 from lgvi_kernels.lanes.arithmetic import lane, mul  # noqa: F401
 from lgvi_kernels.tangents.lanes import declare
 from lgvi_kernels.tangents.native import DualShape, snippets
+from lgvi_warp.engine.tangents import Slopes
+from lgvi_warp.scene.variations import Target
 from tests.control.test_analytic import FAR, INERTIA, MASS, NONE, PERIOD
 from tests.support.tools import slope
 
@@ -344,6 +348,31 @@ def test_axes_that_jump_are_refused():
     scene = lw.Scene(vehicle, base.environment, start=base.start)
     with pytest.raises(lw.SceneError, match="kink or a jump"):
         lw.solve(scene, "psi_s", h=0.02, t1=1.0, tangents=["vehicle.inertia[0,1]"])
+
+
+@pytest.mark.parametrize("entry", ["vehicle.inertia[0,1]", "vehicle.inertia[0,2]"])
+def test_axes_of_the_member_that_are_not_those_of_its_copies_are_refused(entry):
+    # A diagonal inertia keeps the axes of the vehicle; its copies get such as point the other way, all alike or each its own.
+    vehicle = lw.Vehicle(20.0, inertia=(1.0, 3.0, 4.0), added_mass=(3.0, 15.0, 25.0), buoyancy=200.0)
+    scene = lw.Scene(vehicle, start=free().start)
+    with pytest.raises(lw.SceneError, match="kink or a jump"):
+        lw.solve(scene, "psi_s", h=0.02, t1=0.2, tangents=[entry])
+
+
+def slopes_of(values):
+    """Slopes of a packed number, out of it and its six copies a step of 1 apart."""
+    copies = SimpleNamespace(targets=(Target("vehicle.mass"),))
+    slopes = Slopes(SimpleNamespace(ensemble=SimpleNamespace(copies=copies), spec=None))
+    slopes.begin(SimpleNamespace(steps=np.ones((1, 1))))
+    return slopes.of(np.array(values))[1][0]
+
+
+def test_round_off_is_no_kink_and_a_member_apart_is_one():
+    np.testing.assert_allclose(slopes_of([0.0, 5e-18, -5e-18, 0.0, 0.0, 5e-18, 0.0]), 0.0, atol=1e-16)
+    line = [0.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0]
+    np.testing.assert_allclose(slopes_of(line), 1.0, rtol=1e-15)
+    with pytest.raises(lw.SceneError, match="kink or a jump"):
+        slopes_of([1e-3, *line[1:]])
 
 
 @pytest.mark.slow

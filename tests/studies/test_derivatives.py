@@ -294,6 +294,26 @@ def test_a_number_that_may_not_be_less():
     says(found.messages[0], "drag.quadratic[2]", "from above alone")
 
 
+def test_a_number_that_cannot_be_moved_leaves_the_others():
+    scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.1, 0.05]})
+    by = ["drag_matrix.linear[5,1]", "vehicle.buoyancy"]
+    found = lw.derivatives(scene, "depth", by, method="rk4", h=0.1, t1=0.5, threads=1)
+    says(found.undefined["depth by drag_matrix.linear[5,1]"], "cannot be moved to either side: ", "unphysical")
+    assert np.isnan(found.jacobian[0, 0])
+    assert found.jacobian[0, 1] < 0.0
+    assert not found.messages
+
+
+def test_quantities_of_signals_alone():
+    save = lw.SaveAt(at=[T1], fields=("command",))
+    found = lw.derivatives(looped(), lambda result: result.command[-1, :, 2], "state_feedback.K[2,2]", save=save, **RUN)
+    named = lw.derivatives(looped(), "command[2]", "state_feedback.K[2,2]", **RUN)
+    assert not found.undefined
+    assert not named.undefined
+    assert found.error[0, 0] < 1e-7 * abs(found.jacobian[0, 0])
+    np.testing.assert_allclose(named.jacobian, found.jacobian, atol=found.error[0, 0] + named.error[0, 0])
+
+
 def fallen(F, k=QUADRATIC):
     s = T1 * np.sqrt(F * k) / M
     return M / k * np.log(np.cosh(s)), -M / k * np.tanh(s) * s / (2.0 * F)

@@ -15,7 +15,7 @@ from lgvi_warp.scene.variations import Target
 from lgvi_warp.studies.derivatives import undefined
 from lgvi_warp.studies.derivatives.answer import Derivatives
 from lgvi_warp.studies.derivatives.copies import CopyRuns, MovedCopies, Neighbours, neighbours
-from lgvi_warp.studies.derivatives.extrapolation import FINE, Extrapolated, extrapolated, relative_increments
+from lgvi_warp.studies.derivatives.extrapolation import FEW, FINE, Extrapolated, extrapolated, relative_increments
 from lgvi_warp.studies.derivatives.stop_times import StopTimeRuns
 from lgvi_warp.studies.reference import ROUND_OFF
 
@@ -142,6 +142,8 @@ class Answering:
             for row in np.flatnonzero(closely):
                 self._put(int(members[row]), (int(row), i, place), near, slopes, times)
         for place, j in enumerate(self._live):
+            if place in self._copies.unmovable:
+                continue
             for values, side in ((near.below, "above"), (near.above, "below")):
                 if np.isnan(values[:, :, place]).all() and not np.isnan(near.at).all():
                     self._sides[j] = (
@@ -158,6 +160,8 @@ class Answering:
             self._question.interests[self._runs.owner[i]], float(near.at[row, i]), int(near.status[row]),
             float(near.time[row]), float(self._growth[member]), float(self._legs[member]),
         )  # fmt: skip
+        if slope is None and slopes.code[place] == FEW and (reason := self._copies.unmovable.get(place[2])):
+            slope = f"{self._question.names[j]} {reason}"
         slope = slope or times.get(place) or _numbers(slopes, place, near.increments[row, place[2]])
         if isinstance(slope, str):
             self._reasons.setdefault((i, j), {}).setdefault(slope, []).append(member)

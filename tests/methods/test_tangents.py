@@ -5,6 +5,7 @@ A closed form is differentiated by a complex step, f'(x) = Im f(x + i e) / e, ex
 rules of the kernel nor with the differences of what is packed.
 """
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -308,8 +309,12 @@ def test_a_member_that_ended_has_no_derivatives_from_there_on():
 @pytest.mark.parametrize(
     ("tangents", "settings", "message"),
     [
-        ("vehicle.mass", {}, "is no list of names"),
-        ([], {}, "is no list of names"),
+        *(
+            (listed, {}, "is no list of names")
+            for listed in ([], 5, True, {"vehicle.mass"}, {"vehicle.mass": 1}, iter(["a"]))
+        ),
+        ([["vehicle.mass"]], {}, "is no list of names"),
+        ([["vehicle.mass"], "vehicle.mass"], {}, "is no list of names"),
         (["vehicle.mas"], {}, "does not name what the scene has"),
         (["drag.quadratic"], {}, "names 6 numbers"),
         (["vehicle.mass", "vehicle.mass"], {}, "is named twice"),
@@ -328,11 +333,24 @@ def test_refused(tangents, settings, message):
 
 
 @pytest.mark.parametrize(
-    "name", ["controller.delay", "fix.every", "fix.latency", "fix.dropout", "fix.quantum", "stuck.time"]
+    "name", ["controller.delay", "fix.every", "fix.latency", " fix.dropout ", "fix.quantum", "stuck.time"]
 )
 def test_what_acts_by_whole_steps_has_no_derivative(name):
-    with pytest.raises(lw.SceneError, match=f"{name}.*no derivative"):
+    with pytest.raises(lw.SceneError, match=f"{name.strip()}.*no derivative"):
         lw.solve(looped(noise=0.1), "rk8", h=PERIOD / 2, t1=1.0, tangents=[name])
+
+
+def test_the_radius_of_waypoints_has_no_derivative():
+    points = lw.control.Waypoints(points=[[0.0, 0.0, 0.0], [6.0, 0.0, 0.0]], speed=1.5, look_ahead=10.0, radius=2.0)
+    controller = lw.Controller(period=PERIOD, guidance=[points], laws=looped().controller.laws)
+    scene = dataclasses.replace(looped(), controller=controller)
+    with pytest.raises(lw.SceneError, match=r"radius.*sets the tick at which a leg is done"):
+        lw.solve(scene, "rk8", h=PERIOD / 2, t1=1.0, tangents=["waypoints.radius"])
+
+
+def test_one_name_may_stand_alone():
+    result = lw.solve(falling(), "rk8", h=0.02, t1=0.1, tangents=" start.velocity[ 0 ] ", threads=1)
+    assert result.tangents == ("start.velocity[0]",)
 
 
 def test_a_number_that_changes_nothing_is_refused():

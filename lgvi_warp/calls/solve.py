@@ -94,8 +94,8 @@ def solve(
         start: `result.final` of another run of these members, from which this one goes on: with the same settings and numbers
             the two have the bits of one run. Samples, statistics and messages are of this run alone. Default: from t = 0.
         tangents: Names of numbers, such as "vehicle.mass" or "start.velocity[0]", by which the derivatives of all samples are
-            wanted, or one name; they are in result.jacobian. The kernel carries them beside the motion, two in one run, and each costs one
-            to two runs without them. Default: none.
+            wanted, or one name; they are in result.jacobian. The kernel carries them beside the motion, two in one run, and
+            each costs one to two runs without them. Default: none.
 
     Returns:
         A Result, of every member unless `until` or `only` says otherwise.

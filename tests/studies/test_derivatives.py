@@ -358,6 +358,7 @@ def test_members_of_a_fleet_with_different_ends():
     assert np.isnan(found.jacobian[:, 0, 0]).tolist() == [False, True, True]
     assert np.isnan(found.jacobian[:, 1, 0]).tolist() == [True, False, False]
     says(found.undefined["depth by start.position[2]"], "(2 of 3 members, the first 1)")
+    says(str(found), "(2 members have none)", "(1 member has none)")
     assert (found.jacobian[1:, 1, 0] < 0.0).all()
 
 

@@ -49,7 +49,7 @@ def solve(
     only: range | None = None,
     on_block: Callable[[Result], None] | None = None,
     start: Final | None = None,
-    tangents: Sequence[str] | None = None,
+    tangents: str | Sequence[str] | None = None,
 ) -> Result:
     """Advance every member of the fleet from t = 0, or from `start`, to t1 and return the samples and statistics asked for.
 
@@ -94,8 +94,8 @@ def solve(
         start: `result.final` of another run of these members, from which this one goes on: with the same settings and numbers
             the two have the bits of one run. Samples, statistics and messages are of this run alone. Default: from t = 0.
         tangents: Names of numbers, such as "vehicle.mass" or "start.velocity[0]", by which the derivatives of all samples are
-            wanted; they are in result.jacobian. The kernel carries them beside the motion, two in one run, and each costs one
-            to two runs without them. Default: none.
+            wanted, or one name; they are in result.jacobian. The kernel carries them beside the motion, two in one run, and
+            each costs one to two runs without them. Default: none.
 
     Returns:
         A Result, of every member unless `until` or `only` says otherwise.
@@ -132,15 +132,14 @@ def solve(
     if only is not None and request.observed.until is not None:
         faults.add("only", only, "runs in parts, where until looks at the whole", "leave out one of them")
     faults.raise_if_any()
-    if tangents is not None:
-        check(request, tangents, store, start, on_block)
+    names = () if tangents is None else check(request, tangents, store, start, on_block)
     plan = request.plan(survey_all=store is not None)
     # Parts of a run, and other processes and machines, must agree on a width.
     if only is None and isinstance(request.executor, Threads) and tangents is None:
         plan = with_best_width(plan, request.count(plan))
     try:
-        if tangents is not None:
-            return run_with_tangents(request, plan, tangents, callback(progress))
+        if names:
+            return run_with_tangents(request, plan, names, callback(progress))
         if store is None:
             report, final = callback(progress), request.keeps_final
             return request.run(plan, progress=report, partial=True, on_block=on_block, final=final)

@@ -18,12 +18,13 @@ from lgvi_warp.engine.arrays import Writing
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.sampling.members import Members, Shifted
-from lgvi_warp.scene.copies import FOUR_POINTS, OFFSETS, SIX_POINTS, repeats
+from lgvi_warp.scene.copies import BETWEEN, FOUR_POINTS, OFFSETS, SIX_POINTS, repeats
 
 # A plan, whose module imports others that import this one.
 Plan = Any
 
-# Two differences of a number may differ by so much of it, and of its round-off; beyond it is not smooth.
+# Two differences of a number may differ by so much of it, and of its round-off; beyond it is not smooth. A number that is 0,
+# or almost, is one of several of size 1, whose round-off it has.
 SMOOTH, ROUND_OFF = 1e-7, 64.0 * 2.0**-52
 
 
@@ -66,9 +67,11 @@ class Slopes:
             raise self._refused(i, "is counted in whole steps or looks there, and so has no derivative")
         self.moved[i] = True
         slope, rough = (np.einsum("j,mj...->m...", weights, changes) for weights in (SIX_POINTS, FOUR_POINTS))
-        size = np.abs(values).max(initial=0.0)
+        # Copies may agree with each other beside a member that stands elsewhere: what they tell of it is compared too.
+        beside = np.einsum("j,mj...->m...", BETWEEN, changes)
+        most = SMOOTH * np.abs(slope).max() + ROUND_OFF * np.abs(values).max(initial=1.0)
         # A difference that is no number belongs to a member that the run marks as failed.
-        if np.any(np.abs(slope - rough) > SMOOTH * np.abs(slope).max() + ROUND_OFF * size):
+        if np.any(np.abs(slope - rough) > most) or np.any(np.abs(beside) > most):
             raise self._refused(i, "is where what follows from it has a kink or a jump, and so no derivative")
         steps = self._steps[:, i].reshape(-1, *(1,) * (values.ndim - 1))
         return np.asarray(slope / steps)

@@ -22,6 +22,7 @@ from lgvi_warp.runs.request import Request
 from lgvi_warp.runs.run import refuse_failed, run_plan
 from lgvi_warp.scene.copies import with_copies
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.variations import targets
 
 # Tangents of one pass: with more, the numbers of a step no longer fit into a core's registers.
 AT_ONCE = 2
@@ -35,16 +36,16 @@ UNDEFINED = {
     "dropout": "is a probability, by which whole looks are lost",
     "quantum": "rounds: what follows jumps",
     "time": "sets the step at which something begins",
+    "radius": "sets the tick at which a leg is done",
     "at": "sets the time at which a member ends",
 }
 
 
-def check(request: Request, tangents: Sequence[str], store: Any, start: Any, on_block: Any) -> None:
-    """Refuse what a run with tangents cannot do, before anything is computed."""
+def check(request: Request, tangents: Any, store: Any, start: Any, on_block: Any) -> tuple[str, ...]:
+    """The names of the numbers, without blanks; refuse what a run with tangents cannot do, before anything is computed."""
     faults, fleet = Faults(), request.fleet
-    if isinstance(tangents, str) or not all(isinstance(name, str) for name in tangents) or not len(tangents):
-        faults.add("tangents", tangents, "is no list of names", 'give tangents=["vehicle.mass", "start.velocity[0]"]')
-        faults.raise_if_any()
+    names = _names(faults, tangents)
+    faults.raise_if_any()
     if store is not None:
         faults.add("tangents", "...", "are kept in memory, and not in a store", "leave store out")
     if start is not None:
@@ -64,11 +65,21 @@ def check(request: Request, tangents: Sequence[str], store: Any, start: Any, on_
     controller = fleet.scene.controller
     if controller is not None and controller.callback is not None:
         faults.add("tangents", "...", "end at a function of the host, which knows no slopes", "take the callback out")
-    for name in tangents:
+    for name in names:
         for word, problem in UNDEFINED.items():
             if name == word or (name.split("[")[0].rpartition(".")[2] == word and _timed(name, fleet)):
                 faults.add("tangents", name, f"{problem}, so that there is no derivative", "leave it out")
     faults.raise_if_any()
+    return names
+
+
+def _names(faults: Faults, tangents: Any) -> tuple[str, ...]:
+    listed = tangents.tolist() if isinstance(tangents, np.ndarray) else tangents
+    listed = [listed] if isinstance(listed, str) else listed
+    if not isinstance(listed, list | tuple) or not listed or not all(isinstance(name, str) for name in listed):
+        faults.add("tangents", tangents, "is no list of names", 'give tangents=["vehicle.mass", "start.velocity[0]"]')
+        return ()
+    return tuple(", ".join(target.label for target in targets(name)) for name in listed)
 
 
 def _timed(name: str, fleet: Ensemble) -> bool:

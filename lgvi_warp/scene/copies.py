@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 OFFSETS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
 SIX_POINTS = np.array([-1.0, 9.0, -45.0, 45.0, -9.0, 1.0]) / 60.0
 FOUR_POINTS = np.array([0.0, 1.0, -8.0, 8.0, -1.0, 0.0]) / 12.0
+BETWEEN = np.array([1.0, -6.0, 15.0, 15.0, -6.0, 1.0]) / 20.0
 # A step over the number itself, or, where that is far smaller than other entries of its array, over these; of nothing but
 # zeros it is a step over 1.
 STEP, LEAST_PART = 2e-3, 1e-2

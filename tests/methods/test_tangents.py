@@ -5,6 +5,9 @@ A closed form is differentiated by a complex step, f'(x) = Im f(x + i e) / e, ex
 rules of the kernel nor with the differences of what is packed.
 """
 
+import dataclasses
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import warp as wp
@@ -15,6 +18,8 @@ from lgvi_kernels.lanes import arithmetic, functions, noise, sums
 from lgvi_kernels.lanes.arithmetic import lane, mul  # noqa: F401
 from lgvi_kernels.tangents.lanes import declare
 from lgvi_kernels.tangents.native import DualShape, snippets
+from lgvi_warp.engine.tangents import Slopes
+from lgvi_warp.scene.variations import Target
 from tests.control.test_analytic import FAR, INERTIA, MASS, NONE, PERIOD
 from tests.support.tools import slope
 
@@ -304,8 +309,12 @@ def test_a_member_that_ended_has_no_derivatives_from_there_on():
 @pytest.mark.parametrize(
     ("tangents", "settings", "message"),
     [
-        ("vehicle.mass", {}, "is no list of names"),
-        ([], {}, "is no list of names"),
+        *(
+            (listed, {}, "is no list of names")
+            for listed in ([], 5, True, {"vehicle.mass"}, {"vehicle.mass": 1}, iter(["a"]))
+        ),
+        ([["vehicle.mass"]], {}, "is no list of names"),
+        ([["vehicle.mass"], "vehicle.mass"], {}, "is no list of names"),
         (["vehicle.mas"], {}, "does not name what the scene has"),
         (["drag.quadratic"], {}, "names 6 numbers"),
         (["vehicle.mass", "vehicle.mass"], {}, "is named twice"),
@@ -324,11 +333,24 @@ def test_refused(tangents, settings, message):
 
 
 @pytest.mark.parametrize(
-    "name", ["controller.delay", "fix.every", "fix.latency", "fix.dropout", "fix.quantum", "stuck.time"]
+    "name", ["controller.delay", "fix.every", "fix.latency", " fix.dropout ", "fix.quantum", "stuck.time"]
 )
 def test_what_acts_by_whole_steps_has_no_derivative(name):
-    with pytest.raises(lw.SceneError, match=f"{name}.*no derivative"):
+    with pytest.raises(lw.SceneError, match=f"{name.strip()}.*no derivative"):
         lw.solve(looped(noise=0.1), "rk8", h=PERIOD / 2, t1=1.0, tangents=[name])
+
+
+def test_the_radius_of_waypoints_has_no_derivative():
+    points = lw.control.Waypoints(points=[[0.0, 0.0, 0.0], [6.0, 0.0, 0.0]], speed=1.5, look_ahead=10.0, radius=2.0)
+    controller = lw.Controller(period=PERIOD, guidance=[points], laws=looped().controller.laws)
+    scene = dataclasses.replace(looped(), controller=controller)
+    with pytest.raises(lw.SceneError, match=r"radius.*sets the tick at which a leg is done"):
+        lw.solve(scene, "rk8", h=PERIOD / 2, t1=1.0, tangents=["waypoints.radius"])
+
+
+def test_one_name_may_stand_alone():
+    result = lw.solve(falling(), "rk8", h=0.02, t1=0.1, tangents=" start.velocity[ 0 ] ", threads=1)
+    assert result.tangents == ("start.velocity[0]",)
 
 
 def test_a_number_that_changes_nothing_is_refused():
@@ -344,6 +366,31 @@ def test_axes_that_jump_are_refused():
     scene = lw.Scene(vehicle, base.environment, start=base.start)
     with pytest.raises(lw.SceneError, match="kink or a jump"):
         lw.solve(scene, "psi_s", h=0.02, t1=1.0, tangents=["vehicle.inertia[0,1]"])
+
+
+@pytest.mark.parametrize("entry", ["vehicle.inertia[0,1]", "vehicle.inertia[0,2]"])
+def test_axes_of_the_member_that_are_not_those_of_its_copies_are_refused(entry):
+    # A diagonal inertia keeps the axes of the vehicle; its copies get such as point the other way, all alike or each its own.
+    vehicle = lw.Vehicle(20.0, inertia=(1.0, 3.0, 4.0), added_mass=(3.0, 15.0, 25.0), buoyancy=200.0)
+    scene = lw.Scene(vehicle, start=free().start)
+    with pytest.raises(lw.SceneError, match="kink or a jump"):
+        lw.solve(scene, "psi_s", h=0.02, t1=0.2, tangents=[entry])
+
+
+def slopes_of(values):
+    """Slopes of a packed number, out of it and its six copies a step of 1 apart."""
+    copies = SimpleNamespace(targets=(Target("vehicle.mass"),))
+    slopes = Slopes(SimpleNamespace(ensemble=SimpleNamespace(copies=copies), spec=None))
+    slopes.begin(SimpleNamespace(steps=np.ones((1, 1))))
+    return slopes.of(np.array(values))[1][0]
+
+
+def test_round_off_is_no_kink_and_a_member_apart_is_one():
+    np.testing.assert_allclose(slopes_of([0.0, 5e-18, -5e-18, 0.0, 0.0, 5e-18, 0.0]), 0.0, atol=1e-16)
+    line = [0.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0]
+    np.testing.assert_allclose(slopes_of(line), 1.0, rtol=1e-15)
+    with pytest.raises(lw.SceneError, match="kink or a jump"):
+        slopes_of([1e-3, *line[1:]])
 
 
 @pytest.mark.slow

@@ -284,6 +284,8 @@ def test_legs_of_waypoints():
     after = lw.derivatives(scene, ["position[1]", "position[1] at 2.0"], by, t1=5.0, **run)
     says(after.undefined["position[1] by heading_pid.kp"], "tick at which a leg is done", "1 of the waypoints")
     assert abs(after.jacobian[1, 0] - before.jacobian[0, 0]) <= after.error[1, 0] + before.error[0, 0]
+    between = lw.derivatives(scene, "position[1] at 4.9", "heading_pid.kp", t1=5.0, **run)
+    says(between.undefined["position[1] at 4.9 by heading_pid.kp"], "1 of the waypoints")
 
 
 def test_a_number_that_may_not_be_less():
@@ -292,6 +294,26 @@ def test_a_number_that_may_not_be_less():
     assert abs(found.jacobian[0, 0] + HEAVY**2 * T1**4 / (12.0 * M**3)) <= found.error[0, 0]
     assert found.error[0, 0] < 1e-7 * abs(found.jacobian[0, 0])
     says(found.messages[0], "drag.quadratic[2]", "from above alone")
+
+
+def test_a_number_that_cannot_be_moved_leaves_the_others():
+    scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.1, 0.05]})
+    by = ["drag_matrix.linear[5,1]", "vehicle.buoyancy"]
+    found = lw.derivatives(scene, "depth", by, method="rk4", h=0.1, t1=0.5, threads=1)
+    says(found.undefined["depth by drag_matrix.linear[5,1]"], "cannot be moved to either side: ", "unphysical")
+    assert np.isnan(found.jacobian[0, 0])
+    assert found.jacobian[0, 1] < 0.0
+    assert not found.messages
+
+
+def test_quantities_of_signals_alone():
+    save = lw.SaveAt(at=[T1], fields=("command",))
+    found = lw.derivatives(looped(), lambda result: result.command[-1, :, 2], "state_feedback.K[2,2]", save=save, **RUN)
+    named = lw.derivatives(looped(), "command[2]", "state_feedback.K[2,2]", **RUN)
+    assert not found.undefined
+    assert not named.undefined
+    assert found.error[0, 0] < 1e-7 * abs(found.jacobian[0, 0])
+    np.testing.assert_allclose(named.jacobian, found.jacobian, atol=found.error[0, 0] + named.error[0, 0])
 
 
 def fallen(F, k=QUADRATIC):
@@ -336,6 +358,7 @@ def test_members_of_a_fleet_with_different_ends():
     assert np.isnan(found.jacobian[:, 0, 0]).tolist() == [False, True, True]
     assert np.isnan(found.jacobian[:, 1, 0]).tolist() == [True, False, False]
     says(found.undefined["depth by start.position[2]"], "(2 of 3 members, the first 1)")
+    says(str(found), "(2 members have none)", "(1 member has none)")
     assert (found.jacobian[1:, 1, 0] < 0.0).all()
 
 

@@ -29,8 +29,9 @@ class Derivatives(Saved):
         by: names of the numbers (k,).
         value: the quantities (m,).
         jacobian: derivative of each quantity by each number (m, k) [unit of the quantity / unit of the number]; NaN for none.
-        error: bound of the error of each derivative (m, k), by how far differences at several increments are apart, and by
-            round-off; the error of the method's step is not in it. NaN where there is no derivative.
+        error: estimate of the error of each derivative (m, k), by how far differences at several increments are apart, and by
+            round-off; no bound: now and then an error is up to some 3 times that. The error of the method's step is not in
+            it. NaN where there is no derivative.
         increments: the largest increment that each derivative stands on (m, k) [unit of the number]; NaN where there is none.
         undefined: "quantity by number" -> why it has no derivative, in a sentence.
         messages: notes for the user.
@@ -104,5 +105,6 @@ def _sure(value: float, error: float) -> str:
 def _ends(values: np.ndarray) -> str:
     """The mean of members, with the least and the largest; how many have none."""
     known = values[np.isfinite(values)]
-    missing = f" (none of {len(values) - len(known)} members)" if len(known) < len(values) else ""
+    count = len(values) - len(known)
+    missing = f" ({count} members have none)" if count > 1 else " (1 member has none)" if count else ""
     return f"{known.mean():.6g}, {known.min():.6g} to {known.max():.6g}{missing}" if len(known) else "none"

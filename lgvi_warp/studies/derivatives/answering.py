@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.results.quantities import OfResult
+from lgvi_warp.results.quantities import EndQuantity, OfResult
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.variations import Target
 from lgvi_warp.studies.derivatives import undefined
 from lgvi_warp.studies.derivatives.answer import Derivatives
 from lgvi_warp.studies.derivatives.copies import CopyRuns, MovedCopies, Neighbours, neighbours
-from lgvi_warp.studies.derivatives.extrapolation import FINE, Extrapolated, extrapolated, relative_increments
+from lgvi_warp.studies.derivatives.extrapolation import FEW, FINE, Extrapolated, extrapolated, relative_increments
 from lgvi_warp.studies.derivatives.stop_times import StopTimeRuns
 from lgvi_warp.studies.reference import ROUND_OFF
 
@@ -73,7 +73,7 @@ class Answering:
         question, runs = self._question, self._runs
         growth, from_here = runs.nudged(final=undefined.has_waypoints(question.scene))
         self._growth = growth if runs.dtype == "float64" else np.zeros_like(growth)
-        self._legs = undefined.legs_done(question.scene, from_here)
+        self._legs = self._legs_of(undefined.legs_done(question.scene, from_here))
         groups = self._groups()
         n, m, k = question.fleet.members, len(runs.labels), len(question.names)
         value = np.full((n, m), np.nan)
@@ -100,6 +100,28 @@ class Answering:
             members=runs.members,
             provenance=runs.provenance,
         )  # fmt: skip
+
+    def _legs_of(self, at_end: np.ndarray) -> np.ndarray:
+        """Legs of waypoints that members have done (n, interests) where each quantity is asked; at_end: (n,)."""
+        times = [each.when if isinstance(each, EndQuantity) else None for each in self._question.interests]
+        at = {when: self._legs_at(when) for when in set(times) if when is not None and at_end.any()}
+        return np.stack([at_end if when is None else at.get(when, at_end) for when in times], axis=1)
+
+    def _legs_at(self, when: float) -> np.ndarray:
+        """Legs that members have done at a time (n,): of a run that ends there."""
+        if when <= 0.0:
+            return np.zeros(self._question.fleet.members)
+        interest = OfResult("position", lambda result: result.position[-1])
+        own = CopyRuns(self._copies, [interest], {**self._same_steps(), "t1": when, "save": None})
+        members = np.arange(self._question.fleet.members)
+        ended = own.runner.run(self._copies.ensemble(members, self._copies.numbers), warned=False, final=True)
+        self._runs.members += len(members)
+        return undefined.legs_done(self._question.scene, ended)
+
+    def _same_steps(self) -> dict[str, Any]:
+        """Settings of runs with the same steps."""
+        plan = self._runs.plan
+        return {**self._settings, "method": plan.method, "h": plan.grid.h, "dtype": self._runs.dtype}
 
     def _groups(self) -> list[tuple[np.ndarray, Neighbours, Extrapolated]]:
         """Run some members at all increments, and the others at those that were best."""
@@ -132,8 +154,8 @@ class Answering:
     def _fill(self, members: np.ndarray, near: Neighbours, slopes: Extrapolated) -> None:
         """Take over derivatives of members, and look closely at those that may have none."""
         times = self._stop_times(members, near)
-        odd = (near.status != 0) | (self._growth[members] > undefined.MOST_GROWTH) | (self._legs[members] > 0.0)
-        odd = odd[:, None] | ~np.isfinite(near.at)
+        odd = (near.status != 0) | (self._growth[members] > undefined.MOST_GROWTH)
+        odd = odd[:, None] | ~np.isfinite(near.at) | (self._legs[members][:, list(self._runs.owner)] > 0.0)
         for i, place in np.ndindex(len(self._runs.labels), len(self._live)):
             j = self._live[place]
             increments = np.take_along_axis(near.increments[:, place], slopes.first[:, i, place, None], axis=1)[:, 0]
@@ -142,6 +164,8 @@ class Answering:
             for row in np.flatnonzero(closely):
                 self._put(int(members[row]), (int(row), i, place), near, slopes, times)
         for place, j in enumerate(self._live):
+            if place in self._copies.unmovable:
+                continue
             for values, side in ((near.below, "above"), (near.above, "below")):
                 if np.isnan(values[:, :, place]).all() and not np.isnan(near.at).all():
                     self._sides[j] = (
@@ -154,10 +178,13 @@ class Answering:
     ) -> None:  # fmt: skip
         """Note a derivative of a member, or why there is none."""
         row, i, j = place[0], place[1], self._live[place[2]]
+        owner = self._runs.owner[i]
         slope: SlopeOrReason | None = undefined.of_member(
-            self._question.interests[self._runs.owner[i]], float(near.at[row, i]), int(near.status[row]),
-            float(near.time[row]), float(self._growth[member]), float(self._legs[member]),
+            self._question.interests[owner], float(near.at[row, i]), int(near.status[row]),
+            float(near.time[row]), float(self._growth[member]), float(self._legs[member, owner]),
         )  # fmt: skip
+        if slope is None and slopes.code[place] == FEW and (reason := self._copies.unmovable.get(place[2])):
+            slope = f"{self._question.names[j]} {reason}"
         slope = slope or times.get(place) or _numbers(slopes, place, near.increments[row, place[2]])
         if isinstance(slope, str):
             self._reasons.setdefault((i, j), {}).setdefault(slope, []).append(member)
@@ -175,7 +202,7 @@ class Answering:
         """What is told of the times at which events stopped members, by place (row, i, j)."""
         runs, times = self._runs, dict[tuple[int, int, int], SlopeOrReason]()
         grid, events = runs.plan.grid, undefined.timed_events(self._question.scene)
-        settings = {**self._settings, "method": runs.plan.method, "h": grid.h, "dtype": runs.dtype}
+        settings = self._same_steps()
         relative = relative_increments(runs.dtype)
         for i, owner in enumerate(runs.owner):
             interest = self._question.interests[owner]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, samples_for, statistics_for, values_of
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import failed
+from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.quantities import OfResult
@@ -34,13 +35,14 @@ class MovedCopies:
     """Copies of the members of a fleet, of which some numbers are moved.
 
     scene: of the copies, whose events and quanta may be others. targets: the numbers (k) that are moved. left_out: names of
-    numbers that the scene has in place of the members.
+    numbers that the scene has in place of the members. unmovable: why numbers cannot be moved to either side, by their places.
     """
 
     fleet: Ensemble
     scene: Any
     targets: tuple[Target, ...]
     left_out: Collection[str] = ()
+    unmovable: dict[int, str] = field(default_factory=dict)
 
     @functools.cached_property
     def numbers(self) -> dict[str, np.ndarray]:
@@ -104,7 +106,7 @@ class MovedCopies:
     def physical(self, each: np.ndarray, increments: np.ndarray) -> np.ndarray:
         """Which increments (k, 2, levels) above and below leave all members each (n,) physical; increments: (n, k, levels).
 
-        Raises SceneError: some number cannot be moved at all.
+        Why a number has none at all is noted in `unmovable`, by its place.
         """
         k, levels = increments.shape[1:]
         good = np.ones((k, 2, levels), bool)
@@ -118,7 +120,7 @@ class MovedCopies:
                 except SceneError as error:
                     good[j, side, level], fault = False, error
             if fault is not None and not good[j].any():
-                raise fault
+                self.unmovable[j] = f"cannot be moved to either side: {fault}"
         return good
 
     def nudged(self) -> tuple[Ensemble, Ensemble]:
@@ -163,7 +165,7 @@ class CopyRuns:
         self.copies, self.interests = copies, tuple(interests)
         every = np.arange(copies.fleet.members)
         first = copies.ensemble(every, copies.numbers)
-        save = samples_for(copies.scene, self.interests, settings.get("save"))
+        save = _with_states(samples_for(copies.scene, self.interests, settings.get("save")))
         gathered = statistics_for(copies.scene, self.interests)
         # A copy that is far away may fail: that ends no study.
         lasting = {"on_failure": "freeze"} if copies.scene.run.on_failure == "raise" else {}
@@ -221,6 +223,13 @@ class CopyRuns:
             results.append(result)
         self.members += 2 * self.copies.fleet.members
         return np.linalg.norm(ends[1] - ends[0], axis=1) / NUDGE, results[0]
+
+
+def _with_states(save: SaveAt | None) -> SaveAt | None:
+    """Keep states beside signals alone: by them growth is told."""
+    if save is None or set(save.fields) & set(FIELDS):
+        return save
+    return replace(save, fields=(*FIELDS, *save.fields))
 
 
 @dataclass(frozen=True)

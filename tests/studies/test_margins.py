@@ -116,18 +116,19 @@ def test_margins_by_runs_are_those_at_which_the_envelope_shrinks(fleet, found):
     assert np.abs(found.by_runs["delay"] - found.values["delay"]).max() <= H * (1.0 + 1e-9)
 
 
-@pytest.mark.slow
-def test_the_poles_of_a_closed_loop_with_a_delay_are_those_of_the_system_by_hand():
-    for steps in (0, 3, 11):
-        closed = lw.linear.linearize(scene(delay=steps * H), 80.0, closed=True, method="psi_s", h=H)
-        turning = [name for name in closed.states if not name.startswith(("position", "velocity"))]
-        # Beside roll and pitch, which nothing turns: two integrators each, at 1.
-        others = [f"{word}[{i}]" for word in ("rotation", "angular_velocity") for i in (0, 1)]
-        yaw = closed.part([name for name in turning if name not in others])
-        assert abs(np.abs(yaw.poles[0]) - radius(6.0, 0.8, 9.0, 1.0, steps)) < 1e-8
-        assert closed.inputs == tuple(f"control_wrench[{i}]" for i in range(6))
-        torque, rate = closed.inputs.index("control_wrench[5]"), closed.states.index("angular_velocity[2]")
-        assert abs(closed.B[rate, torque] - PERIOD / J) < 1e-9
+@pytest.mark.parametrize(
+    "steps", [3, pytest.param(0, marks=pytest.mark.slow), pytest.param(11, marks=pytest.mark.slow)]
+)
+def test_the_poles_of_a_closed_loop_with_a_delay_are_those_of_the_system_by_hand(steps):
+    closed = lw.linear.linearize(scene(delay=steps * H), 80.0, closed=True, method="psi_s", h=H)
+    turning = [name for name in closed.states if not name.startswith(("position", "velocity"))]
+    # Beside roll and pitch, which nothing turns: two integrators each, at 1.
+    others = [f"{word}[{i}]" for word in ("rotation", "angular_velocity") for i in (0, 1)]
+    yaw = closed.part([name for name in turning if name not in others])
+    assert abs(np.abs(yaw.poles[0]) - radius(6.0, 0.8, 9.0, 1.0, steps)) < 1e-8
+    assert closed.inputs == tuple(f"control_wrench[{i}]" for i in range(6))
+    torque, rate = closed.inputs.index("control_wrench[5]"), closed.states.index("angular_velocity[2]")
+    assert abs(closed.B[rate, torque] - PERIOD / J) < 1e-9
 
 
 def test_a_distribution(found):

@@ -218,8 +218,8 @@ def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float)
     bench = MotionBench(Ensemble(scene, 1), method, h, (k + 1) * period, period)
     places, begin = np.zeros(1, np.int64), k * bench.every
     motion = bench.run(places, None, 0, begin)
-    rows, after = loop_rows(bench, motion.memory, k)
-    derivatives = Differences(bench, begin, bench.every, rows, after, step=step)(places, motion)[0]
+    rows = loop_rows(bench, motion.memory)
+    derivatives = Differences(bench, begin, bench.every, rows, rows, step=step)(places, motion)[0]
     names = names_of(rows)
     pushed, inputs = np.zeros((len(derivatives), 0)), list[str]()
     for key, (first, count) in bench.bus.commands.items():  # type: ignore[union-attr]
@@ -237,28 +237,25 @@ def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
     return (bus.acting + row, bus.acting + bus.channels + row) if bus.delayed else (row,)
 
 
-def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray], tick: int) -> tuple[list[Row], list[Row]]:
-    """What a closed loop remembers after a tick, and after the next one, in the same order.
+def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray]) -> list[Row]:
+    """What a closed loop remembers after a tick.
 
     What ticks note of themselves is left out, and what was not delivered: only its sign counts, for integrals that wait.
     """
     bus: Any = bench.bus
     names = [f"{key}.command[{i}]" for key, (_, count) in bus.commands.items() for i in range(count)]
-    before = remembered(bench, memory, terms=True)
+    kept = remembered(bench, memory, terms=True)
     for i, name in enumerate(names):
         words = ("acting", "before") if bus.delayed else ("",)
         rows = zip(command_rows(bench, i), words, strict=True)
-        before += [Row("", row, f"{name} {word}".strip()) for row, word in rows]
-    before += [row for row in remembered(bench, memory, terms=False) if row.key != "controller"]
-    after = list(before)
+        kept += [Row("", row, f"{name} {word}".strip()) for row, word in rows]
+    kept += [row for row in remembered(bench, memory, terms=False) if row.key != "controller"]
     if bus.delayed:
+        # The commands of the last ticks, the latest first.
         sets = memory["controller"].shape[1] // bus.channels
         for age in range(sets):
-            for i, name in enumerate(names):
-                ago = f"{name} {age} ago"
-                before.append(Row("controller", (tick - age) % sets * bus.channels + i, ago))
-                after.append(Row("controller", (tick + 1 - age) % sets * bus.channels + i, ago))
-    return before, after
+            kept += [Row("controller", age * bus.channels + i, f"{name} {age} ago") for i, name in enumerate(names)]
+    return kept
 
 
 def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool) -> list[Row]:

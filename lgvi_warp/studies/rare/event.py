@@ -15,8 +15,8 @@ from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.statistics.base import TYPES, Statistic
-from lgvi_warp.statistics.metrics.nearest import LEAST, SIDES, named
 from lgvi_warp.statistics.member_metrics import names_a_statistic
+from lgvi_warp.statistics.metrics.nearest import LEAST, SIDES, named
 from lgvi_warp.statistics.values.functional import functional
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.tracking import check_wanted

@@ -190,6 +190,16 @@ def test_an_attitude_is_learned_from_headings():
     assert after.mean() == pytest.approx(before.mean() + gain * (0.4 - before.mean()), abs=2e-3)
 
 
+@pytest.mark.parametrize("of", ["euler", "euler[2]"])
+def test_angles_are_compared_within_half_a_turn(of):
+    measured = [[0.1, -0.2, 3.1]] if of == "euler" else [3.1]
+    heading = lw.studies.Series(of, [0.5], measured, 0.1)
+    predicted = np.array([[0.1, 0.0], [0.0, -0.2], [-3.1, 3.0]])[-heading.values.shape[1] :]
+    apart = heading.near(heading.values[0], predicted) - heading.values[0][:, None]
+    np.testing.assert_allclose(apart[-1], [2.0 * np.pi - 6.2, -0.1], atol=1e-12)
+    assert np.all(np.abs(apart) < 0.3)
+
+
 def test_what_is_refused():
     fleet, (_, _, fixes) = drifting(10), series()
     for message, call in {
@@ -208,6 +218,7 @@ def test_what_is_refused():
         "names no instrument": lambda: lw.assimilate(fleet, [], h=0.05),
         "is not known": lambda: lw.assimilate(fleet, fixes, filter="ukf", h=0.05),
         "series.std = 0": lambda: lw.studies.Series("depth", [1.0], [1.0], 0.0),
+        "that are infinite; give NaN": lambda: lw.studies.Series("depth", [1.0, 2.0], [1.0, np.inf], 0.1),
         "has 3 numbers, and 1 were measured": lambda: lw.assimilate(
             fleet, lw.studies.Series("position", [1.0], [1.0], 0.1), h=0.05
         ),

@@ -177,6 +177,19 @@ def test_two_instruments_and_missing_values():
     assert "Assimilation of 3 times to 4 s" in repr(answer)
 
 
+def test_members_that_an_event_stops_are_told():
+    fleet, (_, _, fixes) = drifting(60), series()
+    assert not lw.assimilate(fleet, fixes, method="rk8", h=0.05).messages
+    scene = lw.Scene(
+        fleet.scene.vehicle, fleet.scene.environment, terms=fleet.scene.terms, events=[lw.events.Floor(depth=0.3)]
+    )
+    answer = lw.assimilate(lw.Ensemble(scene, 60, 2, fleet.vary), fixes, method="rk8", h=0.05)
+    (message,) = answer.messages
+    # Those that start below it, and some that go there.
+    below = int((fleet.select(0, 60).position[:, 2] > 0.3).sum())
+    assert 5 < below <= int(re.search(r"stopped (\d+) of 60 members", message)[1]) < 40
+
+
 def test_an_attitude_is_learned_from_headings():
     # Turns about the vertical add: the headings are a scalar that Kalman's filter knows.
     vary = {"start.attitude": lw.distributions.RotationNormal(std=[0.0, 0.0, 0.3])}

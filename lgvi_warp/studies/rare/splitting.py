@@ -70,7 +70,7 @@ def piloted(walk: Walk, size: int, rng: np.random.Generator) -> LevelPilot:
         bound = None if happened >= ARRIVED else _next_bound(stage.reach, bounds)
         if bound is None:
             return LevelPilot(
-                score, np.array(bounds), np.array([*shares, happened]), np.array(steps).reshape(-1, walk.d)
+                score, np.array(bounds), np.array([*shares, happened]), np.array(steps).reshape(len(steps), walk.d)
             )
         crossed = first_reached(walk, score, stage, log, bound)
         shares.append(float((stage.reach >= bound).mean()))

@@ -177,6 +177,19 @@ def test_two_instruments_and_missing_values():
     assert "Assimilation of 3 times to 4 s" in repr(answer)
 
 
+def test_members_that_an_event_stops_are_told():
+    fleet, (_, _, fixes) = drifting(60), series()
+    assert not lw.assimilate(fleet, fixes, method="rk8", h=0.05).messages
+    scene = lw.Scene(
+        fleet.scene.vehicle, fleet.scene.environment, terms=fleet.scene.terms, events=[lw.events.Floor(depth=0.3)]
+    )
+    answer = lw.assimilate(lw.Ensemble(scene, 60, 2, fleet.vary), fixes, method="rk8", h=0.05)
+    (message,) = answer.messages
+    # Those that start below it, and some that go there.
+    below = int((fleet.select(0, 60).position[:, 2] > 0.3).sum())
+    assert 5 < below <= int(re.search(r"stopped (\d+) of 60 members", message)[1]) < 40
+
+
 def test_an_attitude_is_learned_from_headings():
     # Turns about the vertical add: the headings are a scalar that Kalman's filter knows.
     vary = {"start.attitude": lw.distributions.RotationNormal(std=[0.0, 0.0, 0.3])}
@@ -188,6 +201,16 @@ def test_an_attitude_is_learned_from_headings():
     gain = before.var(ddof=1) / (before.var(ddof=1) + 0.01)
     after = lw.solve(fleet.subset(range(300)), "psi_x", h=0.1, t1=0.6, start=answer.final).euler[-1, :, 2]
     assert after.mean() == pytest.approx(before.mean() + gain * (0.4 - before.mean()), abs=2e-3)
+
+
+@pytest.mark.parametrize("of", ["euler", "euler[2]"])
+def test_angles_are_compared_within_half_a_turn(of):
+    measured = [[0.1, -0.2, 3.1]] if of == "euler" else [3.1]
+    heading = lw.studies.Series(of, [0.5], measured, 0.1)
+    predicted = np.array([[0.1, 0.0], [0.0, -0.2], [-3.1, 3.0]])[-heading.values.shape[1] :]
+    apart = heading.near(heading.values[0], predicted) - heading.values[0][:, None]
+    np.testing.assert_allclose(apart[-1], [2.0 * np.pi - 6.2, -0.1], atol=1e-12)
+    assert np.all(np.abs(apart) < 0.3)
 
 
 def test_what_is_refused():
@@ -208,6 +231,7 @@ def test_what_is_refused():
         "names no instrument": lambda: lw.assimilate(fleet, [], h=0.05),
         "is not known": lambda: lw.assimilate(fleet, fixes, filter="ukf", h=0.05),
         "series.std = 0": lambda: lw.studies.Series("depth", [1.0], [1.0], 0.0),
+        "that are infinite; give NaN": lambda: lw.studies.Series("depth", [1.0, 2.0], [1.0, np.inf], 0.1),
         "has 3 numbers, and 1 were measured": lambda: lw.assimilate(
             fleet, lw.studies.Series("position", [1.0], [1.0], 0.1), h=0.05
         ),

@@ -296,6 +296,7 @@ def test_noise_alone_can_be_the_cause():
     ("position[1] - 1.0", "has the same value for most members"),
     (3.0, "is no event"),
     ({"position[0]": {"near": 1.0}}, "is no condition"),
+    ({"max(depth)": {"above": 9.0}, "position[0]": {"above": 9.0}}, 'give "max(position[0])"'),
 ])  # fmt: skip
 def test_what_is_no_rare_event_is_refused(limit, words):
     with pytest.raises(lw.SceneError) as error:

@@ -93,6 +93,22 @@ def test_rare_failures_are_those_of_the_normal_law(found):
     assert (rare.failing.own_values()["start.position[2]"] >= FLOOR).any()
 
 
+def test_rare_failures_run_where_the_cells_do(scene, found):
+    class Counting:
+        def __init__(self):
+            self.members = 0
+
+        def run(self, work, blocks, advanced):
+            for block in blocks:
+                self.members += block.count
+                yield block, work(block)
+
+    counting = Counting()
+    again = swept(scene, cases=CASES[:1], executor=counting).rare("near")
+    assert again.probability == found.rare("near").probability
+    assert counting.members >= again.members["the scene's own"] > 10_000
+
+
 def test_cases_are_compared_by_the_same_failing_members(found):
     (row,) = found.compare_rare("near", "aside")
     assert row.ratio.paired

@@ -12,8 +12,10 @@ import lgvi_warp as lw
 from lgvi_warp.sampling.final import joined
 from lgvi_warp.studies.rare.event import SURE, condition_of
 from lgvi_warp.studies.rare.flock import Flock
+from lgvi_warp.studies.rare.moving import moved
 from lgvi_warp.studies.rare.split_search import SplitSearch
 from lgvi_warp.studies.rare.splitting import piloted, split_runs
+from lgvi_warp.studies.rare.stages import Stage, walked
 from lgvi_warp.studies.rare.subset import NoProgress
 from lgvi_warp.studies.rare.walk import VehicleWalk, pieces
 from tests.support.refusals import says
@@ -37,11 +39,23 @@ class Place:
         return Place(self.x[rows])
 
 
+def normals_of(keys, seed, step):
+    """A standard normal (n,) for each key at a step, the same whenever it is asked (SplitMix64; Steele, Lea & Flood 2014)."""
+    with np.errstate(over="ignore"):
+        z = keys.astype(np.uint64)
+        for number in (seed, step):
+            z = (z + np.uint64(number + 1)) * np.uint64(0x9E3779B97F4A7C15)
+            z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+            z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+            z ^= z >> np.uint64(31)
+    return ndtri(((z >> np.uint64(11)).astype(float) + 0.5) / 2.0**53)
+
+
 class LinearWalk:
     """A speed in drag and noise, and its place, by steps of Euler; the place begins at u where `start` is not 0."""
 
     def __init__(self, seed, bound, of=0, lasting=False, start=0.0, per=5, looks=20, dt=0.03):
-        self.rng, self.bound, self.of = np.random.default_rng(seed), bound, of
+        self.seed, self.bound, self.of = seed, bound, of
         self.looks, self.per, self.dt, self.start, self.d = looks, per, dt, start, int(start > 0.0)
         self.lasting, self.ran, self.fresh = np.array([lasting]), 0, 0
 
@@ -62,8 +76,9 @@ class LinearWalk:
     def advance(self, flock, keys):
         x, most = flock.place.x.copy(), flock.values[0].copy()
         self.ran += len(x)
-        for _ in range(self.per):
-            x[:, 1] += -self.dt * x[:, 1] + np.sqrt(self.dt) * self.rng.standard_normal(len(x))
+        for step in range(self.per):
+            noise = normals_of(keys, self.seed, flock.look * self.per + step)
+            x[:, 1] += -self.dt * x[:, 1] + np.sqrt(self.dt) * noise
             x[:, 0] += self.dt * x[:, 1]
             most = np.fmax(most, x[:, self.of])
         values = most if self.lasting[0] else x[:, self.of]
@@ -135,9 +150,14 @@ def test_runs_with_fixed_levels_have_the_right_mean():
     check_mean(shares_of(end_case(1e-3, of=0, start=0.4), range(6), 100, 64), 1e-3)
 
 
+def test_runs_whose_starts_move_have_the_right_mean():
+    # Starts have seven tenths of the variance: what copies of a member share decides.
+    check_mean(shares_of(end_case(1e-3, of=0, start=2.0, per=1, dt=0.15), range(4), 100, 64), 1e-3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("p", [1e-2, 1e-3, 1e-5])
-@pytest.mark.parametrize("more", [{"of": 0}, {"of": 1}, {"of": 0, "start": 0.4}])
+@pytest.mark.parametrize("more", [{"of": 0}, {"of": 1}, {"of": 0, "start": 0.4}, {"of": 0, "start": 2.0}])
 def test_runs_with_fixed_levels_have_the_right_mean_over_seeds(p, more):
     check_mean(shares_of(end_case(p, **more), range(10), 200, 64), p)
 
@@ -172,9 +192,29 @@ def check_told(rows):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [{"of": 0}, {"of": 1}, {"of": 0, "start": 0.4}])
+@pytest.mark.parametrize("more", [{"of": 0}, {"of": 1}, {"of": 0, "start": 0.4}, {"of": 0, "start": 2.0}])
 def test_the_error_told_is_that_seen(more):
     check_told(scored(end_case(1e-5, looks=50, per=2, **more), range(40), 1e-5))
+
+
+def test_a_start_that_stays_reaches_its_level_again():
+    """A step of nothing runs each member again, with the noise of all its stages, to where it was."""
+    walk, rngs = end_case(1e-4, of=0, start=2.0)(3), [np.random.default_rng(2)]
+    pilot = piloted(walk, 200, np.random.default_rng(1))
+    stage, stages = Stage.first(walk, rngs[0].standard_normal((300, 1)), np.zeros(300, int)), []
+    for i, bound in enumerate(pilot.bounds[:3]):
+        crossed = walked(walk, pilot.score, stage, bound)
+        stages.append(stage)
+        stage = stage.next(walk, crossed, 300, rngs)
+        again, share = moved(walk, pilot.score, list(stages), stage, bound, np.zeros(1), rngs)
+        assert share == 1.0
+        np.testing.assert_array_equal(again.u, stage.u)
+        np.testing.assert_array_equal(again.before, stage.before)
+        for look, (rows, flock) in stage.entrants.items():
+            those, there = again.entrants[look]
+            np.testing.assert_array_equal(there.place.x[np.argsort(those)], flock.place.x[np.argsort(rows)])
+        stage, share = moved(walk, pilot.score, stages, stage, bound, pilot.steps[i], rngs)
+        assert 0.2 < share < 0.9
 
 
 def test_what_never_comes_nearer_is_refused():
@@ -266,6 +306,15 @@ def test_the_answer_is_kept_in_files(found, tmp_path):
     assert "splitting in time" in str(found)
     pytest.importorskip("matplotlib")
     assert len(lw.plots.rare(found, path=tmp_path / "rare.png")) == 2
+
+
+def test_failing_members_have_starts_of_their_own(found):
+    # They were copied at each of some ten levels; steps from the copies' starts tell them apart.
+    starts, weight = np.unique(found.normals, return_inverse=True)
+    shares = np.bincount(weight.ravel(), found.weights)
+    assert len(starts) > 100
+    assert 1.0 / np.sum(shares**2) > 50.0
+    assert not any("different starts" in message for message in found.messages)
 
 
 def test_the_same_seed_has_the_same_answer():

@@ -14,7 +14,7 @@ from lgvi_warp.calls.prepared import Prepared, prepare
 from lgvi_warp.common.arguments import listed, names_of, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.common.status import failed
+from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, exact
 from lgvi_warp.physics.fields import FIELDS
@@ -200,7 +200,7 @@ class _Track:
         self.parameters = members.parameters
         self.log_weights = np.zeros(n)
         self.indices, self.fresh = np.array(members.indices), int(np.max(members.indices)) + 1
-        self.time, self.effective = 0.0, float(n)
+        self.time, self.effective, self.stopped = 0.0, float(n), 0
         self.states: dict[str, Any] = {name: np.array(getattr(members, name)) for name in FIELDS}
         self.learned = learned_rows(self.targets, members.parameters, n)
         # Set by the first run.
@@ -221,6 +221,7 @@ class _Track:
         self.states = {name: np.asarray(result.samples[name][-1], np.float64) for name in FIELDS}
         self.provenance = result.provenance
         ended = failed(np.asarray(result.status))
+        self.stopped = max(self.stopped, int(stopped(np.asarray(result.status)).sum()))
         if ended.any() and self.filter != "particles":
             problem = f"{int(ended.sum())} of {len(ended)} members failed before {time:g} s"
             raise SceneError(
@@ -358,6 +359,11 @@ class _Track:
             remarks.append(
                 "copies of a particle stay copies: nothing is drawn on the way; add noise, or learn a number"
             )
+        if self.stopped:
+            problem = (
+                f"an event of the scene stopped {self.stopped} of {self.fleet.members} members, which go no further"
+            )
+            remarks.append(f"{problem}; leave the event out, or narrow what is known before")
         worst = min(self.notes["effective"])
         if self.filter == "particles" and worst < 20.0:
             remarks.append(f"at one time {worst:.1f} members had all the weight: give more members or larger std")

@@ -12,7 +12,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.results.quantities import OfResult, quantities
 
 # Quantities that are angles: a measurement differs from a prediction by less than half a turn.
-ANGLES = ("euler[0]", "euler[1]", "euler[2]", "heading")
+ANGLES = ("euler", "euler[0]", "euler[1]", "euler[2]", "heading")
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,8 @@ class Series:
             faults.add("time", self.time, "is no rising list of times >= 0", "sort it and drop repetitions")
         if values is not None and time is not None and (values.ndim not in (1, 2) or len(values) != time.size):
             faults.add("values", self.values, f"has shape {values.shape}", f"give {time.size} rows, one for each time")
+        if values is not None and np.isinf(values).any():
+            faults.add("values", self.values, "has values that are infinite", "give NaN for one that is missing")
         if std is not None and (std.ndim > 1 or not np.all(std > 0.0)):
             faults.add("std", self.std, "is not positive", "give the standard deviation of the error")
         with faults.including():

@@ -15,7 +15,9 @@ from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.statistics.base import TYPES, Statistic
+from lgvi_warp.statistics.member_metrics import names_a_statistic
 from lgvi_warp.statistics.metrics.nearest import LEAST, SIDES, named
+from lgvi_warp.statistics.values.functional import functional
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.tracking import check_wanted
 from lgvi_warp.studies.sweeps.setup import kept, metric_of
@@ -145,6 +147,7 @@ def _of_conditions(conditions: dict[str, Any]) -> RareCondition:
     metrics: dict[str, Statistic] = {}
     if not (single := len(conditions) == 1 and bool(words)):
         for name in names:
+            _refuse_end(name)
             key, metric = metric_of("limit", name)
             metrics[key] = metric
             conditions[key] = conditions.pop(name)
@@ -158,6 +161,16 @@ def _of_conditions(conditions: dict[str, Any]) -> RareCondition:
         quantities(words[0])
         return RareCondition(label, words[0], success.limits)
     return RareCondition(label, None, success.limits, metrics, statuses)
+
+
+def _refuse_end(name: Any) -> None:
+    """Refuse a number at the end beside other conditions, which are of the whole path."""
+    if not isinstance(name, str) or names_a_statistic(name):
+        return
+    of = functional("limit", name)
+    if not of.over_path:
+        problem = "is a number at the end, which is an event by itself alone, and not beside other conditions"
+        raise refusal("limit", of.label, problem, f'give "max({of.label})" or "min({of.label})", or ask for each alone')
 
 
 def _words(name: str, above: float, below: float) -> str:

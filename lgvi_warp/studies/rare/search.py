@@ -27,6 +27,7 @@ RARE, FEWEST_PLAIN = 1e-3, 256
 RELATED, OWN_COUNT, BEYOND_CHANCE = 1.2, 12, 0.01
 # The part of the error asked for that numbers are chosen for; one so much larger is left as it is. Most rounds of runs.
 AIM, LEFT, ROUNDS = 1.0, 1.2, 4
+TAKES_MORE = "the error asked takes more than the {:,} members that may be run"
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +120,7 @@ class RareSearch:
         runs = self.climbed(0, FIRST_SIZE, self.chained or self.limit)
         probability, spread, _ = joined(runs)
         if probability > RARE:
-            return self.plain(probability)
+            return self.plain(probability, runs)
         if self.weighted:
             if self.d > MOST_NORMALS:
                 self.notes.append(f"weights: not tried with {self.d} normals, more than {MOST_NORMALS}")
@@ -141,13 +142,17 @@ class RareSearch:
         self._told(RUNS * size)
         return climb(limit, levels, generators, self._told)
 
-    def plain(self, probability: float) -> RareAnswer:
-        """Plain sampling, of what is not rare."""
-        count = (1.0 - probability) / (probability * (AIM * self.relative_error) ** 2)
-        count = min(max(count, FEWEST_PLAIN), self.most - self.members)
+    def plain(self, probability: float, runs: Sequence[SubsetRun]) -> RareAnswer:
+        """Plain sampling, of what is not rare; chains go on from those of these runs where it meets none."""
+        count = max((1.0 - probability) / (probability * (AIM * self.relative_error) ** 2), FEWEST_PLAIN)
+        if count > self.most - self.members:
+            self.notes.append(TAKES_MORE.format(self.most))
+            count = self.most - self.members
         self._expected = self.members + count
         found = sampled(self.limit, self.d, math.ceil(count), self.seed, self._told)
-        weights = np.full(len(found.failing), 1.0 / max(1, len(found.failing)))
+        if not len(found.failing):
+            return self.subset(runs)
+        weights = np.full(len(found.failing), 1.0 / len(found.failing))
         return self._found(
             "plain", (found.probability, found.spread, found.degrees), found.failing, found.limits, weights
         )
@@ -208,7 +213,7 @@ class RareSearch:
             size = round(size / (1.0 / SHARE)) * round(1.0 / SHARE)
             if self.members + RUNS * size * levels > self.most:
                 afford = int((self.most - self.members) / (RUNS * levels)) // 10 * 10
-                self.notes.append(f"the error asked takes more than the {self.most:,} members that may be run")
+                self.notes.append(TAKES_MORE.format(self.most))
                 if afford < LEAST_SIZE:
                     break
                 size = afford

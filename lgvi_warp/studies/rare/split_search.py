@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.random import generator
-from lgvi_warp.studies.rare.search import RareAnswer
+from lgvi_warp.studies.rare.search import TAKES_MORE, RareAnswer
 from lgvi_warp.studies.rare.splitting import LevelPilot, SplitRuns, piloted, split_runs
 from lgvi_warp.studies.rare.subset import NoProgress, SubsetRun
 
@@ -88,7 +88,7 @@ class SplitSearch:
         """Members of a level of each run, where so many are wanted of all."""
         size = math.ceil(np.clip(wanted / RUNS, LEAST, LARGEST))
         afford = int((self.most - self.walk.members) / (RUNS * self._price))
-        note = f"the error asked takes more than the {self.most:,} members that may be run"
+        note = TAKES_MORE.format(self.most)
         if size > afford and note not in self.notes:
             self.notes.append(note)
         return max(LEAST, min(size, afford))
@@ -117,8 +117,8 @@ class SplitSearch:
         share = weights / weights.sum() if len(weights) else weights
         if self.walk.d and (starts := different(failing, share)) < FEW_STARTS:
             problem = (
-                f"the failing members stand on some {starts:.0f} different starts: what varies there is hardly told, "
-                "and the interval is too narrow"
+                f"the failing members stand on some {starts:.0f} different starts, since few steps from these were taken: "
+                "what varies there is hardly told, and the interval may be too narrow"
             )
             self.notes.append(f'{problem}; by="chains" moves these numbers, too')
         return SplitAnswer(probability, spread, len(runs) - 1.0, "splitting", self.walk.members, failing, limits, share, runs,

@@ -117,8 +117,13 @@ class RareFailures:
     def _key(self, cell: SweepCell) -> str:
         return key_of({"cell": cell.key, "success": self.success.to_dict(), "rare": self.asked(cell.case)})
 
-    def run(self, cell: SweepCell, lasting: bool, progress: Callable[[float], None] | None) -> None:
-        """Find the probability that a member of a cell fails, or read it where it is known; lasting: whether files keep it."""
+    def run(
+        self, cell: SweepCell, lasting: bool, progress: Callable[[float], None] | None, execution: Mapping[str, Any]
+    ) -> None:
+        """Find the probability that a member of a cell fails, or read it where it is known.
+
+        lasting: whether files keep it. execution: threads, executor and scheduler.
+        """
         key, asked = self._key(cell), self.asked(cell.case)
         answer = self._read(key) if lasting else None
         if answer is None:
@@ -126,7 +131,7 @@ class RareFailures:
             try:
                 condition: Any = failing_of(self.success, self.setup.metrics, cell.fleet.scene)
                 found = rare_event(cell.fleet, condition, seed=self.setup.members.seed, progress=progress, **asked,
-                                   **self._settings())  # fmt: skip
+                                   **self.setup.settings, **execution)  # fmt: skip
                 answer = RareFailure.of(found)
                 if lasting:
                     self._write(key, answer)

@@ -145,11 +145,11 @@ def swept(
     cells = list(_run(setup, records, progress, total, execution))
     found = Sweep(setup, cells, records, conditions, baseline, float(confidence), interval, rares)
     if rares is not None:
-        _run_rare(rares, found, progress, total)
+        _run_rare(rares, found, progress, total, execution)
     return found
 
 
-def _run_rare(rares: RareFailures, found: Sweep, progress: Any, total: int) -> None:
+def _run_rare(rares: RareFailures, found: Sweep, progress: Any, total: int, execution: Mapping[str, Any]) -> None:
     """Find the rare failures that are asked for, and compare them with those of the baseline."""
     asking = [cell for cell in found.cells if cell.case.rare and not found.record(cell).refused]
     done = total - RARE_PARTS * len(asking)
@@ -157,7 +157,7 @@ def _run_rare(rares: RareFailures, found: Sweep, progress: Any, total: int) -> N
         at = done + RARE_PARTS * i
         share = progress and (lambda part, at=at: progress((at + RARE_PARTS * part) / total))
         assert cell.fleet is not None
-        rares.run(cell, found.records.folder is not None and not found.setup.unknown(cell.fleet), share)
+        rares.run(cell, found.records.folder is not None and not found.setup.unknown(cell.fleet), share, execution)
     rare_against_baseline(found)
     if progress:
         progress(1.0)

@@ -129,6 +129,22 @@ def test_what_is_likely_is_sampled_plainly():
     assert abs(many.probability / ndtr(-2.0) - 1.0) < 4.0 * many.spread
 
 
+def test_plain_members_that_meet_no_event_leave_it_to_chains():
+    # Some 3,000 plain members expect 4 events: of a hundred seeds one meets none.
+    p, d = 1.2e-3, 70
+    found = RareSearch(lambda u: u.sum(axis=1) / math.sqrt(d) + ndtri(p), d, relative_error=0.5, seed=35).answer()
+    assert found.estimator == "subset"
+    assert abs(found.probability / p - 1.0) < 3.0 * found.spread
+    assert found.weights.sum() == pytest.approx(1.0)
+
+
+def test_plain_members_are_told_where_they_are_too_few():
+    found = RareSearch(lambda u: u[:, 0] - 2.0, 3, relative_error=0.005, most=10_000).answer()
+    assert found.estimator == "plain"
+    assert found.members < 20_000
+    assert any("more than the 10,000 members" in note for note in found.notes)
+
+
 def test_plain_members_are_those_that_happen():
     found = sampled(lambda u: u[:, 0] - 1.0, 2, 4096, seed=0)
     assert (found.failing[:, 0] > 1.0).all()

@@ -348,6 +348,13 @@ def test_the_radius_of_waypoints_has_no_derivative():
         lw.solve(scene, "rk8", h=PERIOD / 2, t1=1.0, tangents=["waypoints.radius"])
 
 
+def test_the_times_of_a_schedule_in_steps_have_no_derivative():
+    push = lw.terms.WrenchSchedule(times=[0.0, 1.0], force=[[0.0] * 3, [9.0, 0.0, 0.0]], interpolation="steps")
+    scene = dataclasses.replace(free(), terms=[push])
+    with pytest.raises(lw.SceneError, match=r"wrench_schedule.times\[1\].*no derivative"):
+        lw.solve(scene, "psi_x", h=0.1, t1=0.3, tangents=["wrench_schedule.times[1]"])
+
+
 def test_one_name_may_stand_alone():
     result = lw.solve(falling(), "rk8", h=0.02, t1=0.1, tangents=" start.velocity[ 0 ] ", threads=1)
     assert result.tangents == ("start.velocity[0]",)

@@ -369,6 +369,18 @@ def test_a_fleet_has_an_axis_of_members(members):
     assert not np.isin(again.value, plain.value).any()
 
 
+def test_members_that_need_other_increments_than_the_first_ones():
+    """Almost neutral bodies: drag by the square of the speed is no power series in the weight across its sign."""
+    heavy = np.array([HEAVY] * 9 + [1.9e-4, -5.7e-5, 3e-3])
+    sampling = lw.designs.Table({"vehicle.buoyancy": MASS * GRAVITY - heavy})
+    fleet = lw.Ensemble(body(quadratic=QUADRATIC), sampling=sampling)
+    found = lw.derivatives(fleet, "depth", "vehicle.buoyancy", **RUN)
+    assert not found.undefined
+    truth = fallen(np.abs(heavy))[1]
+    assert (np.abs(found.jacobian[:, 0, 0] - truth) <= found.error[:, 0, 0]).all()
+    assert (found.error[:, 0, 0] < 1e-2 * np.abs(truth)).all()
+
+
 def test_members_of_a_fleet_with_different_ends():
     fleet = lw.Ensemble(
         body(quadratic=QUADRATIC, events=[lw.events.Floor(depth=7.0)]),

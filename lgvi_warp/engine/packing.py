@@ -43,9 +43,13 @@ class Packing:
 
     def __init__(self, plan: Plan, members: Members):
         self.plan, self.members = plan, members
-        self.numbers: Any = framed(plan.method, members.parameters, plan.shared)
+        self.numbers: Any = self._framed()
         self.frame, self.U, _ = self.numbers[FRAME]
         self.scale = self._shared("scale", lambda numbers: self._scale(numbers[AXES][0]))
+
+    def _framed(self) -> dict[str, Any]:
+        """The members' numbers with their frame."""
+        return framed(self.plan.method, self.members.parameters, self.plan.shared)
 
     def _shared(self, key: Any, compute: Callable[[Any], Any]) -> Any:
         return self.plan.shared(key, self.numbers, compute)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from lgvi_warp.common.errors import refusal
 from lgvi_warp.engine import arrays
 from lgvi_warp.engine.arrays import Writing
 from lgvi_warp.engine.packing import Packing
+from lgvi_warp.engine.shared import AXES, FRAME
+from lgvi_warp.physics import inertia
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.sampling.members import Members, Shifted
 from lgvi_warp.scene.copies import BETWEEN, FOUR_POINTS, OFFSETS, SIX_POINTS, repeats
@@ -125,6 +128,21 @@ class CopiesPacking(Packing):
     def __init__(self, plan: Plan, members: Members):
         self._repeats = repeats(len(plan.ensemble.copies.targets))
         super().__init__(plan, members)
+
+    def _framed(self) -> dict[str, Any]:
+        # Principal axes may come in any order and sense: those of the copies are to go on from the member's.
+        numbers = super()._framed()
+        return numbers | {name: self._like_members(*numbers[name]) for name in (AXES, FRAME)}
+
+    def _like_members(self, frame: Frame, U: np.ndarray, coupling: np.ndarray) -> tuple[Frame, np.ndarray, np.ndarray]:
+        if frame.whole is not None and len(frame.J) > 1:
+            # The kernel computes with the whole inertia, and not with the moments.
+            return replace(frame, J=np.repeat(self.of_members(frame.J), self._repeats, axis=0)), U, coupling
+        if len(frame.Q) == 1:
+            return frame, U, coupling
+        like = np.repeat(self.of_members(frame.Q), self._repeats, axis=0)
+        P = inertia.nearest_axes(frame.Q, like, ordered=self.plan.method.turns)
+        return inertia.in_order(frame, P), inertia.in_axes(P, U), coupling
 
     def _scale(self, frame: Frame) -> np.ndarray:
         # A unit of the kernel's: the same for a member and its copies.

@@ -246,6 +246,28 @@ def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return Q, np.take_along_axis(J, order, axis=1)
 
 
+def nearest_axes(Q: np.ndarray, like: np.ndarray, ordered: bool) -> np.ndarray:
+    """Matrices P (n, 3, 3) that put axes Q into another order and sense, so that Q P is next to other axes (n, 3, 3).
+
+    The identity where none is next to them. ordered: whether their order stays.
+    """
+    between = np.swapaxes(Q, -1, -2) @ like
+    largest = np.abs(between).argmax(axis=1)
+    P = np.zeros_like(between)
+    np.put_along_axis(P, largest[:, None], np.sign(np.take_along_axis(between, largest[:, None], axis=1)), axis=1)
+    proper = np.abs(np.linalg.det(P) - 1.0) < ROUND_OFF
+    if ordered:
+        proper &= ~notation.off_diagonal(P).any(axis=1)
+    return np.where(proper[:, None, None], P, notation.EYE)
+
+
+def in_order(frame: Frame, P: np.ndarray) -> Frame:
+    """The same frame with its axes in another order and sense; P: as of `nearest_axes`."""
+    order = np.abs(P).argmax(axis=1)
+    M, E, E_forces = (in_axes(P, each) if each.any() else each for each in (frame.M, frame.E, frame.E_forces))
+    return replace(frame, Q=frame.Q @ P, J=np.take_along_axis(frame.J, order, axis=1), M=M, E=E, E_forces=E_forces)
+
+
 def turns_frame(body: Blocks, middle: int = 3) -> tuple[Frame, np.ndarray]:
     """The frame of psi_x: the state at axis 1's origin, the forces at the origin of axis `middle`.
 

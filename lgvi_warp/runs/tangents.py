@@ -16,6 +16,7 @@ from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.kernel_spec import COMPENSATED
 from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.engine.tangents import Jacobians
+from lgvi_warp.physics.terms.wrench import WrenchSchedule
 from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.request import Request
@@ -69,6 +70,9 @@ def check(request: Request, tangents: Any, store: Any, start: Any, on_block: Any
         for word, problem in UNDEFINED.items():
             if name == word or (name.split("[")[0].rpartition(".")[2] == word and _timed(name, fleet)):
                 faults.add("tangents", name, f"{problem}, so that there is no derivative", "leave it out")
+        if any(name.startswith(f"{schedule}.times[") for schedule in _jumping(fleet)):
+            problem = "is when a push jumps, which a run meets at whole steps, so that there is no derivative"
+            faults.add("tangents", name, problem, "leave it out")
     faults.raise_if_any()
     return names
 
@@ -87,6 +91,11 @@ def _timed(name: str, fleet: Ensemble) -> bool:
     scene = fleet.scene
     parts = scene.controller.parts if scene.controller else ()
     return name.partition(".")[0] in {part.key for part in (*parts, *scene.events)}
+
+
+def _jumping(fleet: Ensemble) -> list[str]:
+    """Keys of schedules in steps."""
+    return [term.key for term in fleet.scene.terms if isinstance(term, WrenchSchedule) and term.jumps]
 
 
 def run_with_tangents(

@@ -348,6 +348,13 @@ def test_the_radius_of_waypoints_has_no_derivative():
         lw.solve(scene, "rk8", h=PERIOD / 2, t1=1.0, tangents=["waypoints.radius"])
 
 
+def test_the_times_of_a_schedule_in_steps_have_no_derivative():
+    push = lw.terms.WrenchSchedule(times=[0.0, 1.0], force=[[0.0] * 3, [9.0, 0.0, 0.0]], interpolation="steps")
+    scene = dataclasses.replace(free(), terms=[push])
+    with pytest.raises(lw.SceneError, match=r"wrench_schedule.times\[1\].*no derivative"):
+        lw.solve(scene, "psi_x", h=0.1, t1=0.3, tangents=["wrench_schedule.times[1]"])
+
+
 def test_one_name_may_stand_alone():
     result = lw.solve(falling(), "rk8", h=0.02, t1=0.1, tangents=" start.velocity[ 0 ] ", threads=1)
     assert result.tangents == ("start.velocity[0]",)
@@ -368,13 +375,31 @@ def test_axes_that_jump_are_refused():
         lw.solve(scene, "psi_s", h=0.02, t1=1.0, tangents=["vehicle.inertia[0,1]"])
 
 
-@pytest.mark.parametrize("entry", ["vehicle.inertia[0,1]", "vehicle.inertia[0,2]"])
-def test_axes_of_the_member_that_are_not_those_of_its_copies_are_refused(entry):
-    # A diagonal inertia keeps the axes of the vehicle; its copies get such as point the other way, all alike or each its own.
-    vehicle = lw.Vehicle(20.0, inertia=(1.0, 3.0, 4.0), added_mass=(3.0, 15.0, 25.0), buoyancy=200.0)
-    scene = lw.Scene(vehicle, start=free().start)
-    with pytest.raises(lw.SceneError, match="kink or a jump"):
-        lw.solve(scene, "psi_s", h=0.02, t1=0.2, tangents=[entry])
+TUMBLING = lw.Start(NONE, euler_deg=(10.0, 20.0, 30.0), velocity=(0.5, -0.2, 0.1), angular_velocity=(0.3, 0.2, 0.8))
+PRODUCTS = ((0, 1), (0, 2), (1, 2))
+
+
+@pytest.mark.slow_but("*-psi_s")
+@pytest.mark.parametrize("kind", ["psi_s", "psi_x", "rk4", "drag"])
+@pytest.mark.parametrize("moments", [(1.0, 3.0, 4.0), (4.0, 1.5, 3.0)])
+def test_axes_of_copies_go_on_from_those_of_the_member(kind, moments):
+    # A diagonal inertia keeps the axes of the vehicle; its copies get principal axes in another order, and of other senses.
+    vehicle = lw.Vehicle(20.0, inertia=moments, added_mass=(3.0, 15.0, 25.0), buoyancy=200.0)
+    drag = lw.terms.Drag(linear=(1.0, 2.0, 3.0, 0.1, 0.2, 0.3), quadratic=(3.0, 2.0, 1.0, 0.3, 0.2, 0.1))
+    scene = lw.Scene(vehicle, start=TUMBLING, terms=[drag] if kind == "drag" else [])
+    sizes = {f"vehicle.inertia[{i},{j}]": 1.0 for i, j in PRODUCTS}
+    assert_agree(scene, sizes, "rk4" if kind == "drag" else kind, 1e-9, h=0.02, t1=1.0, threads=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["psi_x", "rk4"])
+def test_axes_of_copies_of_a_coupled_body(method):
+    lever = 20.0 * 0.1 * np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    rigid = np.block([[20.0 * np.eye(3), lever.T], [lever, np.diag([4.2, 1.7, 3.0])]])
+    vehicle = lw.Vehicle(rigid_body_mass_matrix=rigid, added_mass_matrix=np.diag([3.0, 15.0, 25.0, 0.5, 0.1, 0.2]),
+                         weight=200.0, center_of_gravity=(0.0, 0.0, 0.1), buoyancy=200.0)  # fmt: skip
+    sizes = {f"vehicle.rigid_body_mass_matrix[{3 + i},{3 + j}]": 1.0 for i, j in PRODUCTS}
+    assert_agree(lw.Scene(vehicle, start=TUMBLING), sizes, method, 1e-9, h=0.02, t1=1.0, threads=1)
 
 
 def slopes_of(values):

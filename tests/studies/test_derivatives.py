@@ -269,6 +269,26 @@ def test_a_member_that_stops_at_a_time():
     says(found.undefined["depth by time.at"], "whole steps")
 
 
+def pushed(interpolation):
+    """A body that is pushed ahead from 1 s on: at once, or ever more."""
+    forces = [[0.0] * 3, [LINEAR, 0.0, 0.0]]
+    times = [0.0, 1.0] if interpolation == "steps" else [1.0, 3.0]
+    return body(0.0, terms=[lw.terms.WrenchSchedule(times=times, force=forces, interpolation=interpolation)])
+
+
+def test_times_at_which_a_schedule_jumps():
+    """A push that begins at 1 s begins at the step after it; one that grows, at that time."""
+    by, run = ["wrench_schedule.times[1]", "wrench_schedule.force[1,0]"], RUN | {"method": "psi_x", "h": 0.1, "t1": 3.0}
+    steps = lw.derivatives(pushed("steps"), "position[0]", by, **run)
+    assert list(steps.undefined) == ["position[0] by wrench_schedule.times[1]"]
+    says(steps.undefined["position[0] by wrench_schedule.times[1]"], "jumps", "step")
+    assert abs(steps.jacobian[0, 1] - 2.0**2 / (2.0 * M)) <= steps.error[0, 1] + 1e-12
+    # x = F (t - t0)^3 / (6 M (t1 - t0)) between both times.
+    grows = lw.derivatives(pushed("linear"), "position[0] at 2.0", by, **run)
+    assert not grows.undefined
+    assert grows.jacobian[0, 0] == pytest.approx(-LINEAR / (6.0 * M * 2.0**2), rel=0.02)  # the step's own error, h^2
+
+
 def test_legs_of_waypoints():
     points = [[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [6.0, 100.0, 0.0]]
     controller = lw.Controller(
@@ -347,6 +367,18 @@ def test_a_fleet_has_an_axis_of_members(members):
     assert "mean over members" in str(found)
     again = lw.derivatives(upright, "depth", ["vehicle.buoyancy", "start.position[2]"], seed=4, **RUN)
     assert not np.isin(again.value, plain.value).any()
+
+
+def test_members_that_need_other_increments_than_the_first_ones():
+    """Almost neutral bodies: drag by the square of the speed is no power series in the weight across its sign."""
+    heavy = np.array([HEAVY] * 9 + [1.9e-4, -5.7e-5, 3e-3])
+    sampling = lw.designs.Table({"vehicle.buoyancy": MASS * GRAVITY - heavy})
+    fleet = lw.Ensemble(body(quadratic=QUADRATIC), sampling=sampling)
+    found = lw.derivatives(fleet, "depth", "vehicle.buoyancy", **RUN)
+    assert not found.undefined
+    truth = fallen(np.abs(heavy))[1]
+    assert (np.abs(found.jacobian[:, 0, 0] - truth) <= found.error[:, 0, 0]).all()
+    assert (found.error[:, 0, 0] < 1e-2 * np.abs(truth)).all()
 
 
 def test_members_of_a_fleet_with_different_ends():

@@ -76,6 +76,11 @@ class WrenchSchedule(Term):
             object.__setattr__(self, "torque", np.zeros(() if ragged(self.force) else np.shape(self.force)))
         super().__post_init__()
 
+    @property
+    def jumps(self) -> bool:
+        """Whether the values jump at the times, which a run meets at whole steps."""
+        return self.interpolation == "steps"
+
     def drive(self) -> np.ndarray:
         # The largest sizes of force and torque in the schedule.
         return np.abs(np.concatenate([self.force, self.torque], axis=1)).max(axis=0)
@@ -84,7 +89,7 @@ class WrenchSchedule(Term):
         # Two tables: the force, and the torque about the origin of the forces.
         force = context.frame.vector(numbers["force"])
         torque = context.frame.torque(*repeated(numbers["torque"], numbers["force"]))
-        tables = [knots(numbers["times"], values, self.interpolation == "steps") for values in (force, torque)]
+        tables = [knots(numbers["times"], values, self.jumps) for values in (force, torque)]
         return Packed({"count": numbers["times"].shape[1] - 1}, side_by_side(*tables))
 
 

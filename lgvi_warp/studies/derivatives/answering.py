@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.status import failed
 from lgvi_warp.results.quantities import EndQuantity, OfResult
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.variations import Target
@@ -139,8 +140,22 @@ class Answering:
             chosen = np.take_along_axis(relative, first[:, None] + np.arange(KEPT_LEVELS), axis=1)
             near = neighbours(runs, others, chosen, lambda part: self._report(share + (1.0 - share) * part))
             rounding = np.broadcast_to(2.0 * np.nan_to_num(slopes.rounding).max(axis=0), near.above.shape[:-1])
-            groups.append((others, near, self._extrapolated(near, rounding)))
+            slopes = self._extrapolated(near, rounding)
+            # Increments that suit the first members may be too long for others, or too short.
+            again = self._unsure(near, slopes)
+            groups.append((others[~again], near.part(~again), slopes.part(~again)))
+            if again.any():
+                near = neighbours(runs, others[again], relative)
+                groups.append((others[again], near, self._extrapolated(near)))
         return groups
+
+    def _unsure(self, near: Neighbours, slopes: Extrapolated) -> np.ndarray:
+        """Which members (n,) have derivatives that differences at some increments do not give, and others may."""
+        against = [[self._question.known_against(self._question.interests[i], self._question.targets[j])
+                    for j in self._live] for i in self._runs.owner]  # fmt: skip
+        asked = np.array([[reason is None for reason in row] for row in against], bool)
+        open_ends = np.isfinite(near.at)[:, :, None] & asked
+        return np.asarray(((slopes.code != FINE) & open_ends).any(axis=(1, 2)) & ~failed(near.status))
 
     def _extrapolated(self, near: Neighbours, rounding: np.ndarray | None = None) -> Extrapolated:
         at = np.broadcast_to(near.at[:, :, None], near.above.shape[:-1])

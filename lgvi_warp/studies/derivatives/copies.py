@@ -246,6 +246,10 @@ class Neighbours:
     status: np.ndarray
     time: np.ndarray
 
+    def part(self, members: np.ndarray) -> Neighbours:
+        """Those of some members."""
+        return Neighbours(*(values[members] for values in vars(self).values()))
+
 
 def neighbours(
     runs: CopyRuns, members: np.ndarray, relative: np.ndarray, report: Callable[[float], None] | None = None

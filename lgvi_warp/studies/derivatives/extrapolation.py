@@ -42,6 +42,10 @@ class Extrapolated:
     rounding: np.ndarray
     code: np.ndarray
 
+    def part(self, members: np.ndarray) -> Extrapolated:
+        """Those of some members, where the first axis is that of members."""
+        return Extrapolated(*(values[members] for values in vars(self).values()))
+
 
 def relative_increments(dtype: str) -> np.ndarray:
     """Increments as parts of a number's size, the largest first."""

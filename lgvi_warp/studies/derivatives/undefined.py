@@ -13,6 +13,7 @@ from lgvi_warp.control.fault import Fault
 from lgvi_warp.control.sensor import Sensor
 from lgvi_warp.control.waypoints import Waypoints
 from lgvi_warp.physics.terms.events import StopTime
+from lgvi_warp.physics.terms.wrench import WrenchSchedule
 from lgvi_warp.results.quantities import EndQuantity, MetricQuantity, OfResult
 from lgvi_warp.results.result import Result
 from lgvi_warp.sampling.final import MEMORY
@@ -51,6 +52,8 @@ def of_number(scene: Any, target: Target) -> str | None:
         reason = "is that of the tick at or after it"
     elif isinstance(part, Waypoints) and name == "radius":
         reason = "decides at which tick a leg is done"
+    elif isinstance(part, WrenchSchedule) and name == "times" and part.jumps:
+        reason = "is when the push jumps, and a run meets that at whole steps"
     return f"{target.label} {reason}" if reason else None
 
 

@@ -44,7 +44,8 @@ def normals_of(keys, seed, step):
     with np.errstate(over="ignore"):
         z = keys.astype(np.uint64)
         for number in (seed, step):
-            z = (z + np.uint64(number + 1)) * np.uint64(0x9E3779B97F4A7C15)
+            # No two keys and seeds have one product each: sums of them would be those of their neighbours.
+            z = (z * np.uint64(0x9E3779B97F4A7C15)) ^ (np.uint64(number + 1) * np.uint64(0xD1B54A32D192ED03))
             z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
             z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
             z ^= z >> np.uint64(31)

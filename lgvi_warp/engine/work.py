@@ -138,7 +138,9 @@ def run_block(
 
         def keep_start() -> None:
             running = np.zeros(block.count, np.uint8), np.zeros(block.count, np.int64)
-            keep(slice(0, 1), at_start(plan, members, packets), lambda: running)
+            # Members that ended before a run that goes on are not running at its start.
+            ends = packets.ended if plan.launches.goes_on else lambda: running
+            keep(slice(0, 1), at_start(plan, members, packets), ends)
             for slope_taker in slope_takers:
                 slope_taker(slice(0, 1), slopes_at_start(packets, plan.layout.fields))
 

@@ -114,6 +114,24 @@ def test_members_that_end(at):
     assert len(whole.status.counts()) == 2
 
 
+@pytest.mark.slow_but("False")
+@pytest.mark.parametrize("signals", [False, True])
+def test_members_that_ended_are_out_of_statistics_from_the_start_of_a_piece_on(signals):
+    # Each piece's statistics are those of one run at its times, at its start too; members stop before it, or fail.
+    events = [lw.events.Floor(depth=10.05), lw.events.StopTime(at=0.17)]
+    fleet = autopilot() if signals else fleet_of("torpedo", members=40, events=events, terms=[])
+    scene = fleet.scene if not signals else dataclasses.replace(fleet.scene, events=[lw.events.StopTime(at=0.17)])
+    fleet = lw.Ensemble(scene, fleet.members, 1, fleet.vary)
+    asked = [lw.statistics.Mean("speed", stopped=way, name=way) for way in ("held", "left_out")]
+    how = dict(method="psi_x", h=0.01, save=lw.SaveAt(every=0.1), statistics=asked)
+    whole, first = (lw.solve(fleet, **how, t1=t1) for t1 in (0.4, 0.2))
+    second = lw.solve(fleet, **how, t1=0.4, start=first.final)
+    assert whole.statistics["left_out"].count[2] < fleet.members
+    for way in ("held", "left_out"):
+        np.testing.assert_array_equal(second.statistics[way].count, whole.statistics[way].count[2:])
+        np.testing.assert_array_equal(second.statistics[way].value, whole.statistics[way].value[2:])
+
+
 SENSORS = [
     {"type": "sensor", "name": "depth_cell", "of": "depth", "noise": 0.02, "quantum": 0.005, "latency": 1.0},
     {"type": "sensor", "name": "compass", "of": "heading", "noise": 0.01, "drift": 0.002, "dropout": 0.2},

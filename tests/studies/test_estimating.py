@@ -75,6 +75,26 @@ def test_a_fixed_step_has_its_bias_told():
     assert found.value - truth - 0.02 <= found.bias_interval[1]
 
 
+@pytest.mark.parametrize("h", [None, 0.125])
+def test_single_precision_has_its_bias_told(h):
+    """At 1e6 m positions are multiples of 1/16 m: steps of 0.125 s lose what they move by, at any step of that precision."""
+    scene = dataclasses.replace(closed.sphere(), start=lw.Start(position=[0.0, 0.0, 1e6]))
+    fleet = lw.Ensemble(scene, 64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+    found = lw.estimate(fleet, "mean position[2]", 0.05, dtype="float32", h=h, **RUN)
+    assert found.settings["dtype"] == "float32"
+    assert found.interval[0] <= 1e6 + closed.fall() <= found.interval[1]
+    assert "float64" in found.reference
+    assert abs(found.bias) > 0.1
+
+
+def test_a_suggestion_for_a_mean_knows_the_bias_of_a_scene_in_single_precision():
+    scene = dataclasses.replace(closed.sphere(), start=lw.Start(position=[0.0, 0.0, 1e6]))
+    scene = lw.Scene.from_dict(scene.to_dict() | {"run": {"dtype": "float32"}})
+    fleet = lw.Ensemble(scene, 64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+    found = lw.suggest(fleet, 0.05, "mean position[2]", t1=closed.TIME, methods=[closed.METHOD])
+    assert found.settings["dtype"] == "float64"
+
+
 def test_an_error_above_the_spread_takes_few_members():
     found, truth = estimated("fall", error=20.0)
     assert sum(found.members.values()) <= 64

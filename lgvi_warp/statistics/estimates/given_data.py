@@ -10,6 +10,10 @@ import numpy as np
 
 # Bins of an input: two for each member's share n^(1/3), between these numbers.
 FEWEST_BINS, MOST_BINS = 4, 64
+# From so many members a bin on, each bin has a line.
+FOR_LINES = 10
+# A part of a variance that is round-off.
+NOTHING = 1e-20
 
 
 class Explained(NamedTuple):
@@ -25,9 +29,10 @@ class Explained(NamedTuple):
 def explained(inputs: Mapping[str, np.ndarray], y: np.ndarray, confidence: float) -> dict[str, Explained]:
     """Return what each input (n,) explains of an output (n,); members with a number that is not finite are left out.
 
-    The members are divided into bins of each input, of about as many members. The share is the variance between bins over
-    that of all, less what chance alone puts between them (Kelley's epsilon squared, 1935); its interval is of the
-    noncentral F distribution. Inputs are meant to be independent of one another.
+    The members are divided into bins of each input, of about as many members, with a line in each where members are many.
+    The share is the variance that bins and lines explain over that of all, less what chance alone puts there (Kelley's
+    epsilon squared, 1935). Its interval is of the noncentral F distribution, widened as the delta method says for numbers
+    that are drawn, and upwards by what twice as wide bins explain less. Inputs are meant to be independent of one another.
     """
     names, y = list(inputs), np.asarray(y, np.float64)
     X = np.stack([np.asarray(inputs[name], np.float64) for name in names]) if names else np.zeros((0, len(y)))
@@ -57,17 +62,50 @@ def _index(x: np.ndarray, y: np.ndarray, confidence: float) -> tuple[float, floa
     count = bins.max() + 1 if n else 0
     if count < 2 or n <= count or np.ptp(y) == 0.0:
         return np.nan, 0.0, 1.0, np.nan
-    sizes = np.bincount(bins, minlength=count)
-    means = np.bincount(bins, y, count) / sizes
-    between = float(np.sum(sizes * (means - y.mean()) ** 2))
-    total = float(np.sum((y - y.mean()) ** 2))
-    within = max(total - between, 0.0) / (n - count)
-    if within == 0.0:
+    with_lines = n >= FOR_LINES * count
+    left, numbers = _left(x, y, bins, with_lines)
+    square = (y - y.mean()) ** 2
+    total, within = float(square.sum()), float(np.sum(left**2)) / (n - numbers)
+    if within * n <= NOTHING * total:
         return 1.0, 1.0, 1.0, 0.0
-    ratio, free = between / (count - 1) / within, (count - 1, n - count)
-    tail = 0.5 * (1.0 - confidence)
-    ends = [shift / (shift + n) for shift in (_shift(1.0 - tail, ratio, free), _shift(tail, ratio, free))]
-    return 1.0 - within * (n - 1) / total, ends[0], ends[1], float(fdtrc(*free, ratio))
+    between = max(total - within * (n - numbers), 0.0)
+    ratio, free = between / (numbers - 1) / within, (numbers - 1, n - numbers)
+    tail, share = 0.5 * (1.0 - confidence), 1.0 - within * (n - 1) / total
+    lower, upper = (shift / (shift + n) for shift in (_shift(1.0 - tail, ratio, free), _shift(tail, ratio, free)))
+    # What each member adds to the share, to first order: its numbers are drawn too, and need not be normal. The F
+    # distribution is of given numbers and normal remainders, with the variance in the root.
+    part = 1.0 - float(np.sum(left**2)) / total
+    adds = ((1.0 - part) * square - left**2) / (total / n)
+    normal = np.sqrt(2.0 * part * (1.0 - part) ** 2 * (2.0 - part))
+    wider = max(float(np.std(adds)) / normal, 1.0) if normal > 0.0 else 1.0
+    # Bins leave no more of a dependence within them than twice as wide ones leave besides, beyond what chance does.
+    wide, fewer = _left(x, y, bins // 2, with_lines)
+    less = share - (1.0 - float(np.sum(wide**2)) / (n - fewer) * (n - 1) / total)
+    steep = max(less - 2.0 * (1.0 - share) * np.sqrt(2.0 * (numbers - fewer)) / n, 0.0)
+    lower = min(lower, share - wider * (share - lower))
+    upper = max(upper, share + wider * (upper - share)) + steep
+    return share, max(lower, 0.0), min(upper, 1.0), float(fdtrc(*free, ratio))
+
+
+def _left(x: np.ndarray, y: np.ndarray, bins: np.ndarray, with_lines: bool) -> tuple[np.ndarray, int]:
+    """What the bins leave of each number (n,), and by how many numbers they fit it.
+
+    A bin fits the mean of its members, or a line, so that little of a steep dependence is left.
+    """
+    sizes = np.bincount(bins)
+    count = len(sizes)
+
+    def centred(z: np.ndarray) -> np.ndarray:
+        return np.asarray(z - (np.bincount(bins, z, count) / sizes)[bins])
+
+    left = centred(y)
+    if not with_lines:
+        return left, count
+    along = centred((x - x.mean()) / x.std())
+    spread = np.bincount(bins, along**2, count)
+    lines = spread > NOTHING * len(x)
+    slopes = np.bincount(bins, along * left, count) / np.where(lines, spread, np.inf)
+    return left - slopes[bins] * along, count + int(lines.sum())
 
 
 def _bins(x: np.ndarray) -> np.ndarray:

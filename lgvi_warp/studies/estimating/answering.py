@@ -60,7 +60,7 @@ def answered(
         pilot.messages.append(f"{failed} is left out: members fail at it")
         if chosen.place + 1 == len(chosen.ladder.settings):
             raise failing(top, np.concatenate(levels[0].y))
-        chosen = finer(chosen)
+        chosen = finer(pilot, chosen)
     solved, part = enough(pilot, chosen, levels)
     report(1.0)
     return told(pilot, chosen, levels, (seen, ways, pilot_seconds), (solved, part), own, content)

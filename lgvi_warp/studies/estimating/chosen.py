@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lgvi_warp.common.errors import SceneError, refusal
-from lgvi_warp.studies.estimating.bias import APART, Bias
+from lgvi_warp.studies.estimating.bias import APART, Bias, StepChange
 from lgvi_warp.studies.estimating.choice import candidates
 from lgvi_warp.studies.estimating.levels import Setting
-from lgvi_warp.studies.estimating.pilot import FEW, Ladder, Pilot, at_once, climb, observed, runs_at
+from lgvi_warp.studies.estimating.pilot import FEW, Ladder, Pilot, at_once, climb, failing, observed, runs_at
 
 # Coarser settings that levels are sought among.
 MOST_COARSER = 4
@@ -50,7 +50,7 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
     climbed = list[Chosen]()
     own = ladders[0][-2] if fixed else own
     if own is not None and seems_few(pilot, ladders[0]) and (ladder := at_once(pilot, own)):
-        return choice_of(pilot, ladder, own)
+        return with_rounding(pilot, choice_of(pilot, ladder, own))
     asked = own if fixed else None
     for i, steps in enumerate(ladders):
         if climbed and not worth_another(pilot, climbed[0]):
@@ -68,6 +68,7 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
             raise SceneError([f"setting: no step was taken: {causes}; mend what fails, or fix method= and h="])
         if climbed and climbed[-1].ladder.end == "apart":
             break
+    climbed = [with_rounding(pilot, each) for each in climbed]
     best = min(climbed, key=lambda each: (each.bias.mean_square > each.error**2, price(pilot, each)))
     return compared(pilot, best, [each for each in climbed if each is not best])
 
@@ -108,6 +109,25 @@ def choice_of(pilot: Pilot, ladder: Ladder, fixed: Setting | None) -> Chosen:
                   else f"the halving before, from {ladder.settings[max(place - 1, 0)]}, on {pairs} members")  # fmt: skip
 
 
+def with_rounding(pilot: Pilot, chosen: Chosen) -> Chosen:
+    """The same with the bias of a precision other than double, which no step of that precision shows."""
+    setting = chosen.setting
+    if setting.dtype == "float64":
+        return chosen
+    twin = replace(setting, dtype="float64")
+    apart = difference_of(pilot, setting, twin)
+    bias = Bias(chosen.bias.value + apart.value, chosen.bias.half + apart.half)
+    return replace(chosen, bias=bias, reference=f"{chosen.reference}, and float64 on {apart.members}")
+
+
+def difference_of(pilot: Pilot, setting: Setting, twin: Setting) -> StepChange:
+    """How much the target changes from a setting to the same in double precision; SceneError where members fail there."""
+    y = pilot.y(twin, pilot.grid(setting), pilot.first)
+    if not np.isfinite(y).all():
+        raise failing(twin, y)
+    return pilot.pair(setting, twin, pilot.first)
+
+
 def compared(pilot: Pilot, best: Chosen, others: Sequence[Chosen]) -> Chosen:
     """The same with what another method differs by: where the two disagree the bias may be as large; and notes."""
     ladder, messages = best.ladder, pilot.messages
@@ -142,10 +162,10 @@ def constant(pilot: Pilot, setting: Setting) -> bool:
     )  # fmt: skip
 
 
-def finer(chosen: Chosen) -> Chosen:
+def finer(pilot: Pilot, chosen: Chosen) -> Chosen:
     """The next step of the ladder."""
     place = chosen.place + 1
-    return replace(chosen, place=place, bias=chosen.ladder.biases()[place])
+    return with_rounding(pilot, replace(chosen, place=place, bias=chosen.ladder.biases()[place]))
 
 
 def coarser_than(pilot: Pilot, chosen: Chosen, coarse: Sequence[Sequence[Setting]]) -> list[Setting]:

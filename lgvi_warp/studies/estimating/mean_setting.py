@@ -54,7 +54,8 @@ def mean_settings(
     seed = int(EnsembleSettings(1, fleet.seed).seed)
     question, spacing = question_of(of), spacing_of(fleet.scene, t1)
     runs = Runs([fleet], question, t1, seed=seed, execution={"threads": threads})
-    ladders, noise = ladders_of(fleet, t1, spacing, methods, None, None)
+    # In double precision, also of a scene in single: in_single tells what that adds.
+    ladders, noise = ladders_of(fleet, t1, spacing, methods, None, "float64")
     pilot, kept, closest = (
         Pilot(runs, question.target, noise, error / ROOM, most=seconds),
         list[MeanSetting](),

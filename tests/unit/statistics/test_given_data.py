@@ -66,3 +66,21 @@ def test_intervals_cover_95_percent(index):
         hits += found.lower <= index <= found.upper
     # At 0 only the upper end can miss.
     assert (0.93 if index else 0.96) <= hits / 1000 <= (0.97 if index else 0.99)
+
+
+@pytest.mark.parametrize(("members", "tries"), [(200, 40), pytest.param(500, 200, marks=pytest.mark.slow)])
+def test_intervals_cover_a_square_and_a_product(members, tries):
+    """x + y^2 + x z of normal numbers: their first-order indices are 1/4, 2/4 and 0, of numbers that are not normal."""
+    rng, hits = np.random.default_rng(6), np.zeros(3)
+    for _ in range(tries):
+        x, y, z = rng.normal(size=(3, members))
+        found = explained({"x": x, "y": y, "z": z}, x + y**2 + x * z, 0.95)
+        hits += [found[name].lower <= truth <= found[name].upper for name, truth in zip("xyz", (0.25, 0.5, 0.0))]
+    # Of 40 intervals of which 90 % hold, 30 or more do in 99 of 100 tries; of 200, 169.
+    assert (hits >= (30 if members == 200 else 169)).all()
+
+
+def test_what_an_input_explains_alone_is_all():
+    x = np.random.default_rng(7).normal(size=500)
+    found = explained({"x": x}, 3.0 * x + 1e6, 0.95)["x"]
+    assert (found.share, found.upper) == (pytest.approx(1.0), 1.0)

@@ -57,6 +57,8 @@ from lgvi_kernels.lanes.view import (
     remembered,
     row1,
     row3,
+    slope_against,
+    slope_along,
     table1,
     table3,
     to_body,

@@ -14,7 +14,7 @@ from lgvi_kernels.lanes.view import to_body
 from lgvi_kernels.laws import drag, drag_directions
 from lgvi_kernels.maps import turns
 from lgvi_kernels.maps.collocation import make_G
-from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.compose import superpose, superpose_loads
 from lgvi_kernels.maps.coupled import make_W
 from lgvi_kernels.maps.dense_inertia import make_dense_velocities
 from lgvi_kernels.maps.dissipation import make_V
@@ -106,9 +106,9 @@ def make_velocities(velocity, turning, coupled):
     return velocities_of_state, velocities_of_forces
 
 
-def make_damping(damping, shear):
-    """D of the damping laws, and of water that varies in space. None if there is neither."""
-    if damping is None and shear is None:
+def make_damping(damping, shear, loads):
+    """D of the damping laws, and of water that varies in space. None if there is neither, nor loads, which have their own."""
+    if damping is None and shear is None and loads is None:
         return None
 
     @wp.func
@@ -179,7 +179,8 @@ def make_method(spec):
     shear, water_wrench = None, acceleration_wrench if varies else None
     if "shear" in spec.parts:
         shear, water_wrench = make_shear(matrix3_struct(width, real), lever, shifted), make_water_wrench(lever, shifted)
-    damping = make_damping(laws_damping, shear)
+    loads = superpose_loads(laws)
+    damping = make_damping(laws_damping, shear, loads)
     prepare, E = make_exact_drag(spec, velocities_of_forces)
 
     @wp.func
@@ -192,14 +193,15 @@ def make_method(spec):
 
     if spec.explicit is not None:
         wrenches = superpose(laws, "push"), superpose(laws, "matrix")
+        rest = superpose_loads(laws, without_push=True)
         acting = (View, Wrench, Flow, Damping, law, *wrenches, damping, flow, water_wrench, shifted, velocities)
-        everything, _, _, slope = make_forces(*acting)
+        everything, _, _, slope = make_forces(*acting, loads, rest)
         step = make_explicit(spec, make_types(spec), everything, velocities, slope)
         momentum = in_body if spec.inertial else None
         return Step(step, step, velocities, prepare, water_velocity, velocities_of_forces, momentum)
     V = None
     if damping is not None and spec.averages is None:
-        V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
+        V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled, loads, Wrench)
     solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked, spec.tangents)
     used = {letter for letter, _ in spec.maps} | ({spec.lead[0]} if spec.lead else set())
     letters = {
@@ -239,7 +241,7 @@ def make_method(spec):
             shifted,
             velocities,
         )
-        _, forces, current, _ = make_forces(*acting)
+        _, forces, current, _ = make_forces(*acting, loads, loads)
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)
         letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)

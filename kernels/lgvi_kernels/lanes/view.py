@@ -40,6 +40,18 @@ def to_inertial(view: Any, v: Any):
 
 
 @wp.func
+def slope_along(water: Any, v: Any):
+    """G v: how fast the water's velocity changes along v, inertial axes."""
+    return v.x * water.by_north + v.y * water.by_east + v.z * water.by_depth
+
+
+@wp.func
+def slope_against(water: Any, v: Any):
+    """G^T v: how the water's velocity along v changes, inertial axes."""
+    return vec3(dot(water.by_north, v), dot(water.by_east, v), dot(water.by_depth, v))
+
+
+@wp.func
 def velocity_at(view: Any, r: Any):
     """nu + Om x r: the velocity of the body's point r through the water, body axes [m/s]."""
     return view.nu + cross(view.Om, r)

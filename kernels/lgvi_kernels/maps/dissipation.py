@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""V: laws of the form (force; torque) = -D(nu) (nu; Om), advanced by a linearly implicit step of order 2.
+"""V: laws of the form (force; torque) = w - D(nu) (nu; Om), advanced by a linearly implicit step of order 2.
 
 D is frozen at a velocity predicted for the middle of the step; with D frozen, two stages of the L-stable scheme with
 gamma = 1 - 1/sqrt(2) (Alexander 1977) solve I6 nu' = -D nu. Stiff drag decays, whatever the step; for D + D^T >= 0 the
@@ -49,32 +49,62 @@ def make_implicit(Damping, Factor, coupled):
     return implicit
 
 
-def make_V(damping, velocities, Damping, Factor, coupled):
-    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces."""
+def make_V(damping, velocities, Damping, Factor, coupled, loads, Wrench):
+    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces.
+
+    loads: of laws that look at the water, (D, w) of a force and torque w - D (nu; Om); None for none.
+    """
     implicit = make_implicit(Damping, Factor, coupled)
 
     @wp.func
+    def solved(factor: Any, x: Any, w: Any, h: Any):
+        """(nu, Om) of the momenta plus h w."""
+        if wp.static(loads is not None):
+            nu, Om = solve6(factor, x.p + h * w.force, x.pi + h * w.torque)
+        else:
+            nu, Om = solve6(factor, x.p, x.pi)
+        return nu, Om
+
+    @wp.func
+    def damped(x: Any, D: Any, w: Any, nu: Any, Om: Any, h: Any):
+        """The momenta after h of the force and torque w - D (nu; Om)."""
+        if wp.static(loads is not None):
+            x = pushed(x, h * (w.force - damped_force(D, nu, Om)))
+            x = twisted(x, h * (w.torque - damped_torque(D, nu, Om)))
+        else:
+            x = pushed(x, -h * damped_force(D, nu, Om))
+            x = twisted(x, -h * damped_torque(D, nu, Om))
+        return x
+
+    @wp.func
+    def resistance(view: Any, water: Any, c: Any):
+        """D of all that resists, and w."""
+        D = damping(Damping(), view, water, c)
+        w = Wrench()
+        if wp.static(loads is not None):
+            D, w = loads(D, w, view, c.params)
+        return D, w
+
+    @wp.func
     def V(x: Any, view: Any, water: Any, c: Any, h: Any):
-        """I6 nu' = -D nu over h, b and R fixed."""
+        """I6 nu' = w - D nu over h, b and R fixed."""
         # D of the velocity that half an implicit Euler step predicts for the middle: with D of the start the order is 1.
         scaled = h * c.inertia.inverse_scale
+        half = h.dtype(0.5) * scaled
         nu, Om = velocities(c.inertia, x.p, x.pi)
         view.nu = nu
         view.Om = Om
-        D_start = damping(Damping(), view, water, c)
-        predictor = implicit(D_start, c.inertia, h.dtype(0.5) * scaled)
-        nu_half, Om_half = solve6(predictor, x.p, x.pi)
+        D_start, w_start = resistance(view, water, c)
+        nu_half, Om_half = solved(implicit(D_start, c.inertia, half), x, w_start, half)
         view.nu = nu_half
         view.Om = Om_half
-        D = damping(Damping(), view, water, c)
+        D, w = resistance(view, water, c)
         gamma = h.dtype(wp.static(GAMMA)) * scaled
         # Two stages with weights 1 - gamma and gamma and one matrix, which is factorised once.
         factor = implicit(D, c.inertia, gamma)
-        nu_1, Om_1 = solve6(factor, x.p, x.pi)
-        x = pushed(x, (gamma - scaled) * damped_force(D, nu_1, Om_1))
-        x = twisted(x, (gamma - scaled) * damped_torque(D, nu_1, Om_1))
-        nu_2, Om_2 = solve6(factor, x.p, x.pi)
-        x = pushed(x, -gamma * damped_force(D, nu_2, Om_2))
-        return twisted(x, -gamma * damped_torque(D, nu_2, Om_2))
+        nu_1, Om_1 = solved(factor, x, w, gamma)
+        x = damped(x, D, w, nu_1, Om_1, scaled - gamma)
+        nu_2, Om_2 = solved(factor, x, w, gamma)
+        return damped(x, D, w, nu_2, Om_2, gamma)
 
     return V

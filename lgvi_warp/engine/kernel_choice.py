@@ -301,6 +301,11 @@ def declared(term: Term, module: Any, given: bool = False) -> tuple[tuple[str, A
     return numbers
 
 
+def seeing_roles(module: Any) -> tuple[str, ...]:
+    """The functions that a law makes which looks at the water."""
+    return tuple(module.seeing(_no_water)) if hasattr(module, "seeing") else ()
+
+
 def _no_water(view: Any, point: Any, sea: Any) -> Any:
     """Stands for the water while functions are looked at that will not be called."""
 

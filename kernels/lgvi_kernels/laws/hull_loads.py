@@ -4,7 +4,7 @@
 Each strip carries the momentum a w per length across the hull's axis, w its velocity through the water where it is. With
 alpha = Du/Dt of the water, U the strip's velocity through it along the axis, and G = du/db, the force per length is
 
-    f = rho S alpha - d(a w)/dt + d(U a w)/dx - a G^T w - c |w| w        across the axis
+    f = rho S alpha - d(a w)/dt + d(U a w)/dx - a G^T w - c |w| w
 
 (Lighthill 1960; Newman 1977, 7.4). For water that is everywhere as at the origin, and for the force of its slopes there, the
 kernel has all of it but drag (maps/water.py): strips add the difference.
@@ -74,24 +74,25 @@ def seeing(water_at):
                 w_far = off_axis(e, far)
                 w_near = off_axis(e, near)
                 alpha = to_body(view, there.rate + slope_along(there, there.velocity)) - alpha_here
-                # How the water changes for the strip, which moves in it.
+                # How the water across the axis changes for the strip, which moves in it and turns.
                 moving = slope_along(there, to_inertial(view, body + x * turning))
-                change = to_body(view, there.rate + moving) - change_here - dot(e, du) * turning
+                change = off_axis(e, to_body(view, there.rate + moving) - change_here)
+                change = change - dot(e, du) * turning - dot(du, turning) * e
                 held = added * to_body(view, slope_against(there, to_inertial(view, w_near)))
                 held_here = added * to_body(view, slope_against(here, to_inertial(view, w_far)))
                 s = drag * root(dot(w_near, w_near))
                 pushed = displaced * alpha + added * change
                 if wp.static(implicit):
-                    pushed = pushed + s * du
+                    pushed = pushed + s * off_axis(e, du)
                     S0 = S0 + s
                     S1 = S1 + s * x
                     S2 = S2 + (s * x) * x
                 else:
-                    pushed = pushed - s * near
+                    pushed = pushed - s * w_near
                 force = force + pushed - held + held_here
                 moment = moment + x * (pushed - held) + row1(view, at + 3) * alpha
                 moment = moment - added * (dot(e, near) * w_near - dot(e, far) * w_far)
-            return off_axis(e, force), moment, S0, S1, S2
+            return force, moment, S0, S1, S2
 
         return strips
 

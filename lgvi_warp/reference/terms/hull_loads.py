@@ -39,16 +39,17 @@ class HullLoads(Law):
             near, far = (v - view.R.T @ water.velocity for water in (there, here))
             alpha = view.R.T @ (material(there, there.velocity) - material(here, here.velocity))
             # d/dt of the momentum a w, which lies across an axis that turns.
-            found = view.R.T @ (material(there, view.R @ v) - material(here, view.R @ body))
-            found = found - AXIS @ (far - near) * cross(view.Om, AXIS)
+            more = far - near
+            found = ACROSS @ view.R.T @ (material(there, view.R @ v) - material(here, view.R @ body))
+            found += cross(view.Om, ACROSS @ more) - ACROSS @ cross(view.Om, more)
             momentum, momentum_here = a * ACROSS @ near, a * ACROSS @ far
             held, held_here = (
                 view.R.T @ water.gradient.T @ view.R @ p for water, p in ((there, momentum), (here, momentum_here))
             )
-            force = ACROSS @ (self.density * S * alpha + a * found - held)
+            force = self.density * S * alpha + a * found - held
             torque = cross(arm, force) + cross(AXIS, self.density * tilting * alpha)
             torque = torque - cross(AXIS, AXIS @ near * momentum - AXIS @ far * momentum_here)
-            w += weight * np.concatenate([force + ACROSS @ held_here, torque])
+            w += weight * np.concatenate([force + held_here, torque])
             # Drag c |w| w, w = A (nu; Om) less the water's difference.
             A = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, x], [0.0, 0.0, 1.0, 0.0, -x, 0.0]])
             c = 0.5 * self.density * weight * drag * math.hypot(*near[1:])

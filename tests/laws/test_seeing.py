@@ -9,7 +9,7 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.law import add, add_outer, mul, ones, row1, sub, to_body, vec3  # noqa: F401
+from lgvi_kernels.law import add, add_outer, cross, lane3, mul, ones, row1, struct, sub, to_body, vec3  # noqa: F401
 from tests.support.linear_flow import LinearFlow
 from tests.support.tools import GRAVITY, last, one
 
@@ -19,31 +19,32 @@ def seeing(water_at):
     def friction(D: Any, w: Any, view: Any, p: Any, sea: Any):
         """-k times the velocity over the ground: that through the water, which D takes, plus the water's."""
         k = row1(view, p.first)
-        water = water_at(view, p.origin, sea)
-        w.force = w.force - k * to_body(view, water.velocity)
-        one_ = ones(k)
-        zero = one_ - one_
+        push = k * to_body(view, water_at(view, p.origin, sea).velocity)
+        w.force = w.force - push
+        w.torque = w.torque - cross(p.origin, push)
+        unity = ones(k)
+        zero = unity - unity
         for i in range(3):
-            axis = vec3(one_, zero, zero)
+            axis = vec3(unity, zero, zero)
             if i == 1:
-                axis = vec3(zero, one_, zero)
+                axis = vec3(zero, unity, zero)
             if i == 2:
-                axis = vec3(zero, zero, one_)
-            D = add_outer(D, k * axis, zero * axis, axis, zero * axis)
+                axis = vec3(zero, zero, unity)
+            arm = cross(p.origin, axis)
+            D = add_outer(D, k * axis, k * arm, axis, arm)
         return D, w
 
     return {"load": friction}
 
 
 class FrictionDevice:
+    seeing = staticmethod(seeing)
+
     @staticmethod
     def params(width, real):
-        from lgvi_kernels.law import lane3, struct
-
         return struct("Friction", origin=lane3(width, real), first=wp.int32)
 
 
-FrictionDevice.seeing = staticmethod(seeing)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

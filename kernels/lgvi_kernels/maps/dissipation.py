@@ -49,62 +49,72 @@ def make_implicit(Damping, Factor, coupled):
     return implicit
 
 
-def make_V(damping, velocities, Damping, Factor, coupled, loads, Wrench):
-    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces.
-
-    loads: of laws that look at the water, (D, w) of a force and torque w - D (nu; Om); None for none.
-    """
+def make_V(damping, velocities, Damping, Factor, coupled):
+    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces."""
     implicit = make_implicit(Damping, Factor, coupled)
 
     @wp.func
-    def solved(factor: Any, x: Any, w: Any, h: Any):
-        """(nu, Om) of the momenta plus h w."""
-        if wp.static(loads is not None):
-            nu, Om = solve6(factor, x.p + h * w.force, x.pi + h * w.torque)
-        else:
-            nu, Om = solve6(factor, x.p, x.pi)
-        return nu, Om
+    def V(x: Any, view: Any, water: Any, c: Any, h: Any):
+        """I6 nu' = -D nu over h, b and R fixed."""
+        # D of the velocity that half an implicit Euler step predicts for the middle: with D of the start the order is 1.
+        scaled = h * c.inertia.inverse_scale
+        nu, Om = velocities(c.inertia, x.p, x.pi)
+        view.nu = nu
+        view.Om = Om
+        D_start = damping(Damping(), view, water, c)
+        predictor = implicit(D_start, c.inertia, h.dtype(0.5) * scaled)
+        nu_half, Om_half = solve6(predictor, x.p, x.pi)
+        view.nu = nu_half
+        view.Om = Om_half
+        D = damping(Damping(), view, water, c)
+        gamma = h.dtype(wp.static(GAMMA)) * scaled
+        # Two stages with weights 1 - gamma and gamma and one matrix, which is factorised once.
+        factor = implicit(D, c.inertia, gamma)
+        nu_1, Om_1 = solve6(factor, x.p, x.pi)
+        x = pushed(x, (gamma - scaled) * damped_force(D, nu_1, Om_1))
+        x = twisted(x, (gamma - scaled) * damped_torque(D, nu_1, Om_1))
+        nu_2, Om_2 = solve6(factor, x.p, x.pi)
+        x = pushed(x, -gamma * damped_force(D, nu_2, Om_2))
+        return twisted(x, -gamma * damped_torque(D, nu_2, Om_2))
 
-    @wp.func
-    def damped(x: Any, D: Any, w: Any, nu: Any, Om: Any, h: Any):
-        """The momenta after h of the force and torque w - D (nu; Om)."""
-        if wp.static(loads is not None):
-            x = pushed(x, h * (w.force - damped_force(D, nu, Om)))
-            x = twisted(x, h * (w.torque - damped_torque(D, nu, Om)))
-        else:
-            x = pushed(x, -h * damped_force(D, nu, Om))
-            x = twisted(x, -h * damped_torque(D, nu, Om))
-        return x
+    return V
+
+
+def make_loaded_V(damping, loads, velocities, Damping, Wrench, Factor, coupled):
+    """The step with these damping laws and the loads (D, w) of laws that look at the water: I6 nu' = w - D nu."""
+    implicit = make_implicit(Damping, Factor, coupled)
 
     @wp.func
     def resistance(view: Any, water: Any, c: Any):
         """D of all that resists, and w."""
-        D = damping(Damping(), view, water, c)
-        w = Wrench()
-        if wp.static(loads is not None):
-            D, w = loads(D, w, view, c.params)
+        D, w = loads(damping(Damping(), view, water, c), Wrench(), view, c.params)
         return D, w
 
     @wp.func
+    def damped(x: Any, D: Any, w: Any, nu: Any, Om: Any, h: Any):
+        """The momenta after h of the force and torque w - D (nu; Om)."""
+        x = pushed(x, h * (w.force - damped_force(D, nu, Om)))
+        return twisted(x, h * (w.torque - damped_torque(D, nu, Om)))
+
+    @wp.func
     def V(x: Any, view: Any, water: Any, c: Any, h: Any):
-        """I6 nu' = w - D nu over h, b and R fixed."""
-        # D of the velocity that half an implicit Euler step predicts for the middle: with D of the start the order is 1.
+        """As V of make_V, with w frozen where D is: what is steady in the end is found, however strong D is."""
         scaled = h * c.inertia.inverse_scale
         half = h.dtype(0.5) * scaled
         nu, Om = velocities(c.inertia, x.p, x.pi)
         view.nu = nu
         view.Om = Om
         D_start, w_start = resistance(view, water, c)
-        nu_half, Om_half = solved(implicit(D_start, c.inertia, half), x, w_start, half)
+        predictor = implicit(D_start, c.inertia, half)
+        nu_half, Om_half = solve6(predictor, x.p + half * w_start.force, x.pi + half * w_start.torque)
         view.nu = nu_half
         view.Om = Om_half
         D, w = resistance(view, water, c)
         gamma = h.dtype(wp.static(GAMMA)) * scaled
-        # Two stages with weights 1 - gamma and gamma and one matrix, which is factorised once.
         factor = implicit(D, c.inertia, gamma)
-        nu_1, Om_1 = solved(factor, x, w, gamma)
+        nu_1, Om_1 = solve6(factor, x.p + gamma * w.force, x.pi + gamma * w.torque)
         x = damped(x, D, w, nu_1, Om_1, scaled - gamma)
-        nu_2, Om_2 = solved(factor, x, w, gamma)
+        nu_2, Om_2 = solve6(factor, x.p + gamma * w.force, x.pi + gamma * w.torque)
         return damped(x, D, w, nu_2, Om_2, gamma)
 
     return V

@@ -12,13 +12,13 @@ from lgvi_kernels.maps.submaps import look, make_at_user_origin
 
 
 def make_forces(
-    View, Wrench, Flow, Damping, force, push, matrix, damping, flow, water_wrench, shifted, velocities, loads, added
+    View, Wrench, Flow, Damping, force, push, matrix, damping, flow, water_wrench, shifted, velocities, loads
 ):
     """(everything, forces, current, slope) of these laws; an argument is None where a scene has no such law (see make_K).
 
     push: the wrench of damping laws that give it; matrix: the damping of the others; damping: that of all laws, and of water
-    that varies in space, which is in `water_wrench` as well; loads: those of laws that look at the water (see seeing.py),
-    added: of which these are not in `push`.
+    that varies in space, which is in `water_wrench` as well; loads: of laws that look at the water (see seeing.py), those that
+    are not in `push`.
     """
     at_user_origin = make_at_user_origin(shifted)
 
@@ -46,10 +46,10 @@ def make_forces(
             D = matrix(Damping(), view, c.params)
             w.force = w.force - damped_force(D, nu, Om)
             w.torque = w.torque - damped_torque(D, nu, Om)
-        if wp.static(added is not None):
-            D_added, w = added(Damping(), w, view, c.params)
-            w.force = w.force - damped_force(D_added, nu, Om)
-            w.torque = w.torque - damped_torque(D_added, nu, Om)
+        if wp.static(loads is not None):
+            D_loads, w = loads(Damping(), w, view, c.params)
+            w.force = w.force - damped_force(D_loads, nu, Om)
+            w.torque = w.torque - damped_torque(D_loads, nu, Om)
         return w, water.velocity
 
     @wp.func
@@ -80,14 +80,6 @@ def make_forces(
         return total + p.x + q.y + r.z
 
     @wp.func
-    def resistance(view: Any, water: Any, c: Any):
-        """D of all that resists."""
-        D = damping(Damping(), view, water, c)
-        if wp.static(loads is not None):
-            D, unused = loads(D, Wrench(), view, c.params)
-        return D
-
-    @wp.func
     def slope(x: Any, c: Any, h: Any, nu: Any, Om: Any):
         """D(s nu), near the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D.
 
@@ -98,12 +90,12 @@ def make_forces(
         water = water_at(view, x, c)
         view.nu = nu
         view.Om = Om
-        D = resistance(view, water, c)
+        D = damping(Damping(), view, water, c)
         q = h * trace(D, c.inertia)
         square = q * q
         s = ones(q) + square / (ones(q) + square)
         view.nu = s * nu
         view.Om = s * Om
-        return resistance(view, water, c)
+        return damping(Damping(), view, water, c)
 
     return everything, forces, current, slope

@@ -44,6 +44,7 @@ from lgvi_kernels.lanes.functions import (
 from lgvi_kernels.lanes.noise import normals_over, wandered
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.view import (
+    add_drag_at,
     add_outer,
     add_rows,
     command,

@@ -9,7 +9,7 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
-from lgvi_kernels.law import add, add_outer, cross, lane3, mul, ones, row1, struct, sub, to_body, vec3  # noqa: F401
+from lgvi_kernels.law import add, add_drag_at, cross, lane3, mul, row1, struct, sub, to_body  # noqa: F401
 from tests.support.linear_flow import LinearFlow
 from tests.support.tools import GRAVITY, last, one
 
@@ -22,17 +22,7 @@ def seeing(water_at):
         push = k * to_body(view, water_at(view, p.origin, sea).velocity)
         w.force = w.force - push
         w.torque = w.torque - cross(p.origin, push)
-        unity = ones(k)
-        zero = unity - unity
-        for i in range(3):
-            axis = vec3(unity, zero, zero)
-            if i == 1:
-                axis = vec3(zero, unity, zero)
-            if i == 2:
-                axis = vec3(zero, zero, unity)
-            arm = cross(p.origin, axis)
-            D = add_outer(D, k * axis, k * arm, axis, arm)
-        return D, w
+        return add_drag_at(D, k, p.origin), w
 
     return {"load": friction}
 

@@ -236,6 +236,19 @@ def add_outer(D: Any, force: Any, torque: Any, velocity: Any, rate: Any):
 
 
 @wp.func
+def add_drag_at(D: Any, s: Any, r: Any):
+    """D plus the resistance s [N s/m] to the velocity of the body's point r, whatever its direction."""
+    unity = ones(s)
+    zero = unity - unity
+    x = vec3(unity, zero, zero)
+    y = vec3(zero, unity, zero)
+    z = vec3(zero, zero, unity)
+    D = add_outer(D, s * x, s * cross(r, x), x, cross(r, x))
+    D = add_outer(D, s * y, s * cross(r, y), y, cross(r, y))
+    return add_outer(D, s * z, s * cross(r, z), z, cross(r, z))
+
+
+@wp.func
 def add_rows(m: Any, a: Any, b: Any):
     """m + a b^T."""
     m.row0 = m.row0 + a.x * b

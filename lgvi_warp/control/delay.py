@@ -35,7 +35,8 @@ class Delay(Part):
         return {"delay": outside["delay"] | (numbers["delay"] > MOST_PERIODS * self.period)}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # As many sets of commands, the latest first, as some member needs. A delay that varies is that of the nearest whole step.
+        # As many sets of commands, the latest first, as some member needs.
+        # A delay that varies is that of the nearest whole step.
         bus, every = self.bus, round(self.period / context.h)
         steps = np.rint(numbers["delay"] / context.h)
         periods = steps // every

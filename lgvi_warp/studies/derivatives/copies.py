@@ -227,7 +227,7 @@ class CopyRuns:
 
 def _with_states(save: SaveAt | None) -> SaveAt | None:
     """Keep states beside signals alone: by them growth is told."""
-    if save is None or set(save.fields) & set(FIELDS):
+    if not isinstance(save, SaveAt) or set(save.fields) & set(FIELDS):  # what is none is refused with the run
         return save
     return replace(save, fields=(*FIELDS, *save.fields))
 

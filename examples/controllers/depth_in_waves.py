@@ -47,7 +47,9 @@ def plot(runs, path):
         late = time >= 60.0
         for axes, values in ((above, depth), (below, pitch)):
             axes.plot(time[late], values[late, 0], style, color=color, label=name)
-    above.set(ylabel="depth [m]", title="What waves do along the hull takes a quarter of its pitch, and leaves its depth")
+    above.set(
+        ylabel="depth [m]", title="What waves do along the hull takes a quarter of its pitch, and leaves its depth"
+    )
     above.invert_yaxis()
     below.set(xlabel="time [s]", ylabel="pitch [deg]", xlim=(60.0, 90.0))
     for axes in (above, below):

@@ -286,7 +286,9 @@ def _push(bench: Bench, step: float) -> Iterator[Check]:
     views, here = bench.views, bench.at(bench.views)
     other = "load" if "load" in here else "damping"
     twist = np.abs(np.concatenate([views.velocity, views.rate], axis=1))
-    limit = 100.0 * ROUND_OFF * (np.einsum("kij,kj->ki", np.abs(_matrices(here)), twist).max() + np.abs(here["push"]).max())
+    limit = (
+        100.0 * ROUND_OFF * (np.einsum("kij,kj->ki", np.abs(_matrices(here)), twist).max() + np.abs(here["push"]).max())
+    )
     remedy = f"is it w less the matrix of {other}() times (nu; Om)?"
     yield judged(f"push: as {other}", here["push"] - _wrench(other, here[other], views), limit, views, remedy)
 

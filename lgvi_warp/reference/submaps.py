@@ -162,7 +162,7 @@ def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) ->
 
 
 def V(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Velocity-dependent laws, w - D(nu) nu, by the linearly implicit step of order 2 with D frozen at the predicted middle."""
+    """Velocity-dependent laws, w - D(nu) nu, by the linearly implicit step of order 2, D and w of the predicted middle."""
     I6, P = body.I6, np.concatenate([x.p, x.pi])
     nu, Om = np.split(np.linalg.solve(I6, P), 2)
     w = load(x, body, h, nu, Om)[1]

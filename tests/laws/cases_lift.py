@@ -64,7 +64,10 @@ CASES = {
     "cross-flow": Case((terms.CrossFlow(**HULL),), (CrossFlow(**arrays(HULL), density=DENSITY),)),
     "hull loads": Case(
         (terms.HullLoads(**HULL, added_mass=ADDED_MASS), terms.Waves(**STEEP_WAVES, name="swell")),
-        (HullLoads(**arrays(HULL), added_mass=np.array(ADDED_MASS), density=DENSITY), Waves(**arrays(STEEP_WAVES), gravity=9.8)),
+        (
+            HullLoads(**arrays(HULL), added_mass=np.array(ADDED_MASS), density=DENSITY),
+            Waves(**arrays(STEEP_WAVES), gravity=9.8),
+        ),
     ),
     "body lift": Case((terms.BodyLift(matrix=LIFT),), (BodyLift(matrix=LIFT),)),
 }

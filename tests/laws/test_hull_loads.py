@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loads of water that varies along a slender hull: against a Lagrangian of its strips that is differentiated by numbers, against
-the pressure on spheroids, and against closed forms of waves that are much longer, or shorter, than the hull."""
+"""Loads of water that varies along a slender hull: against a Lagrangian of its strips that is differentiated by numbers,
+against the pressure on spheroids, and against closed forms of waves much longer than the hull and of drag in a shear."""
 
 import numpy as np
 import pytest
@@ -136,9 +136,7 @@ def spheroid_in(hull, share=1.0, **flow):
     stations = hull.a * np.sin(0.5 * np.pi * np.linspace(-1.0, 1.0, 257))
     breadth = 2.0 * hull.c * np.sqrt(1.0 - (stations / hull.a).clip(-1.0, 1.0) ** 2)
     added = share * 1000.0 * np.pi * breadth**2 / 4.0
-    body = lw.Vehicle(
-        hull.displaced, inertia=(J,) * 3, added_mass=hull.added_mass(), buoyancy=hull.displaced * GRAVITY
-    )
+    body = lw.Vehicle(hull.displaced, inertia=(J,) * 3, added_mass=hull.added_mass(), buoyancy=hull.displaced * GRAVITY)
     strips = lw.terms.HullLoads(stations=stations, diameters=breadth, added_mass=added)
     return lw.Scene(body, lw.Environment(GRAVITY, water_density=1000.0), terms=[strips, LinearFlow(**flow)])
 
@@ -213,7 +211,10 @@ def test_drag_is_that_of_the_flow_at_each_strip():
     found = []
     for coefficient in (0.0, Cd):
         hull = lw.terms.HullLoads(
-            stations=np.linspace(-0.8, 0.8, 41), diameters=[0.2] * 41, added_mass=[0.0] * 41, drag_coefficient=coefficient
+            stations=np.linspace(-0.8, 0.8, 41),
+            diameters=[0.2] * 41,
+            added_mass=[0.0] * 41,
+            drag_coefficient=coefficient,
         )
         water = lw.Environment(GRAVITY, water_density=DENSITY)
         found.append(moment_of(lw.Scene(body, water, terms=[hull, LinearFlow(**columns(shear))])))

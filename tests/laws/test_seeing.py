@@ -35,8 +35,6 @@ class FrictionDevice:
         return struct("Friction", origin=lane3(width, real), first=wp.int32)
 
 
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class GroundFriction(lw.laws.Term):
     """Friction on the ground."""
@@ -62,14 +60,16 @@ def scene(k, *water):
 )
 def test_friction_stops_a_vehicle_over_the_ground(water, method, h, allowed):
     # (m + A) dv/dt = -k v, whatever the current: it pushes by nothing.
-    b, R, nu, Om = last(lw.solve(one(scene(30.0, water), nu=(1.0, 0.5, 0.0)), method, h=h, t1=1.0))
+    b, R, nu, _ = last(lw.solve(one(scene(30.0, water), nu=(1.0, 0.5, 0.0)), method, h=h, t1=1.0))
     np.testing.assert_allclose(R @ nu, np.array([1.0, 0.5, 0.0]) * np.exp(-30.0 / 20.0), atol=allowed)
     np.testing.assert_allclose(b, np.array([1.0, 0.5, 0.0]) * (1.0 - np.exp(-1.5)) * 20.0 / 30.0, atol=allowed)
 
 
 def test_friction_however_strong_is_stable():
-    b, R, nu, Om = last(
-        lw.solve(one(scene(1e6, lw.terms.Current(velocity=[0.4, 0.0, 0.0])), nu=(1.0, 0.0, 0.0)), "psi_s", h=0.1, t1=2.0)
+    b, _, nu, _ = last(
+        lw.solve(
+            one(scene(1e6, lw.terms.Current(velocity=[0.4, 0.0, 0.0])), nu=(1.0, 0.0, 0.0)), "psi_s", h=0.1, t1=2.0
+        )
     )
     assert np.abs(nu).max() < 1e-9
     assert np.abs(b).max() < 0.2

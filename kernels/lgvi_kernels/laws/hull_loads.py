@@ -25,8 +25,10 @@ ROWS = 5
 
 @functools.cache
 def params(width, real):
-    """Params: axis, the unit vector along the hull, a and b across it, axis x a = b; origin, the user's, from that of the
-    forces; a_arm, b_arm: origin x a and b. Rows: ROWS for each of `count` strips."""
+    """Params: axis, the unit vector along the hull, a and b across it, axis x a = b; origin, the user's.
+
+    The origin is taken from that of the forces; a_arm, b_arm: origin x a and b. Rows: ROWS for each of `count` strips.
+    """
     Lane3 = lane3(width, real)
     vectors = dict.fromkeys(("axis", "origin", "a", "b", "a_arm", "b_arm"), Lane3)
     return struct("HullLoads", **vectors, first=wp.int32, count=wp.int32)

@@ -23,9 +23,17 @@ class HullLoads(Law):
             for part in (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0)):
                 x, D, a, drag = (
                     (1.0 - part) * table[i] + part * table[i + 1]
-                    for table in (self.stations, self.diameters, self.added_mass, self.drag_coefficient * self.diameters)
+                    for table in (
+                        self.stations,
+                        self.diameters,
+                        self.added_mass,
+                        self.drag_coefficient * self.diameters,
+                    )
                 )
-                S, slope = math.pi * D**2 / 4.0, math.pi * D / 2.0 * (self.diameters[i + 1] - self.diameters[i]) / length
+                S, slope = (
+                    math.pi * D**2 / 4.0,
+                    math.pi * D / 2.0 * (self.diameters[i + 1] - self.diameters[i]) / length,
+                )
                 strips.append((x, 0.5 * length, drag, S, S * slope / (2.0 * math.pi), a))
         return strips
 

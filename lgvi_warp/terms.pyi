@@ -6,6 +6,7 @@ from lgvi_warp.physics.terms.control_wrench import ControlWrench as ControlWrenc
 from lgvi_warp.physics.terms.cross_flow import CrossFlow as CrossFlow
 from lgvi_warp.physics.terms.current import Current as Current
 from lgvi_warp.physics.terms.current import CurrentProfile as CurrentProfile
+from lgvi_warp.physics.terms.current_field import CurrentField as CurrentField
 from lgvi_warp.physics.terms.current_harmonics import CurrentHarmonics as CurrentHarmonics
 from lgvi_warp.physics.terms.drag import Drag as Drag
 from lgvi_warp.physics.terms.drag import DragMatrix as DragMatrix

@@ -67,7 +67,9 @@ class CurrentField(Term):
 
     def check(self, faults: Faults) -> None:
         if self.times is None and self.velocities.shape[1] > 1:
-            faults.add("times", None, f"is missing for {self.velocities.shape[1]} fields", "give [first, between] in seconds")
+            faults.add(
+                "times", None, f"is missing for {self.velocities.shape[1]} fields", "give [first, between] in seconds"
+            )
         if self.times is not None and not self.times[1] > 0.0:
             faults.add("times", self.times, "has no time between two fields", "give [first, between] in seconds")
         if _no_scenario(self.scenario[None], len(self.velocities)).any():
@@ -88,7 +90,9 @@ class CurrentField(Term):
         counts = np.array(field.shape[1:6])
         # Rows from one node to the next along each axis; 0 where there is one node.
         rows = 3 * np.array([np.prod(counts[i + 1 :], dtype=np.int64) for i in range(5)])
-        words = dict(zip(("scenario", "time", "north", "east", "depth"), np.where(counts > 1, rows, 0).tolist(), strict=True))
+        words = dict(
+            zip(("scenario", "time", "north", "east", "depth"), np.where(counts > 1, rows, 0).tolist(), strict=True)
+        )
         times = numbers.get("times", np.array([[0.0, 1.0]]))
         values = {
             "origin": numbers["origin"],

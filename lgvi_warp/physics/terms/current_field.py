@@ -14,12 +14,12 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CurrentField(Term):
-    """A current on a regular grid in north, east and depth, and in time if it is given: linear in each, and held outside.
+    """A current on a regular grid in north, east and depth, and in time if that is given: linear in each, held outside.
 
     Several fields of one grid, of an ensemble forecast say, are scenarios: `scenario` says which, and may vary by member.
 
     Args:
-        velocities: Velocities of the water at the nodes, (x, y, z, 3) [m/s] in inertial axes; (t, x, y, z, 3) where `times` are
+    Several fields of one grid, such as those of an ensemble forecast, are scenarios, of which `scenario` may vary by member.
             given; (s, t, x, y, z, 3), or (s, x, y, z, 3) without `times`, with scenarios.
         origin: Place of the first node, (3,) [m]: north, east, depth; zeros by default.
         spacing: Distance of the nodes along north, east and depth, (3,) [m].

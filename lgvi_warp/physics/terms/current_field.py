@@ -19,8 +19,8 @@ class CurrentField(Term):
     Several fields of one grid, of an ensemble forecast say, are scenarios: `scenario` says which, and may vary by member.
 
     Args:
-    Several fields of one grid, such as those of an ensemble forecast, are scenarios, of which `scenario` may vary by member.
-            given; (s, t, x, y, z, 3), or (s, x, y, z, 3) without `times`, with scenarios.
+        velocities: Velocities of the water at the nodes, (x, y, z, 3) [m/s] in inertial axes; (t, x, y, z, 3) with `times`;
+            (s, t, x, y, z, 3), or (s, x, y, z, 3) without `times`, with scenarios.
         origin: Place of the first node, (3,) [m]: north, east, depth; zeros by default.
         spacing: Distance of the nodes along north, east and depth, (3,) [m].
         times: Time of the first field and time between two of them, (2,) [s]; None, the default: they do not change.

@@ -10,8 +10,6 @@ from lgvi_kernels import device
 from lgvi_kernels.law import *
 
 FLOW = "varying"
-# It reads rows by the index of each lane, which a View within bounds can.
-GATHERS = True
 
 
 @functools.cache
@@ -114,4 +112,4 @@ flow = make_flow(False)
 @functools.cache
 def made(features):
     """The same of a field that changes in time."""
-    return device(__name__, features, params=params, flow=make_flow(True), FLOW=FLOW, GATHERS=GATHERS)
+    return device(__name__, features, params=params, flow=make_flow(True), FLOW=FLOW)

@@ -138,6 +138,12 @@ def cross_flow():
     return terms.CrossFlow(stations=x, diameters=0.4 * np.sqrt(1.0 - x**2), drag_coefficient=1.1)
 
 
+def hull_loads():
+    """Ten stations, so eighteen strips."""
+    x = np.linspace(-0.9, 0.9, 10)
+    return terms.HullLoads(stations=x, diameters=0.4 * np.sqrt(1.0 - x**2), drag_coefficient=1.1)
+
+
 def body_lift():
     """Lift and its moment in sway and heave, and of the rates."""
     matrix = np.zeros((6, 6))
@@ -179,7 +185,12 @@ def each_term():
     box = lw.events.Box(lower=[-1e4] * 3, upper=[1e4] * 3)
     alone = {make.__name__: scene(make()) for make in ALL}
     first = {"none": scene(), "drag": scene(drag()), "quadratic drag": scene(drag(quadratic_only=True))}
-    return first | alone | {"events: box": scene(events=[box])}
+    hull = {
+        "hull_loads": scene(hull_loads()),
+        "waves, hull_loads": scene(waves(), hull_loads()),
+        "current_profile, hull_loads": scene(current_profile(), hull_loads()),
+    }
+    return first | alone | hull | {"events: box": scene(events=[box])}
 
 
 def coupled():

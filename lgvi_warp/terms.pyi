@@ -6,11 +6,13 @@ from lgvi_warp.physics.terms.control_wrench import ControlWrench as ControlWrenc
 from lgvi_warp.physics.terms.cross_flow import CrossFlow as CrossFlow
 from lgvi_warp.physics.terms.current import Current as Current
 from lgvi_warp.physics.terms.current import CurrentProfile as CurrentProfile
+from lgvi_warp.physics.terms.current_field import CurrentField as CurrentField
 from lgvi_warp.physics.terms.current_harmonics import CurrentHarmonics as CurrentHarmonics
 from lgvi_warp.physics.terms.drag import Drag as Drag
 from lgvi_warp.physics.terms.drag import DragMatrix as DragMatrix
 from lgvi_warp.physics.terms.fins import Fins as Fins
 from lgvi_warp.physics.terms.gauss_markov_current import GaussMarkovCurrent as GaussMarkovCurrent
+from lgvi_warp.physics.terms.hull_loads import HullLoads as HullLoads
 from lgvi_warp.physics.terms.hydrostatics import Restoring as Restoring
 from lgvi_warp.physics.terms.hydrostatics import Weight as Weight
 from lgvi_warp.physics.terms.lift import BodyLift as BodyLift

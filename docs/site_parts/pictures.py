@@ -53,6 +53,7 @@ STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out"
 SWEEP = "examples/sweeps/depth_gain_map.toml"
 MADE = {
     "controllers/dead_thruster.png": of_script("examples/controllers/dead_thruster.py"),
+    "controllers/depth_in_waves.png": of_script("examples/controllers/depth_in_waves.py"),
     "controllers/depth_keeping.png": of_script("examples/controllers/depth_keeping.py"),
     "controllers/learning.png": of_script("examples/controllers/train_a_policy.py", "1.5"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),

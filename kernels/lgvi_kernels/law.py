@@ -44,6 +44,7 @@ from lgvi_kernels.lanes.functions import (
 from lgvi_kernels.lanes.noise import normals_over, wandered
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.view import (
+    add_drag_at,
     add_outer,
     add_rows,
     command,
@@ -57,6 +58,8 @@ from lgvi_kernels.lanes.view import (
     remembered,
     row1,
     row3,
+    slope_against,
+    slope_along,
     table1,
     table3,
     to_body,

@@ -17,7 +17,7 @@ from lgvi_warp.common.machine import register_width
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, put_rows
-from lgvi_warp.engine.kernel_choice import declared
+from lgvi_warp.engine.kernel_choice import declared, seeing_roles
 from lgvi_warp.physics import inertia, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import PackingContext, Term
@@ -158,6 +158,7 @@ class Bench(TermBench):
     def __init__(self, term: Term, module: Any, scene: Scene, packets: int, seed: int):
         width = register_width("float64")
         super().__init__(term, module, scene, packets * width, seed, COLUMNS, (width,))
+        self.roles = (*self.roles, *seeing_roles(module))
         self.noisy = bool(getattr(module, "NOISE", False))
         around = scene.start.given()["position"]
         self.views = random_views(packets, width, seed, around)

@@ -35,6 +35,8 @@ from lgvi_warp.scene.scene import Scene
 # Length of the time over which a law follows [s].
 FOLLOWED = 0.4
 FLOWS = ("steady", "uniform", "varying")
+# Roles that may look at the velocities.
+MOVING = ("damping", "push", "load")
 
 
 def check_law(
@@ -50,7 +52,8 @@ def check_law(
     * `law`: independent of velocities, and of the time unless `timed`. With POTENTIAL, force and torque are the
       derivatives of `potential`, and `energy` adds the same potential.
     * `damping`: nu . D nu >= 0. With `dissipative = False` the least power is reported and is no fault.
-    * `push`: the force and torque of `damping`.
+    * `push`: the force and torque of `damping`, or of `load`.
+    * `load`: as `damping`, in water made for the check that varies everywhere.
     * `follow`: what it leaves in the memory depends on the time alone, and is the same by two parts of the time as at once.
     * `distance`: the same in all body axes.
     * `flow`: rate and gradient are the derivatives of the velocity, `water` gives the same velocity, and FLOW fits it.
@@ -128,10 +131,10 @@ def _of_every_law(bench: Bench, step: float) -> Iterator[Check]:
     faster = bench.at(replace(views, velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
     later = bench.at(replace(views, time=views.time + 3.7))
     for role, value in here.items():
-        if role not in ("damping", "push"):
-            remedy = "only damping(D, view, p) and push(w, view, p) may look at view.nu and view.Om"
+        if role not in MOVING:
+            remedy = "only damping, push and load may look at view.nu and view.Om"
             yield judged(f"{role}: blind to velocity", faster[role] - value, 0.0, views, remedy)
-        if not bench.term.timed and not bench.noisy:
+        if role != "load" and not bench.term.timed and not bench.noisy:
             remedy = f"write timed = True in {kind}, or it gets no time"
             yield judged(f"{role}: blind to time", later[role] - value, 0.0, views, remedy)
     if not bench.noisy:
@@ -177,7 +180,7 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     """The same wrench from a frame with other axes and origin."""
     views, turned_views = bench.views, bench.views.elsewhere()
     turned = _tried(bench, bench.context(bench.parameters, True), turned_views, "in other axes of the body")
-    for role in [role for role in ("law", "damping", "push") if role in here]:
+    for role in [role for role in ("law", *MOVING) if role in here]:
         if isinstance(turned, str):
             yield judged(f"{role}: any axes", turned, 0.0, views, "")
             continue
@@ -193,11 +196,12 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 
 def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
-    """(force; torque) (k, 6) of a law, or of a damping matrix at the views' velocities."""
-    if role != "damping":
+    """(force; torque) (k, 6) of a law, or of a damping matrix or a load at the views' velocities."""
+    if role not in ("damping", "load"):
         return value
     twist = np.concatenate([views.velocity, views.rate], axis=1)
-    return np.asarray(-np.einsum("kij,kj->ki", value.reshape(-1, 6, 6), twist))
+    resistance = np.einsum("kij,kj->ki", value[:, :36].reshape(-1, 6, 6), twist)
+    return np.asarray(value[:, 36:] - resistance if role == "load" else -resistance)
 
 
 class Slope(NamedTuple):
@@ -251,10 +255,10 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
 
 def _damping(bench: Bench, step: float) -> Iterator[Check]:
     """nu.D nu >= 0 at the views' velocities, and at those that the D found there would speed up most."""
-    if "damping" not in bench.roles:
+    if not {"damping", "load"} & set(bench.roles):
         return
     views = bench.views
-    D = bench.at(views)["damping"].reshape(-1, 6, 6)
+    D = _matrices(bench.at(views))
     weakest = np.linalg.eigh(D + np.swapaxes(D, 1, 2))[1][:, :, 0]
     trials = [views, *(replace(views, velocity=s * weakest[:, :3], rate=s * weakest[:, 3:]) for s in (1.0, -1.0))]
     power, allowed, twist = (np.concatenate(x) for x in zip(*(_power(bench, trial) for trial in trials), strict=True))
@@ -280,16 +284,23 @@ def _push(bench: Bench, step: float) -> Iterator[Check]:
     if "push" not in bench.roles:
         return
     views, here = bench.views, bench.at(bench.views)
-    D = np.abs(here["damping"]).reshape(-1, 6, 6)
+    other = "load" if "load" in here else "damping"
     twist = np.abs(np.concatenate([views.velocity, views.rate], axis=1))
-    limit = 100.0 * ROUND_OFF * np.einsum("kij,kj->ki", D, twist).max()
-    remedy = "is it w less the matrix of damping() times (nu; Om)?"
-    yield judged("push: as damping", here["push"] - _wrench("damping", here["damping"], views), limit, views, remedy)
+    limit = (
+        100.0 * ROUND_OFF * (np.einsum("kij,kj->ki", np.abs(_matrices(here)), twist).max() + np.abs(here["push"]).max())
+    )
+    remedy = f"is it w less the matrix of {other}() times (nu; Om)?"
+    yield judged(f"push: as {other}", here["push"] - _wrench(other, here[other], views), limit, views, remedy)
+
+
+def _matrices(here: dict[str, np.ndarray]) -> np.ndarray:
+    """The matrices (k, 6, 6) of damping, or of loads."""
+    return (here["damping"] if "damping" in here else here["load"][:, :36]).reshape(-1, 6, 6)
 
 
 def _power(bench: Bench, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """nu.D nu (k,) [W], what rounding may make of it, and the velocities (k, 6)."""
-    D = bench.at(views)["damping"].reshape(-1, 6, 6)
+    D = _matrices(bench.at(views))
     twist = np.concatenate([views.velocity, views.rate], axis=1)
     power = np.einsum("ki,kij,kj->k", twist, D, twist)
     return power, ROUND_OFF * np.einsum("ki,kij,kj->k", np.abs(twist), np.abs(D), np.abs(twist)), twist

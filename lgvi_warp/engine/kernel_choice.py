@@ -79,7 +79,7 @@ def choose_kernel(
     control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
     acting = _acting(ensemble, facts, built_in, controller, user_axes)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
-    damping = any(hasattr(module, "damping") for term, module in acting if not term.exact_flow)
+    damping = any(resists(module) for term, module in acting if not term.exact_flow)
     flow = _flow(acting)
     drags = [term for term, _ in acting if term.exact_flow]
     others = [module for term, module in acting if not term.carries]
@@ -176,7 +176,14 @@ def _controller(ensemble: Ensemble, facts: Survey) -> Controller | None:
 
 def _steady(module: Any) -> bool:
     """Whether a law's force is constant in inertial axes."""
-    return hasattr(module, "steady_force") or not any(hasattr(module, role) for role in ("law", "damping", "evolve"))
+    return hasattr(module, "steady_force") or not any(
+        hasattr(module, role) for role in ("law", "damping", "evolve", "seeing")
+    )
+
+
+def resists(module: Any) -> bool:
+    """Whether a law's force depends on the velocities, so that a splitting makes it by a step of its own."""
+    return hasattr(module, "damping") or hasattr(module, "seeing")
 
 
 def _conservative(facts: Survey, acting: list[tuple[Term, Any]]) -> bool:
@@ -193,7 +200,8 @@ def _conservative(facts: Survey, acting: list[tuple[Term, Any]]) -> bool:
             dissipates = term.dissipative or not hasattr(module, "damping")
             bounded = hasattr(module, "supply") or hasattr(module, "steady_size")
             known_potential = getattr(module, "POTENTIAL", False) and hasattr(module, "energy") and bounded
-            passive = not hasattr(module, "flow") and dissipates and (known_potential or not hasattr(module, "law"))
+            blind = not hasattr(module, "flow") and not hasattr(module, "seeing")
+            passive = blind and dissipates and (known_potential or not hasattr(module, "law"))
         if not passive:
             return False
     return True
@@ -245,11 +253,13 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
         faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
     elif getattr(module, "params", None) is None and term.lanes() is None:
         faults.add(f"{term.key}.device", module, "has no params(width, real)", page)
-    elif not any(hasattr(module, role) for role in roles):
+    elif not any(hasattr(module, role) for role in (*roles, "seeing")):
         faults.add(f"{term.key}.device", module, f"has none of {', '.join(roles)}", page)
     else:
         for role in roles:
             _check_signature(faults, term, module, role)
+        if hasattr(module, "seeing"):
+            _check_seeing(faults, term, module.seeing(_no_water), page)
         if hasattr(module, "follow") and not hasattr(module, "evolve"):
             faults.add(f"{term.key}.device", module, "has follow and no evolve", page)
         if hasattr(module, "push") and not hasattr(module, "damping"):
@@ -291,12 +301,33 @@ def declared(term: Term, module: Any, given: bool = False) -> tuple[tuple[str, A
     return numbers
 
 
+def seeing_roles(module: Any) -> tuple[str, ...]:
+    """The functions that a law makes which looks at the water."""
+    return tuple(module.seeing(_no_water)) if hasattr(module, "seeing") else ()
+
+
+def _no_water(view: Any, point: Any, sea: Any) -> Any:
+    """Stands for the water while functions are looked at that will not be called."""
+
+
+def _check_seeing(faults: Faults, term: Term, functions: Any, page: str) -> None:
+    """Add a fault unless a law that looks at the water makes the functions that the kernel asks for."""
+    if not isinstance(functions, dict) or "load" not in functions or set(functions) - set(SEEING):
+        faults.add(f"{term.key}.seeing", functions, "is no dict with load, and push if you like", page)
+        return
+    for role, function in functions.items():
+        _check_function(faults, term, role, function, SEEING[role])
+
+
 def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:
     """Add a fault unless a role is a Warp function of as many arguments as the kernel passes."""
     function = getattr(module, role, None)
-    if function is None:
-        return
-    arguments = ARGUMENTS.get(role, "view, p" if role == "distance" else "w, view, p")
+    if function is not None:
+        arguments = ARGUMENTS.get(role, "view, p" if role == "distance" else "w, view, p")
+        _check_function(faults, term, role, function, arguments)
+
+
+def _check_function(faults: Faults, term: Term, role: str, function: Any, arguments: str) -> None:
     wanted = arguments.count(",") + 1
     names = list(getattr(function, "input_types", {}))
     if not names:
@@ -307,6 +338,8 @@ def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None
 
 
 ROLES = ("law", "damping", "push", "flow", "evolve", "follow")
+# What a law makes that looks at the water, with the arguments.
+SEEING = {"load": "D, w, view, p, sea", "push": "w, view, p, sea"}
 # Roles of a controller's parts, with their arguments.
 ARGUMENTS = {"measure": "y, p", "guide": "r, y, p", "control": "w, r, y, p", "allocate": "w, y, p", "send": "y, p"}
 # How water may move, the most special first.
@@ -360,7 +393,7 @@ def _check(
             faults.add("method", method.name, f"needs potentials of position plus those of attitude; {term.key} has none such",
                        "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
         if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
-                             or term.exact_flow or getattr(module, "NOISE", False)):  # fmt: skip
+                             or term.exact_flow or getattr(module, "NOISE", False) or hasattr(module, "seeing")):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
             faults.add("method", method.name, problem, "use psi_s")
     for term, module in acting:

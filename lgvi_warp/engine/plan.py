@@ -20,7 +20,7 @@ from lgvi_warp.control.signals import check_signals, ordered
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.going_on import begun
 from lgvi_warp.engine.kernel import Kernel
-from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel
+from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, resists
 from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of, with_tangents
 from lgvi_warp.engine.launches import Launches
 from lgvi_warp.engine.packing import rows_shared
@@ -262,4 +262,4 @@ def _launches(grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, 
 def damping_terms(terms: Sequence[Term]) -> list[Term]:
     """The terms whose device code has damping."""
     devices = [built_in("laws", term.device) if isinstance(term.device, str) else term.device for term in terms]
-    return [term for term, device in zip(terms, devices, strict=True) if hasattr(device, "damping")]
+    return [term for term, device in zip(terms, devices, strict=True) if resists(device)]

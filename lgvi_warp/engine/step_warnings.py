@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from lgvi_warp.common.status import Warnings
+from lgvi_warp.engine.kernel_choice import resists
 from lgvi_warp.methods.limits import MUNK, RESTORING, longest_stage, oscillation_limit, rotation_limit
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
@@ -90,7 +91,7 @@ def watched(method: Method, choice: Any, dtype: str, checks: str) -> tuple[str, 
 
 def _dragged(choice: Any) -> bool:
     """Whether a law takes speed from the vehicle."""
-    return bool(choice.drag) or any(hasattr(module, "damping") for _, module in choice.laws)
+    return bool(choice.drag) or any(resists(module) for _, module in choice.laws)
 
 
 def _split(plan: Watched) -> bool:

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, cross
-from lgvi_warp.reference.submaps import Body, State, acceleration_wrench, damping, look, remembered, water
+from lgvi_warp.reference.submaps import Body, State, acceleration_wrench, damping, load, look, remembered, water
 from lgvi_warp.reference.terms import Law
 
 Row = tuple[float, ...]
@@ -74,7 +74,7 @@ def wrench(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array,
     flow = water(views, body)
     force, torque = body.wrench(x.b, x.R, views)
     pushed, turned = acceleration_wrench(x.R, body, flow)
-    drag = damping(x, body, h, nu, Om, flow) @ np.concatenate([nu, Om])
+    drag = damping(x, body, h, nu, Om, flow) @ np.concatenate([nu, Om]) - load(x, body, h, nu, Om)[1]
     return force + pushed - drag[:3], torque + turned - drag[3:], flow.velocity
 
 

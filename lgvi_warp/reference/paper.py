@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array, NoSolution, Solver, cross, newton, norm
-from lgvi_warp.reference.submaps import Body, State, acceleration_wrench, damping, look, remembered, water
+from lgvi_warp.reference.submaps import Body, State, acceleration_wrench, damping, load, look, remembered, water
 
 # b (3,) [m], R (3, 3), nu (3,) [m/s], Om (3,) [rad/s].
 Motion = tuple[Array, Array, Array, Array]
@@ -116,7 +116,7 @@ def forces(x: State, body: Body, h: float, nu: Array, Om: Array) -> Wrench:
     flow = water(views, body)
     force, torque = body.wrench(x.b, x.R, views, potential=False)
     pushed, turned = acceleration_wrench(x.R, body, flow)
-    drag = damping(x, body, h, nu, Om, flow) @ np.concatenate([nu, Om])
+    drag = damping(x, body, h, nu, Om, flow) @ np.concatenate([nu, Om]) - load(x, body, h, nu, Om)[1]
     return force + pushed - drag[:3], torque + turned - drag[3:]
 
 

@@ -133,6 +133,20 @@ def remembered(x: State, body: Body, h: float, second: bool) -> State:
     return replace(x, memory=tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True)))
 
 
+def load(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, Array]:
+    """D (6, 6) and w (6,) of the laws that look at the water: their force and torque are w - D (nu; Om)."""
+    views = look(x, body, h)
+
+    def water_at(point: Array) -> Flow:
+        return water(tuple(replace(view, b=view.b + view.R @ point) for view in views), body)
+
+    D, w = np.zeros((6, 6)), np.zeros(6)
+    for term, view in zip(body.terms, views, strict=True):
+        more, push = term.load(replace(view, nu=nu, Om=Om), water_at)
+        D, w = D + more, w + push
+    return D, w
+
+
 def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) -> Array:
     """D (6, 6) at nu, Om: the sum of the damping laws, and what water that varies in space does.
 
@@ -144,18 +158,19 @@ def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) ->
     rigid = np.hstack([body.mass * np.eye(3), -hat(body.mass_lever)])
     total[:3] += X.T @ (body.I6[:3] - rigid)
     total[:, :3] += rigid.T @ X
-    return np.asarray(total)
+    return np.asarray(total + load(x, body, h, nu, Om)[0])
 
 
 def V(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Velocity-dependent laws, -D(nu) nu, by the linearly implicit step of order 2 with D frozen at the predicted middle."""
+    """Velocity-dependent laws, w - D(nu) nu, by the linearly implicit step of order 2, D and w of the predicted middle."""
     I6, P = body.I6, np.concatenate([x.p, x.pi])
-    start = np.linalg.solve(I6, P)
-    half = np.linalg.solve(I6 + 0.5 * h * damping(x, body, h, start[:3], start[3:], flow), P)
-    Dm = damping(x, body, h, half[:3], half[3:], flow)
+    nu, Om = np.split(np.linalg.solve(I6, P), 2)
+    w = load(x, body, h, nu, Om)[1]
+    nu, Om = np.split(np.linalg.solve(I6 + 0.5 * h * damping(x, body, h, nu, Om, flow), P + 0.5 * h * w), 2)
+    Dm, w = damping(x, body, h, nu, Om, flow), load(x, body, h, nu, Om)[1]
     factor = I6 + GAMMA * h * Dm
-    P = P - (1.0 - GAMMA) * h * Dm @ np.linalg.solve(factor, P)
-    P = P - GAMMA * h * Dm @ np.linalg.solve(factor, P)
+    P = P + (1.0 - GAMMA) * h * (w - Dm @ np.linalg.solve(factor, P + GAMMA * h * w))
+    P = P + GAMMA * h * (w - Dm @ np.linalg.solve(factor, P + GAMMA * h * w))
     return replace(x, p=P[:3], pi=P[3:])
 
 
@@ -173,7 +188,7 @@ def E(x: State, body: Body, h: float, flow: Flow) -> State:
 
 def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
     """E where drag is the only velocity-dependent law, V otherwise."""
-    damped = [term for term in body.terms if type(term).damping is not Law.damping]
+    damped = [term for term in body.terms if type(term).damping is not Law.damping or type(term).load is not Law.load]
     alone = len(damped) == 1 and isinstance(damped[0], Drag) and not np.any(flow.gradient)
     if alone:
         return E(x, body, h, flow)

@@ -35,6 +35,13 @@ def test_depth_is_kept_whatever_the_ballast(tmp_path):
 
 
 @pytest.mark.slow
+def test_waves_along_the_hull_change_the_pitch_and_not_the_depth(tmp_path):
+    origin, hull = printed("controllers/depth_in_waves", tmp_path)
+    assert 0.6 < number(hull, "deg$") / number(origin, "deg$") < 0.85
+    assert abs(number(hull, "m, pitch") / number(origin, "m, pitch") - 1.0) < 0.05
+
+
+@pytest.mark.slow
 def test_reallocation_keeps_the_place_when_a_thruster_dies(tmp_path):
     unknown, known = printed("controllers/dead_thruster", tmp_path)
     assert number(known, "cm off") < 0.1 * number(unknown, "cm off")

@@ -131,7 +131,7 @@ def together(*names):
 
 # One of each type.
 CASES["all together"] = together(
-    "drag matrix", "current", "current profile", "current harmonics", "waves", "Gauss-Markov current", "tether", "wrench",
-    "wrench schedule", "wrench noise", "thrusters", "fins", "control fins with rates", "cross-flow", "body lift",
-    "stratification",
+    "drag matrix", "current", "current field", "current profile", "current harmonics", "waves", "Gauss-Markov current",
+    "tether", "wrench", "wrench schedule", "wrench noise", "thrusters", "fins", "control fins with rates", "cross-flow",
+    "hull loads", "body lift", "stratification",
 )  # fmt: skip

@@ -7,7 +7,9 @@ from lgvi_warp.physics import terms
 from lgvi_warp.reference.terms.control_fins import ControlFins
 from lgvi_warp.reference.terms.cross_flow import CrossFlow
 from lgvi_warp.reference.terms.fins import Fins
+from lgvi_warp.reference.terms.hull_loads import HullLoads
 from lgvi_warp.reference.terms.lift import BodyLift
+from lgvi_warp.reference.terms.waves import Waves
 from tests.laws.case import Case
 
 DENSITY = 1025.0
@@ -37,6 +39,8 @@ HULL = dict(
     diameters=(0.02, 0.15, 0.2, 0.2, 0.0),
     drag_coefficient=(1.0, 1.1, 1.2, 1.1, 0.9),
 )
+ADDED_MASS = (1.0, 12.0, 30.0, 28.0, 0.0)
+STEEP_WAVES = dict(amplitudes=(0.5, 0.4), periods=(4.0, 5.0), headings_deg=(20.0, 150.0), phases=(0.5, -0.9))
 LIFT = np.random.default_rng(5).normal(size=(6, 6)) * np.array([4.0, 4.0, 4.0, 0.5, 0.5, 0.5])
 
 
@@ -58,5 +62,12 @@ CASES = {
     "control fins with rates": steered(RATES),
     "control fins that lag": steered(RATES, time_constant=(0.1, 0.0, 0.3), **STALL),
     "cross-flow": Case((terms.CrossFlow(**HULL),), (CrossFlow(**arrays(HULL), density=DENSITY),)),
+    "hull loads": Case(
+        (terms.HullLoads(**HULL, added_mass=ADDED_MASS), terms.Waves(**STEEP_WAVES, name="swell")),
+        (
+            HullLoads(**arrays(HULL), added_mass=np.array(ADDED_MASS), density=DENSITY),
+            Waves(**arrays(STEEP_WAVES), gravity=9.8),
+        ),
+    ),
     "body lift": Case((terms.BodyLift(matrix=LIFT),), (BodyLift(matrix=LIFT),)),
 }

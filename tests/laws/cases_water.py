@@ -5,6 +5,7 @@ import numpy as np
 
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.terms.noisy import channel
+from lgvi_warp.reference.terms.current_field import CurrentField
 from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.reference.terms.stratification import Stratification
 from lgvi_warp.reference.terms.waves import Waves
@@ -40,7 +41,22 @@ def noisy(host, twin, numbers, name="", noise_step=None):
     return Case((term,), (twin(**arrays(numbers), channel=channel(term.key), noise_step=noise_step),), False)
 
 
+RNG = np.random.default_rng(8)
+FIELD = dict(velocities=0.3 * RNG.normal(size=(2, 3, 5, 4, 3, 3)), origin=(-8.0, -6.0, 0.0), spacing=(4.0, 4.0, 8.0),
+             times=(-0.2, 0.7), scenario=1.0)  # fmt: skip
+STILL_FIELD = FIELD | {"velocities": 0.3 * RNG.normal(size=(5, 4, 1, 3)), "times": None, "scenario": 0.0}
+
 CASES = {
+    "current field": Case((terms.CurrentField(**FIELD),), (CurrentField(**arrays(FIELD)),), False),
+    "current field that stays": Case(
+        (terms.CurrentField(**STILL_FIELD),),
+        (
+            CurrentField(
+                **arrays(STILL_FIELD | {"velocities": STILL_FIELD["velocities"][None, None], "times": (0.0, 1.0)})
+            ),
+        ),
+        False,
+    ),
     "current harmonics": case(terms.CurrentHarmonics, **HARMONICS),
     "waves": Case((terms.Waves(**WAVES),), (Waves(**arrays(WAVES), gravity=GRAVITY),)),
     "Gauss-Markov current": noisy(terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV),

@@ -100,7 +100,7 @@ def scaled(term, by):
     return numbers, replace(term, **numbers, **({"command": None} if "command" in term.parameters() else {}))
 
 
-FIXED = ("command", "polynomial", "polynomial_astern", "table_commands", "lift_angles")
+FIXED = ("scenario", "command", "polynomial", "polynomial_astern", "table_commands", "lift_angles")
 # Packed the same for one member as for many, to the bit.
 EXACT = ("current harmonics", "waves", "Gauss-Markov current", "wrench noise", "stratification")
 

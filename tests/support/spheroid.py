@@ -76,21 +76,30 @@ class Spheroid:
             gradient = gradient + k * (g * np.stack(slope, axis=1) + (dg * polynomial)[:, None] * grad_t)
         return phi, gradient
 
-    def force(self, v, dv, u, rate, strain, strain_rate):
-        """Force of the pressure [N] on the body that moves at v with acceleration dv and does not turn.
+    def force(self, *motion):
+        """Force of the pressure [N] on the body; motion: as of `pressure`."""
+        _, area = self.surface()
+        return -self.pressure(*motion) @ area
+
+    def moment(self, *motion):
+        """Moment of the pressure about the body's centre [N m]; motion: as of `pressure`."""
+        y, area = self.surface()
+        return -self.pressure(*motion) @ np.cross(y, area)
+
+    def pressure(self, v, dv, u, rate, strain, strain_rate):
+        """Pressure (k,) [Pa] on the surface of the body that moves at v with acceleration dv and does not turn.
 
         u, rate, strain, strain_rate: the water's velocity, du/dt, du/dx (symmetric, without trace) and d2u/dxdt at the
         body's centre.
         """
-        y, area = self.surface()
+        y, _ = self.surface()
         nu = v - u
         _, disturbed = self.disturbance(y, nu, strain)
         # The disturbance goes with the body: at a fixed place it changes by its motion, too.
         grown, _ = self.disturbance(y, dv - rate - strain @ v, strain_rate)
         change = y @ rate + 0.5 * np.einsum("ki,ij,kj->k", y, strain_rate, y) + grown - disturbed @ v
         velocity = u + y @ strain.T + disturbed
-        pressure = -DENSITY * (change + 0.5 * np.sum(velocity**2, axis=1))
-        return -pressure @ area
+        return -DENSITY * (change + 0.5 * np.sum(velocity**2, axis=1))
 
     def added_mass(self):
         """(3,) [kg] along the axes, by the same integral."""

@@ -6,15 +6,18 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, lane, mul, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, lane, mul, neg, ones, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.functions import cosine, sine
 from lgvi_kernels.lanes.packet import put
 from lgvi_kernels.lanes.state import damping_struct, flow_struct, view_struct, wrench_struct
 from lgvi_kernels.maps.bounded import bounded_law
-from lgvi_kernels.maps.compose import params_of, plays, superpose
+from lgvi_kernels.maps.compose import params_of, plays, superpose, superpose_loads
+from lgvi_kernels.maps.seeing import seeing_laws
 
 # Role of the law -> its columns of `out`, as (first, count); a role that the law does not have leaves zeros.
-COLUMNS = {"law": (0, 6), "damping": (6, 36), "push": (59, 6), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1)}
-OUT_FIELDS = 65
+COLUMNS = {"law": (0, 6), "damping": (6, 36), "push": (59, 6), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1),
+           "load": (65, 42)}  # fmt: skip
+OUT_FIELDS = 107
 
 
 class Examine(NamedTuple):
@@ -25,14 +28,31 @@ class Examine(NamedTuple):
     Params: Any
 
 
+@wp.func
+def swirl(f: Any, view: Any, sea: Any):
+    """Water for laws that look at it: it varies in all directions, and grows everywhere at once."""
+    half = view.h.dtype(0.5) * ones(view.b.x)
+    phase = half * view.b.x + ones(half) * view.b.y - (half * half) * view.b.z
+    u = vec3(half, -ones(half), half * half)
+    s = sine(phase) * u
+    f.velocity = f.velocity + cosine(phase) * u
+    f.rate = f.rate + half * u
+    f.by_north = f.by_north - half * s
+    f.by_east = f.by_east - s
+    f.by_depth = f.by_depth + (half * half) * s
+    return f
+
+
 @functools.cache
 def make_examine(module, numbers, width, real):
     """Build (without compiling) the kernel that evaluates this module's functions."""
     module = bounded_law(module, width, real)
+    (module,) = seeing_laws((module,), width, real, False, swirl)
     Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), (numbers,), width, real)
     Wrench, Damping, Flow = (make(width, real) for make in (wrench_struct, damping_struct, flow_struct))
     roles = ("law", "damping", "push", "flow", "evolve", "follow")
     law, damping, push, flow, evolve, follow = (superpose((module,), role) for role in roles)
+    load = superpose_loads((module,))
     distance, energy = plays(module, "distance"), superpose((module,), "energy")
 
     @wp.func
@@ -96,6 +116,14 @@ def make_examine(module, numbers, width, real):
                 w_push = push(Wrench(), view, p)
                 put(out, i, 59, w_push.force)
                 put(out, i, 62, w_push.torque)
+            if wp.static(load is not None):
+                D_load, w_load = load(Damping(), Wrench(), view, p)
+                put_rows(out, i, 65, D_load.force_velocity)
+                put_rows(out, i, 68, D_load.force_rate)
+                put_rows(out, i, 83, D_load.torque_velocity)
+                put_rows(out, i, 86, D_load.torque_rate)
+                put(out, i, 101, w_load.force)
+                put(out, i, 104, w_load.torque)
             if wp.static(flow is not None):
                 f = flow(Flow(), view, p)
                 put(out, i, 42, f.velocity)

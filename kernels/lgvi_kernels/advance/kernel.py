@@ -16,6 +16,7 @@ from lgvi_kernels.advance.spec import Types, make_types
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_kernels.lanes.subnormals import flush_subnormals, put_back
 from lgvi_kernels.maps.bounded import bounded_spec
+from lgvi_kernels.maps.seeing import seeing_spec
 
 
 class Advance(NamedTuple):
@@ -28,7 +29,7 @@ class Advance(NamedTuple):
 @functools.cache
 def make_advance(spec):
     """Build (without compiling) the kernel for this Spec."""
-    spec = bounded_spec(spec)
+    spec = seeing_spec(bounded_spec(spec))
     types, real = make_types(spec), spec.real
     Lane, Number, Ints, Monitor = types.Lane, types.Number, types.Ints, types.Monitor
     Constants, Inertia, Params, Events = types.Constants, types.Inertia, types.Params, types.Events

@@ -14,10 +14,10 @@ from lgvi_kernels.lanes.view import to_body
 from lgvi_kernels.laws import drag, drag_directions
 from lgvi_kernels.maps import turns
 from lgvi_kernels.maps.collocation import make_G
-from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.compose import superpose, superpose_loads
 from lgvi_kernels.maps.coupled import make_W
 from lgvi_kernels.maps.dense_inertia import make_dense_velocities
-from lgvi_kernels.maps.dissipation import make_V
+from lgvi_kernels.maps.dissipation import make_loaded_V, make_V
 from lgvi_kernels.maps.explicit import make_explicit
 from lgvi_kernels.maps.forces import make_forces
 from lgvi_kernels.maps.paper import make_phi
@@ -106,9 +106,9 @@ def make_velocities(velocity, turning, coupled):
     return velocities_of_state, velocities_of_forces
 
 
-def make_damping(damping, shear):
-    """D of the damping laws, and of water that varies in space. None if there is neither."""
-    if damping is None and shear is None:
+def make_damping(damping, shear, loads):
+    """D of the damping laws, and of water that varies in space. None if there is neither, nor loads, which have their own."""
+    if damping is None and shear is None and loads is None:
         return None
 
     @wp.func
@@ -120,6 +120,17 @@ def make_damping(damping, shear):
         return D
 
     return total
+
+
+def make_resistance(damping, loads, Wrench):
+    """D of all that resists: of damping laws, of water that varies, and of laws that look at the water."""
+
+    @wp.func
+    def resistance(D: Any, view: Any, water: Any, c: Any):
+        D, unused = loads(damping(D, view, water, c), Wrench(), view, c.params)
+        return D
+
+    return resistance
 
 
 def make_exact_drag(spec, velocities_of_forces):
@@ -179,7 +190,8 @@ def make_method(spec):
     shear, water_wrench = None, acceleration_wrench if varies else None
     if "shear" in spec.parts:
         shear, water_wrench = make_shear(matrix3_struct(width, real), lever, shifted), make_water_wrench(lever, shifted)
-    damping = make_damping(laws_damping, shear)
+    loads = superpose_loads(laws)
+    damping = make_damping(laws_damping, shear, loads)
     prepare, E = make_exact_drag(spec, velocities_of_forces)
 
     @wp.func
@@ -192,14 +204,20 @@ def make_method(spec):
 
     if spec.explicit is not None:
         wrenches = superpose(laws, "push"), superpose(laws, "matrix")
-        acting = (View, Wrench, Flow, Damping, law, *wrenches, damping, flow, water_wrench, shifted, velocities)
-        everything, _, _, slope = make_forces(*acting)
+        rest = superpose_loads(laws, without_push=True)
+        resistance = damping if loads is None else make_resistance(damping, loads, Wrench)
+        acting = (View, Wrench, Flow, Damping, law, *wrenches, resistance, flow, water_wrench, shifted, velocities)
+        everything, _, _, slope = make_forces(*acting, rest)
         step = make_explicit(spec, make_types(spec), everything, velocities, slope)
         momentum = in_body if spec.inertial else None
         return Step(step, step, velocities, prepare, water_velocity, velocities_of_forces, momentum)
     V = None
     if damping is not None and spec.averages is None:
-        V = make_V(damping, velocities_of_forces, Damping, factor_struct(width, real), coupled)
+        Factor = factor_struct(width, real)
+        if loads is None:
+            V = make_V(damping, velocities_of_forces, Damping, Factor, coupled)
+        else:
+            V = make_loaded_V(damping, loads, velocities_of_forces, Damping, Wrench, Factor, coupled)
     solve, solve_within = make_solve(real, spec.solver, spec.iterations, spec.adaptive, spec.checked, spec.tangents)
     used = {letter for letter, _ in spec.maps} | ({spec.lead[0]} if spec.lead else set())
     letters = {
@@ -239,7 +257,7 @@ def make_method(spec):
             shifted,
             velocities,
         )
-        _, forces, current, _ = make_forces(*acting)
+        _, forces, current, _ = make_forces(*acting, loads)
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)
         letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)

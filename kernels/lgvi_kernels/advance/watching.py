@@ -14,9 +14,9 @@ from lgvi_kernels.advance import monitor as monitors
 from lgvi_kernels.advance.spec import make_types
 from lgvi_kernels.advance.stepping import make_stepping
 from lgvi_kernels.lanes.arithmetic import add, any_positive, div, mul, neg, ones, positive, sub  # noqa: F401
-from lgvi_kernels.lanes.state import damping_struct
+from lgvi_kernels.lanes.state import damping_struct, wrench_struct
 from lgvi_kernels.laws import drag_directions
-from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.compose import superpose, superpose_loads
 
 
 class Watching(NamedTuple):
@@ -104,6 +104,21 @@ def make_watching(spec):
     return Watching(begin, note, energy_alarm)
 
 
+def make_resistance(damping, loads, Wrench):
+    """(D, view, params) -> D of damping laws, and of laws that look at the water; None where there are none."""
+    if loads is None:
+        return damping
+
+    @wp.func
+    def resistance(D: Any, view: Any, p: Any):
+        if wp.static(damping is not None):
+            D = damping(D, view, p)
+        D, unused = loads(D, Wrench(), view, p)
+        return D
+
+    return resistance
+
+
 def _looks(spec, method):
     """(look_at, energies, supplies, growth) of monitor.py; the step stands in for those that a Spec does not ask for."""
     width, real, laws = spec.lanes, spec.real, spec.laws
@@ -113,7 +128,7 @@ def _looks(spec, method):
     look_at, energies, supplies, growth = (method.step,) * 4
     if spec.warning_rows:
         rates = []
-        damping = superpose(laws, "damping")
+        damping = make_resistance(superpose(laws, "damping"), superpose_loads(laws), wrench_struct(width, real))
         if "drag" in spec.warning_rows and spec.drag:
             rates.append(monitors.make_drag_rate(directions, spec.drag, of_forces, 2.0))
         if "drag" in spec.warning_rows and damping is not None:

@@ -69,6 +69,14 @@ def gather(width, real, shared):
     return f"{kind} r = {kind}(); {begin} for (int j = 0; j < {width}; ++j) {{ {each} }} return r;"
 
 
+def gather_any(width, real, shared):
+    """C++ that reads, for each lane, the row of its own index, which the caller knows to be there."""
+    kind, number = f"wp::vec_t<{width}, wp::{real.__name__}>", f"wp::{real.__name__}"
+    value = "from[index[j]]" if shared else "from[index[j]][j]"
+    place = f"(({number if shared else kind}*)rows.data) + ((wp::int64)entry * rows.shape[1] + row + offset)"
+    return f"{kind} r; const auto* from = {place}; for (int j = 0; j < {width}; ++j) r[j] = {value}; return r;"
+
+
 def whole(width, real):
     """C++ of the whole numbers at or below those of a lane; what is no number, or beyond int32, becomes an end of int32."""
     floor = "__builtin_floorf" if real == wp.float32 else "__builtin_floor"

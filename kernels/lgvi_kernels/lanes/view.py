@@ -40,6 +40,18 @@ def to_inertial(view: Any, v: Any):
 
 
 @wp.func
+def slope_along(water: Any, v: Any):
+    """G v: how fast the water's velocity changes along v, inertial axes."""
+    return v.x * water.by_north + v.y * water.by_east + v.z * water.by_depth
+
+
+@wp.func
+def slope_against(water: Any, v: Any):
+    """G^T v: how the water's velocity along v changes, inertial axes."""
+    return vec3(dot(water.by_north, v), dot(water.by_east, v), dot(water.by_depth, v))
+
+
+@wp.func
 def velocity_at(view: Any, r: Any):
     """nu + Om x r: the velocity of the body's point r through the water, body axes [m/s]."""
     return view.nu + cross(view.Om, r)
@@ -221,6 +233,19 @@ def add_outer(D: Any, force: Any, torque: Any, velocity: Any, rate: Any):
     D.torque_velocity = add_rows(D.torque_velocity, torque, velocity)
     D.torque_rate = add_rows(D.torque_rate, torque, rate)
     return D
+
+
+@wp.func
+def add_drag_at(D: Any, s: Any, r: Any):
+    """D plus the resistance s [N s/m] to the velocity of the body's point r, whatever its direction."""
+    unity = ones(s)
+    zero = unity - unity
+    x = vec3(unity, zero, zero)
+    y = vec3(zero, unity, zero)
+    z = vec3(zero, zero, unity)
+    D = add_outer(D, s * x, s * cross(r, x), x, cross(r, x))
+    D = add_outer(D, s * y, s * cross(r, y), y, cross(r, y))
+    return add_outer(D, s * z, s * cross(r, z), z, cross(r, z))
 
 
 @wp.func

@@ -34,6 +34,8 @@ def written_here(law):
 class BoundedLaw:
     """A law, or an event, whose functions get a View that holds them to their own rows; all else is the law's own."""
 
+    BOUNDED = True
+
     def __init__(self, law, bounded):
         self.device = law
         roles = {role: _held(getattr(law, role), bounded) for role in ROLES if hasattr(law, role)}
@@ -48,7 +50,7 @@ class BoundedLaw:
 @functools.cache
 def bounded_law(law, width, real, shared=False):
     """The law itself if it was written here; else a law that does the same within its own rows."""
-    return law if written_here(law) else BoundedLaw(law, _make_bounded(width, real, shared))
+    return law if written_here(law) else BoundedLaw(law, make_bounded(width, real, shared))
 
 
 def bounded_spec(spec):
@@ -63,7 +65,7 @@ def bounds_struct():
 
 
 @functools.cache
-def _make_bounded(width, real, shared):
+def make_bounded(width, real, shared):
     """(view, bounds) -> the same View, with the rows within these bounds alone."""
     Bounded = view_struct(width, real, shared, True)
 
@@ -92,6 +94,31 @@ def _make_bounded(width, real, shared):
         return own
 
     return bounded
+
+
+def make_unbounded(View):
+    """A View within bounds -> the View that it was made of, as laws that move the water read it."""
+
+    @wp.func
+    def unbounded(own: Any):
+        view = View()
+        view.north = own.north
+        view.east = own.east
+        view.down = own.down
+        view.b = own.b
+        view.nu = own.nu
+        view.Om = own.Om
+        view.t = own.t
+        view.h = own.h
+        view.step = own.step
+        view.second = own.second
+        view.packet = own.packet
+        view.entry = own.entry
+        view.table = own.table.rows
+        view.memory = own.memory.rows
+        return view
+
+    return unbounded
 
 
 def _held(role, bounded):

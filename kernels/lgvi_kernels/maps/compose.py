@@ -10,7 +10,7 @@ from lgvi_kernels.lanes.arithmetic import lane, lane3
 from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.tick import delayed_key, held_key
-from lgvi_kernels.maps.bounded import BoundedLaw, bounds_struct
+from lgvi_kernels.maps.bounded import bounds_struct
 
 
 def plays(law, role):
@@ -68,7 +68,7 @@ def params_of(laws, numbers, width, real):
         own = make(width, real, *(field_type(kind, width, real) for _, kind in numbers[0]))
     else:
         own = numbers_struct(laws[0], numbers[0], width, real)
-    if isinstance(laws[0], BoundedLaw):
+    if getattr(laws[0], "BOUNDED", False):
         own = struct("BoundedParams", own=own, bounds=bounds_struct())
     return struct("Params", own=own, rest=params_of(laws[1:], numbers[1:], width, real))
 
@@ -81,6 +81,8 @@ def superpose(laws, role):
     """
     if not any(plays(law, role) for law in laws):
         return None
+    if any(getattr(law, "SEES", False) and hasattr(law, role) for law in laws):
+        return _handing_on(_superpose_seeing(laws, role))
     function, rest = plays(laws[0], role), superpose(laws[1:], role)
     if function is None:
 
@@ -100,5 +102,72 @@ def superpose(laws, role):
     @wp.func
     def total(w: Any, view: Any, p: Any):
         return function(rest(w, view, p.rest), view, p.own)
+
+    return total
+
+
+def _handing_on(nested):
+    """(sum, view, params) -> sum of laws of which some look at the water, for which they also get the params of all laws."""
+
+    @wp.func
+    def handing_on(w: Any, view: Any, p: Any):
+        return nested(w, view, p, p)
+
+    return handing_on
+
+
+def _superpose_seeing(laws, role):
+    """As superpose, (sum, view, params, params of all laws) -> sum."""
+    if not any(plays(law, role) for law in laws):
+        return None
+    function, rest = plays(laws[0], role), _superpose_seeing(laws[1:], role)
+    seeing = getattr(laws[0], "SEES", False) and hasattr(laws[0], role)
+
+    @wp.func
+    def total(w: Any, view: Any, p: Any, sea: Any):
+        if wp.static(rest is not None):
+            w = rest(w, view, p.rest, sea)
+        if wp.static(function is not None and seeing):
+            w = function(w, view, p.own, sea)
+        if wp.static(function is not None and not seeing):
+            w = function(w, view, p.own)
+        return w
+
+    return total
+
+
+@functools.cache
+def superpose_loads(laws, without_push=False):
+    """Fold the loads of laws that look at the water, (D, w, view, params) -> (D, w). None if there are none.
+
+    without_push: only those of laws that have no `push`.
+    """
+    nested = _superpose_loads(laws, without_push)
+    if nested is None:
+        return None
+
+    @wp.func
+    def loads(D: Any, w: Any, view: Any, p: Any):
+        D, w = nested(D, w, view, p, p)
+        return D, w
+
+    return loads
+
+
+def _superpose_loads(laws, without_push):
+    if not laws:
+        return None
+    rest, load = _superpose_loads(laws[1:], without_push), getattr(laws[0], "load", None)
+    load = None if without_push and hasattr(laws[0], "push") else load
+    if rest is None and load is None:
+        return None
+
+    @wp.func
+    def total(D: Any, w: Any, view: Any, p: Any, sea: Any):
+        if wp.static(rest is not None):
+            D, w = rest(D, w, view, p.rest, sea)
+        if wp.static(load is not None):
+            D, w = load(D, w, view, p.own, sea)
+        return D, w
 
     return total

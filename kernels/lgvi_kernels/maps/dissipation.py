@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""V: laws of the form (force; torque) = -D(nu) (nu; Om), advanced by a linearly implicit step of order 2.
+"""V: laws of the form (force; torque) = w - D(nu) (nu; Om), advanced by a linearly implicit step of order 2.
 
 D is frozen at a velocity predicted for the middle of the step; with D frozen, two stages of the L-stable scheme with
 gamma = 1 - 1/sqrt(2) (Alexander 1977) solve I6 nu' = -D nu. Stiff drag decays, whatever the step; for D + D^T >= 0 the
@@ -76,5 +76,45 @@ def make_V(damping, velocities, Damping, Factor, coupled):
         nu_2, Om_2 = solve6(factor, x.p, x.pi)
         x = pushed(x, -gamma * damped_force(D, nu_2, Om_2))
         return twisted(x, -gamma * damped_torque(D, nu_2, Om_2))
+
+    return V
+
+
+def make_loaded_V(damping, loads, velocities, Damping, Wrench, Factor, coupled):
+    """The step with these damping laws and the loads (D, w) of laws that look at the water: I6 nu' = w - D nu."""
+    implicit = make_implicit(Damping, Factor, coupled)
+
+    @wp.func
+    def resistance(view: Any, water: Any, c: Any):
+        """D of all that resists, and w."""
+        D, w = loads(damping(Damping(), view, water, c), Wrench(), view, c.params)
+        return D, w
+
+    @wp.func
+    def damped(x: Any, D: Any, w: Any, nu: Any, Om: Any, h: Any):
+        """The momenta after h of the force and torque w - D (nu; Om)."""
+        x = pushed(x, h * (w.force - damped_force(D, nu, Om)))
+        return twisted(x, h * (w.torque - damped_torque(D, nu, Om)))
+
+    @wp.func
+    def V(x: Any, view: Any, water: Any, c: Any, h: Any):
+        """As V of make_V, with w frozen where D is: what is steady in the end is found, however strong D is."""
+        scaled = h * c.inertia.inverse_scale
+        half = h.dtype(0.5) * scaled
+        nu, Om = velocities(c.inertia, x.p, x.pi)
+        view.nu = nu
+        view.Om = Om
+        D_start, w_start = resistance(view, water, c)
+        predictor = implicit(D_start, c.inertia, half)
+        nu_half, Om_half = solve6(predictor, x.p + half * w_start.force, x.pi + half * w_start.torque)
+        view.nu = nu_half
+        view.Om = Om_half
+        D, w = resistance(view, water, c)
+        gamma = h.dtype(wp.static(GAMMA)) * scaled
+        factor = implicit(D, c.inertia, gamma)
+        nu_1, Om_1 = solve6(factor, x.p + gamma * w.force, x.pi + gamma * w.torque)
+        x = damped(x, D, w, nu_1, Om_1, scaled - gamma)
+        nu_2, Om_2 = solve6(factor, x.p + gamma * w.force, x.pi + gamma * w.torque)
+        return damped(x, D, w, nu_2, Om_2, gamma)
 
     return V

@@ -11,11 +11,14 @@ from lgvi_kernels.maps.dissipation import damped_force, damped_torque
 from lgvi_kernels.maps.submaps import look, make_at_user_origin
 
 
-def make_forces(View, Wrench, Flow, Damping, force, push, matrix, damping, flow, water_wrench, shifted, velocities):
+def make_forces(
+    View, Wrench, Flow, Damping, force, push, matrix, damping, flow, water_wrench, shifted, velocities, loads
+):
     """(everything, forces, current, slope) of these laws; an argument is None where a scene has no such law (see make_K).
 
     push: the wrench of damping laws that give it; matrix: the damping of the others; damping: that of all laws, and of water
-    that varies in space, which is in `water_wrench` as well.
+    that varies in space, which is in `water_wrench` as well; loads: of laws that look at the water (see seeing.py), those that
+    are not in `push`.
     """
     at_user_origin = make_at_user_origin(shifted)
 
@@ -43,6 +46,10 @@ def make_forces(View, Wrench, Flow, Damping, force, push, matrix, damping, flow,
             D = matrix(Damping(), view, c.params)
             w.force = w.force - damped_force(D, nu, Om)
             w.torque = w.torque - damped_torque(D, nu, Om)
+        if wp.static(loads is not None):
+            D_loads, w = loads(Damping(), w, view, c.params)
+            w.force = w.force - damped_force(D_loads, nu, Om)
+            w.torque = w.torque - damped_torque(D_loads, nu, Om)
         return w, water.velocity
 
     @wp.func

@@ -19,25 +19,13 @@ import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import add, cross, dot, mul, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.matrix3 import apply, combine, plus, product, transposed
-from lgvi_kernels.lanes.view import to_body, to_inertial
-
-
-@wp.func
-def along(water: Any, v: Any):
-    """G v: how fast the water's velocity changes along v, inertial axes."""
-    return v.x * water.by_north + v.y * water.by_east + v.z * water.by_depth
-
-
-@wp.func
-def against(water: Any, v: Any):
-    """G^T v: how the water's velocity along v changes, inertial axes."""
-    return vec3(dot(water.by_north, v), dot(water.by_east, v), dot(water.by_depth, v))
+from lgvi_kernels.lanes.view import slope_against, slope_along, to_body, to_inertial
 
 
 @wp.func
 def acceleration_wrench(w: Any, view: Any, inertia: Any, water: Any):
     """(rho V - m) R^T Du/Dt at the centres of buoyancy and of gravity."""
-    a = to_body(view, water.rate + along(water, water.velocity))
+    a = to_body(view, water.rate + slope_along(water, water.velocity))
     w.force = w.force + inertia.excess * a
     w.torque = w.torque + cross(inertia.excess_lever, a)
     return w
@@ -46,9 +34,9 @@ def acceleration_wrench(w: Any, view: Any, inertia: Any, water: Any):
 @wp.func
 def slopes_in_body(m: Any, view: Any, water: Any):
     """X^T of X = R^T G R, written into m: row j is R^T G (R e_j)."""
-    m.row0 = to_body(view, along(water, vec3(view.north.x, view.east.x, view.down.x)))
-    m.row1 = to_body(view, along(water, vec3(view.north.y, view.east.y, view.down.y)))
-    m.row2 = to_body(view, along(water, vec3(view.north.z, view.east.z, view.down.z)))
+    m.row0 = to_body(view, slope_along(water, vec3(view.north.x, view.east.x, view.down.x)))
+    m.row1 = to_body(view, slope_along(water, vec3(view.north.y, view.east.y, view.down.y)))
+    m.row2 = to_body(view, slope_along(water, vec3(view.north.z, view.east.z, view.down.z)))
     return m
 
 
@@ -86,11 +74,11 @@ def make_water_wrench(lever, shifted):
         nu = view.nu
         if wp.static(shifted):
             nu = nu + cross(view.Om, inertia.user_origin_forces)
-        carried = to_body(view, along(water, to_inertial(view, nu)))
+        carried = to_body(view, slope_along(water, to_inertial(view, nu)))
         momentum = inertia.added * nu
         if wp.static(lever):
             momentum = momentum + apply(inertia.added_coupling, view.Om)
-        force = inertia.dry * carried + to_body(view, against(water, to_inertial(view, momentum)))
+        force = inertia.dry * carried + to_body(view, slope_against(water, to_inertial(view, momentum)))
         w.force = w.force - force
         if wp.static(lever):
             w.torque = w.torque - cross(inertia.dry_lever, carried)

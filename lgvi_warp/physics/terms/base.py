@@ -362,7 +362,9 @@ class Term:
         """
         device = self.device
         follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential
-        more = self.timed or self.memory or any(hasattr(device, role) for role in ("damping", "flow", "evolve"))
+        more = (
+            self.timed or self.memory or any(hasattr(device, role) for role in ("damping", "flow", "evolve", "seeing"))
+        )
         return frozenset({"energy"} if follows and not more else ())
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:

@@ -52,18 +52,7 @@ class CrossFlow(Term):
         return bool(np.any(numbers["diameters"]) and np.any(numbers["drag_coefficient"]))
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        # The derivative across the hull, strip by strip, at the whole speed and all rates together.
-        strength = numbers["drag_coefficient"] * numbers["diameters"]
-        stations, breadth = (0.5 * (table[:, 1:] + table[:, :-1]) for table in (numbers["stations"], strength))
-        size = water_density[:, None] * breadth * np.diff(numbers["stations"])
-        motion, turning = (np.linalg.norm(speeds[:, half], axis=1)[:, None] for half in (slice(0, 3), slice(3, 6)))
-        size = size * (motion + turning * np.abs(stations))
-        arms = stations[..., None] * np.array([1.0, 0.0, 0.0])
-        total = np.zeros((len(size), 6, 6))
-        for across in ACROSS:
-            rows = np.concatenate([np.broadcast_to(across, arms.shape), np.cross(arms, across)], axis=-1)
-            total = total + np.einsum("nk,nki,nkj->nij", size, np.broadcast_to(rows, (*size.shape, 6)), rows)
-        return total
+        return strip_braking(numbers, speeds, water_density)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The two directions across the hull, and two strips per segment: station, and rho/2 Cd D times its length.
@@ -78,3 +67,19 @@ class CrossFlow(Term):
             strips.append(side_by_side(x[..., None], (half_density * half_length * c)[..., None]))
         rows = side_by_side(*strips)
         return Packed(values | {"count": 2 * half_length.shape[1]}, rows.reshape(len(rows), -1))
+
+
+def strip_braking(numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
+    """How strongly cross-flow drag brakes, as `Term.braking`."""
+    # The derivative across the hull, strip by strip, at the whole speed and all rates together.
+    strength = numbers["drag_coefficient"] * numbers["diameters"]
+    stations, breadth = (0.5 * (table[:, 1:] + table[:, :-1]) for table in (numbers["stations"], strength))
+    size = water_density[:, None] * breadth * np.diff(numbers["stations"])
+    motion, turning = (np.linalg.norm(speeds[:, half], axis=1)[:, None] for half in (slice(0, 3), slice(3, 6)))
+    size = size * (motion + turning * np.abs(stations))
+    arms = stations[..., None] * np.array([1.0, 0.0, 0.0])
+    total = np.zeros((len(size), 6, 6))
+    for across in ACROSS:
+        rows = np.concatenate([np.broadcast_to(across, arms.shape), np.cross(arms, across)], axis=-1)
+        total = total + np.einsum("nk,nki,nkj->nij", size, np.broadcast_to(rows, (*size.shape, 6)), rows)
+    return total

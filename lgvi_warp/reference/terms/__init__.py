@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Laws of one vehicle, in the user's body axes and about his origin: numbers and the methods of `Law`."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,6 +47,8 @@ class Flow:
         return Flow(self.velocity + other.velocity, self.rate + other.rate, self.gradient + other.gradient)
 
 
+# The water at a point (3,) [m] of the body, body axes.
+WaterAt = Callable[[Array], Flow]
 STILL = Flow(np.zeros(3), np.zeros(3), np.zeros((3, 3)))
 
 
@@ -72,6 +75,10 @@ class Law:
     def flow(self, view: View) -> Flow:
         """How the water moves at view.b."""
         return STILL
+
+    def load(self, view: View, water_at: WaterAt) -> tuple[Array, Array]:
+        """D (6, 6) and w (6,) with (force; torque) = w - D (nu; Om), of a law that looks at the water."""
+        return np.zeros((6, 6)), np.zeros(6)
 
     def potential(self, view: View) -> float:
         """Potential energy U(b, R) [J]; 0 by default."""

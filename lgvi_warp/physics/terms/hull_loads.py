@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What water that varies along a slender hull does to it, by strips."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.cross_flow import ACROSS, GAUSS, strip_braking
+from lgvi_warp.physics.terms.fins import twist
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HullLoads(Term):
+    """Loads on a slender hull in water that varies along it, as waves do, by strips (Lighthill 1960; Newman 1977, 7.4).
+
+    The vehicle's added mass and the water at its origin make the loads of water that is the same all along the hull. This term
+    adds what differs at each station: the pressure of the undisturbed water, the momentum of the water that the strip sets in
+    motion, and cross-flow drag at the flow there. It takes the place of `CrossFlow`: give one of them.
+
+    Args:
+        stations: Places along the body's x axis, (k,) [m], rising; two or more, from stern to bow.
+        diameters: Breadth D of the hull across the flow, (k,) [m], linear between stations.
+        added_mass: Added mass across the hull per length, (k,) [kg/m], linear between stations; by default that of a
+            slender round hull, rho pi D^2 / 4.
+        drag_coefficient: Drag coefficient Cd, (k,), or one number for all stations; 0 by default.
+
+    Raises:
+        SceneError: Where stations do not rise or are fewer than two, and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> hull = lw.terms.HullLoads(stations=[-0.8, 0.0, 0.8], diameters=[0.0, 0.2, 0.0])
+        >>> hull.drag_coefficient.tolist()
+        [0.0, 0.0, 0.0]
+    """
+
+    type: ClassVar[str] = "hull_loads"
+    dissipative: ClassVar[bool] = False
+    braking_grows_with: ClassVar[tuple[str, ...]] = ("drag_coefficient", "diameters")
+
+    stations: Any = number(("k",), "m", rising=True)
+    diameters: Any = number(("k",), "m", least=0.0)
+    added_mass: Any = number(("k",), "kg/m", None, least=0.0, optional=True)
+    drag_coefficient: Any = number(("k",), "1", 0.0, least=0.0)
+
+    def __post_init__(self) -> None:
+        self.repeat(rows_of(self.stations), "drag_coefficient")
+        super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        if len(self.stations) < 2:
+            faults.add("stations", self.stations, "has one station", "give two or more, from stern to bow")
+
+    def present(self, numbers: Numbers) -> bool:
+        # Whether some member has a hull.
+        return bool(np.any(numbers["diameters"]) or np.any(numbers.get("added_mass", 0.0)))
+
+    def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
+        return strip_braking(numbers, speeds, water_density)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        frame, origin = context.frame, np.zeros((1, 3))
+        a, b = (twist(frame, origin, direction) for direction in ACROSS)
+        values: dict[str, Any] = {"a": a[:, :3], "a_arm": a[:, 3:], "b": b[:, :3], "b_arm": b[:, 3:]}
+        values |= {"axis": frame.vector(np.array([[1.0, 0.0, 0.0]])), "origin": frame.point(origin)}
+        density = context.parameters["environment.water_density"][:, None]
+        x, D, Cd = (numbers[name] for name in ("stations", "diameters", "drag_coefficient"))
+        half = 0.5 * np.diff(x)
+        slope = np.diff(D) / np.diff(x)
+        strips = []
+        for place in GAUSS:
+            at, breadth, c = (table[:, :-1] + place * np.diff(table) for table in (x, D, Cd * D))
+            area = 0.25 * np.pi * breadth**2
+            added = density * area
+            if "added_mass" in numbers:
+                added = numbers["added_mass"][:, :-1] + place * np.diff(numbers["added_mass"])
+            # Integral of z^2 over a round section is S^2 / (4 pi): its slope, for the moment of the pressure along the axis.
+            tilting = density * area * 0.25 * breadth * slope
+            rows = (at, half * 0.5 * density * c, half * density * area, half * tilting, half * added)
+            strips.append(side_by_side(*(row[..., None] for row in rows)))
+        table = side_by_side(*strips)
+        return Packed(values | {"count": 2 * half.shape[1]}, table.reshape(len(table), -1))

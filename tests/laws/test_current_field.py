@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Currents on a grid: exact where they are linear, a closed circle in an eddy, scenarios, times, the ends, and bad input."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import lgvi_warp as lw
+from tests.support.tools import GRAVITY, last, one
+
+# Neutral, and as heavy as the water that it displaces: it goes with the water if it begins so.
+DRIFTER = lw.Vehicle(10.0, inertia=(1.0, 1.2, 1.3), added_mass=(4.0, 5.0, 6.0), buoyancy=10.0 * GRAVITY,
+                     center_of_buoyancy=(0.0, 0.0, 0.0))  # fmt: skip
+NODES = [np.linspace(-60.0, 60.0, 13), np.linspace(-60.0, 60.0, 7), np.linspace(0.0, 40.0, 5)]
+SPACING = [x[1] - x[0] for x in NODES]
+ORIGIN = [x[0] for x in NODES]
+
+
+def field_of(u, **more):
+    """A field from a function of north, east and depth."""
+    places = np.meshgrid(*NODES, indexing="ij")
+    values = np.stack([np.broadcast_to(x, places[0].shape) for x in u(*places)], axis=-1)
+    return lw.terms.CurrentField(velocities=values, origin=ORIGIN, spacing=SPACING, **more)
+
+
+def scene(*terms):
+    return lw.Scene(DRIFTER, lw.Environment(GRAVITY), terms=list(terms))
+
+
+TURN = 2.0 * np.pi / 200.0
+
+
+@pytest.mark.parametrize(("method", "h", "allowed"), [("rk8", 1.0, 1e-8), ("psi_s", 0.5, 2e-3)])
+def test_what_drifts_in_an_eddy_comes_back(method, h, allowed):
+    # psi_s takes the water half way: its circle opens by (turn h)^4 / 8 of the radius a step, and lags by (turn h)^2 / 6.
+    eddy = field_of(lambda x, y, z: (-TURN * y, TURN * x, 0.0 * z))
+    start = np.array([30.0, 5.0, 11.0])
+    fleet = one(scene(eddy), b=start, nu=(-TURN * start[1], TURN * start[0], 0.0))
+    turns = 100 if method == "rk8" else 1
+    b, *_ = last(lw.solve(fleet, method, h=h, t1=turns * 200.0))
+    assert np.abs(b - start).max() < allowed * 30.0
+
+
+def test_a_trilinear_current_in_time_is_exact():
+    # A drifter goes as a particle does: through cells, by SciPy, in a current that is linear in each number and in time.
+    def u(x, y, z, t):
+        grow = 1.0 + 0.004 * t
+        return np.array([0.2 + 0.01 * y, 0.1 - 0.002 * x * y / 60.0, 0.001 * z + 0.0005 * x]) * grow
+
+    places = np.meshgrid(*NODES, indexing="ij")
+    values = np.stack([np.stack(u(*places, t), axis=-1) for t in (0.0, 50.0, 100.0)])
+    field = lw.terms.CurrentField(velocities=values, origin=ORIGIN, spacing=SPACING, times=[0.0, 50.0])
+    start = np.array([-20.0, 10.0, 12.0])
+    b, *_ = last(lw.solve(one(scene(field), b=start, nu=u(*start, 0.0)), "rk8", h=0.5, t1=100.0))
+    path = solve_ivp(lambda t, b: u(*b, t), (0.0, 100.0), start, method="DOP853", rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(b, path.y[:, -1], atol=1e-9)
+    result = lw.solve(one(scene(field), b=start), "rk8", h=0.5, t1=100.0)
+    known = field.water({"velocities": field.velocities[None], "scenario": np.zeros(1), "times": field.times[None],
+                         "origin": field.origin[None], "spacing": field.spacing[None]},
+                        result.position[-1:], np.array([100.0]), {})  # fmt: skip
+    np.testing.assert_allclose(known[0, 0], u(*result.position[-1, 0], 100.0), rtol=1e-12)
+
+
+def test_outside_the_grid_and_its_times_the_nearest_holds():
+    field = lw.terms.CurrentField(
+        velocities=np.array([0.1, 0.3])[:, None, None, None, None] * np.ones((1, 1, 1, 1, 3)),
+        spacing=[1.0, 1.0, 1.0], times=[10.0, 5.0],
+    )  # fmt: skip
+    result = lw.solve(one(scene(field), b=(500.0, -500.0, 900.0), nu=(0.1, 0.1, 0.1)), "rk8", h=0.5, t1=30.0)
+    # (rho V + A) dv/dt = (rho V + A) du/dt: it goes with the water, whose speed grows between the two times alone.
+    expected = 0.1 * 10.0 + 0.5 * (0.1 + 0.3) * 5.0 + 0.3 * 15.0
+    np.testing.assert_allclose(result.position[-1, 0] - [500.0, -500.0, 900.0], expected, rtol=1e-9)
+
+
+def test_scenarios_are_members_of_a_forecast():
+    steady = np.array([[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, -0.3]])
+    field = lw.terms.CurrentField(velocities=steady[:, None, None, None], spacing=[1.0, 1.0, 1.0])
+    assert field.velocities.shape == (3, 1, 1, 1, 1, 3)
+    each = {"current_field.scenario": np.arange(3.0)}
+    still = np.zeros((3, 3))
+    fleet = lw.Ensemble.from_states(scene(field), still, np.tile(np.eye(3), (3, 1, 1)), steady, still, each)
+    result = lw.solve(fleet, h=0.1, t1=5.0)
+    np.testing.assert_allclose(result.position[-1], 5.0 * steady, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"velocities": np.zeros((3, 3))}, "has shape"),
+        ({"velocities": np.zeros((2, 3, 4, 5, 2))}, "has shape"),
+        ({"velocities": np.zeros((1, 2, 3, 3, 3, 3))}, "times = None: is missing for 2 fields"),
+        ({"times": [0.0, 0.0], "velocities": np.zeros((2, 3, 3, 3, 3))}, "has no time between two fields"),
+        ({"scenario": 1.0}, "scenario = 1.0: is none of 1"),
+        ({"spacing": [1.0, 0.0, 1.0]}, "spacing"),
+    ],
+)
+def test_bad_input(wrong, words):
+    with pytest.raises(lw.SceneError, match=words):
+        lw.terms.CurrentField(**{"velocities": np.zeros((3, 3, 3, 3)), "spacing": [1.0, 1.0, 1.0]} | wrong)
+
+
+def test_a_member_of_a_scenario_that_is_not_there_is_refused():
+    field = lw.terms.CurrentField(velocities=np.ones((2, 1, 1, 1, 1, 3)), spacing=[1.0, 1.0, 1.0])
+    with pytest.raises(lw.SceneError, match=r"current_field.scenario of member 0 = 2.0"):
+        lw.Ensemble(scene(field), 2, 0, {"current_field.scenario": lw.distributions.Choice([2.0])})

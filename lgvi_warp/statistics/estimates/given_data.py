@@ -12,6 +12,8 @@ import numpy as np
 FEWEST_BINS, MOST_BINS = 4, 64
 # From so many members a bin on, each bin has a line.
 FOR_LINES = 10
+# A noncentrality whose spread, 2 over its root, is none beside that of the remainders; SciPy's distribution ends at 1e10.
+LARGE = 1e8
 # A part of a variance that is round-off.
 NOTHING = 1e-20
 
@@ -118,7 +120,12 @@ def _bins(x: np.ndarray) -> np.ndarray:
 def _shift(level: float, ratio: float, free: tuple[int, int]) -> float:
     """The noncentrality for which an F ratio is at this level of its distribution; 0 where there is none."""
     from scipy.optimize import brentq
+    from scipy.special import chdtri
     from scipy.stats import ncf
+
+    if ratio * free[0] > LARGE:
+        # What is explained is then known beside what is not: a ratio of it and a chi-square number.
+        return max(ratio * free[0] * float(chdtri(free[1], level)) / free[1] - free[0], 0.0)
 
     def above(shift: float) -> float:
         return float(ncf.cdf(ratio, *free, shift)) - level

@@ -84,3 +84,14 @@ def test_what_an_input_explains_alone_is_all():
     x = np.random.default_rng(7).normal(size=500)
     found = explained({"x": x}, 3.0 * x + 1e6, 0.95)["x"]
     assert (found.share, found.upper) == (pytest.approx(1.0), 1.0)
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-5, 1e-7, 1e-9])
+def test_what_explains_all_but_a_trace_has_an_interval(noise):
+    """The part that is left is known to its own chance, however small it is beside what is explained."""
+    x, rest = np.random.default_rng(4).normal(size=(2, 500))
+    found = explained({"x": x}, x + noise * rest, 0.95)["x"]
+    left = noise**2 / (1.0 + noise**2)
+    assert found.upper >= 1.0 - left - 1e-15
+    assert 1.0 - found.lower == pytest.approx(left, rel=1.0)
+    assert found.lower <= found.share <= found.upper

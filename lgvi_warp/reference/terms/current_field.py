@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A current on a grid of north, east, depth and time."""
 
-import itertools
-
 import numpy as np
 
 from lgvi_warp.reference.rotation import Array
@@ -23,7 +21,7 @@ class CurrentField(Law):
         cell = np.clip(np.floor(held).astype(int), 0, np.maximum(last - 1, 0))
         part = held - cell
         velocity, slopes = np.zeros(3), np.zeros((3, 4))
-        for corner in itertools.product((0, 1), repeat=4):
+        for corner in np.ndindex(2, 2, 2, 2):
             at, c = np.minimum(cell + corner, last), np.array(corner)
             near = np.where(c == 1, part, 1.0 - part)
             value = field[tuple(at)]

@@ -75,6 +75,20 @@ def test_a_fixed_step_has_its_bias_told():
     assert found.value - truth - 0.02 <= found.bias_interval[1]
 
 
+@pytest.mark.parametrize("where", ["argument", "scene"])
+def test_a_step_longer_than_the_run_has_its_bias_told(where):
+    """A step of 50 s is made as one of 20 s, and half of it too: the bias is told by half of what is made."""
+    scene = closed.sphere()
+    if where == "scene":
+        scene = lw.Scene.from_dict(scene.to_dict() | {"run": {"step": 50.0, "method": closed.METHOD}})
+    fleet = lw.Ensemble(scene, 64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+    error, h = (0.1, 50.0) if where == "argument" else (1.0, None)
+    found = lw.estimate(fleet, "mean position[2]", error, h=h, **RUN)
+    assert found.settings["h"] == closed.TIME
+    assert abs(found.bias) > 0.1
+    assert found.interval[0] <= 400.0 + closed.fall() <= found.interval[1]
+
+
 @pytest.mark.parametrize("h", [None, 0.125])
 def test_single_precision_has_its_bias_told(h):
     """At 1e6 m positions are multiples of 1/16 m: steps of 0.125 s lose what they move by, at any step of that precision."""

@@ -145,7 +145,7 @@ def estimate(
     coarse = [coarse_of(spacing, i, ladders[0][0]) for i, spacing in enumerate(steps) if i]
     content = {"scene": whole.scene.to_dict(), "ensemble": whole.to_dict(), "seed": seed, "t1": float(t1)}
     content |= {"versions": machine.versions(), "machine": machine.describe()}
-    own = own_setting(whole.scene, ladders)
+    own = own_setting(whole, float(t1), ladders)
     report = callback(progress) or void
     try:
         return answering.answered(pilot, ladders, coarse, h is not None, own, report, content)
@@ -154,12 +154,18 @@ def estimate(
         raise KeyboardInterrupt(text) from stop
 
 
-def own_setting(scene: Any, ladders: Sequence[Sequence[Setting]]) -> Setting | None:
-    """The scene's own step with its own method, or the first one's; None where the scene has none."""
-    if scene.run.step is None:
+def own_setting(fleet: Ensemble, t1: float, ladders: Sequence[Sequence[Setting]]) -> Setting | None:
+    """The scene's own step, as it is made, with its own method, or the first one's; None where the scene has none."""
+    run = fleet.scene.run
+    if run.step is None:
         return None
-    named = [steps[0] for steps in ladders if steps[0].method == scene.run.method]
-    return replace((named or [ladders[0][0]])[0], h=scene.run.step)
+    named = [steps[0] for steps in ladders if steps[0].method == run.method]
+    like = (named or [ladders[0][0]])[0]
+    try:
+        step = make_plan(fleet, like.method, run.step, t1, dtype=like.dtype).grid.h
+    except SceneError:
+        step = run.step
+    return replace(like, h=step)
 
 
 def drawn(fleet: Ensemble) -> Ensemble:
@@ -221,7 +227,7 @@ def ladders_of(
     coarsest = spacing / m
     names = short_and_own(fleet, h is not None) if methods is None else methods
     most = 1 if h is not None else METHODS if methods is None else len(methods)
-    taken, refused, noise = list[Any](), list[str](), "none"
+    taken, refused, noise, actual = list[Any](), list[str](), "none", 0.0
     for name in names:
         try:
             plan = make_plan(fleet, name, h or float(coarsest), t1, dtype=dtype)
@@ -233,13 +239,15 @@ def ladders_of(
         if noisy:
             noise = "grid" if all(isinstance(term, NoisyTerm) for term in noisy) else "free"
         taken.append(name if isinstance(name, str | Method) else plan.method)
+        actual = plan.grid.h
         if len(taken) == most:
             break
     if not taken:
         raise SceneError(refused)
     if h is None:
         return [[Setting(name, float(coarsest / 2**k), dtype) for k in range(HALVINGS)] for name in taken], noise
-    exact = saveat.exact(h)
+    # The step that is made divides the run and its samples: of a longer one half may be no shorter.
+    exact = saveat.exact(actual)
     longer = [exact * 2**k for k in range(DOUBLINGS, 0, -1) if (spacing / (exact * 2**k)).denominator == 1]
     return [[Setting(taken[0], float(step), dtype) for step in (*longer, exact, exact / 2)]], noise
 

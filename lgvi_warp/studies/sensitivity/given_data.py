@@ -57,8 +57,9 @@ def given_data(
     """Estimate first-order indices of a run that is over, by every number that varied in it, those of the start too.
 
     No design is needed: members are divided into bins of each input, and the variance between the bins' means is compared
-    with that of all, less what chance puts there. The interval is of the noncentral F distribution,
-    widened by the spread of what members add. Interactions are not seen (see `lw.uq.sobol`), and inputs are meant to be independent: what correlated ones explain is counted for each.
+    with that of all, less what chance alone puts there. The interval is of the noncentral F distribution, widened by the
+    spread of what members add. Interactions are not seen (see `lw.uq.sobol`), and inputs are meant to be independent: what
+    correlated ones explain is counted for each.
 
     Args:
         result: What `lw.solve`, `lw.open_run` or `lw.Result.load` returned, or the path of a store.

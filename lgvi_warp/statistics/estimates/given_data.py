@@ -12,6 +12,8 @@ import numpy as np
 FEWEST_BINS, MOST_BINS = 4, 64
 # From so many members a bin on, each bin has a line.
 FOR_LINES = 10
+# From such a share on the noncentral F distribution is not asked.
+NEARLY_ALL = 0.999
 # A part of a variance that is round-off.
 NOTHING = 1e-20
 
@@ -71,7 +73,7 @@ def _index(x: np.ndarray, y: np.ndarray, confidence: float) -> tuple[float, floa
     between = max(total - within * (n - numbers), 0.0)
     ratio, free = between / (numbers - 1) / within, (numbers - 1, n - numbers)
     tail, share = 0.5 * (1.0 - confidence), 1.0 - within * (n - 1) / total
-    lower, upper = (shift / (shift + n) for shift in (_shift(1.0 - tail, ratio, free), _shift(tail, ratio, free)))
+    lower, upper = _ends(share, ratio, free, tail)
     # What each member adds to the share, to first order: its numbers are drawn too, and need not be normal. The F
     # distribution is of given numbers and normal remainders, with the variance in the root.
     part = 1.0 - float(np.sum(left**2)) / total
@@ -113,6 +115,19 @@ def _bins(x: np.ndarray) -> np.ndarray:
     count = int(np.clip(2.0 * len(x) ** (1.0 / 3.0), FEWEST_BINS, MOST_BINS))
     edges = np.unique(np.quantile(x, np.arange(1, count) / count)) if len(x) else x
     return np.unique(np.searchsorted(edges, x, side="right"), return_inverse=True)[1]
+
+
+def _ends(share: float, ratio: float, free: tuple[int, int], tail: float) -> tuple[float, float]:
+    """The ends of the interval of a share by its F ratio, of given numbers and normal remainders."""
+    from scipy.special import ndtri
+
+    if share > NEARLY_ALL:
+        # What is left is known as a variance is; the distribution is beyond its functions there.
+        factor = np.exp(-ndtri(tail) * np.sqrt(2.0 / free[1]))
+        return float(1.0 - (1.0 - share) * factor), float(1.0 - (1.0 - share) / factor)
+    n = sum(free) + 1
+    lower, upper = (shift / (shift + n) for shift in (_shift(1.0 - tail, ratio, free), _shift(tail, ratio, free)))
+    return lower, upper
 
 
 def _shift(level: float, ratio: float, free: tuple[int, int]) -> float:

@@ -227,7 +227,7 @@ def ladders_of(
     coarsest = spacing / m
     names = short_and_own(fleet, h is not None) if methods is None else methods
     most = 1 if h is not None else METHODS if methods is None else len(methods)
-    taken, refused, noise, actual = list[Any](), list[str](), "none", h
+    taken, refused, noise, actual = list[Any](), list[str](), "none", 0.0
     for name in names:
         try:
             plan = make_plan(fleet, name, h or float(coarsest), t1, dtype=dtype)
@@ -246,7 +246,7 @@ def ladders_of(
         raise SceneError(refused)
     if h is None:
         return [[Setting(name, float(coarsest / 2**k), dtype) for k in range(HALVINGS)] for name in taken], noise
-    # The step that is made divides the run and its samples: of a longer one half would be no shorter.
+    # The step that is made divides the run and its samples: of a longer one half may be no shorter.
     exact = saveat.exact(actual)
     longer = [exact * 2**k for k in range(DOUBLINGS, 0, -1) if (spacing / (exact * 2**k)).denominator == 1]
     return [[Setting(taken[0], float(step), dtype) for step in (*longer, exact, exact / 2)]], noise

@@ -208,7 +208,7 @@ def runs_at(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
         ladder.refused[str(setting)] = error.faults[0]
         return False
     if np.isnan(y).any():
-        ladder.refused[str(setting)] = f"{int(np.isnan(y).sum())} of {len(y)} members fail"
+        ladder.refused[str(setting)] = f"{int(np.isnan(y).sum())} of {len(y)} members fail, or have no finite number"
         return False
     if pilot.target.kind in ("mean", "cvar") and np.isinf(y).any():
         problem = f"is infinite for {int(np.isinf(y).sum())} of {len(y)} members, so that its mean is"

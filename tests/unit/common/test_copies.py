@@ -98,6 +98,7 @@ OTHERS = {
     "Table": lambda: lw.designs.Table(values={"vehicle.mass": [1.0, 2.0]}),
     "UnitCubePoints": lambda: lw.designs.UnitCubePoints([[0.5]]), "LatinHypercube": lambda: lw.designs.LatinHypercube(4),
     "Fins": lambda: lw.terms.Fins(position=[V], chord=[(1, 0, 0)], normal=[(0, 0, 1)], area=0.1, drag=0.1, lift_slope=3.0),
+    "CurrentField": lambda: lw.terms.CurrentField(velocities=np.ones((2, 2, 2, 3)), spacing=V),
     "LowPass": lambda: lw.control.LowPass(of="depth", time_constant=1.0), "Packed": lambda: lw.laws.Packed({"a": np.ones(2)}),
     "PoseSMC": lambda: lw.control.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V,
                                           k_sigma_r=V, k_d_r=V),

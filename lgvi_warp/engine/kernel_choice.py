@@ -6,6 +6,7 @@ Decided once for a run from a survey of all members; the members' own numbers co
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -259,7 +260,7 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
         for role in roles:
             _check_signature(faults, term, module, role)
         if hasattr(module, "seeing"):
-            _check_seeing(faults, term, module.seeing(_no_water), page)
+            _check_seeing(faults, term, _functions_of(module.seeing), page)
         if hasattr(module, "follow") and not hasattr(module, "evolve"):
             faults.add(f"{term.key}.device", module, "has follow and no evolve", page)
         if hasattr(module, "push") and not hasattr(module, "damping"):
@@ -303,7 +304,13 @@ def declared(term: Term, module: Any, given: bool = False) -> tuple[tuple[str, A
 
 def seeing_roles(module: Any) -> tuple[str, ...]:
     """The functions that a law makes which looks at the water."""
-    return tuple(module.seeing(_no_water)) if hasattr(module, "seeing") else ()
+    return tuple(_functions_of(module.seeing)) if hasattr(module, "seeing") else ()
+
+
+@functools.cache
+def _functions_of(seeing: Callable[[Any], Any]) -> Any:
+    """What a law makes that looks at the water; kept, since each plan asks."""
+    return seeing(_no_water)
 
 
 def _no_water(view: Any, point: Any, sea: Any) -> Any:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from tests.laws.test_water_gradients import accelerations, hat, turn
+from tests.laws.test_water_gradients import accelerations
+from tests.support.hamel import by_lagrangian, hat, turn
 from tests.support.linear_flow import LinearFlow, columns
 from tests.support.spheroid import Spheroid
 from tests.support.tools import GRAVITY, one
@@ -72,38 +73,6 @@ def lagrangian(b, R, v, Om, t):
     return L
 
 
-def slopes(b, R, v, Om, t):
-    """Derivatives of the Lagrangian by b, by turns of the body, by v and by Om: by steps along the imaginary axis."""
-    e = 1e-30j * np.eye(3)
-    moved = (
-        [(b + e[i], R, v, Om, t) for i in range(3)],
-        [(b, R @ (np.eye(3) + hat(e[i])), v, Om, t) for i in range(3)],
-        [(b, R, v + e[i], Om, t) for i in range(3)],
-        [(b, R, v, Om + e[i], t) for i in range(3)],
-    )
-    return tuple(np.array([lagrangian(*x).imag / 1e-30 for x in each]) for each in moved)
-
-
-def left_over(dv, dOm):
-    """(6,) What Hamel's equations leave: dP/dt - dL/db, and dK/dt + Om x K less the derivative by turns."""
-
-    def momenta(s):
-        place = POSE["b"] + s * TWIST["v"] + 0.5 * s**2 * dv, POSE["R"] @ turn(s * TWIST["Om"])
-        return np.concatenate(slopes(*place, TWIST["v"] + s * dv, TWIST["Om"] + s * dOm, s)[2:])
-
-    d = 1e-3
-    change = (8.0 * (momenta(d) - momenta(-d)) - momenta(2.0 * d) + momenta(-2.0 * d)) / (12.0 * d)
-    by_place, by_turns, _, K = slopes(POSE["b"], POSE["R"], TWIST["v"], TWIST["Om"], 0.0)
-    return change + np.concatenate([-by_place, np.cross(TWIST["Om"], K) - by_turns])
-
-
-def by_lagrangian():
-    """(dv/dt, dOm/dt): the equations are linear in them."""
-    none = left_over(np.zeros(3), np.zeros(3))
-    matrix = np.stack([left_over(e[:3], e[3:]) - none for e in np.eye(6)], axis=1)
-    return np.split(np.linalg.solve(matrix, -none), 2)
-
-
 def bar(*more):
     """The scene of the Lagrangian."""
     body = lw.Vehicle(rigid_body_mass_matrix=RIGID, added_mass_matrix=ADDED_MATRIX, buoyancy=DISPLACED * GRAVITY,
@@ -117,7 +86,7 @@ def bar(*more):
 def test_strips_move_as_their_lagrangian_says(method, h, allowed):
     nu = POSE["R"].T @ TWIST["v"]
     fleet = one(bar(), **POSE, nu=nu, Om=TWIST["Om"])
-    got, want = accelerations(fleet, method, h), by_lagrangian()
+    got, want = accelerations(fleet, method, h), by_lagrangian(lagrangian, **POSE, **TWIST)
     without = bar()
     still = lw.Scene(without.vehicle, without.environment, terms=list(without.terms[1:]))
     coarse = accelerations(one(still, **POSE, nu=nu, Om=TWIST["Om"]), method, h)

@@ -12,19 +12,12 @@ import lgvi_warp as lw
 from lgvi_warp.reference import explicit
 from lgvi_warp.reference.submaps import Body, start
 from lgvi_warp.reference.terms import Flow, Law
+from tests.support.hamel import by_lagrangian, hat, turn
 from tests.support.linear_flow import LinearFlow, columns
 from tests.support.spheroid import Spheroid
 from tests.support.tools import GRAVITY, difference, last, one, slope
 
 DOWN = np.array([0.0, 0.0, 1.0])
-
-
-def hat(v):
-    return np.cross(np.eye(3), v)
-
-
-def turn(v):
-    return lw.notation.matrix_from_rotation_vector(np.asarray(v))
 
 
 # Nine samples determine the derivative at the first one to the eighth power of their distance.
@@ -192,39 +185,6 @@ def lagrangian(b, R, v, Om, t):
     )
 
 
-def slopes(b, R, v, Om, t):
-    """Derivatives of the Lagrangian by b, by turns of the body, by v and by Om: by steps along the imaginary axis."""
-    e = 1e-30j * np.eye(3)
-    moved = (
-        [(b + e[i], R, v, Om, t) for i in range(3)],
-        [(b, R @ (np.eye(3) + hat(e[i])), v, Om, t) for i in range(3)],
-        [(b, R, v + e[i], Om, t) for i in range(3)],
-        [(b, R, v, Om + e[i], t) for i in range(3)],
-    )
-    return tuple(np.array([lagrangian(*x).imag / 1e-30 for x in each]) for each in moved)
-
-
-def left_over(dv, dOm):
-    """(6,) What Hamel's equations leave: dP/dt - dL/db, and dK/dt + Om x K less the derivative by turns."""
-
-    def momenta(s):
-        place = POSE["b"] + s * TWIST["v"], POSE["R"] @ turn(s * TWIST["Om"])
-        return np.concatenate(slopes(*place, TWIST["v"] + s * dv, TWIST["Om"] + s * dOm, s)[2:])
-
-    # The derivative along the way to the fourth power of 1e-3.
-    d = 1e-3
-    change = (8.0 * (momenta(d) - momenta(-d)) - momenta(2.0 * d) + momenta(-2.0 * d)) / (12.0 * d)
-    by_place, by_turns, _, K = slopes(POSE["b"], POSE["R"], TWIST["v"], TWIST["Om"], 0.0)
-    return change + np.concatenate([-by_place, np.cross(TWIST["Om"], K) - by_turns])
-
-
-def by_lagrangian():
-    """(dv/dt, dOm/dt): the equations are linear in them."""
-    none = left_over(np.zeros(3), np.zeros(3))
-    matrix = np.stack([left_over(e[:3], e[3:]) - none for e in np.eye(6)], axis=1)
-    return np.split(np.linalg.solve(matrix, -none), 2)
-
-
 class LinearWater(Law):
     """The twin's water: that of the Lagrangian."""
 
@@ -256,7 +216,7 @@ def lopsided(*given, center=CENTER, added=ADDED):
 def test_a_lopsided_body_moves_as_its_lagrangian_says(method, h, allowed):
     water = LinearFlow(**FLOW, **columns(STRAIN))
     fleet = one(lopsided(water), POSE["b"], POSE["R"], POSE["R"].T @ TWIST["v"], TWIST["Om"])
-    for got, right in zip(accelerations(fleet, method, h), by_lagrangian(), strict=True):
+    for got, right in zip(accelerations(fleet, method, h), by_lagrangian(lagrangian, **POSE, **TWIST), strict=True):
         # Of splittings, h^2 and the round-off of nine samples over h: each about 2e-9.
         np.testing.assert_allclose(got[0], right, rtol=0.0, atol=allowed)
 
@@ -274,7 +234,9 @@ def test_the_twin_of_a_lopsided_body_moves_as_its_lagrangian_says():
     dv = (
         R @ (dnu + np.cross(TWIST["Om"], nu)) + FLOW["acceleration"] + FLOW["growth"] * STRAIN @ b + STRAIN @ TWIST["v"]
     )
-    np.testing.assert_allclose(np.concatenate([dv, dOm]), np.concatenate(by_lagrangian()), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(
+        np.concatenate([dv, dOm]), np.concatenate(by_lagrangian(lagrangian, **POSE, **TWIST)), rtol=0.0, atol=1e-9
+    )
 
 
 class Wave(NamedTuple):

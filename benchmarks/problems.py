@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What benchmarks and tests solve: the paper's vehicle in nearly neutral trim with each term alone, and with all; states."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import lgvi_warp as lw
@@ -45,6 +47,29 @@ def current_profile():
     """Four depths, which the vehicle stays between."""
     velocities = [[0.4, 0.1, 0.0], [0.3, 0.2, 0.02], [0.1, 0.1, -0.02], [0.0, -0.1, 0.0]]
     return terms.CurrentProfile(depths=[0.0, 8.0, 16.0, 60.0], velocities=velocities)
+
+
+def current_field(times=1):
+    """A swirl of 2 MB where vehicles are in cells of their own: 44 x 44 x 44 nodes, or fewer at several times."""
+    n = round((44**3 / times) ** (1.0 / 3.0))
+    x = np.linspace(-40.0, 40.0, n)
+    north, east, depth = np.meshgrid(x, x, np.linspace(0.0, 40.0, n), indexing="ij")
+    decay = 0.01 * np.exp(-depth / 40.0)
+    field = np.stack([-east * decay, north * decay, 0.001 * north], axis=-1)
+    grid = {"origin": [-40.0, -40.0, 0.0], "spacing": [80.0 / (n - 1), 80.0 / (n - 1), 40.0 / (n - 1)]}
+    if times == 1:
+        return terms.CurrentField(velocities=field, **grid)
+    return terms.CurrentField(
+        velocities=np.stack([field * (1.0 + 0.1 * i) for i in range(times)]), times=[0.0, 1.0], **grid
+    )
+
+
+def one_cell():
+    """The same where all vehicles are in one cell."""
+    x = np.array([-1e4, 1e4])
+    north, east, depth = np.meshgrid(x, x, [0.0, 1e3], indexing="ij")
+    field = 1e-5 * np.stack([-east, north, 0.1 * depth], axis=-1)
+    return terms.CurrentField(velocities=field, origin=[-1e4, -1e4, 0.0], spacing=[2e4, 2e4, 1e3])
 
 
 def current_harmonics():
@@ -138,9 +163,9 @@ def cross_flow():
     return terms.CrossFlow(stations=x, diameters=0.4 * np.sqrt(1.0 - x**2), drag_coefficient=1.1)
 
 
-def hull_loads():
+def hull_loads(stations=10):
     """Ten stations, so eighteen strips."""
-    x = np.linspace(-0.9, 0.9, 10)
+    x = np.linspace(-0.9, 0.9, stations)
     return terms.HullLoads(stations=x, diameters=0.4 * np.sqrt(1.0 - x**2), drag_coefficient=1.1)
 
 
@@ -153,6 +178,40 @@ def body_lift():
 
 def stratification():
     return terms.Stratification(gradient=0.005, reference_depth=10.0)
+
+
+def ballast():
+    """Two tanks that follow a schedule at a limited rate."""
+    return terms.Ballast(position=[[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]], rate_limit=1e-4, times=[0.0, 1.0, 2.0, 3.0],
+                         command_schedule=[[0.0, 0.0], [1e-4, -1e-4], [-1e-4, 1e-4], [0.0, 0.0]])  # fmt: skip
+
+
+def buoyancy_engine():
+    return terms.BuoyancyEngine(pump_rate=1e-4, volume_down=-1e-4, volume_up=1e-4, depth_top=5.0, depth_bottom=15.0,
+                                position=[0.5, 0.0, 0.0])  # fmt: skip
+
+
+def surface_buoyancy():
+    """Five stations, so eight parts, below the surface."""
+    return terms.SurfaceBuoyancy(heights=[0.1, 0.3, 0.3, 0.3, 0.1], stations=[-0.9, -0.5, 0.0, 0.5, 0.9])
+
+
+def quadratic_form():
+    """Eight products."""
+    products = ["X_u|u|", "Y_v|v|", "Z_w|w|", "K_p|p|", "M_q|q|", "N_r|r|", "Y_ur", "M_uw"]
+    return terms.QuadraticForm(products=products, values=[-20.0, -80.0, -80.0, -3.0, -5.0, -5.0, 4.0, 3.0])
+
+
+def moving_mass():
+    """By its weight, along a path."""
+    return terms.MovingMass(
+        mass=1.0, places=[[0.0, 0.0, 0.05], [0.05, 0.0, 0.05], [0.0, 0.0, 0.05]], times=[0.0, 1.0, 2.0]
+    )
+
+
+def polar():
+    """The coefficients of the Seawing glider."""
+    return lw.Scene.named("seawing").terms[0]
 
 
 def wrench_noise():
@@ -188,9 +247,24 @@ def each_term():
     hull = {
         "hull_loads": scene(hull_loads()),
         "waves, hull_loads": scene(waves(), hull_loads()),
+        "hull_loads, 4 stations": scene(hull_loads(4)),
         "current_profile, hull_loads": scene(current_profile(), hull_loads()),
+        "current_profile, hull_loads, 4 stations": scene(current_profile(), hull_loads(4)),
     }
-    return first | alone | hull | {"events: box": scene(events=[box])}
+    fields = {
+        "current_field": scene(current_field()),
+        "current_field, 4 times": scene(current_field(4)),
+        "current_field, one cell": scene(one_cell()),
+    }
+    own = (ballast, buoyancy_engine, polar, moving_mass, surface_buoyancy, quadratic_form)
+    glider = {make.__name__: scene(make()) for make in own}
+    powered = replace(thrusters(), power_commands=[-1.0, 0.0, 1.0], power=[200.0, 0.0, 250.0])
+    glider["thrusters, energy_use"] = scene(powered, terms.EnergyUse(hotel=20.0))
+    x = np.linspace(-50.0, 50.0, 101)
+    hills = 60.0 + np.sin(x / 5.0)[:, None] * np.cos(x / 7.0)
+    floor = lw.events.Floor(depth=hills, origin=[-50.0, -50.0], spacing=[1.0, 1.0])
+    events = {"events: box": scene(events=[box]), "events: floor": scene(events=[lw.events.Floor(depth=60.0)])}
+    return first | alone | hull | fields | glider | events | {"events: floor on a grid": scene(events=[floor])}
 
 
 def coupled():

@@ -11,6 +11,7 @@ from lgvi_warp.physics.terms import register as register
 from lgvi_warp.physics.terms.base import Packed as Packed
 from lgvi_warp.physics.terms.base import PackingContext as PackingContext
 from lgvi_warp.physics.terms.base import Term as Term
+from lgvi_warp.physics.terms.base import knots as knots
 from lgvi_warp.physics.terms.base import number as number
 from lgvi_warp.physics.terms.events import Event as Event
 from lgvi_warp.physics.terms.noisy import NoisyTerm as NoisyTerm

@@ -4,6 +4,7 @@
 from lgvi_warp.statistics.metrics.actuator_metrics import ActuatorEnergy as ActuatorEnergy
 from lgvi_warp.statistics.metrics.actuator_metrics import CustomMetric as CustomMetric
 from lgvi_warp.statistics.metrics.actuator_metrics import Effort as Effort
+from lgvi_warp.statistics.metrics.actuator_metrics import ElectricalEnergy as ElectricalEnergy
 from lgvi_warp.statistics.metrics.actuator_metrics import SaturationShare as SaturationShare
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure as TimeToFailure
 from lgvi_warp.statistics.metrics.actuator_metrics import Travel as Travel
@@ -21,4 +22,6 @@ from lgvi_warp.statistics.metrics.tracking_metrics import RMSError as RMSError
 from lgvi_warp.statistics.metrics.tracking_metrics import SettlingTime as SettlingTime
 from lgvi_warp.statistics.metrics.tracking_metrics import SteadyStateError as SteadyStateError
 from lgvi_warp.statistics.metrics.tracking_metrics import Undershoot as Undershoot
+from lgvi_warp.studies.consistency import Consistency as Consistency
+from lgvi_warp.studies.consistency import consistency as consistency
 from lgvi_warp.studies.search.risk import CVaR as CVaR

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # The public names of this door, one a line.
 
+from lgvi_warp.physics.terms.ballast import Ballast as Ballast
+from lgvi_warp.physics.terms.buoyancy_engine import BuoyancyEngine as BuoyancyEngine
 from lgvi_warp.physics.terms.control_fins import ControlFins as ControlFins
 from lgvi_warp.physics.terms.control_wrench import ControlWrench as ControlWrench
 from lgvi_warp.physics.terms.cross_flow import CrossFlow as CrossFlow
@@ -10,13 +12,18 @@ from lgvi_warp.physics.terms.current_field import CurrentField as CurrentField
 from lgvi_warp.physics.terms.current_harmonics import CurrentHarmonics as CurrentHarmonics
 from lgvi_warp.physics.terms.drag import Drag as Drag
 from lgvi_warp.physics.terms.drag import DragMatrix as DragMatrix
+from lgvi_warp.physics.terms.energy_use import EnergyUse as EnergyUse
 from lgvi_warp.physics.terms.fins import Fins as Fins
 from lgvi_warp.physics.terms.gauss_markov_current import GaussMarkovCurrent as GaussMarkovCurrent
 from lgvi_warp.physics.terms.hull_loads import HullLoads as HullLoads
 from lgvi_warp.physics.terms.hydrostatics import Restoring as Restoring
 from lgvi_warp.physics.terms.hydrostatics import Weight as Weight
 from lgvi_warp.physics.terms.lift import BodyLift as BodyLift
+from lgvi_warp.physics.terms.moving_mass import MovingMass as MovingMass
+from lgvi_warp.physics.terms.polar import Polar as Polar
+from lgvi_warp.physics.terms.quadratic_form import QuadraticForm as QuadraticForm
 from lgvi_warp.physics.terms.stratification import Stratification as Stratification
+from lgvi_warp.physics.terms.surface_buoyancy import SurfaceBuoyancy as SurfaceBuoyancy
 from lgvi_warp.physics.terms.tether import Tether as Tether
 from lgvi_warp.physics.terms.thrusters import Thrusters as Thrusters
 from lgvi_warp.physics.terms.waves import Waves as Waves

@@ -56,8 +56,11 @@ MADE = {
     "controllers/depth_in_waves.png": of_script("examples/controllers/depth_in_waves.py"),
     "controllers/depth_keeping.png": of_script("examples/controllers/depth_keeping.py"),
     "controllers/learning.png": of_script("examples/controllers/train_a_policy.py", "1.5"),
+    "controllers/lost_bottom.png": of_script("examples/controllers/lost_bottom.py"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
+    "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),
     "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
+    "guide/glider_in_an_eddy.png": of_script("examples/studies/glider_in_an_eddy.py"),
     "guide/tune_worst_5_percent.png": of_script("examples/sweeps/tune_worst_5_percent.py"),
     **{
         f"guide/stability_{name}.png": Made(("examples/paper.toml", *room("plots")), STABILITY, f"stability_{name}.png")

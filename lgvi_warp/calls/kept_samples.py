@@ -165,7 +165,7 @@ class KeptSamples:
         for first, stop in itertools.pairwise([0, *range(1, len(rows), at_once), len(rows)]):
             chosen = rows[first:stop]
             fields = {name: self._read(name, chosen, at) for name in names}
-            others = (result.time[chosen], chosen, result.terms, lambda: (status, last), controller)
+            others = (result.time[chosen], chosen, result.terms, lambda: (status, last), controller, self.events)
             yield slice(first, stop), KeptFields(fields, *others)
 
     def _read(self, name: str, rows: np.ndarray, at: slice) -> np.ndarray:

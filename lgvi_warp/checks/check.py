@@ -37,6 +37,7 @@ FOLLOWED = 0.4
 FLOWS = ("steady", "uniform", "varying")
 # Roles that may look at the velocities.
 MOVING = ("damping", "push", "load")
+SEES_VELOCITIES = (*MOVING, "power")
 
 
 def check_law(
@@ -55,7 +56,9 @@ def check_law(
     * `push`: the force and torque of `damping`, or of `load`.
     * `load`: as `damping`, in water made for the check that varies everywhere.
     * `follow`: what it leaves in the memory depends on the time alone, and is the same by two parts of the time as at once.
+    * `carried_inertia`: symmetric; it and `carried_momentum` see no velocities.
     * `distance`: the same in all body axes.
+    * `power`: the same in all body axes and about all origins.
     * `flow`: rate and gradient are the derivatives of the velocity, `water` gives the same velocity, and FLOW fits it.
 
     Args:
@@ -80,11 +83,12 @@ def check_law(
     """
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.terms.Drag(...), not its class"])
+    term = term.beside_account(True)  # else terms leave their power out
     module = kernel_choice.device_module(term, term.device_in(False), built_in)
     packets = -(-whole_number("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))
     bench = Bench(term, module, of_scene(scene), packets, whole_number("seed", seed, 0))
     checks: list[Check] = []
-    for examine in (_numbers, _finite, _of_every_law, _potential, _damping, _push, _flow, _follow):
+    for examine in (_numbers, _finite, _of_every_law, _potential, _damping, _push, _flow, _follow, _carried):
         with np.errstate(all="ignore"):  # what is not finite is found by its check
             checks += examine(bench, step)
         if examine in (_numbers, _finite) and not all(check.ok for check in checks):
@@ -131,8 +135,8 @@ def _of_every_law(bench: Bench, step: float) -> Iterator[Check]:
     faster = bench.at(replace(views, velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
     later = bench.at(replace(views, time=views.time + 3.7))
     for role, value in here.items():
-        if role not in MOVING:
-            remedy = "only damping, push and load may look at view.nu and view.Om"
+        if role not in SEES_VELOCITIES:
+            remedy = "only damping, push, load and power may look at view.nu and view.Om"
             yield judged(f"{role}: blind to velocity", faster[role] - value, 0.0, views, remedy)
         if role != "load" and not bench.term.timed and not bench.noisy:
             remedy = f"write timed = True in {kind}, or it gets no time"
@@ -145,7 +149,9 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     """The same law whatever lane it is in, however its numbers are given, in whatever axes."""
     views = bench.views
     back = np.arange(bench.count).reshape(-1, bench.width)[:, ::-1].reshape(-1)
-    mixed = bench.at(Views(**{name: value[back] for name, value in vars(views).items()}))
+    mixed_views = Views(**{name: value[back] for name, value in vars(views).items()})
+    # What a law remembers may depend on where it is: it remembers anew.
+    mixed = Bank(bench, bench.context(bench.parameters), mixed_views).evaluate(mixed_views)
     each = {name: np.repeat(value, bench.count, axis=0) for name, value in bench.parameters.items()}
     varied = _tried(bench, bench.context(each), views, "where numbers have one entry a member")
     for role, value in here.items():
@@ -180,7 +186,12 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     """The same wrench from a frame with other axes and origin."""
     views, turned_views = bench.views, bench.views.elsewhere()
     turned = _tried(bench, bench.context(bench.parameters, True), turned_views, "in other axes of the body")
-    for role in [role for role in ("law", *MOVING) if role in here]:
+    if "power" in here:
+        difference = turned if isinstance(turned, str) else turned["power"] - here["power"]
+        limit = ROUND_OFF * np.abs(here["power"]).max() * 100.0
+        remedy = "turn vectors by context.frame.vector(), points by .point(), torques by .torque() in packed()"
+        yield judged("power: any axes", difference, limit, views, remedy)
+    for role in [role for role in ("law", *MOVING, "carried_inertia", "carried_momentum") if role in here]:
         if isinstance(turned, str):
             yield judged(f"{role}: any axes", turned, 0.0, views, "")
             continue
@@ -196,8 +207,8 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 
 def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
-    """(force; torque) (k, 6) of a law, or of a damping matrix or a load at the views' velocities."""
-    if role not in ("damping", "load"):
+    """(force; torque) (k, 6) of a law, or of a matrix or a load at the views' velocities."""
+    if role not in ("damping", "load", "carried_inertia"):
         return value
     twist = np.concatenate([views.velocity, views.rate], axis=1)
     resistance = np.einsum("kij,kj->ki", value[:, :36].reshape(-1, 6, 6), twist)
@@ -368,11 +379,24 @@ def _follow(bench: Bench, step: float) -> Iterator[Check]:
         return np.asarray(rows.transpose(0, 2, 1).reshape(-1, rows.shape[1]))
 
     at_once = remembered((views, FOLLOWED))
-    elsewhere = Views(views.attitude[::-1], views.position + 1.0, 1.0 - views.velocity, 1.0 - views.rate, views.time)
-    remedy = "leave follow() out: what this law remembers depends on more than the time"
-    yield judged("follow: blind to the state", remembered((elsewhere, FOLLOWED)) - at_once, 0.0, views, remedy)
+    if not getattr(bench.module, "FOLLOWS_PLACE", False):
+        elsewhere = Views(
+            views.attitude[::-1], views.position + 1.0, 1.0 - views.velocity, 1.0 - views.rate, views.time
+        )
+        remedy = "leave follow() out: what this law remembers depends on more than the time"
+        yield judged("follow: blind to the state", remembered((elsewhere, FOLLOWED)) - at_once, 0.0, views, remedy)
     earlier = replace(views, time=views.time - 0.25 * FOLLOWED)
     apart = remembered((earlier, 0.75 * FOLLOWED), (views, 0.25 * FOLLOWED)) - at_once
     limit = ROUND_OFF * (np.abs(at_once).max() + 1e-300)
     remedy = "advance by the exact solution over view.h, which ends at view.t"
     yield judged("follow: exact", apart, limit, views, remedy)
+
+
+def _carried(bench: Bench, step: float) -> Iterator[Check]:
+    """What is added to an inertia is symmetric."""
+    if "carried_inertia" not in bench.roles:
+        return
+    D = bench.at(bench.views)["carried_inertia"].reshape(-1, 6, 6)
+    apart = (D - np.swapaxes(D, 1, 2)).reshape(len(D), -1)
+    remedy = "add m J^T J, as add_drag_at(D, m, r) does for a mass m at r"
+    yield judged("carried_inertia: symmetric", apart, ROUND_OFF * np.abs(D).max(), bench.views, remedy)

@@ -38,7 +38,7 @@ from lgvi_warp.checks.report import (
 )
 from lgvi_warp.common.arguments import whole_number
 from lgvi_warp.common.errors import SceneError, refusal
-from lgvi_warp.control.base import SECTIONS, Allocation, Part
+from lgvi_warp.control.base import SECTIONS, Allocation, MeasuringPart, Part
 from lgvi_warp.control.controller import Controller
 from lgvi_warp.control.heading_pid import HeadingPID
 from lgvi_warp.control.set_point import SetPoint
@@ -290,8 +290,14 @@ def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     if isinstance(bench.part, Allocation):
         row, count = bus.commands[bench.part.to]
         may[row : row + count] = True
+    if bench.part.key in bus.ranges:
+        may[bus.ranges[bench.part.key]] = True
     if "send" in bench.roles:
         may[: bus.channels] = may[bus.acting : bus.answer] = True
+    if isinstance(bench.part, MeasuringPart):
+        row = bus.handed.get(bench.part.key, 0)
+        may[row : row + bench.part.handed_rows * bench.part.is_handed] = True
+        may[bus.belief : bus.belief + bench.part.belief_rows] = True
     changed = (here.memory != before) & ~(np.isnan(here.memory) & np.isnan(before)) & ~may
     rows = sorted(set(np.flatnonzero(changed.any(axis=0)).tolist()))
     written = ", ".join(f"p.memory + {row - first}" for row in rows[:3])

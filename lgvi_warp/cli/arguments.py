@@ -13,6 +13,7 @@ from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
 from lgvi_warp.cli.derivatives import derivatives
 from lgvi_warp.cli.lists import list_names, new, schema, show_help
+from lgvi_warp.cli.loops import margins, trim, worst_case
 from lgvi_warp.cli.machine import bench, calibrate, info
 from lgvi_warp.cli.plot import plot
 from lgvi_warp.cli.rare import rare
@@ -26,7 +27,8 @@ from lgvi_warp.common.errors import closest
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
-          derivatives, view, info, bench, warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
+          derivatives, margins, worst_case, trim, view, info, bench, warm, calibrate, new, list_names, schema, plot,
+          completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
 }
@@ -49,6 +51,9 @@ EPILOG = """examples:
   lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
   lgvi-warp rare examples/paper.toml --when "position[2] above 690"
   lgvi-warp derivatives examples/paper.toml --of "position[0]" --by vehicle.mass --by "start.angular_velocity[0]"
+  lgvi-warp margins dive.toml --loop heading_pid --of gain --of disk
+  lgvi-warp worst-case dive.toml --of "max(depth)" --within vehicle.buoyancy=297:302
+  lgvi-warp trim dive.toml --speed 1.5
   lgvi-warp info runs/large
   lgvi-warp run examples/paper.toml --json -q
 

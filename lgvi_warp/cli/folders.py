@@ -51,7 +51,8 @@ class Content:
 
 
 # Study -> name of the public class of what it found.
-CLASSES = {"tradeoff": "Tradeoff", "stability": "StabilityMap", "rare": "RareEvent", "derivatives": "Derivatives"}
+CLASSES = {"tradeoff": "Tradeoff", "stability": "StabilityMap", "rare": "RareEvent", "derivatives": "Derivatives",
+           "worst_case": "WorstCase"}  # fmt: skip
 
 
 def _study(kind: str) -> Any:
@@ -60,6 +61,10 @@ def _study(kind: str) -> Any:
         from lgvi_warp.studies.sensitivity.indices import Indices
 
         return Indices
+    if kind == "margins":
+        from lgvi_warp.studies.linear.margins import Margins
+
+        return Margins
     from lgvi_warp import studies
 
     return getattr(studies, CLASSES[kind])

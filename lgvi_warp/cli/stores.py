@@ -11,6 +11,8 @@ from lgvi_warp.cli.output import Part, print_faults, tell
 from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.verb import add_shared, as_verb
+from lgvi_warp.cli.view import indices
+from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.files import place_of
 
 
@@ -44,21 +46,55 @@ def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
 
 def export_arguments(verb: Any) -> None:
     """Add the arguments of the verb export."""
-    add_shared(verb, "dir")
-    verb.add_argument("--to", required=True, help="netcdf or parquet")
+    add_shared(verb, "dir", dir="a store, a result.npz, or a folder with one of the two")
+    verb.add_argument(
+        "--to",
+        metavar="FILE",
+        required=True,
+        help="a file .csv, .parquet, .nc, .geojson, .kml or .mcap; or netcdf, all that a store holds, or parquet",
+    )
     verb.add_argument("--out", metavar="FILE", type=Path,
-                      help="the file, replaced if it exists (default: beside the store)")  # fmt: skip
+                      help="the file of --to netcdf and --to parquet (default: beside the run)")  # fmt: skip
+    verb.add_argument("--members", metavar="LIST", help="these members, as 3,17 or 0:100 (default: all that were kept)")
+    verb.add_argument("--origin", metavar="LAT,LON", help="origin of the axes [deg] (default: that of the scene)")
+    verb.add_argument(
+        "--start", metavar="DATE", help="date and time at t = 0, as 2026-06-01T00:00:00Z (default: the scene's)"
+    )
+    verb.add_argument("--overwrite", action="store_true", help="replace a file that is there")
 
 
-@as_verb("export", "write a run as one NetCDF or Parquet file", export_arguments)
+@as_verb("export", "write a run as one file of another program", export_arguments)
 def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
-    """Run the verb export: write a stored run as one NetCDF or Parquet file."""
+    """Run the verb export: write a run, or members of it, as one file of another program."""
     from lgvi_warp.store.export import export as write_as
 
-    with progress_bar(chosen.quiet, "writing"):
-        path = (write or write_as)(chosen.dir, chosen.to, chosen.out)
+    settings = {"members": _members(chosen.members), "origin": _origin(chosen.origin), "start": chosen.start,
+                "overwrite": chosen.overwrite}  # fmt: skip
+    with progress_bar(chosen.quiet, "writing") as progress:
+        path = (write or write_as)(chosen.dir, chosen.to, chosen.out, **settings, progress=progress)
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
     return 0
+
+
+def _members(text: str | None) -> slice | list[int] | None:
+    """Read the members of --members: "3,17" or "0:100"."""
+    if text is None or ":" not in text:
+        return indices(text)
+    words = [word.strip() for word in text.split(":")]
+    if len(words) > 3 or not all(word.isdigit() for word in words if word) or words[2:] in ([""], ["0"]):
+        raise SceneError([f"--members {text}: is no list of members; write --members 3,17 or --members 0:100"])
+    return slice(*(int(word) if word else None for word in words))
+
+
+def _origin(text: str | None) -> list[float] | None:
+    """Read the latitude and longitude of --origin."""
+    if text is None:
+        return None
+    try:
+        latitude, longitude = map(float, text.split(","))
+    except ValueError:
+        raise SceneError([f"--origin {text}: is no place; write --origin=63.44,10.40"]) from None
+    return [latitude, longitude]
 
 
 def report_arguments(verb: Any) -> None:

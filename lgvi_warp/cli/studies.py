@@ -303,7 +303,7 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
     if chosen.plan:
         known = ("cases", "grid", "vary", "members", "seed", "sampling", "rare")
         about = {name: arguments.pop(name, None) for name in known}
-        for name in ("success", "baseline", "confidence", "interval"):
+        for name in ("success", "baseline", "confidence", "interval", "matters"):
             arguments.pop(name, None)
         closed_loop = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
         with progress_bar(chosen.quiet, "measuring"):

@@ -12,7 +12,7 @@ import threading
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 
@@ -249,9 +249,19 @@ def placed(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = N
         beside.unlink(missing_ok=True)
 
 
+def new_text_file(beside: Path) -> TextIO:
+    """Open a text file in UTF-8 that is not there yet, such as the one that `placed` gives, to write it piece by piece."""
+    return beside.open("x", encoding="utf-8", newline="\n")
+
+
+def new_file(beside: Path) -> BinaryIO:
+    """Open a file that is not there yet, such as the one that `placed` gives, to write it piece by piece."""
+    return beside.open("xb")
+
+
 def write_text(path: str | os.PathLike[str], text: str, root: str | os.PathLike[str] | None = None) -> Path:
     """Write a text file in UTF-8; it is there whole or not at all."""
-    with placed(path, root) as beside, beside.open("x", encoding="utf-8", newline="\n") as file:
+    with placed(path, root) as beside, new_text_file(beside) as file:
         file.write(text)
     return Path(path)
 

@@ -22,7 +22,7 @@ from lgvi_warp.common.errors import NothingToDraw, SceneError
 # read one or two megabytes a second of TOML, and a tenth of that of YAML. A table may hold millions of numbers; arrays are
 # read as long as the file is.
 MOST_BYTES = {"scene file": 1 << 20, "YAML file": 128 << 10, "CSV file": 512 << 20, "JSON file": safe_files.MOST_JSON,
-              "NumPy file": sys.maxsize}  # fmt: skip
+              "NumPy file": sys.maxsize, "GeoTIFF file": sys.maxsize}  # fmt: skip
 MOST_OTHERS = 16 << 20
 PATHS = {"scene file": "give the path of a TOML file", "CSV file": "give the path of a CSV file"}
 OTHER_PATHS = "give the path of a file, or its text"

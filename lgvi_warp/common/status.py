@@ -48,6 +48,8 @@ class Status(IntEnum):
     BOX = 18
     TIME = 19
     CONDITION = 20
+    BATTERY = 21
+    OUTSIDE = 22
 
     @property
     def stopped(self) -> bool:
@@ -84,6 +86,8 @@ _TEXT = {
     Status.BOX: "stopped by an event: left the box",
     Status.TIME: "stopped by an event: its time was over",
     Status.CONDITION: "stopped by an event: a condition of the user",
+    Status.BATTERY: "stopped by an event: it used the capacity of its battery",
+    Status.OUTSIDE: "stopped by an event: left the data of a field",
     Status.NON_FINITE: "a number of the state is not finite; check the start state, the parameters and the step",
 }
 

@@ -7,7 +7,8 @@ import copy
 import functools
 from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, word_of
+
+if TYPE_CHECKING:
+    from lgvi_warp.ocean.places import LocalPlane
 
 # What guidance may give, and laws may need.
 WISHES = ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
@@ -36,8 +40,9 @@ READINGS = {
 class Bus(NamedTuple):
     """The first rows of the memory, by which parts hand numbers on: {actuator: (first row, channels)} and single rows.
 
+    handed: First rows of what sensors hand to an estimator, by their keys; belief: first row of what the estimator believes.
     acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and the
-        row of the step from which the former act. period: Time between two ticks [s].
+        row of the step from which the former act. period: Time between two ticks [s]. ranges: Row of each altimeter's reading.
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -48,6 +53,9 @@ class Bus(NamedTuple):
     delayed: bool = False
     period: float = 1.0
     answer: int = 0
+    ranges: Mapping[str, int] = MappingProxyType({})
+    handed: Mapping[str, int] = MappingProxyType({})
+    belief: int = -1
 
     @property
     def channels(self) -> int:
@@ -55,14 +63,34 @@ class Bus(NamedTuple):
         return self.unmet
 
     @classmethod
-    def of(cls, channels: Mapping[str, int], period: float = 1.0, answers: int = 0) -> Bus:
-        """The bus of some actuators, with a time between two ticks [s]."""
+    def of(
+        cls,
+        channels: Mapping[str, int],
+        period: float = 1.0,
+        answers: int = 0,
+        altimeters: Sequence[str] = (),
+        handed: Mapping[str, int] = MappingProxyType({}),
+        belief: int = 0,
+    ) -> Bus:
+        """The bus of some actuators, with a time between two ticks [s].
+
+        channels: Commands of each. answers: Rows for answers of the host. altimeters: Their keys. handed: Rows that sensors
+            hand to an estimator, by their keys; belief: rows of what it believes.
+        """
         commands, row = {}, 0
         for key, count in channels.items():
             commands[key] = (row, count)
             row += count
-        rows = 4 * row + 7
-        return cls(commands, row, row + 6, 2 * row + 6, rows + answers, period=period, answer=rows)
+        ranges = {key: 4 * row + 7 + i for i, key in enumerate(altimeters)}
+        rows = 4 * row + 7 + len(ranges)
+        handing, end = {}, rows + answers
+        for key, count in handed.items():
+            handing[key] = end
+            end += count
+        places: dict[str, Any] = {
+            "answer": rows, "ranges": ranges, "handed": handing, "belief": end if belief else -1
+        }  # fmt: skip
+        return cls(commands, row, row + 6, 2 * row + 6, end + belief, period=period, **places)
 
     def values_of(self, key: str) -> dict[str, Any]:
         """What the device code of an actuator reads."""
@@ -129,6 +157,33 @@ class Part(Term):
         object.__setattr__(part, "chosen", chosen)
         return part
 
+    def in_scene(self, faults: Faults, events: Sequence[Term], sensors: Sequence[Any]) -> Any:
+        """Tell the part what it needs to know of the scene's events and of the sensors.
+
+        Args:
+            faults: Collects the faults of what is missing.
+            events: Events of the scene.
+            sensors: Sensors of the controller, each of which knows the scene.
+
+        Returns:
+            A copy, or the part where it needs nothing; by default the latter.
+        """
+        return self
+
+    def located(self, plane: LocalPlane | None) -> Any:
+        """Convert the places on the Earth that the part has, if it has any, to positions.
+
+        Args:
+            plane: The plane of the scene's inertial axes on the Earth; None where the scene has no origin.
+
+        Returns:
+            By default the part itself.
+
+        Raises:
+            SceneError: Where the part has places, and the scene no origin.
+        """
+        return self
+
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         """Tell the part where it finds what others write.
 
@@ -167,8 +222,40 @@ class MeasuringPart(Part):
 
     section: ClassVar[str] = "sensors"
     kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
-        "complementary_filter", "sensor", "dead_reckoning", "low_pass"
+        "altimeter",
+        "complementary_filter",
+        "dvl",
+        "error_state_filter",
+        "imu",
+        "sensor",
+        "dead_reckoning",
+        "low_pass",
     )
+    # Rows of the bus with what it believes, beside the measurement.
+    belief_rows: ClassVar[int] = 0
+
+    @property
+    def uses(self) -> Mapping[str, str]:
+        """Keys of the sensors that hand their readings to this estimator alone, by what they are to it; by default none."""
+        return {}
+
+    @property
+    def handed_rows(self) -> int:
+        """Numbers that it hands to an estimator at a tick; 0, the default, for a part that can hand on nothing."""
+        return 0
+
+    @property
+    def is_handed(self) -> bool:
+        """Whether an estimator of the scene takes its readings: then it leaves the measurement as it is."""
+        return hasattr(self, "bus") and self.key in self.bus.handed
+
+    def check_used(self, faults: Faults, sensors: Sequence[Any]) -> None:
+        """Add a fault for each sensor that this estimator cannot use.
+
+        Args:
+            faults: Collects the faults.
+            sensors: All parts of the list, in their order.
+        """
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -176,7 +263,9 @@ class Guidance(Part):
     """A part that says which motion is wanted."""
 
     section: ClassVar[str] = "guidance"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("reference_model", "set_point", "trajectory", "waypoints")
+    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
+        "altitude", "reference_model", "set_point", "trajectory", "waypoints"
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -305,7 +394,7 @@ class Allocation(Part):
     """
 
     section: ClassVar[str] = "allocation"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("pseudo_inverse", "matrix")
+    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("pseudo_inverse", "bounded_least_squares", "matrix")
     # The term that takes the commands, the faults of its channels that are known, and which of X Y Z K M N laws ask for (6,);
     # set for a part of a scene.
     actuator: ClassVar[Any] = None

@@ -7,14 +7,15 @@ import copy
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common import declared
 from lgvi_warp.common.declared import positive, read, real
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.control.base import READINGS, SECTIONS, Allocation, Bus, Part
+from lgvi_warp.control.altimeter import Altimeter
+from lgvi_warp.control.base import SECTIONS, Allocation, Bus, Part
 from lgvi_warp.control.callback import Callback, CallbackCommands, refuse_second
 from lgvi_warp.control.delay import MOST_PERIODS, Delay
 from lgvi_warp.control.fault import Fault
@@ -23,11 +24,17 @@ from lgvi_warp.control.sensor import Sensor
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term, build, check_list
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
+from lgvi_warp.physics.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from lgvi_warp.ocean.places import LocalPlane
 
 # A time and a whole number of steps that differ by less than this part of the step are the same.
 ROUND_OFF = 1e-9
 # A part of a component below this is round-off, when it is asked what actuators can make.
 SPANNED = 1e-8
+# What a scene without actuators lacks.
+ACTUATOR = 'give the vehicle a term that does, [[terms]] type = "thrusters", "control_fins" or "control_wrench"'
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,6 +99,8 @@ class Controller:
         if not faults:
             refuse_second([part for part in self.laws if isinstance(part, Callback)])
             self._check_wishes(faults)
+            for part in self.sensors:
+                part.check_used(faults, self.sensors)
         faults.raise_if_any()
 
     def _check_wishes(self, faults: Faults) -> None:
@@ -118,15 +127,19 @@ class Controller:
 
     @property
     def acting_parts(self) -> tuple[Part, ...]:
-        """The parts in the order in which the kernel has them: faults of a sensor right after it, others after the delay."""
+        """The parts in the order in which the kernel has them: altimeters first, which look from the true place.
+
+        Faults of a sensor come right after it, others after the delay.
+        """
         callback, parts = self.callback, list[Part]()
         # The commands of a callback reach their actuator by an allocation of their own.
         idle = callback if callback is not None and callback.to else None
-        for part in (part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section) if part is not idle):
+        others = (part for section in tuple(SECTIONS)[1:-1] for part in getattr(self, section) if part is not idle)
+        for part in (*sorted(self.sensors, key=lambda sensor: not isinstance(sensor, Altimeter)), *others):
             of_sensor = (fault for fault in self.faults if getattr(fault, "sensor", None) and fault.of == part.key)
             parts += [part, *of_sensor]
-        others = tuple(part for part in self.faults if part not in parts)
-        return (*parts, *((self.delay_part,) if self.bus.delayed else ()), *others)
+        sent = tuple(part for part in self.faults if part not in parts)
+        return (*parts, *((self.delay_part,) if self.bus.delayed else ()), *sent)
 
     @property
     def callback(self) -> Callback | None:
@@ -142,18 +155,48 @@ class Controller:
         values = {f"{part.key}.{name}": value for part in self.parts for name, value in part.parameters().items()}
         return {f"{self.key}.delay": self.delay} | values
 
-    def wired(self, terms: Sequence[Term], nominal: Mapping[str, np.ndarray] | None = None) -> Controller:
-        """The same controller, whose parts know their actuators and the rows of the memory.
+    def located(self, plane: LocalPlane | None) -> Controller:
+        """The same controller, whose parts know the positions of their places on the Earth.
 
         Args:
-            terms: Terms of the scene.
-            nominal: Numbers of the vehicle and its environment by name, as the scene has them; none by default.
+            plane: The plane of the scene's inertial axes on the Earth; None where the scene has no origin.
 
         Returns:
             A copy.
 
         Raises:
-            SceneError: Where an allocation or a fault names a term that takes no commands. The message lists every fault.
+            SceneError: Where a part has places, and the scene no origin.
+        """
+        located = copy.copy(self)
+        faults = Faults("controller.")
+        for section in SECTIONS:
+            parts = list(getattr(self, section))
+            for i, part in enumerate(parts):
+                with faults.including():
+                    parts[i] = part.located(plane)
+            object.__setattr__(located, section, tuple(parts))
+        faults.raise_if_any()
+        return located
+
+    def wired(
+        self,
+        terms: Sequence[Term],
+        nominal: Mapping[str, np.ndarray] | None = None,
+        events: Sequence[Term] = (),
+    ) -> Controller:
+        """The same controller, whose parts know their actuators and the rows of the memory.
+
+        Args:
+            terms: Terms of the scene.
+            nominal: Numbers of the vehicle and its environment by name, as the scene has them; none by default.
+            events: Events of the scene; none by default.
+
+        Returns:
+            A copy.
+
+        Raises:
+            SceneError: Where an allocation or a fault names a term that takes no commands, or a part misses something of the
+                scene. The message lists every fault.
         """
         faults = Faults("controller.")
         able = {term.key: term for term in terms if term.channels}
@@ -166,11 +209,17 @@ class Controller:
         object.__setattr__(wired, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
         object.__setattr__(wired, "actuators", actuators)
         object.__setattr__(wired, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
+        for section in ("sensors", "guidance"):
+            parts = tuple(part.in_scene(faults, events, wired.sensors) for part in getattr(self, section))
+            object.__setattr__(wired, section, parts)
+        faults.raise_if_any()
         channels = {key: term.channels for key, term in actuators.items()}
         callback = self.callback
         answers = 0 if callback is None else channels[callback.to] if callback.to else 6
         shared = max(law.shared_rows for law in self.laws)
-        controller = wired.on(Bus.of(channels, self.period, max(answers, shared)))
+        altimeters = [part.key for part in self.sensors if isinstance(part, Altimeter)]
+        rows = self.handed_rows, self.belief_rows
+        controller = wired.on(Bus.of(channels, self.period, max(answers, shared), altimeters, *rows))
         for part in controller.allocation:
             part.check_actuator(faults)
         faults.raise_if_any()
@@ -183,6 +232,17 @@ class Controller:
         """1 for each of X Y Z K M N that some law asks for, else 0, (6,)."""
         names = {name for law in self.laws for name in law.demands or COMPONENTS}
         return np.array([float(name in names) for name in COMPONENTS])
+
+    @property
+    def handed_rows(self) -> dict[str, int]:
+        """Rows that each sensor hands to an estimator, by its key."""
+        taken = {key for part in self.sensors for key in part.uses.values()}
+        return {part.key: part.handed_rows for part in self.sensors if part.key in taken}
+
+    @property
+    def belief_rows(self) -> int:
+        """Rows of what an estimator believes."""
+        return sum(part.belief_rows for part in self.sensors)
 
     def _effect(self) -> np.ndarray:
         """What all channels make of the components that are asked for, each column of unit size, (6, channels)."""
@@ -234,9 +294,11 @@ class Controller:
             parts = (CallbackCommands(to=self.callback.to), *(part for part in parts if part.type))
         if not parts:
             if len(able) != 1:
-                fault = "is missing" if able else "has no actuator: no term of the scene takes commands"
-                which = " or ".join(map(repr, able)) if able else "thrusters, control_fins or control_wrench"
-                faults.add("allocation", "", fault, f"give [[controller.allocation]] to = {which}")
+                if able:
+                    which = " or ".join(map(repr, able))
+                    faults.add("allocation", "", "is missing", f"give [[controller.allocation]] to = {which}")
+                else:
+                    faults.add("controller", "", "moves nothing: no term of the scene takes commands", ACTUATOR)
                 return ()
             parts = (PseudoInverse(to=next(iter(able))),)
         wrong = [part.to for part in parts if not isinstance(part.to, str)]
@@ -247,7 +309,8 @@ class Controller:
         counts = Counter(part.to for part in parts)
         for part in parts:
             if part.to not in able:
-                faults.add("allocation.to", part.to, "is no term that takes commands", closest(part.to, able))
+                remedy = closest(part.to, able) if able else ACTUATOR
+                faults.add("allocation.to", part.to, "is no term that takes commands", remedy)
             elif able[part.to].own_commands:
                 problem = "has commands of its own"
                 faults.add("allocation.to", part.to, problem, f"leave {part.to}.command and its schedule out")
@@ -256,11 +319,15 @@ class Controller:
         return parts
 
     def _check_faults(self, faults: Faults, actuators: Mapping[str, Term]) -> None:
-        counts = {part.key: READINGS[part.of] for part in self.sensors if isinstance(part, Sensor)}
+        counts = {part.key: part.count for part in self.sensors if isinstance(part, Sensor)}
         counts |= {key: term.channels for key, term in actuators.items()}
+        handed = self.handed_rows
         for part in (part for part in self.faults if isinstance(part, Fault)):
             key, count = f"{part.key}.channel", counts.get(part.of, 0)
-            if part.of not in counts:
+            if part.of in handed:
+                problem = "hands its readings to an estimator alone, which no fault changes"
+                faults.add(f"{part.key}.of", part.of, problem, "vary the sensor's own numbers, or leave the fault out")
+            elif part.of not in counts:
                 remedy = closest(part.of, counts)
                 faults.add(f"{part.key}.of", part.of, "is no actuator and no sensor of this controller", remedy)
             elif not 0 <= part.channel < count:
@@ -278,24 +345,25 @@ class Controller:
         """
         return max(1, round(self.period / h))
 
-    def check_step(self, faults: Faults, h: float) -> None:
+    def check_step(self, faults: Faults, h: float, asked: float | None = None) -> None:
         """Add a fault where period or delay is no whole number of steps.
 
         Args:
             faults: Collects the faults.
             h: Step of the run [s].
+            asked: The step that was asked for [s], where the end of the run or a sample time shortened it; by default None.
         """
         for name, value in (("period", float(self.period)), ("delay", float(self.delay))):
+            if _is_whole(name, value, h):
+                continue
             low = int(value / h + ROUND_OFF)
-            none = name == "period" and value < 0.5 * h
-            if none or abs(value - round(value / h) * h) > ROUND_OFF * h:
-                near = " or ".join(f"{max(i, 1) * h:.9g}" for i in sorted({max(low, 1), low + 1}))
-                faults.add(
-                    f"controller.{name}",
-                    value,
-                    f"is no whole number of steps of {h:.9g} s",
-                    f"give {near} s, or another step",
-                )
+            near = " or ".join(f"{max(i, 1) * h:.9g}" for i in sorted({max(low, 1), low + 1}))
+            problem, remedy = f"is no whole number of steps of {h:.9g} s", f"give {near} s, or another step"
+            if asked is not None:
+                problem += f", which the end of the run and its sample times have made of {asked:.9g} s"
+                if _is_whole(name, value, asked):
+                    remedy = f"give an end and sample times that are whole numbers of {asked:.9g} s, or another step"
+            faults.add(f"controller.{name}", value, problem, remedy)
 
     def to_dict(self) -> dict[str, Any]:
         """The controller as the section of a scene file.
@@ -318,7 +386,7 @@ def from_table(table: Any) -> Controller | None:
 
 
 def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
-    """The terms of a scene from its content, each of which knows whether a controller drives it.
+    """The terms of a scene from its content, each of which knows its vehicle, and whether a controller drives it.
 
     The controller itself is not built: a law may be a function, of which the content has the name alone.
     """
@@ -327,7 +395,10 @@ def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
     parts = [part for entries in lists if isinstance(entries, list) for part in entries if isinstance(part, Mapping)]
     actuators = {to for part in parts if isinstance(to := part.get("to"), str)}
     bus = Bus.of({term.key: term.channels for term in terms if term.key in actuators}, 1.0)
-    return tuple(term.driven_by(bus if term.key in actuators else None) for term in terms)
+    wired = (term.driven_by(bus if term.key in actuators else None) for term in terms)
+    body = Vehicle(**scene["vehicle"]) if "vehicle" in scene else None
+    numbers = {f"vehicle.{name}": value for name, value in body.parameters().items()} if body else {}
+    return tuple(term.of_vehicle(numbers) if body else term for term in wired)
 
 
 def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
@@ -350,3 +421,8 @@ def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
                 faults.add(where, entry, "is no part of this list", f"give one of {', '.join(known)}")
     faults.raise_if_any()
     return tuple(parts)
+
+
+def _is_whole(name: str, value: float, h: float) -> bool:
+    """Whether a period, of one step at least, or a delay is a whole number of steps [s]."""
+    return (name == "delay" or value >= 0.5 * h) and abs(value - round(value / h) * h) <= ROUND_OFF * h

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from lgvi_warp.common.declared import checked, flag, text
 from lgvi_warp.control.base import Bus, Sending, first_step
-from lgvi_warp.control.sensor import Sensor
+from lgvi_warp.control.sensor import RANGE, Sensor
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
@@ -67,6 +67,8 @@ class Fault(Sending):
         # The numbers, and the rows of the command or the channel of the reading.
         begin = first_step(numbers["time"], context.h)
         members_numbers = {"begin": begin, "gain": numbers["gain"], "offset": numbers["offset"]}
+        if self.sensor is not None and self.sensor.of == RANGE:
+            return Packed(members_numbers | {"row": self.bus.ranges[self.of]})
         if self.sensor is not None:
             return Packed(members_numbers | {"channel": self.channel})
         fresh = self.bus.commands[self.of][0] + self.channel

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from lgvi_warp.control.base import ControlLaw, Numbers, Packed, PackingContext
 from lgvi_warp.physics.terms.base import number
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
@@ -36,11 +38,20 @@ class LoopBegin(ControlLaw):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopGain(LoopBegin):
-    """Multiplies the demand of the laws since `LoopBegin`."""
+    """Multiplies each component of the demand of the laws since `LoopBegin`."""
 
     device: ClassVar[str] = "loop_gain:end"
 
-    factor: Any = number((), "1", 1.0)
+    factor: Any = number((6,), "1", (1.0,) * 6)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        factor = numbers["factor"]
+        return Packed({"of_force": factor[:, :3], "of_torque": factor[:, 3:], "demand": self.bus.answer})
+
+
+def of_all(factor: np.ndarray) -> np.ndarray:
+    """Factors (m, 6) on the components of a demand, from one on all of them (m,)."""
+    return np.repeat(factor[:, None], len(COMPONENTS), axis=1)
 
 
 def with_factor(laws: Sequence[ControlLaw], loop: str | None) -> list[ControlLaw]:

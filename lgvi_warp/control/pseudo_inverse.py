@@ -3,22 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
-
-import numpy as np
+from typing import ClassVar
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.control.base import Allocation, rest_rows
-from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.actuators import UNLIMITED
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
-from lgvi_warp.physics.terms.thrust_curves import polynomial_values, side_of_table, table_values
+from lgvi_warp.control.base import rest_rows
+from lgvi_warp.control.efforts import EffortAllocation, pseudo_inverse
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, side_by_side
+
+# The most channels with known faults of one actuator: there is a set of lines for each subset of them.
+MOST_LOST = 4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PseudoInverse(Allocation):
+class PseudoInverse(EffortAllocation):
     """Commands for the efforts t of least sum of weight t^2 whose wrench B t is nearest to the demand (Fossen 2021, 11.2).
 
     t = W^-1 B^T (B W^-1 B^T)^+ w. Components for which no law asks do not count. Effort is thrust of thrusters, by the
@@ -34,17 +32,8 @@ class PseudoInverse(Allocation):
 
     type: ClassVar[str] = "pseudo_inverse"
 
-    weights: Any = number(("n",), "1", None, above=0.0, optional=True)
-    speed: Any = number((), "m/s", 1.0, above=0.0)
-
     def check_actuator(self, faults: Faults) -> None:
-        count = self.actuator.channels
-        if self.weights is not None and len(self.weights) != count:
-            fault = f"has {len(self.weights)} numbers"
-            faults.add(f"{self.key}.weights", self.weights, fault, f"give {count}, one for each channel of {self.to}")
-        if self.shape == "polynomial" and np.any(self.actuator.limit >= UNLIMITED):
-            fault = "does not end: the inverse of a polynomial needs the range of the commands"
-            faults.add(f"{self.to}.limit", self.actuator.limit, fault, "give the largest command")
+        super().check_actuator(faults)
         lost = self.lost_channels
         if len(lost) > MOST_LOST:
             faults.add(
@@ -54,158 +43,26 @@ class PseudoInverse(Allocation):
                 f"let at most {MOST_LOST} be known",
             )
 
-    @property
-    def shape(self) -> str:
-        """How effort follows from the command: "square", "polynomial" or "table" of thrusters, else "linear"."""
-        return str(getattr(self.actuator, "shape", "linear"))
-
     def device_in(self, aligned: bool) -> str:
-        return f"pseudo_inverse:{self.shape}{',lost' if self.losses else ''}"
-
-    def reach(self) -> np.ndarray:
-        numbers = {name: value[None] for name, value in self.actuator.parameters().items()}
-        effect = self.actuator.effect(numbers, {"environment.water_density": np.ones(1)}, np.reshape(self.speed, 1))
-        return np.asarray(effect[0])
+        return f"pseudo_inverse:{self.curve_word}{',lost' if self.losses else ''}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses.
-        actuator_numbers = context.own(self.actuator)
-        B = self.asked[:, None] * self.actuator.effect(actuator_numbers, context.parameters, numbers["speed"])
-        weights = numbers.get("weights", np.ones((1, B.shape[2])))
-        lost, limit = self.lost_channels, actuator_numbers["limit"]
-        rows = []
+        B, weights = self.effect_and_weights(numbers, context)
+        lost, rows = self.lost_channels, []
         for s in range(1 << len(lost)):
-            lines = _lines(B, weights, [channel for j, channel in enumerate(lost) if s >> j & 1])
+            lines = pseudo_inverse(B, weights, [channel for j, channel in enumerate(lost) if s >> j & 1])
             rows += [rest_rows(B @ lines), lines.reshape(len(lines), -1)]
-        keys = {"coefficient": np.ones_like(limit), "coefficient_astern": np.ones_like(limit), "dead_band": 0.0 * limit}
-        curve = [actuator_numbers.get(key, value) for key, value in keys.items()]
-        share = np.zeros((1, B.shape[2]))
-        share[0, list(lost)] = 2.0 ** np.arange(len(lost))
-        columns = (
-            limit,
-            *curve,
-            self.steps_of_loss(context),
-            share,
-            *self._largest(actuator_numbers, limit - curve[2]),
-        )
-        channels = side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns))
+        channels = self.channel_rows(B, context)
         rows.append(channels.reshape(len(channels), -1))
-        curves, size = self._curves(actuator_numbers)
+        actuator_numbers = context.own(self.actuator)
+        curves, size = self.curves(actuator_numbers)
         first, count = self.bus.commands[self.to]
         words = {
             "commands": first,
             "count": count,
             "sets": 1 << len(lost),
             "size": size,
-            # Whether the polynomials of some member differ ahead and astern.
-            "sided": int(self.shape == "polynomial" and not np.array_equal(*_polynomials(actuator_numbers))),
+            "sided": self.sided(actuator_numbers),
         }
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))
-
-    def _largest(self, numbers: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
-        """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""
-        reach = np.maximum(reach, 0.0)
-        if self.shape == "table":
-            at, values = numbers["table_commands"], numbers["table_thrusts"]
-            return tuple(side * table_values(at, values, side * reach) for side in (1.0, -1.0))
-        if self.shape == "polynomial":
-            curves = _polynomials(numbers)
-            turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
-            return tuple(
-                polynomial_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True)
-            )
-        return (reach if self.shape == "linear" else reach**2,) * 2
-
-    def _curves(self, numbers: Numbers) -> tuple[np.ndarray, int]:
-        """Rows of the curves and of their inverses, and how many there are of a kind."""
-        if self.shape in ("linear", "square"):
-            return np.zeros((1, 0)), 0
-        curves, size = self.actuator.curve_rows(numbers)
-        if self.shape == "table":
-            at, values = numbers["table_commands"], numbers["table_thrusts"]
-            each = (
-                side_of_table(at, values[:, :, i], side) for i in range(self.actuator.channels) for side in (1.0, -1.0)
-            )
-            return side_by_side(curves, *(rising_knots(thrusts, commands) for commands, thrusts in each)), size
-        reach = np.max(np.maximum(numbers["limit"] - numbers["dead_band"], 0.0), axis=-1)
-        sides = (inverse_rows(polynomial, reach) for polynomial in _polynomials(numbers))
-        return side_by_side(curves, *sides), size
-
-
-# The most channels with known faults of one actuator: there is a set of lines for each subset of them.
-MOST_LOST = 4
-# Singular values below this part of the largest count as zero.
-RANK = 1e-10
-
-
-def _polynomials(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Those of thrusters, ahead and astern."""
-    return numbers["polynomial"], numbers["polynomial_astern"]
-
-
-def _lines(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> np.ndarray:
-    """The pseudo-inverse (n, channels, 6) of the effect of those channels that are not lost."""
-    scaled = B / np.sqrt(weights)[:, None, :]
-    scaled[:, :, list(lost)] = 0.0
-    return np.asarray(np.linalg.pinv(scaled, rcond=RANK) / np.sqrt(weights)[:, :, None])
-
-
-def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """As `knots` of values (n, k), where several knots may be at one place, with one value: those change nothing."""
-    width = np.diff(at, axis=1)
-    inverse = np.divide(1.0, width, out=np.zeros_like(width), where=width > 0.0)
-    steps = np.stack([at[:, :-1], inverse, np.diff(values, axis=1)], axis=-1)
-    return np.concatenate([values[:, :1], steps.reshape(len(at), -1)], axis=1)
-
-
-# Points at which a polynomial is looked at for its turn, and coefficients of the start of its inverse.
-POINTS, START_SIZE = 1025, 16
-# Chebyshev's points for the start of its inverse, both ends among them: there it is exact, where Newton's steps crawl. And
-# from the values there to the coefficients.
-POINTS_OF_START = np.cos(np.pi * np.arange(START_SIZE) / (START_SIZE - 1))
-TO_COEFFICIENTS = np.linalg.inv(np.polynomial.polynomial.polyvander(POINTS_OF_START, START_SIZE - 1))
-
-
-def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """The start of the inverse of polynomials f (1 or n, powers), from 0 to where they turn, or to their reach (1 or n,).
-
-    It is a polynomial in 2 s - 1, f = (largest f) (1 - (1 - s^2)^2), in which the inverse is smooth where f begins as a square
-    and where it turns (lgvi_kernels.laws.thrust_curves).
-
-    Returns: Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
-    """
-    polynomial, reach = repeated(polynomial, reach)
-    top = highest(polynomial, reach)
-    most = polynomial_values(polynomial, top[:, None])[:, 0]
-    wanted = most[:, None] * (1.0 - (1.0 - (0.5 * (POINTS_OF_START + 1.0)) ** 2) ** 2)
-    inverses = _last(
-        lambda w: polynomial_values(polynomial, w) < wanted, np.zeros_like(wanted), top[:, None] + 0.0 * wanted
-    )
-    acts = most > 0.0
-    inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
-    slope = np.where(acts, 1e-3 * most / np.where(acts, top, 1.0), 1.0)
-    return side_by_side(*(x[:, None] for x in (inverse, most, top, slope)), inverses @ TO_COEFFICIENTS.T)
-
-
-def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """Where polynomials (1 or n, powers) from the first power up cease to rise first, (1 or n,), or their reach."""
-    polynomial, reach = repeated(polynomial, reach)
-    points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
-    values = polynomial_values(polynomial, points)
-    falls = np.diff(values, axis=1) <= 0.0
-    turns = falls.any(axis=1)
-    turn = np.where(turns, falls.argmax(axis=1), POINTS - 1)
-    # The slope changes its sign within one of the two intervals beside that point.
-    row, slopes = np.arange(len(points)), polynomial * np.arange(1, polynomial.shape[1] + 1)
-    before, after = points[row, np.maximum(turn - 1, 0)], points[row, np.minimum(turn + 1, POINTS - 1)]
-    peak = _last(lambda w: polynomial_values(slopes, w) > 0.0, before[:, None], after[:, None])[:, 0]
-    return np.where(turns, np.where(turn > 0, peak, 0.0), reach)
-
-
-def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Where a condition of an array, which holds at low and not at high, ceases to hold, by bisection."""
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        inside = holds(middle)
-        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
-    return high

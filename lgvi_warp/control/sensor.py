@@ -17,12 +17,18 @@ from lgvi_warp.physics.terms.noisy import key_of
 
 # Numbers of a sensor, in the order of its device code, with the value that has no effect; those of each axis, those of ticks.
 VECTORS = ("bias", "noise", "drift", "quantum")
-IDLE = dict.fromkeys(VECTORS, 0.0) | {"every": 1.0, "latency": 0.0, "dropout": 0.0}
+IDLE = dict.fromkeys(VECTORS, 0.0) | {"every": 1.0, "latency": 0.0, "dropout": 0.0, "deepest": np.inf}
 DRAWING = frozenset({"noise", "drift", "dropout"})
-KEEPING = frozenset({"every", "latency", "dropout"})
+KEEPING = frozenset({"every", "latency", "dropout", "deepest"})
 # What its device code has where the call gives its normals.
 GIVEN = "given"
+# What it has where an estimator takes its readings.
+HANDED = "handed"
+# Below any depth, within float32.
+BOTTOMLESS = 1e30
 MOST_TICKS = 1000.0
+# What an altimeter reads, a sensor of its own.
+RANGE = "range"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -44,6 +50,10 @@ class Sensor(MeasuringPart):
         every: Ticks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
         latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first one is there.
         dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default. The first is never lost.
+        deepest: Depth of the body's origin below which readings are lost, as those of GPS are [m]; inf by default.
+
+    An estimator that names the sensor (see lw.control.ErrorStateFilter) takes the readings itself: then what is measured stays
+    as it was, no reading is kept, the first may be lost, and the estimator waits for the latency.
 
     Raises:
         SceneError: Where `of` is not known, or `every` or `latency` is no whole number; and as `Term`.
@@ -55,7 +65,7 @@ class Sensor(MeasuringPart):
     """
 
     type: ClassVar[str] = "sensor"
-    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, GIVEN)
+    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, GIVEN, HANDED)
 
     of: str = ""
     noise: Any = number((3,), "unit", 0.0, least=0.0)
@@ -65,18 +75,25 @@ class Sensor(MeasuringPart):
     every: Any = number((), "ticks", IDLE["every"], least=1.0, most=MOST_TICKS)
     latency: Any = number((), "ticks", IDLE["latency"], least=0.0, most=MOST_TICKS)
     dropout: Any = number((), "1", IDLE["dropout"], least=0.0, most=1.0)
+    deepest: Any = number((), "m", IDLE["deepest"], infinite=True)
 
     def __post_init__(self) -> None:
-        faults = Faults(f"{self.key}.")
-        faults.choice("of", self.of, READINGS)
-        faults.raise_if_any()
-        if READINGS[self.of] > 1:
-            self.repeat(READINGS[self.of], *VECTORS)
+        if self.of != RANGE:
+            faults = Faults(f"{self.key}.")
+            faults.choice("of", self.of, READINGS)
+            faults.raise_if_any()
+        if self.count > 1:
+            self.repeat(self.count, *VECTORS)
         super().__post_init__()
+
+    @property
+    def count(self) -> int:
+        """How many numbers it reads."""
+        return READINGS[self.of]
 
     def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
         # One number for each that it reads; a sensor of a scalar has scalars.
-        return () if READINGS[self.of] == 1 else super().shape_of(item)
+        return () if self.count == 1 else super().shape_of(item)
 
     def check(self, faults: Faults) -> None:
         for name in ("every", "latency"):
@@ -93,7 +110,13 @@ class Sensor(MeasuringPart):
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # The names of the numbers that matter for some member.
-        return tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
+        acting = tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
+        return (*(name for name in acting if name != "latency"), HANDED) if self.is_handed else acting
+
+    @property
+    def handed_rows(self) -> int:
+        # Its numbers, and whether they are new.
+        return self.count + 1
 
     def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
         """What it draws.
@@ -104,7 +127,7 @@ class Sensor(MeasuringPart):
         Returns:
             The streams, at each tick.
         """
-        count = READINGS[self.of]
+        count = self.count
         drift = Stream("drift", 1, 0, 1) if count == 1 else Stream("drift", 3, 1)
         each = (Stream("noise", count), drift, Stream("dropout", 1, 0, 3))
         return tuple(stream for stream in each if stream.name in acting)
@@ -116,9 +139,14 @@ class Sensor(MeasuringPart):
         # The numbers that matter, the key of the random numbers, and the rows of what it keeps.
         from scipy.special import ndtri
 
-        chosen, count = set(self.chosen), READINGS[self.of]
+        chosen, count = set(self.chosen), self.count
+        handed = HANDED in chosen
         values: dict[str, Any] = {name: _vector(numbers[name]) for name in VECTORS if name in chosen}
         values |= {name: _whole(name, numbers[name]) for name in ("every", "latency") if name in chosen}
+        if "deepest" in chosen:
+            values["deepest"] = np.minimum(numbers["deepest"], BOTTOMLESS)
+        if handed:
+            values["handed"] = self.bus.handed[self.key]
         if "dropout" in chosen:
             # A reading is lost where a standard normal is below this.
             values["dropout"] = np.clip(ndtri(numbers["dropout"]), -1e30, 1e30)
@@ -128,7 +156,7 @@ class Sensor(MeasuringPart):
             values["key"] = key_of(self.key, context)
         sets = 1 + (int(values["latency"].max()) if "latency" in chosen else 0)
         rows = 9 if self.of == "attitude" else count
-        kept = (sets + 1) * rows + 1 if chosen & KEEPING else 0
+        kept = (sets + 1) * rows + 1 if chosen & KEEPING and not handed else 0
         memory = np.zeros((1, count * ("drift" in chosen) + kept))
         return Packed(values | {"sets": sets}, memory=memory)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The signals of a controller that a run may save beside the motion: shape, unit and meaning of each, by name."""
+"""What a run may save beside the motion, signals of a controller and the energy used: shape, unit and meaning, by name."""
 
 from __future__ import annotations
 
@@ -23,6 +23,8 @@ class Signal(NamedTuple):
     row: int = 0
 
 
+# The one that needs no controller, but a term that keeps the account.
+ENERGY_USED = "energy_used"
 # Signals with one number for each command of the scene.
 CHANNELS = ("command", "actuator")
 _OF_ACTUATORS = (
@@ -50,6 +52,31 @@ _REFERENCE = _KINDS | {
 }
 
 
+# Rows of what an estimator believes, as lgvi_kernels/laws/control/error_state_filter.py writes them.
+_BLOCKS = "position [m], velocity [m/s], attitude [rad], biases of accelerometer [m/s^2] and gyroscope [rad/s]"
+_SLOTS = "four beams [m/s], fix and delayed fix, each three [m], depth [m], heading [rad]"
+ESTIMATE = "estimate"
+_OF_ESTIMATOR = (
+    Signal(
+        Field("estimate_sigma", (15,), "1", f"standard deviations that the filter believes: {_BLOCKS}"), ESTIMATE, 0
+    ),
+    Signal(
+        Field("estimate_bias", (6,), "1", "estimated biases of accelerometer [m/s^2] and gyroscope [rad/s]"),
+        ESTIMATE,
+        15,
+    ),
+    Signal(Field("nees", (), "1", "e^T P^-1 e of the 15 errors of the estimate, by the truth"), ESTIMATE, 21),
+    Signal(Field("nis", (), "1", "sum of the squared innovations over their variances at the last tick"), ESTIMATE, 22),
+    Signal(Field("nis_count", (), "1", "how many innovations that are"), ESTIMATE, 23),
+    Signal(Field("innovation", (12,), "1", f"innovations of the last tick, 0 where none: {_SLOTS}"), ESTIMATE, 24),
+    Signal(
+        Field("innovation_sigma", (12,), "1", f"standard deviations that these should have: {_SLOTS}"),
+        ESTIMATE,
+        36,
+    ),
+)
+
+
 def _noted(group: str, word: str, kinds: Mapping[str, Field], rows: Mapping[str, int]) -> tuple[Signal, ...]:
     def field(kind: str) -> Field:
         return replace(kinds[kind], name=f"{group}_{kind}", meaning=f"{word} {kinds[kind].meaning}")
@@ -63,8 +90,12 @@ SIGNALS: dict[str, Signal] = {
         *_OF_ACTUATORS,
         *_noted("measured", "measured", _KINDS, _MEASURED),
         *_noted("reference", "wanted", _REFERENCE, _WANTED),
+        *_OF_ESTIMATOR,
+        Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""),
     )
 }
+# Names of those that a filter alone has.
+OF_A_FILTER = tuple(signal.field.name for signal in _OF_ESTIMATOR)
 # Names of all samples that a run may save, in their order, and of those that a file may hold.
 SAVED = (*FIELDS, *SIGNALS)
 IN_FILES = (*SAVED, "quaternion_wxyz", "energy")
@@ -76,12 +107,19 @@ def ordered(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in SAVED if name in wanted)
 
 
-def saved_fields(controller: Controller | None) -> dict[str, Field]:
-    """The fields that runs of a scene with this controller, wired, may save."""
+def saved_fields(controller: Controller | None, accounted: bool = False) -> dict[str, Field]:
+    """The fields that runs of a scene with this controller, wired, may save; accounted: it accounts the energy used."""
     fields = {name: TABLE[name] for name in FIELDS}
+    if accounted:
+        fields[ENERGY_USED] = SIGNALS[ENERGY_USED].field
     if controller is None or controller.bus is None:
         return fields
-    signals = {name: signal.field for name, signal in SIGNALS.items()}
+    tells = controller.bus.belief >= 0
+    signals = {
+        name: signal.field
+        for name, signal in SIGNALS.items()
+        if name != ENERGY_USED and (tells or signal.group != ESTIMATE)
+    }
     channels = sum(count for _, count in controller.bus.commands.values())
     return fields | signals | {name: replace(signals[name], shape=(channels,)) for name in CHANNELS}
 
@@ -96,6 +134,8 @@ def has_shape(name: str, shape: tuple[int, ...]) -> bool:
 def row_of(name: str, bus: Bus, noted: Mapping[str, int]) -> int:
     """The first row of the memory that holds a signal."""
     signal = SIGNALS[name]
+    if signal.group == ESTIMATE:
+        return bus.belief + signal.row
     firsts = {"command": 0, "unmet": bus.unmet, "actuator": bus.report}
     return firsts[name] if name in firsts else noted[signal.group] + signal.row
 
@@ -109,9 +149,20 @@ def check_names(faults: Faults, key: str, names: Any) -> None:
         faults.choice(key, name, SAVED)
 
 
-def check_signals(faults: Faults, key: str, names: Iterable[str], controller: Controller | None) -> None:
-    """Add a fault for each signal that a scene with this controller does not have."""
-    problem = "is a signal of a controller, which this scene has not"
-    for name in ordered(names) if controller is None else ():
-        if name in SIGNALS:
+def check_signals(faults: Faults, key: str, names: Iterable[str], scene: Any) -> None:
+    """Add a fault for each signal that a scene does not have."""
+    accounted = any(term.accounts for term in scene.terms)
+    for name in (name for name in ordered(names) if name in SIGNALS):
+        if name == ENERGY_USED:
+            if not accounted:
+                remedy = 'give a term of type "energy_use", or leave it out'
+                faults.add(key, name, "is not accounted in this scene", remedy)
+        elif scene.controller is None:
+            problem = "is a signal of a controller, which this scene has not"
             faults.add(key, name, problem, "give [controller], or leave it out")
+    controller = scene.controller
+    tells = controller is not None and controller.bus is not None and controller.bus.belief >= 0
+    for name in ordered(names) if controller is not None and not tells else ():
+        if name in SIGNALS and SIGNALS[name].group == ESTIMATE:
+            remedy = 'give [[controller.sensors]] type = "error_state_filter" with report = true'
+            faults.add(key, name, "is told by a filter, which this scene has not, or which does not report", remedy)

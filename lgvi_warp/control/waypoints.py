@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.declared import word
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.declared import array, word
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.control.base import Guidance, Numbers, Packed, PackingContext
+from lgvi_warp.ocean.places import LocalPlane, check_places
+from lgvi_warp.physics.fields import PLACE_UNIT
 from lgvi_warp.physics.terms.base import number
 
 # How the heading follows from the way off the leg, and what is done at the last point.
@@ -31,6 +35,8 @@ class Waypoints(Guidance):
 
     Args:
         points: The points, (k, 3) [m], inertial axes: at least two, each at another place of the map than the one before.
+        geodetic: The points as latitude, longitude [deg, WGS 84] and depth [m], (k, 3), in place of `points`; the scene's
+            environment must have an origin. Legs are straight in the plane of its axes. `points` vary, not `geodetic`.
         speed: Wanted speed ahead through the water [m/s].
         look_ahead: D [m].
         radius: Radius of acceptance [m], horizontal.
@@ -50,22 +56,58 @@ class Waypoints(Guidance):
 
     type: ClassVar[str] = "waypoints"
 
-    points: Any = number(("k", 3), "m")
+    points: Any = number(("k", 3), "m", None, optional=True)
     speed: Any = number((), "m/s")
     look_ahead: Any = number((), "m", above=0.0)
     radius: Any = number((), "m", above=0.0)
+    geodetic: Any = array(None, unit=PLACE_UNIT)
     method: str = word("los", known=METHODS)
     kappa: Any = number((), "1/s", 0.1, least=0.0)
     gamma: Any = number((), "rad/(m s)", 0.002, least=0.0)
     at_end: str = word("stop", known=AT_END)
 
     def check(self, faults: Faults) -> None:
-        if len(self.points) < 2:
-            faults.add("points", self.points, "are less than two", "give where the way begins and where it ends")
-        same = np.flatnonzero(np.all(np.diff(self.points[:, :2], axis=0) == 0.0, axis=1))
-        for i in same:
-            where, problem = f"points[{i + 1}]", "is at the same place of the map as the one before"
-            faults.add(where, self.points[i + 1], problem, "leave it out: a leg needs a direction")
+        chosen = [name for name in ("points", "geodetic") if getattr(self, name) is not None]
+        if len(chosen) == 2:
+            faults.add("points and geodetic", "...", "say the same thing twice", "keep one of them")
+        elif not chosen:
+            faults.add("points", None, "are missing", "give points [m], or geodetic [deg, deg, m]")
+        elif chosen == ["points"]:
+            _check_way(faults, "points", self.points)
+        elif not faults:
+            places = np.asarray(self.geodetic, dtype=np.float64)
+            object.__setattr__(self, "geodetic", places)
+            if places.ndim != 2 or places.shape[1] != 3:
+                faults.add("geodetic", places, f"has shape {places.shape}", f"give k x 3 numbers [{PLACE_UNIT}]")
+                return
+            check_places(faults, "geodetic", places)
+            _check_way(faults, "geodetic", places)
+
+    def located(self, plane: LocalPlane | None) -> Any:
+        # With the points that the places are on the plane.
+        if self.geodetic is None:
+            return self
+        if plane is None:
+            problem = "are places on the Earth, and environment.origin is not known"
+            remedy = "give the origin of the axes: [environment] origin = [latitude, longitude]"
+            raise refusal(f"{self.key}.geodetic", self.geodetic, problem, remedy)
+        part = copy.copy(self)
+        points = plane.positions(self.geodetic)
+        points.setflags(write=False)
+        object.__setattr__(part, "points", points)
+        return part
+
+    def with_fields(self, fields: Mapping[str, Any]) -> Any:
+        # Points and places say the same thing: each takes the place of the other.
+        other = {"geodetic": None} if "points" in fields else {"points": None} if self.geodetic is not None else {}
+        return super().with_fields(other | dict(fields))
+
+    def to_dict(self) -> dict[str, Any]:
+        # What was given: places, where points follow from them.
+        content = super().to_dict()
+        if self.geodetic is not None:
+            content.pop("points", None)
+        return content
 
     @property
     def gives(self) -> tuple[str, ...]:
@@ -78,3 +120,12 @@ class Waypoints(Guidance):
         values = {name: value for name, value in numbers.items() if name != "points"}
         words = {"legs": points.shape[1] - 1, "method": METHODS.index(self.method), "stops": int(self.at_end == "stop")}
         return Packed(values | words, points.reshape(len(points), -1), np.zeros((1, 2)))
+
+
+def _check_way(faults: Faults, name: str, points: np.ndarray) -> None:
+    """Note what is no way: a single point, and one at the place of the map of the one before."""
+    if len(points) < 2:
+        faults.add(name, points, "are less than two", "give where the way begins and where it ends")
+    for i in np.flatnonzero(np.all(np.diff(points[:, :2], axis=0) == 0.0, axis=1)):
+        where, problem = f"{name}[{i + 1}]", "is at the same place of the map as the one before"
+        faults.add(where, points[i + 1], problem, "leave it out: a leg needs a direction")

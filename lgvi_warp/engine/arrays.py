@@ -140,6 +140,8 @@ class Lanes:
         self.view = view if view.ndim == 3 else view[:, :, None]
 
 
+# The field of an event's struct that is filled in with the row of the account of the energy used.
+ACCOUNT_FIELD = "account_row"
 # The struct of a law that is held to its own rows: its numbers, and where its rows lie (lgvi_kernels.maps.bounded).
 FIELDS = ("own", "bounds")
 
@@ -158,12 +160,14 @@ class LawArrays:
     memory: what laws and method remember from step to step; the second half is a backup.
     places: where in table and memory each law's rows lie; none before `write`.
     remembered: rows of the memory that each law has, without those in which it works. scratch: the first row of the method's.
+    account: the first row of the memory of the law that keeps the account of the energy used; -1 where none does.
     """
 
     table: Lanes
     memory: Lanes
     remembered: list[slice]
     scratch: int
+    account: int
 
     def __init__(
         self,
@@ -182,8 +186,8 @@ class LawArrays:
         # Rows that all members share, as they were written, by their place in the table; None for those that members own.
         self._written: dict[int, np.ndarray | None] = {}
 
-    def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0) -> None:
-        """Write what the terms packed, and the parts of a controller."""
+    def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0, account: int | None = None) -> None:
+        """Write what the terms packed, and the parts of a controller; account: the number of the law that keeps it."""
         laws = [law for group in groups for law in group.packed]
         sizes = tuple((row_count(law), memory_count(law), law.work) for law in laws), scratch, bus
         moved = self._sizes != sizes
@@ -192,7 +196,7 @@ class LawArrays:
             for structs in self.structs:
                 structs.forget()
             self._sizes, self._written = sizes, {}
-            self._place(laws, bus)
+            self._place(laws, bus, account)
         next_places = iter(self.places)
         for structs, bounded, group in zip(self.structs, self._bounded, groups, strict=True):
             structs.write(
@@ -201,9 +205,10 @@ class LawArrays:
         self._write_table(laws, [known for group in groups for known in group.shared], moved)
         self._write_memory(laws, bus, scratch, moved)
 
-    def _place(self, laws: Sequence[Packed], bus: int) -> None:
+    def _place(self, laws: Sequence[Packed], bus: int, account: int | None) -> None:
         """Give each law its rows of table and memory."""
         row, memory = 1, bus
+        self.account = -1 if account is None else bus + sum(map(memory_rows, laws[:account]))
         self.places, self.remembered = [], []
         for law in laws:
             # The table's first row is none's: it is 0, and what a law without rows reads.
@@ -211,6 +216,8 @@ class LawArrays:
             work = end - law.work
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
             row_fields: dict[str, Any] = {name: place for name, place, part in wanted if part is not None}
+            if ACCOUNT_FIELD in law.values:
+                row_fields[ACCOUNT_FIELD] = self.account
             if law.normals is not None:
                 row_fields["key"] = law.values["key"] | {"row": row + size - law.normals.shape[1]}
             ends = (row, row + size - 1) if size else (0, 0)

@@ -52,6 +52,12 @@ class KernelChoice:
     controller: Controller | None = None  # as it is for these members
     parts_of_control: tuple[tuple[Part, Any], ...] = ()  # with their device code, as they act
     given: bool = False  # the call gives the standard normals that noise and sensors take
+    resisted: bool = False  # a matrix of damping acts, of laws or of water that varies
+
+    @property
+    def account(self) -> int | None:
+        """The number of the law that keeps the account of the energy used; None where none does."""
+        return next((i for i, (term, _) in enumerate(self.laws) if term.accounts), None)
 
     @property
     def has_callback(self) -> bool:
@@ -79,15 +85,19 @@ def choose_kernel(
         parts = [part.with_features(facts.features | words) for part in controller.acting_parts]
     control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
     acting = _acting(ensemble, facts, built_in, controller, user_axes)
-    events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
+    events = tuple(
+        (event, device_module(event, event.device_in(not facts.turned), built_in)) for event in ensemble.scene.events
+    )
     damping = any(resists(module) for term, module in acting if not term.exact_flow)
     flow = _flow(acting)
     drags = [term for term, _ in acting if term.exact_flow]
-    others = [module for term, module in acting if not term.carries]
+    others = [module for term, module in acting if not (term.carries or term.accounts)]
+    # Laws change the inertia: velocities are those of a matrix of each stage.
+    carried = any(hasattr(module, "carried_inertia") for _, module in acting)
     forced = method.base in FORCED and not all(getattr(module, "POTENTIAL", False) for module in others)
     if explicit:
         # Along the kernel's axes drag is six numbers and no matrix.
-        exact = len(drags) == 1 and not facts.bent and not method.linearly_implicit
+        exact = len(drags) == 1 and not facts.bent and not method.linearly_implicit and not carried
     else:
         exact = len(drags) == 1 and not damping and flow != "varying" and not forced
     drag: tuple[str, ...] = ()
@@ -98,9 +108,11 @@ def choose_kernel(
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
     dense = damping or (bool(drags) and not exact) or flow == "varying"
     # An explicit method adds wrenches; a warning about strong drag still compares a matrix with the inertia.
-    whole = dense and (not explicit or method.linearly_implicit or checks == "all")
+    whole = carried or (dense and (not explicit or method.linearly_implicit or checks == "all"))
     memory = any(term.memory for term, _ in acting)
-    _check(method, facts, dense=dense, flow=flow, memory=memory, acting=acting)
+    # The account of the energy used acts on nothing: no method loses its order by it.
+    remembers = any(term.memory and not term.accounts for term, _ in acting)
+    _check(method, facts, dense=dense, flow=flow, memory=remembers, acting=acting)
     mass, coupled = SHAPES_OF_MASS[facts.mass], facts.coupled and not user_axes
     inverse = tuple(sorted(facts.inverse | {(i, i) for i in range(6)})) if facts.inverse else ()
     program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
@@ -140,6 +152,7 @@ def choose_kernel(
         controller=controller,
         parts_of_control=control,
         given=given,
+        resisted=dense,
     )
 
 
@@ -178,7 +191,7 @@ def _controller(ensemble: Ensemble, facts: Survey) -> Controller | None:
 def _steady(module: Any) -> bool:
     """Whether a law's force is constant in inertial axes."""
     return hasattr(module, "steady_force") or not any(
-        hasattr(module, role) for role in ("law", "damping", "evolve", "seeing")
+        hasattr(module, role) for role in ("law", "damping", "evolve", "seeing", "carried_inertia")
     )
 
 
@@ -201,7 +214,7 @@ def _conservative(facts: Survey, acting: list[tuple[Term, Any]]) -> bool:
             dissipates = term.dissipative or not hasattr(module, "damping")
             bounded = hasattr(module, "supply") or hasattr(module, "steady_size")
             known_potential = getattr(module, "POTENTIAL", False) and hasattr(module, "energy") and bounded
-            blind = not hasattr(module, "flow") and not hasattr(module, "seeing")
+            blind = not any(hasattr(module, role) for role in ("flow", "seeing", "carried_inertia"))
             passive = blind and dissipates and (known_potential or not hasattr(module, "law"))
         if not passive:
             return False
@@ -267,6 +280,12 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
             faults.add(f"{term.key}.device", module, "has push and no damping, which splittings need", page)
         if isinstance(term, NoisyTerm) and not getattr(module, "NOISE", False):
             faults.add(f"{term.key}.device", module, "does not say that it is noise", "write NOISE = True")
+        has = hasattr(module, "carried_inertia")
+        if has != term.carried:
+            fault = f"its device code has {'' if has else 'no '}carried_inertia"
+            faults.add(f"{term.key}.carried", term.carried, fault, f"write carried = {has} in {type(term).__name__}")
+        elif not has and (hasattr(module, "carried_momentum") or hasattr(module, "depart")):
+            faults.add(f"{term.key}.device", module, "has carried_momentum or depart and no carried_inertia", page)
         flow = getattr(module, "FLOW", "none")
         if flow not in FLOWS:
             faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
@@ -344,7 +363,7 @@ def _check_function(faults: Faults, term: Term, role: str, function: Any, argume
         faults.add(f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", remedy)
 
 
-ROLES = ("law", "damping", "push", "flow", "evolve", "follow")
+ROLES = ("law", "damping", "push", "flow", "evolve", "follow", "carried_inertia", "carried_momentum", "depart", "power")
 # What a law makes that looks at the water, with the arguments.
 SEEING = {"load": "D, w, view, p, sea", "push": "w, view, p, sea"}
 # Roles of a controller's parts, with their arguments.
@@ -399,14 +418,20 @@ def _check(
         if method.two_part and not getattr(module, "SEPARABLE", False):
             faults.add("method", method.name, f"needs potentials of position plus those of attitude; {term.key} has none such",
                        "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
-        if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
+        if method.gauss and ([role for role in ROLES if hasattr(module, role) and role != "power"] != ["law"]
                              or term.exact_flow or getattr(module, "NOISE", False) or hasattr(module, "seeing")):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
             faults.add("method", method.name, problem, "use psi_s")
+    moving = [term.key for term, module in acting if hasattr(module, "carried_inertia")]
+    if moving and method.tableau is None:
+        problem = f"takes one inertia for all times, which {' and '.join(moving)} changes"
+        faults.add(
+            "method", method.name, problem, "use a Runge-Kutta method, such as rk4, or inertia = false of a mass"
+        )
     for term, module in acting:
-        if method.tableau is None or not term.memory:
+        if method.tableau is None or not term.memory or term.accounts:
             continue
-        if not hasattr(module, "follow"):
+        if not (hasattr(module, "follow") or hasattr(module, "depart")):
             problem = f"cannot advance {term.key}, a term that remembers what is not known between steps"
             faults.add("method", method.name, problem, "use psi_s, psi_x or psi_w")
         elif min(method.tableau.c) < 0.0:

@@ -101,5 +101,5 @@ def _explicit(method: Method, choice: KernelChoice) -> Explicit | None:
     if kind == "vector" and choice.steady and not method.adaptive:
         kind = "inertial"
     # Without damping a linearly implicit method has no matrix, and is the explicit one of its tableau.
-    implicit = tableau.implicit if "dense" in choice.parts else ()
+    implicit = tableau.implicit if choice.resisted else ()
     return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate, method.adaptive, implicit)

@@ -13,16 +13,17 @@ import warp as wp
 
 from lgvi_kernels.advance.events import FIRST
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
-from lgvi_kernels.advance.noting import NOTED
+from lgvi_kernels.advance.noting import NOTED, SEEN_NOTES
 from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, WASTE
 from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import going_on
-from lgvi_warp.engine.arrays import PLAIN, Group, LawArrays, Structs
+from lgvi_warp.engine.arrays import PLAIN, Group, LawArrays, Structs, memory_rows
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.sample_layout import ACCOUNT_ROW
 from lgvi_warp.engine.state_lanes import StateLanes, kernel_for
 from lgvi_warp.engine.step_warnings import (
     at_start,
@@ -115,6 +116,18 @@ class Packets:
             self.monitor.start = -1 if plan.launches.goes_on else plan.grid.first
             self.monitor.first_tick = plan.launches.first_tick
 
+    def _place_account(self) -> None:
+        """Tell the kernel where in the memory the energy used is, and which rows it saves with a sample."""
+        if self.plan.spec.accounted and self.monitor.account != self.laws.account:
+            self.monitor.account = self.laws.account
+            self.monitor.signals = self._signal_rows(self.laws.account)
+            self._launch = None
+
+    def _signal_rows(self, account: int = 0) -> Any:
+        """Rows of the memory that are saved with each sample, a Warp array; account: that of the energy used."""
+        rows = [account if row == ACCOUNT_ROW else row for row in self.plan.layout.signal_rows]
+        return wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
+
     def leave(self) -> None:
         """Leave these packets to the next block; nothing of them may be used any more."""
         self.plan.free_packets.append(self)
@@ -130,9 +143,15 @@ class Packets:
             del each["part"]
         groups = [Group(packed, [shared((kind, i)) for i in range(len(packed))]) for kind, packed in each.items()]
         bus, _ = self._bus()
-        self.laws.write(groups, packing.scratch([law for group in groups for law in group.packed], bus), bus)
+        spare = sum(map(memory_rows, each["part"])) if self._controlled and plan.layout.noted_bits & SEEN_NOTES else 0
+        scratch = packing.scratch([law for group in groups for law in group.packed], bus + spare)
+        self.laws.write(groups, scratch, bus + spare, plan.kernel_choice.account)
+        self._place_account()
         if self._controlled:
             self.monitor.loop = self.laws.structs[1].array
+            of_parts = self.laws.places[len(each["law"]) :]
+            self.monitor.spare, self.monitor.part_rows = bus, spare
+            self.monitor.parts = of_parts[0][1][2] if of_parts else 0
         if plan.spec.warning_rows:
             self._limits.write(self.count, [((), self._watched_limits(), False)])
             self.monitor.limits = self._limits.array
@@ -202,7 +221,7 @@ class Packets:
         """Rows of the controller's bus, and the first of those where frozen lanes keep their signals."""
         controller = self.plan.kernel_choice.controller
         if controller is None:
-            return 0, 0
+            return len(self.plan.layout.signal_rows), 0
         kept = controller.bus.rows + bool(self.plan.layout.noted_bits) * sum(NOTED.values())
         return kept + len(self.plan.layout.signal_rows), kept
 
@@ -220,12 +239,15 @@ class Packets:
         if plan.spec.substep:
             monitor.substeps = wp.zeros(self.count, dtype=Ints, device="cpu")
         controller = plan.kernel_choice.controller
+        if plan.spec.signalled:
+            monitor.kept, monitor.signals = self._bus()[1], self._signal_rows()
+            rows = max(1, len(plan.layout.signal_rows))
+            monitor.first_signals = wp.zeros((self.count, rows), dtype=Lane, device="cpu")
+        if plan.spec.accounted:
+            monitor.account = -1
         if controller is not None:
-            rows = plan.layout.signal_rows
             monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.channels
-            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.layout.noted_bits
-            monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
-            monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
+            monitor.bus, monitor.noting = controller.bus.rows, self.plan.layout.noted_bits
             monitor.slots = plan.launches.ticks_held(self.count * plan.spec.width)
             monitor.numbers, columns = sum(plan.layout.tick_fields.values()), columns_at_ticks(plan)
             monitor.columns = wp.array(columns, dtype=wp.int32, device="cpu")

@@ -24,7 +24,7 @@ from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, ch
 from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of, with_tangents
 from lgvi_warp.engine.launches import Launches
 from lgvi_warp.engine.packing import rows_shared
-from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, check_substep, check_ticks
+from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, check_substep, check_ticks, check_times
 from lgvi_warp.engine.sample_layout import SampleLayout
 from lgvi_warp.engine.shared import MEMBERS, SEED, SharedResultsCache
 from lgvi_warp.engine.state_lanes import kernel_for
@@ -112,6 +112,7 @@ class Plan:
         """The same plan, with the same kernel and as many steps, for members that start, or go on, at another time."""
         grid = self.grid.shifted(ensemble.start_time)
         check_noise_steps(self.kernel_choice, grid)
+        check_times(self.kernel_choice, grid)
         check_ticks(self.kernel_choice, grid, ensemble.final is not None)
         # What is packed of members that start depends on the time; what goes on brings that with it.
         shared = self.shared if ensemble.final is not None else _shared(ensemble, self.shared.user_axes)
@@ -181,7 +182,7 @@ def choose_plan(
     faults, scene = Faults(), ensemble.scene
     check_settings(faults, scene, method, dtype, width, checks, on_failure)
     # Those of `save` are checked before: these are of statistics.
-    check_signals(faults, "statistics", fields, scene.controller)
+    check_signals(faults, "statistics", fields, scene)
     faults.raise_if_any()
     shared = _shared(ensemble, _adds_forces(method) and bool(damping_terms(scene.terms)))
     varied = ensemble.varied_names
@@ -197,6 +198,7 @@ def choose_plan(
     if on_failure == "substep":
         check_substep(choice, method)
     check_noise_steps(choice, grid)
+    check_times(choice, grid)
     check_ticks(choice, grid, ensemble.final is not None)
     chosen = width is None
     if width is None:

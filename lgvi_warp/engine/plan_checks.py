@@ -57,7 +57,7 @@ def check_substep(choice: KernelChoice, method: Method) -> None:
         faults.add("on_failure", "substep", f"{name} {why}", 'use on_failure="freeze"; psi_s and psi solve (24)')
     for term, module in choice.laws:
         noisy = getattr(module, "NOISE", False)
-        if term.memory or noisy:
+        if (term.memory and not term.accounts) or noisy:
             why = "draws its noise once a step" if noisy else "remembers what a step that is made again would change"
             faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
     faults.raise_if_any()
@@ -87,6 +87,14 @@ def check_noise_steps(choice: KernelChoice, grid: TimeGrid) -> None:
     faults.raise_if_any()
 
 
+def check_times(choice: KernelChoice, grid: TimeGrid) -> None:
+    """Refuse a run at times of which a term knows nothing."""
+    faults = Faults()
+    for term, _ in choice.laws:
+        term.check_times(faults, float(grid.times[0]), float(grid.times[-1]))
+    faults.raise_if_any()
+
+
 def check_ticks(choice: KernelChoice, grid: TimeGrid, goes_on: bool = False) -> None:
     """Refuse a period or a delay of the controller that is no whole number of steps, and a start between two ticks.
 
@@ -94,7 +102,7 @@ def check_ticks(choice: KernelChoice, grid: TimeGrid, goes_on: bool = False) -> 
     """
     faults, controller = Faults(), choice.controller
     if controller is not None:
-        controller.check_step(faults, grid.h)
+        controller.check_step(faults, grid.h, grid.asked)
         faults.raise_if_any()
         every = controller.every(grid.h)
         if grid.first % every and not goes_on:

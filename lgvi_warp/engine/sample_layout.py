@@ -8,12 +8,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import Any
 
 from lgvi_kernels.advance.noting import ALL_NOTES, NOTED, bit
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
-from lgvi_warp.control.signals import SIGNALS, row_of, saved_fields
+from lgvi_warp.control.signals import ENERGY_USED, SIGNALS, row_of, saved_fields
 from lgvi_warp.engine.kernel_choice import KernelChoice
 from lgvi_warp.physics.fields import Field
+
+# Stands for the row of the energy used, which is known once the laws are packed.
+ACCOUNT_ROW = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +36,11 @@ class SampleLayout:
     @functools.cached_property
     def table(self) -> dict[str, Field]:
         """The fields that the run may save, by name."""
-        return saved_fields(self.choice.controller)
+        return saved_fields(self.choice.controller, self.choice.account is not None)
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Names of the controller's signals among the fields."""
+        """Names of the signals among the fields: those of the controller, and the energy used."""
         return tuple(name for name in self.fields if name in SIGNALS)
 
     @functools.cached_property
@@ -92,8 +96,11 @@ class SampleLayout:
     def signal_rows(self) -> tuple[int, ...]:
         """Rows of the memory that are saved with each sample: those of each signal in turn."""
         controller = self.choice.controller
-        if controller is None or controller.bus is None:
-            return ()
+        bus: Any = None if controller is None else controller.bus
         noted = {name: rows.start for name, rows in self.noted_rows.items()}
-        begins = ((row_of(name, controller.bus, noted), self.sizes[name]) for name in self.signals)
+
+        def begin(name: str) -> int:
+            return ACCOUNT_ROW if name == ENERGY_USED else row_of(name, bus, noted)
+
+        begins = ((begin(name), self.sizes[name]) for name in self.signals)
         return tuple(row + i for row, size in begins for i in range(size))

@@ -302,4 +302,5 @@ def slopes_in_advance(packets: Packets, k0: int, k1: int) -> list[dict[str, np.n
 def samples_of(plan: Plan, grid: TimeGrid, when: slice, fields: Mapping[str, np.ndarray], ends: Ends) -> Fields:
     """Fields (times, members, ...) of a block with the times, steps and terms that belong to them."""
     scene = plan.ensemble.scene
-    return Fields(fields, grid.times[when], grid.sample_steps[when], scene.terms, ends, scene.controller)
+    times = grid.times[when], grid.sample_steps[when]
+    return Fields(fields, *times, scene.terms, ends, scene.controller, scene.events)

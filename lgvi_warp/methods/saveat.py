@@ -29,7 +29,7 @@ class SaveAt:
         at: Rising times of samples [s], >= 0; default None. Give `every` or `at`, not both.
         fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. A field that is left out
             takes no memory. In a scene with a controller also its signals: "command", "actuator", "demand", "unmet",
-            "measured_..." and "reference_..." (see lw.Result).
+            "measured_..." and "reference_..." (see lw.Result); in one with a term `lw.terms.EnergyUse` also "energy_used".
         final: Whether `result.final` is kept, from which a run can go on: the states at the end, and what forces, actuators
             and controllers remember. Default: where the samples of all members are kept, of fewer than 100,000.
 
@@ -73,12 +73,14 @@ class TimeGrid:
 
     sample_steps: Numbers of steps from t = 0 to each sample, int64, (k,); the first is 0, unless the run starts later.
     times: Those of the samples, (k,) [s].
+    asked: The step that was asked for [s], where it was shortened; else None.
     """
 
     h: float
     sample_steps: np.ndarray
     times: np.ndarray
     messages: tuple[str, ...] = ()
+    asked: float | None = None
 
     @property
     def steps(self) -> int:
@@ -107,14 +109,14 @@ class TimeGrid:
         faults.raise_if_any()
         steps = self.sample_steps - self.first + int(first)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
-        return TimeGrid(self.h, steps, times, self.messages)
+        return TimeGrid(self.h, steps, times, self.messages, self.asked)
 
     def ticks(self, every: int, goes_on: bool = False) -> TimeGrid:
         """The same steps with samples at the ticks of a controller alone; where the run goes on, the first one was made."""
         first = self.first + 1 if goes_on else self.first
         step, steps = exact(self.h), np.arange(-(-first // every) * every, self.last + 1, every)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
-        return TimeGrid(self.h, steps, times, self.messages)
+        return TimeGrid(self.h, steps, times, self.messages, self.asked)
 
     def telling(self, *messages: str) -> TimeGrid:
         """The same steps and samples with more messages."""
@@ -171,7 +173,8 @@ def time_grid(h: float, t1: float, save: SaveAt, t0: float = 0.0) -> TimeGrid:
     steps = np.union1d(regular_steps, [int(t / step) for t in sample_times])
     # A quotient of whole numbers is the float nearest to each time; a sum of steps would not be.
     times = [k * step.numerator / step.denominator for k in steps.tolist()]
-    return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages)
+    asked = None if step == meant else float(meant)
+    return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages, asked)
 
 
 def divisors(count: int) -> list[int]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.status import failed, under_way
 from lgvi_warp.physics import terms, vehicle
-from lgvi_warp.physics.terms.base import CONSERVED, Term
+from lgvi_warp.physics.terms.base import CONSERVED, Inner, Term
 
 
 class Sampled(Protocol):
@@ -81,8 +81,22 @@ def _relative(result: Sampled) -> np.ndarray:
 
 
 def _momenta(result: Sampled) -> np.ndarray:
-    """(p, pi) about the user's origin, (k, n, 6)."""
-    return np.einsum("nij,knj->kni", *_broadcast(vehicle.inertia6(result.parameters), _relative(result)))
+    """(p, pi) about the user's origin, (k, n, 6), of the vehicle and of what moves in it."""
+    relative = _relative(result)
+    momenta = _momenta_of_vehicle(result, relative)
+    return np.asarray(sum((inner.momenta for inner in _inner(result, relative)), momenta))
+
+
+def _momenta_of_vehicle(result: Sampled, relative: np.ndarray) -> np.ndarray:
+    """Those of the vehicle's own inertia at the velocities `relative` (k, n, 6)."""
+    return np.einsum("nij,knj->kni", *_broadcast(vehicle.inertia6(result.parameters), relative))
+
+
+def _inner(result: Sampled, relative: np.ndarray) -> list[Inner]:
+    """What masses that move in the vehicle add."""
+    down, time = result.attitude[..., 2, :].astype(np.float64), result.time
+    each = (term.inner(result.own(term), time, relative, down, result.parameters) for term in result.terms)
+    return [inner for inner in each if inner is not None]
 
 
 def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -91,7 +105,9 @@ def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, n
 
 def kinetic_energy(result: Sampled) -> np.ndarray:
     """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, as (k, n) [J]."""
-    return np.asarray(0.5 * np.sum(_relative(result) * _momenta(result), axis=-1))
+    relative = _relative(result)
+    own = 0.5 * np.sum(relative * _momenta_of_vehicle(result, relative), axis=-1)
+    return np.asarray(sum((inner.kinetic for inner in _inner(result, relative)), own))
 
 
 def energy(result: Sampled) -> np.ndarray:
@@ -100,7 +116,7 @@ def energy(result: Sampled) -> np.ndarray:
     position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
     for term in (*terms.IMPLIED, *result.terms):
         total = total + term.potential(result.own(term), position, attitude, result.parameters)
-    return np.asarray(total)
+    return np.asarray(sum((inner.potential for inner in _inner(result, _relative(result))), total))
 
 
 def linear_momentum(result: Sampled) -> np.ndarray:

@@ -39,6 +39,7 @@ TABLE = {
         Field("angular_velocity", (3,), "rad/s", "angular velocity in body axes"),
         # All others follow from these four.
         Field("depth", (), "m", "depth below the surface"),
+        Field("altitude", (), "m", "height above the sea floor"),
         Field("velocity_inertial", (3,), "m/s", "velocity in inertial axes"),
         Field("speed", (), "m/s", "length of the velocity"),
         Field("quaternion_wxyz", (4,), "1", "unit quaternion of the attitude, scalar first"),
@@ -48,6 +49,8 @@ TABLE = {
         Field("energy", (), "J", "kinetic and potential energy"),
     )
 }
+# Unit of a place on the Earth: latitude, longitude, depth.
+PLACE_UNIT = "deg, deg, m"
 # Names of the samples of the motion that a run computes.
 FIELDS = tuple(TABLE)[:4]
 # Names of the last dimensions of an array, by their sizes; others are named after the array.

@@ -12,8 +12,20 @@ from typing import Protocol
 
 import numpy as np
 
+from lgvi_warp.reference.carried import boarded, landed, velocities
 from lgvi_warp.reference.rotation import Array, cross
-from lgvi_warp.reference.submaps import Body, State, acceleration_wrench, damping, load, look, remembered, water
+from lgvi_warp.reference.submaps import (
+    Body,
+    State,
+    acceleration_wrench,
+    damping,
+    load,
+    look,
+    power,
+    recorded,
+    remembered,
+    water,
+)
 from lgvi_warp.reference.terms import Law
 
 Row = tuple[float, ...]
@@ -89,7 +101,7 @@ def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[A
     b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; some laws look at the step h.
     """
     x = at(x, -origin)
-    nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
+    nu, Om = np.split(velocities(x, body, h), 2)
     force, torque, u = wrench(x, body, h, nu, Om)
     turning = np.array([cross(row, Om) for row in x.R])
     p, pi = cross(x.p, Om) + force, cross(x.pi, Om) + cross(x.p, nu) + torque
@@ -128,25 +140,35 @@ def followed(x: State, body: Body, h: float) -> State:
         return x
     if h < 0.0:
         raise ValueError(f"h = {h:.3g} s: what laws remember is not known before a step; use rkmk4")
-    laws = zip(body.terms, look(x, body, h), strict=True)
-    return replace(x, memory=tuple(law.follow(view) for law, view in laws))
+    views = look(x, body, h)
+    return recorded(x, body, views, tuple(law.follow(view) for law, view in zip(body.terms, views, strict=True)))
 
 
 def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> Array:
     """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 15)."""
-    y, K = pack(x), np.zeros((len(tableau.b), 15))
+    return stages_and_powers(x, body, h, tableau, origin)[0]
+
+
+def stages_and_powers(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> tuple[Array, Array]:
+    """The same, and the power that is taken at each stage, (stages,) [W]."""
+    y, K, watts = pack(x), np.zeros((len(tableau.b), 15)), np.zeros(len(tableau.b))
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
-        K[i] = rates(followed(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, c * h), body, h, origin)
-    return K
+        stage = followed(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, c * h)
+        own = at(stage, -origin)
+        K[i], watts[i] = rates(stage, body, h, origin), power(own, body, h, velocities(own, body, h))
+    return K, watts
 
 
 def stepper(tableau: Tableau, origin: Array = USER) -> Step:
     """step(x, body, h): y + h sum_i b_i k_i, with y taken at a point (3,) [m] of the body; x is at the user's origin."""
 
     def step(x: State, body: Body, h: float) -> State:
-        x = at(remembered_half(x, body, h, second=False), origin)
-        y = pack(x) + h * np.array(tableau.b) @ stages(x, body, h, tableau, origin)
-        return remembered_half(at(followed(unpack(y, x, x.t + h), body, h), -origin), body, h, second=True)
+        x = at(boarded(remembered_half(x, body, h, second=False), body, h), origin)
+        K, watts = stages_and_powers(x, body, h, tableau, origin)
+        y = pack(x) + h * np.array(tableau.b) @ K
+        x = replace(x, used=x.used + h * float(np.array(tableau.b) @ watts))
+        x = landed(at(followed(unpack(y, x, x.t + h), body, h), -origin), body, h)
+        return remembered_half(x, body, h, second=True)
 
     return step
 

@@ -18,7 +18,7 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 class State:
     """b (3,) [m], R (3, 3) body to inertial, p (3,) [N s] and pi (3,) [N m s] relative to the water; t [s]; step.
 
-    memory: what each of the body's laws remembers, in their order.
+    memory: what each of the body's laws remembers, in their order. used: the energy used since the start [J].
     """
 
     b: Array
@@ -28,6 +28,7 @@ class State:
     t: float = 0.0
     step: int = 0
     memory: tuple[Array, ...] = ()
+    used: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,22 @@ def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]
 def remembered(x: State, body: Body, h: float, second: bool) -> State:
     """What the laws remember, half a kick later."""
     views = look(x, body, h)
-    return replace(x, memory=tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True)))
+    memory = tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True))
+    return recorded(x, body, views, memory)
+
+
+def recorded(x: State, body: Body, views: tuple[View, ...], memory: tuple[Array, ...]) -> State:
+    """The same state with what the laws remember now, and the energy that they took meanwhile."""
+    spent = sum(term.spent(view, rows) for term, view, rows in zip(body.terms, views, memory, strict=True))
+    return replace(x, memory=memory, used=x.used + spent)
+
+
+def power(x: State, body: Body, h: float, velocities: Array | None = None) -> float:
+    """The power [W] that all laws take at a state; velocities: (nu; Om) (6,), where they are not I6^-1 of the momenta."""
+    views = look(x, body, h)
+    if velocities is not None:
+        views = tuple(replace(view, nu=velocities[:3], Om=velocities[3:]) for view in views)
+    return sum(term.power(view) for term, view in zip(body.terms, views, strict=True))
 
 
 def load(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, Array]:
@@ -213,10 +229,14 @@ def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     force, torque = body.wrench(x.b, x.R, views)
     pushed, turned = acceleration_wrench(x.R, body, flow)
     wrench = (force + pushed, torque + turned)
+    before = x
     x = kicked(x, 0.5 * h, wrench)
     x = dissipated(x, body, h, flow)
     x = kicked(x, 0.5 * h, wrench)
-    return remembered(replace(x, b=b + h * flow.velocity), body, h, second=True)
+    middle = replace(x, p=0.5 * (before.p + x.p), pi=0.5 * (before.pi + x.pi))
+    x = replace(x, used=x.used + h * power(middle, body, h))
+    # Laws remember where the kick was, half way with the water.
+    return replace(remembered(x, body, h, second=True), b=b + h * flow.velocity)
 
 
 SUBMAPS = {"Ab": Ab, "Ap": Ap, "T": T, "D": D, "K": K}

@@ -275,9 +275,14 @@ def _of_ends(text: str) -> EndQuantity | None:
 class _Samples(dict[str, np.ndarray]):
     """Samples of a result in the form that functions of (samples, members) take."""
 
-    def __init__(self, fields: Mapping[str, np.ndarray], time: np.ndarray, terms: Sequence[Any]):
+    def __init__(self, fields: Mapping[str, np.ndarray], time: np.ndarray, result: Result):
         super().__init__(fields)
-        self.time, self.terms = time, terms
+        self.time, self.terms, self._result = time, result.terms, result
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The events of the scene."""
+        return events_of(self._result.provenance["scene"].get("events", ()))
 
 
 def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
@@ -285,7 +290,7 @@ def samples_of(result: Result, when: slice = slice(None), members: Any = None) -
     fields = {name: result.samples[name][when] for name in SAVED if name in result.samples}
     start = {name: result.samples[name][0] for name in fields}
     known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
-    return _Samples(fields, result.time[when], result.terms), known if members is None else members
+    return _Samples(fields, result.time[when], result), known if members is None else members
 
 
 def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:

@@ -25,6 +25,8 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, TABLE, dims_of
 from lgvi_warp.physics.terms.base import Term, own
+from lgvi_warp.physics.terms.events import from_list
+from lgvi_warp.physics.terms.floor import altitude_over
 from lgvi_warp.results import final as final_files
 from lgvi_warp.results import member_fields, result_file
 from lgvi_warp.sampling.final import Final
@@ -44,7 +46,7 @@ PICTURED = 20
 
 
 class _Signal:
-    """A signal of the controller as an attribute of a result."""
+    """A signal of the controller, or the energy used, as an attribute of a result."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -67,7 +69,9 @@ class Result(Summarized):
             Signals of a controller, where SaveAt(fields=...) names them, are those after the look at each time: command and
             actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand and unmet (k, n, 6) [N,
             N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth, _heading;
-            reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed.
+            reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed. Of a filter
+            (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k, n, 6), nees, nis and nis_count
+            (k, n), innovation and innovation_sigma (k, n, 12). So is energy_used (k, n) [J], of a scene that accounts it.
         status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
         failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN where there
             was neither.
@@ -198,6 +202,7 @@ class Result(Summarized):
         """Angular velocities in body axes [rad/s], shape (k, n, 3)."""
         return self._kept("angular_velocity")
 
+    energy_used = _Signal()
     command, actuator, demand, unmet = _Signal(), _Signal(), _Signal(), _Signal()
     measured_position, measured_attitude, measured_velocity = _Signal(), _Signal(), _Signal()
     measured_water_velocity, measured_angular_velocity = _Signal(), _Signal()
@@ -205,6 +210,8 @@ class Result(Summarized):
     reference_position, reference_attitude, reference_velocity = _Signal(), _Signal(), _Signal()
     reference_angular_velocity, reference_depth = _Signal(), _Signal()
     reference_heading, reference_speed, reference_angular_acceleration = _Signal(), _Signal(), _Signal()
+    estimate_sigma, estimate_bias, nees, nis = _Signal(), _Signal(), _Signal(), _Signal()
+    nis_count, innovation, innovation_sigma = _Signal(), _Signal(), _Signal()
 
     @functools.cached_property
     def quaternion_wxyz(self) -> np.ndarray:
@@ -221,6 +228,12 @@ class Result(Summarized):
     def depth(self) -> np.ndarray:
         """Depth of the body's origin below the surface [m], float64, shape (k, n)."""
         return self._quantity("depth")
+
+    @property
+    def altitude(self) -> np.ndarray:
+        """Height of the body's origin above the highest floor of the scene [m], float64, shape (k, n)."""
+        events = from_list(self.provenance["scene"].get("events", ()))
+        return altitude_over(events, self._kept("position"), self.parameters)
 
     @property
     def speed(self) -> np.ndarray:

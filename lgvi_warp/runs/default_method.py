@@ -55,6 +55,9 @@ def choices(ensemble: Ensemble, h: float, known_rates: Rates | None = None) -> I
     h: Step [s].
     known_rates: The rates of the motion; default None: they are computed.
     """
+    if not is_damped(ensemble) and any(term.carried for term in ensemble.scene.terms):
+        yield Method("rk4", reason="since the inertia changes")
+        return
     if not is_damped(ensemble):
         yield Method("psi_s", reason="since nothing damps the motion")
         yield Method("psi_x", reason="since nothing damps the motion, and psi_s does not take the scene")
@@ -122,7 +125,7 @@ def stable(method: Method, numbers: dict[str, float], share: float = SHARES["dra
 
 def is_damped(ensemble: Ensemble) -> bool:
     """Tell whether a term takes energy from some of the first members."""
-    terms = [term for term in damping_terms(ensemble.scene.terms) if term.dissipative]
+    terms = [term for term in damping_terms(ensemble.scene.terms) if term.dissipative or term.brakes]
     if not terms:
         return False
     parameters = ensemble.parameters(0, min(LOOKED_AT, ensemble.members))

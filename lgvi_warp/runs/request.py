@@ -116,9 +116,8 @@ class Request:
         if self.save is not None and not isinstance(self.save, SaveAt):
             faults.add("save", self.save, "is no SaveAt", "give lw.SaveAt(every=1.0) or lw.SaveAt(at=[...])")
         faults.raise_if_any()
-        check_signals(
-            faults, "run.save_fields" if self.save is None else "save.fields", self.saved, self.fleet.scene.controller
-        )
+        key = "run.save_fields" if self.save is None else "save.fields"
+        check_signals(faults, key, self.saved, self.fleet.scene)
         faults.raise_if_any()
         if self.save is not None:
             return time_grid(h, t1, self.save, t0)

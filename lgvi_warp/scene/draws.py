@@ -201,6 +201,10 @@ def draws_of(scene: SceneLike, settings: EnsembleSettings, explicit: Mapping[str
     faults = Faults("ensemble.vary.")
     base, sampling = scene.parameters(), settings.sampling
     columns, designed = sampling.own_values(), sampling.distributions()
+    if any(name.startswith("start.geodetic") for name in columns):
+        from lgvi_warp.scene.given_places import positions_in_place_of_places
+
+        columns = positions_in_place_of_places(columns, scene)
     start = {} if explicit else {f"start.{key}": value for key, value in scene.start.given().items()}
     if not explicit:
         start = _turned_by_matrix(faults, start, [*settings.vary, *designed, *columns])

@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lgvi_warp.common.arguments import mapping_of, path_of
 from lgvi_warp.common.errors import SceneError, among, cut, refusal
 from lgvi_warp.common.reading import file_text
@@ -42,7 +44,7 @@ def tables_of_text(
 
 
 def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
-    """Put relative paths of files that the content names below the folder: a table of members, policies, and a mesh."""
+    """Put relative paths of files that the content names below the folder: a table of members, policies, data, and a mesh."""
     try:
         ensemble = content["ensemble"]
         sampling = ensemble["sampling"]
@@ -59,6 +61,10 @@ def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
             content = content | {"vehicle": vehicle | {"shape": shape | {"mesh": _mesh_in(folder, shape["mesh"])}}}
     except (KeyError, TypeError):
         pass
+    with contextlib.suppress(KeyError, TypeError, AttributeError):
+        content = content | {"terms": [_below(folder, term) for term in content["terms"]]}
+    with contextlib.suppress(KeyError, TypeError, AttributeError):
+        content = content | {"events": [_below(folder, event) for event in content["events"]]}
     try:
         controller = content["controller"]
         laws = [_below(folder, law) for law in controller["laws"]]
@@ -68,9 +74,9 @@ def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     return content
 
 
-def _below(folder: Path, law: Any) -> Any:
-    """Return the table of a law, with the path of its file put below the folder."""
-    return law | {"file": os.fspath(folder / law["file"])} if isinstance(law.get("file"), str) else law
+def _below(folder: Path, part: Any) -> Any:
+    """Return the table of a term, an event or a law, with the path of its file put below the folder."""
+    return part | {"file": os.fspath(folder / part["file"])} if isinstance(part.get("file"), str) else part
 
 
 def _mesh_in(folder: Path, name: str) -> str:
@@ -141,6 +147,65 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
         names = [_name_of(term) for term in terms]
         merged["terms"] = [term for term in known.get("terms", []) if not among(_name_of(term), names)] + list(terms)
     return merged
+
+
+def with_origin_of_floors(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Complete the tables of floors that are read from a file by the origin of the axes that [environment] says."""
+    events, origin = content.get("events"), _entry(content, "environment", "origin")
+    if origin is None or not isinstance(events, list | tuple):
+        return content
+
+    def completed(event: Any) -> Any:
+        reads = isinstance(event, Mapping) and event.get("type") == "floor" and "file" in event
+        return {"origin": origin} | dict(event) if reads else event
+
+    return {**content, "events": [completed(event) for event in events]}
+
+
+def with_times_of_data(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Complete the tables of currents that are read from a file by what other sections say.
+
+    That is the origin of the axes and the moment that is t = 0, of [environment], how long the run lasts, and where members
+    start.
+    """
+    terms = content.get("terms")
+    if not isinstance(terms, list | tuple) or not any(_reads_file(term) for term in terms):
+        return content
+    known = {key: _entry(content, "environment", key) for key in ("origin", "start")}
+    known["duration"] = _entry(content, "run", "duration")
+    known = {key: value for key, value in known.items() if value is not None}
+
+    def completed(term: Any) -> Any:
+        if not _reads_file(term):
+            return term
+        table = known | dict(term)
+        if table.get("speed") is not None and "around" not in table:
+            around = _start(content, table.get("origin"))
+            table |= {} if around is None else {"around": around}
+        return table
+
+    return {**content, "terms": [completed(term) for term in terms]}
+
+
+def _reads_file(term: Any) -> bool:
+    return isinstance(term, Mapping) and among(term.get("type"), ("current_field",)) and "file" in term
+
+
+def _entry(content: Mapping[str, Any], section: str, key: str) -> Any:
+    """A value of a section, which is a table or an object; None where there is none."""
+    table = content.get(section, {})
+    return table.get(key) if isinstance(table, Mapping) else getattr(table, key, None)
+
+
+def _start(content: Mapping[str, Any], origin: Any) -> Any:
+    """Where members start, (3,) [m]; None for nothing given."""
+    place = _entry(content, "start", "geodetic")
+    if place is None or np.shape(place) != (3,) or np.shape(origin) != (2,):
+        return _entry(content, "start", "position")
+    from lgvi_warp.ocean.places import LocalPlane
+
+    north, east = LocalPlane(*map(float, origin)).local(*place[:2])
+    return [float(north), float(east), float(place[2])]
 
 
 def _name_of(term: Any) -> Any:

@@ -37,7 +37,7 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
         if target.index is None:
             place[attribute] = value
             continue
-        start = scene.start.given().get(attribute) if key == "start" else base[target.name]
+        start = _of_start(scene, attribute) if key == "start" else base[target.name]
         array = np.array(place.get(attribute, start), dtype=np.float64)
         try:
             array[target.index] = value
@@ -49,6 +49,11 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
         place[attribute] = array
     faults.raise_if_any()
     return _changed(scene, changes)
+
+
+def _of_start(scene: Any, name: str) -> Any:
+    """A number of the start; None where the start is given by others."""
+    return scene.start.geodetic if name == "geodetic" else scene.start.given().get(name)
 
 
 def _changed(scene: SceneT, changes: Mapping[str, Mapping[str, Any]]) -> SceneT:

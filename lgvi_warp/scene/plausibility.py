@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgvi_warp.ocean.places import FAR_FROM_ORIGIN, too_long
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins
-from lgvi_warp.physics.terms.cross_flow import CrossFlow
+from lgvi_warp.physics.terms.strips import StripTerm
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
@@ -63,8 +64,12 @@ MOST_SAMPLES = 30_000_000
 FAST = f"a current of {{:.4g}} m/s is beyond the {LIMITS['current'].value:g} m/s of the strongest tides: a unit?"
 FAR = "an angle of {:.4g} rad is beyond 90 degrees: is it given in degrees?"
 HIGH = "a depth of {:.4g} m is above the surface: depth is positive down"
+FAR_AWAY = ("a place is {:.0f} km from environment.origin: lengths across the way to it are {:.2g} % too long there; take an "
+            "origin nearer to the mission")  # fmt: skip
 LARGE = ("an inertia of {:.4g} kg m2 is beyond the {:.4g} kg m2 that the mass allows within the {:.4g} m of the hull's "
          "stations: a unit?")  # fmt: skip
+
+TWICE = "brakes the hull across the flow where {} does: its drag counts twice"
 
 
 def _text(template: str, *numbers: np.ndarray) -> Callable[[int], str]:
@@ -73,7 +78,7 @@ def _text(template: str, *numbers: np.ndarray) -> Callable[[int], str]:
 
 
 def net_weight(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for a net weight that hardly any vehicle has."""
+    """Look for a net weight that hardly any vehicle has; one that floats may be as light as it likes."""
     weight, buoyancy = np.broadcast_arrays(vehicles.weight(p), p["vehicle.buoyancy"])
     net = weight - buoyancy
 
@@ -82,7 +87,8 @@ def net_weight(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
         question = "is the mass in kg, and are weight and buoyancy in N" if buoyancy[i] else "is buoyancy [N] left out"
         return f"the net weight, {abs(net[i]):.4g} N {way}, is beyond half the weight, {weight[i]:.4g} N: {question}?"
 
-    yield "vehicle.buoyancy", np.abs(net) > LIMITS["net weight"].value * weight, text
+    size = np.maximum(net, 0.0) if floats(scene) else np.abs(net)
+    yield "vehicle.buoyancy", size > LIMITS["net weight"].value * weight, text
 
 
 def density(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
@@ -134,12 +140,12 @@ def depths(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 def inertia(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for inertia that a body of this mass and length cannot have.
 
-    The length is that of the stations of a cross flow. Within a length L along x and a breadth D, the variance of a
+    The length is that of the stations of a hull. Within a length L along x and a breadth D, the variance of a
     coordinate is at most a quarter of its range squared (Popoviciu 1935), so that the rigid body's inertia is at most
     m (L^2 + D^2)/4. Added inertia is that of strips: at most the added mass times the largest distance squared.
     """
     for term in scene.terms:
-        if isinstance(term, CrossFlow):
+        if isinstance(term, StripTerm):
             x, breadth = p[f"{term.key}.stations"], p[f"{term.key}.diameters"].max(axis=1)
             rigid = vehicles.dry_mass(p) * ((x[:, -1] - x[:, 0]) ** 2 + breadth**2) / 4.0
             arm = np.abs(x).max(axis=1) ** 2 + breadth**2 / 4.0
@@ -172,8 +178,40 @@ def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     yield "controller.allocation", np.array([bool(missing)]), lambda i: text
 
 
+def hulls(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
+    """Look for two terms that brake the same part of a hull: `hull_loads` has the drag of `cross_flow`."""
+    terms = [term for term in scene.terms if isinstance(term, StripTerm)]
+    for first, second in itertools.combinations(terms, 2):
+        both = np.array(True)
+        for term in (first, second):
+            both = both & np.any(p[f"{term.key}.drag_coefficient"] * p[f"{term.key}.diameters"] > 0.0, axis=1)
+        ends = [p[f"{term.key}.stations"] for term in (first, second)]
+        common = np.minimum(ends[0][:, -1], ends[1][:, -1]) - np.maximum(ends[0][:, 0], ends[1][:, 0])
+        yield f"{second.key}.drag_coefficient", both & (common > 0.0), _text(TWICE.format(first.key))
+
+
+def remarks(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
+    """Pass on what terms say of their own numbers."""
+    for term in scene.terms:
+        for text in term.remarks:
+            yield term.key, np.array([True]), lambda i, text=text: text  # type: ignore[misc]
+
+
+def waypoints(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
+    """Look for waypoints so far from the origin of a map that its lengths are not those of the Earth."""
+    if scene.environment.origin is not None:
+        for term in (term for term in scene.parts if term.type == "waypoints"):
+            points = p[f"{term.key}.points"]
+            yield _far_away(f"{term.key}.points", np.hypot(points[..., 0], points[..., 1]).max(axis=1))
+
+
+def _far_away(key: str, distance: np.ndarray) -> OddityCheck:
+    """Look for places that are far from the origin of the map, at distances (n,) [m]."""
+    return key, distance > FAR_FROM_ORIGIN, _text(FAR_AWAY, distance / 1e3, 100.0 * too_long(distance))
+
+
 # Checks of every member before a run.
-OF_NUMBERS = (net_weight, density, currents, fin_angles, depths, inertia, actuators)
+OF_NUMBERS = (waypoints, net_weight, density, currents, fin_angles, depths, inertia, hulls, actuators, remarks)
 
 
 def of_numbers(
@@ -215,8 +253,10 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
     speed, depth = _speed(members.velocity), members.position[:, 2]
     limit = LIMITS["speed"].value
     yield "start.velocity", speed > limit, lambda i: f"a speed of {speed[i]:.4g} m/s is beyond {limit:g} m/s: a unit?"
-    if not ends_at_the_surface(scene):
+    if not ends_at_the_surface(scene) and not floats(scene):
         yield "start.position", depth < LIMITS["depth"].value, _text(HIGH, depth)
+    if scene.environment.origin is not None:
+        yield _far_away("environment.origin", np.hypot(members.position[:, 0], members.position[:, 1]))
     for term in own_flows(scene):
         numbers = own(term, members.parameters)
         water = term.water(numbers, members.position[None], np.zeros(1), members.parameters)
@@ -237,6 +277,11 @@ def ends_at_the_surface(scene: SceneLike) -> bool:
     return any(event.type == "surface" for event in scene.events) or any(top >= 0.0 for top in boxes)
 
 
+def floats(scene: SceneLike) -> bool:
+    """Return whether the vehicle loses buoyancy above the surface."""
+    return any(term.type == "surface_buoyancy" for term in scene.terms)
+
+
 def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
     """What became odd of members that began well, by samples that are in memory anyway.
 
@@ -246,7 +291,7 @@ def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
     with np.errstate(all="ignore"):
         fast, speed = _later(samples.get("velocity"), _speed, _no_speed_above, limit)
         high, height = _later(samples.get("position"), _higher, _nothing_higher_than, -LIMITS["depth"].value)
-    if ends_at_the_surface(scene):
+    if ends_at_the_surface(scene) or floats(scene):
         high = np.zeros_like(high)
     checked: list[OddityCheck] = [
         ("velocity", fast, lambda i: f"{speed[i]:.4g} m/s on the way is beyond {limit:g} m/s: a unit, or the step?"),
@@ -255,7 +300,7 @@ def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
     return gathered(checked, 0, max(len(fast), len(high)))
 
 
-STOP = "stop members there by the event lw.events.Surface()"
+STOP = "stop members there by the event lw.events.Surface(), or let them float by lw.terms.SurfaceBuoyancy(...)"
 
 
 def _higher(position: np.ndarray) -> np.ndarray:

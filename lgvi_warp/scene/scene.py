@@ -24,7 +24,13 @@ from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.vehicle import UNITS, Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.scene.file import tables_and_text, tables_of_text, with_named_vehicle
+from lgvi_warp.scene.file import (
+    tables_and_text,
+    tables_of_text,
+    with_named_vehicle,
+    with_origin_of_floors,
+    with_times_of_data,
+)
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 from lgvi_warp.scene.variations import check_names
@@ -88,8 +94,12 @@ class Scene(Summarized):
 
                 object.__setattr__(self, "controller", from_table(self.controller))
         if not faults:
+            object.__setattr__(self, "events", self._with_own_events())
             self._check_names(faults)
         sound = not faults
+        if isinstance(self.environment, Environment) and isinstance(self.start, Start):
+            self._locate(faults)
+            sound = not faults
         for name, kind in KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 # Settings of a run have no public class: they are arguments of solve, or a table of a scene file.
@@ -107,6 +117,10 @@ class Scene(Summarized):
         rows = [("vehicle", self.vehicle.title)] if self.vehicle.title else []
         rows += [(f"vehicle.{name}", summaries.few_digits(value, UNITS[name])) for name, value in numbers]
         rows.append(("environment", f"gravity {water.gravity:g} m/s2, water_density {water.water_density:g} kg/m3"))
+        if water.origin is not None:
+            rows.append(
+                ("origin", f"{water.origin[0]:g}, {water.origin[1]:g} deg" + (f", {water.start}" * bool(water.start)))
+            )
         rows += [(f"start.{name}", summaries.few_digits(value, TABLE[name].unit)) for name, value in start]
         rows.append(("terms", summaries.listed(term.key for term in self.terms)))
         if self.controller is not None:
@@ -120,15 +134,26 @@ class Scene(Summarized):
         )
         return "Scene", rows
 
+    def _locate(self, faults: Faults) -> None:
+        """Convert places on the Earth, of the start and of waypoints, to positions from the origin."""
+        with faults.including():
+            object.__setattr__(self, "start", self.start.located(self.environment))
+        if self.controller is not None and not faults:
+            with faults.including():
+                object.__setattr__(self, "controller", self.controller.located(self.environment.plane))
+
     def _connect(self) -> None:
-        """Let terms take the commands of the controller, if there is one; others are by themselves."""
+        """Let terms take the commands of the controller, if there is one, and know their vehicle."""
         bus = None
         if self.controller is not None:
-            object.__setattr__(self, "controller", self.controller.wired(self.terms, self._nominal()))
+            object.__setattr__(self, "controller", self.controller.wired(self.terms, self._nominal(), self.events))
             bus = self.controller.bus
         driven = set(bus.commands) if bus else set()
-        wired = (term.driven_by(bus if term.key in driven else None) for term in self.terms)
-        object.__setattr__(self, "terms", tuple(wired))
+        accounted = any(term.accounts for term in self.terms)
+        terms = (term.beside_account(accounted) for term in self.terms)
+        wired = tuple(term.driven_by(bus if term.key in driven else None) for term in terms)
+        nominal = self._nominal()
+        object.__setattr__(self, "terms", tuple(term.beside(wired).of_vehicle(nominal) for term in wired))
 
     def _nominal(self) -> dict[str, np.ndarray]:
         """The numbers of the vehicle and its environment by name."""
@@ -142,6 +167,11 @@ class Scene(Summarized):
         """Everything that has numbers of its own: terms, events, and the parts of the controller."""
         parts = () if self.controller is None else (self.controller.delay_part, *self.controller.parts)
         return (*self.terms, *self.events, *parts)
+
+    def _with_own_events(self) -> tuple[Any, ...]:
+        """The events, with those that terms bring along in place of former ones."""
+        own = tuple(event for term in self.terms for event in term.own_events)
+        return (*(event for event in self.events if not isinstance(event, events.Outside)), *own)
 
     def _check_names(self, faults: Faults) -> None:
         """Require different names of all terms and events, on every file system."""
@@ -158,6 +188,12 @@ class Scene(Summarized):
                 elif counts[key] > 1:
                     faults.add(place, key, f"is the name of two {word}s or of a term too",
                                f'give each a name of its own: name = "{key}_2"')  # fmt: skip
+        accounts = [term for term in self.terms if term.accounts]
+        if len(accounts) > 1:
+            faults.add("terms", accounts[1].key, "is a second account of the energy used", "keep one of them")
+        for event in (event for event in self.events if event.looks_at_energy and not accounts):
+            problem = "looks at the energy used, which no term accounts"
+            faults.add("events", event.key, problem, 'give a term of type "energy_use"')
         for first, second in alike(keys):
             problem = f"is the same folder as {first!r} on file systems that do not tell capitals apart"
             faults.add("terms and events", second, problem, f'give each a name of its own: name = "{second}_2"')
@@ -299,7 +335,7 @@ def loads(text: str, overrides: Mapping[str, Any] | None = None) -> Scene:
 
 def from_dict(content: Mapping[str, Any]) -> Scene:
     """Build a scene from the tables of a scene file."""
-    content = with_named_vehicle(content)
+    content = with_origin_of_floors(with_times_of_data(with_named_vehicle(content)))
     faults = Faults()
     faults.keys("", content, SECTIONS)
     tables: dict[str, Any] = {}

@@ -21,7 +21,7 @@ from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
 from lgvi_warp.sampling.distributions.named import SCIPY, ScipyDistribution, UserDistribution
 from lgvi_warp.scene.scene import SECTIONS
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
-from lgvi_warp.scene.start import Environment, Start
+from lgvi_warp.scene.start import NAMES, Environment, Start
 from lgvi_warp.statistics.base import TYPES as STATISTICS
 from lgvi_warp.statistics.until import Until
 from lgvi_warp.vehicles.fossen import vehicle_names
@@ -44,11 +44,11 @@ def schema() -> Schema:
         "sampling": {"anyOf": [{"enum": sorted(samplings)}, _alone(samplings)]},
         "indices": _numbers(("k",), {"type": "integer", "minimum": 0}),
     }
-    start = {name: _numbers(TABLE[name].shape) for name in (item.name for item in dataclasses.fields(Start))}
+    start = {name: _numbers(TABLE[name].shape if name in TABLE else (3,)) for name in NAMES}
     lists = {section: _list(base.kinds, {"faults": "fault"}.get(section)) for section, base in LISTS.items()}
     sections = {
         "vehicle": _table(Vehicle, {"name": {"enum": vehicle_names()}}),
-        "environment": _table(Environment),
+        "environment": _table(Environment, {"origin": _numbers((2,)), "start": {"type": "string"}}),
         "start": _table(Start, start),
         "ensemble": _table(EnsembleSettings, ensemble),
         "run": _table(RunSettings, run),
@@ -81,6 +81,11 @@ def _list(kinds: Mapping[str, Any], default: str | None = None) -> Schema:
     entries = [
         _table(kind, {"type": {"const": word}}, () if word == default else ("type",)) for word, kind in able.items()
     ]
+    # Terms whose numbers a file may hold.
+    for word, kind in able.items():
+        if (request := getattr(kind, "of_file", None)) is not None:
+            known = {"type": {"const": word}} | {key: {} for key in kind.of_file_besides}
+            entries.append(_table(request(), known, ("type", "file")))
     return {"type": "array", "items": {"anyOf": entries}}
 
 

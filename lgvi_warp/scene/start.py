@@ -3,63 +3,182 @@
 
 from __future__ import annotations
 
+import copy
+import datetime
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.declared import array, positive, read, real
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.fields import TABLE
+from lgvi_warp.physics.fields import PLACE_UNIT, TABLE
+
+if TYPE_CHECKING:
+    from lgvi_warp.ocean.places import LocalPlane
 
 ATTITUDES = ("attitude", "rotation_vector", "quaternion_wxyz", "euler_deg")
 VELOCITIES = ("velocity", "velocity_inertial")
+PLACES = ("position", "geodetic")
 # In the order of a scene file.
-NAMES = ("position", *ATTITUDES, *VELOCITIES, "angular_velocity")
+NAMES = (*PLACES, *ATTITUDES, *VELOCITIES, "angular_velocity")
 
 
 @dataclass(frozen=True)
 class Environment:
-    """Gravity and density of the water around the vehicle.
+    """Gravity and density of the water around the vehicle, and where and when on the Earth it is.
 
     Args:
         gravity: Acceleration of free fall [m/s2], >= 0; by default 9.80665 (standard gravity).
         water_density: Density of the water [kg/m3], > 0; by default 1025 (sea water).
+        origin: Latitude and longitude (2,) [deg, WGS 84] of the origin of the inertial axes, which point to its north, its
+            east and down; by default None, not known. Longitudes may be -180 to 180 or 0 to 360.
+        start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; without a zone it is UTC. By default None, not known.
 
     Raises:
-        SceneError: If a number is negative or not finite; the message lists every fault.
+        SceneError: If a number is negative or not finite, a latitude beyond 90 degrees; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> lw.Environment(water_density=1000.0)
-        Environment(gravity=9.80665, water_density=1000.0)
+        >>> lw.Environment(water_density=1000.0).gravity
+        9.80665
+        >>> fjord = lw.Environment(origin=[63.44, 10.40], start="2026-06-01T06:00:00Z")
+        >>> fjord.positions([63.45, 10.40, 20.0]).round(1)
+        array([1114.7,    0. ,   20. ])
     """
 
     gravity: float = real(9.80665, unit="m/s2", least=0.0)
     water_density: float = positive(1025.0, unit="kg/m3")
+    origin: Any = array(None, shape=(2,), unit="deg")
+    start: Any = None
 
     def __post_init__(self) -> None:
         faults = Faults("environment.")
-        read(self, faults)
+        origin = read(self, faults)["origin"]
+        if origin is not None:
+            from lgvi_warp.ocean.places import check_places
+
+            check_places(faults, "origin", origin)
+            # Plain numbers: environments are compared.
+            object.__setattr__(self, "origin", tuple(origin.tolist()))
+        if isinstance(self.start, datetime.date):
+            object.__setattr__(self, "start", self.start.isoformat())
+        if self.start is not None and _moment(self.start) is None:
+            remedy = 'write it as "2026-06-01T00:00:00Z"'
+            faults.add("start", self.start, "is no date and time", remedy)
         faults.raise_if_any()
 
-    def to_dict(self) -> dict[str, float]:
+    @property
+    def start_time(self) -> np.datetime64 | None:
+        """Date and time at t = 0 in UTC, to the microsecond; None where it is not known."""
+        return None if self.start is None else _moment(self.start)
+
+    @property
+    def plane(self) -> LocalPlane | None:
+        """The plane of the inertial axes on the Earth; None without an origin."""
+        if self.origin is None:
+            return None
+        # Most scenes are nowhere: they load nothing of it.
+        from lgvi_warp.ocean.places import LocalPlane
+
+        return LocalPlane(*self.origin)
+
+    def positions(self, geodetic: Any) -> np.ndarray:
+        """Convert places on the Earth to positions.
+
+        Args:
+            geodetic: Latitude, longitude [deg] and depth [m] of places, (..., 3).
+
+        Returns:
+            Positions (..., 3) [m], inertial axes (north, east, down).
+
+        Raises:
+            SceneError: Where there is no origin, or a latitude is beyond 90 degrees.
+            ImportError: If pyproj is not installed.
+        """
+        remedy = "give latitude, longitude and depth of each"
+        return positions_of(self, "geodetic", _in_threes("geodetic", geodetic, remedy))
+
+    def geodetic(self, position: Any) -> np.ndarray:
+        """Convert positions to places on the Earth.
+
+        Args:
+            position: Positions (..., 3) [m], inertial axes (north, east, down), such as `result.position`.
+
+        Returns:
+            Latitude, longitude from -180 to 180 [deg] and depth [m], (..., 3). NaN for what is no place: not finite, or
+            farther than the other side of the Earth.
+
+        Raises:
+            SceneError: Where there is no origin.
+            ImportError: If pyproj is not installed.
+        """
+        plane = self.plane
+        if plane is None:
+            raise refusal("environment.origin", None, "is not known", NO_ORIGIN)
+        return plane.places(_in_threes("position", position, "give north, east and down of each"))
+
+    def to_dict(self) -> dict[str, Any]:
         """Return the section [environment] of a scene file.
 
         Returns:
-            gravity [m/s2] and water_density [kg/m3], by name.
+            gravity [m/s2] and water_density [kg/m3], by name; origin [deg] and start where they are known.
         """
-        return {"gravity": float(self.gravity), "water_density": float(self.water_density)}
+        content: dict[str, Any] = {"gravity": float(self.gravity), "water_density": float(self.water_density)}
+        content |= {} if self.origin is None else {"origin": list(self.origin)}
+        return content | ({} if self.start is None else {"start": self.start})
+
+
+NO_ORIGIN = "give the origin of the axes: [environment] origin = [latitude, longitude]"
+
+
+def positions_of(environment: Environment, key: str, places: np.ndarray) -> np.ndarray:
+    """Positions (..., 3) [m] of places (..., 3) [deg, deg, m] that a key of the scene has; faults name the key."""
+    from lgvi_warp.ocean.places import check_places
+
+    faults = Faults()
+    check_places(faults, key, places)
+    plane = environment.plane
+    if plane is None:
+        faults.add(key, places, "is a place on the Earth, and environment.origin is not known", NO_ORIGIN)
+    faults.raise_if_any()
+    assert plane is not None
+    return plane.positions(places)
+
+
+def _in_threes(key: str, values: Any, remedy: str) -> np.ndarray:
+    """Read real numbers (..., 3), which may be NaN."""
+    faults = Faults()
+    array_given = faults.real(key, values, remedy)
+    if array_given is not None and array_given.shape[-1:] != (3,):
+        faults.add(key, values, f"has shape {array_given.shape}", remedy)
+    faults.raise_if_any()
+    assert array_given is not None
+    return array_given
+
+
+def _moment(text: Any) -> np.datetime64 | None:
+    """The date and time that a text says, in UTC; None where it says none."""
+    try:
+        moment = datetime.datetime.fromisoformat(text)
+    except (TypeError, ValueError):
+        return None
+    if moment.tzinfo is not None:
+        try:
+            moment = moment.astimezone(datetime.UTC).replace(tzinfo=None)
+        except OverflowError:
+            return None
+    return np.datetime64(moment, "us")
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
     """The state at t = 0.
 
-    Whatever is None (default) is zero, or no rotation. At most one of the four attitudes and one of the two velocities
-    may be given.
+    Whatever is None (default) is zero, or no rotation. At most one of the two places, one of the four attitudes and one of
+    the two velocities may be given.
 
     Args:
         position: Position of the body origin (3,) [m], inertial axes (north, east, down).
@@ -70,6 +189,8 @@ class Start:
         velocity: Velocity of the body origin (3,) [m/s], body axes.
         velocity_inertial: Velocity of the body origin (3,) [m/s], inertial axes.
         angular_velocity: Angular velocity (3,) [rad/s], body axes.
+        geodetic: Latitude, longitude [deg, WGS 84] and depth [m] of the body origin (3,), in place of position; the scene's
+            environment must have an origin.
 
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
@@ -89,10 +210,13 @@ class Start:
     velocity: Any = array(None, shape=(3,), unit="m/s")
     velocity_inertial: Any = array(None, shape=(3,), unit="m/s")
     angular_velocity: Any = array(None, shape=(3,), unit="rad/s")
+    geodetic: Any = array(None, shape=(3,), unit=PLACE_UNIT)
+    # Position of `geodetic`, which the scene tells.
+    converted: ClassVar[Any] = None
 
     def __post_init__(self) -> None:
         faults = Faults("start.")
-        for names in (ATTITUDES, VELOCITIES):
+        for names in (PLACES, ATTITUDES, VELOCITIES):
             chosen = [name for name in names if getattr(self, name) is not None]
             if len(chosen) > 1:
                 faults.add(" and ".join(chosen), "...", "say the same thing twice", "keep one of them")
@@ -113,6 +237,10 @@ class Start:
             Values by name: position (3,) [m], one attitude, one velocity (3,) [m/s] and angular_velocity (3,) [rad/s].
         """
         chosen = {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
+        if (place := chosen.pop("geodetic", None)) is not None:
+            if self.converted is None:
+                raise refusal("start.geodetic", place, "is of no scene", "give the start to a scene with an origin")
+            chosen = {"position": self.converted} | chosen
         alternatives = {"rotation_vector": ATTITUDES, "velocity": VELOCITIES}
         for name in ("position", "rotation_vector", "velocity", "angular_velocity"):
             if chosen.keys().isdisjoint(alternatives.get(name, (name,))):
@@ -128,8 +256,26 @@ class Start:
         Returns:
             A new start.
         """
-        alike = {name for names in (ATTITUDES, VELOCITIES) if fields.keys() & set(names) for name in names}
+        alike = {name for names in (PLACES, ATTITUDES, VELOCITIES) if fields.keys() & set(names) for name in names}
         return replace(self, **(dict.fromkeys(alike) | dict(fields)))
+
+    def located(self, environment: Environment) -> Start:
+        """Convert the place on the Earth, if one is given, to a position.
+
+        Args:
+            environment: The environment of the scene.
+
+        Returns:
+            The start that knows its position: a copy, or this one where it has no place on the Earth.
+
+        Raises:
+            SceneError: Where the environment has no origin, or a latitude is beyond 90 degrees.
+        """
+        if self.geodetic is None:
+            return self
+        start = copy.copy(self)
+        object.__setattr__(start, "converted", positions_of(environment, "start.geodetic", self.geodetic))
+        return start
 
     def to_dict(self) -> dict[str, Any]:
         """Return the section [start] of a scene file.

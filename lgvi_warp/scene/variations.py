@@ -162,6 +162,8 @@ def _hint(name: str, known: Mapping[str, np.ndarray], also: str) -> str:
     """Return how to mend a name that the scene does not have."""
     section = name.split(".")[0]
     others = [key for key in known if key.split(".")[0] == section]
+    if name == "start.geodetic":
+        return 'vary "start.position" [m] around the place, or give every member its own by lw.designs.Table'
     of_start = section == "start" and others
     return (f"the scene gives {', '.join(others)}" if of_start else closest(name, known)) + also
 

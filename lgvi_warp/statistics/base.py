@@ -43,7 +43,9 @@ TYPES = registry.Kinds(
             *("max_error", "cross_track", "iae", "ise", "itae", "rms"),
         ),
         "metrics.nearest": ("nearest",),
-        "metrics.actuator_metrics": ("effort", "travel", "saturation_share", "energy", "time_to_failure", "own_metric"),
+        "metrics.actuator_metrics": (
+            *("effort", "travel", "saturation_share", "energy", "electrical_energy", "time_to_failure", "own_metric"),
+        ),
         "order": ("extremes", "quantiles"),
         "outcomes": ("outcome", "end_time"),
         "paths.path": ("path_maximum", "path_minimum", "path_range", "path_mean", "path_rms", "path_time"),

@@ -1,53 +1,80 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Export of a run in a store to one NetCDF or Parquet file, piece by piece, whatever its size."""
+"""Export of a run to one file of another program, piece by piece, whatever its size."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import itertools
-import json
+import functools
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from lgvi_warp.common import files as durable
-from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.control.signals import SAVED
-from lgvi_warp.engine.block import Block
-from lgvi_warp.results.result import END_TIME
-from lgvi_warp.store.folder import KEPT, Folder
-from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER, WEIGHT
+from lgvi_warp.common.arguments import file_path, flag, path_of
+from lgvi_warp.common.errors import MissingExtra, SceneError, refusal
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.safe_files import inside
+from lgvi_warp.results.result import Result
+from lgvi_warp.scene.start import Environment
+from lgvi_warp.store.exporting import geojson, kml, ros, tables, trajectories, whole_store
+from lgvi_warp.store.exporting.tracks import Report, recorded, tracks_of
+from lgvi_warp.store.folder import Folder
 from lgvi_warp.store.open import folder_of, open_run
 from lgvi_warp.store.state import state
 
-if TYPE_CHECKING:
-    import zarr
-
+# All of a store, by a word, and the ending of its file.
 FORMATS = {"netcdf": ".nc", "parquet": ".parquet"}
-MEMBERS = (MEMBER, KEPT_MEMBER)
+# Members, by the ending of the file.
+WRITERS: dict[str, Callable[..., None]] = {
+    ".csv": tables.csv,
+    ".parquet": tables.parquet,
+    ".nc": trajectories.netcdf,
+    ".geojson": geojson.write,
+    ".kml": kml.write,
+    ".mcap": ros.write,
+}
+# Files that programs read whole, and the most members that they have unless the user names them.
+DRAWN, MOST_DRAWN = (".geojson", ".kml", ".mcap"), 1000
 
 
-def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | None = None) -> Path:
-    """Export a complete run to a file of another format.
+@shows_progress
+def export(
+    run: Result | str | os.PathLike[str],
+    to: str | os.PathLike[str],
+    out: str | os.PathLike[str] | None = None,
+    *,
+    members: slice | Sequence[int] | None = None,
+    origin: Sequence[float] | None = None,
+    start: str | None = None,
+    overwrite: bool = False,
+    progress: Callable[[float], None] | bool | None = None,
+) -> Path:
+    """Export a run, or some of its members, to a file of another program; the file's ending says of which kind.
 
-    "netcdf" writes one NetCDF-4 file; the members that the run keeps are in its group "kept", statistics in its group
-    "statistics". "parquet" writes one table with a row for each member and time: of all samples, else of those of the kept
-    members, else a row for each member without time.
+    ".csv" and ".parquet": a table with a row for each member and time of the samples, else for each member. ".nc": NetCDF-4
+    with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and transforms in the
+    axes of ROS. docs/guide/exports.md has their columns, names, units and axes.
 
     Args:
-        path: A store, or a folder with one store.
-        to: "netcdf" or "parquet".
-        out: The file; default beside the store. A file that exists is replaced.
+        run: A result, a result.npz, a store, or a folder with one of the two.
+        to: The file. Or "netcdf", all that a store holds with its arrays as they are, or "parquet": for these `out` is the
+            file.
+        out: The file for these two words; by default beside the run.
+        members: Indices or a slice of the members; by default all whose samples were kept. For maps and MCAP 1,000 at most.
+        origin: Latitude and longitude of the axes' origin [deg]; by default that of the run's environment, if it has one.
+        start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; by default that of the run's environment.
+        overwrite: Whether to replace a file that exists; by default it is kept, and the export refused.
+        progress: Function of the fraction done, or True to show it; by default nothing.
 
     Returns:
         Path of the file.
 
     Raises:
-        SceneError: If the run is not complete or is damaged, or a library is missing.
+        SceneError: If the run is not complete or is damaged, has not kept what the file is made of, the file exists, or a
+            library is missing.
         OSError: If the file cannot be written.
 
     Examples:
@@ -55,23 +82,133 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
         >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> result = lw.solve(fleet, h=0.1, t1=2.0, store="run.zarr")
-        >>> print(lw.export("run.zarr", to="netcdf"))
-        run.nc
+        >>> print(lw.export("run.zarr", to="run.csv"))
+        run.csv
+        >>> print(lw.export(result, to="first.geojson", members=[0], origin=[63.44, 10.40]))
+        first.geojson
     """
-    faults = Faults()
-    faults.choice("to", to, FORMATS)
-    faults.raise_if_any()
+    word = to if isinstance(to, str) and to in FORMATS else None
+    ending = FORMATS[word] if word else _ending(to)
+    if word is None and out is not None:
+        raise refusal("out", out, f"is given beside the file {os.fspath(to)!r}", "keep one of them")
+    chosen = {"members": members, "origin": origin, "start": start}
+    if word == "netcdf" and (extra := [name for name, value in chosen.items() if value is not None]):
+        raise refusal(extra[0], chosen[extra[0]], "is given for all that a store holds", "give a file: to='run.nc'")
+    replaces = flag("overwrite", overwrite)
+    source = _source(run)
+    beside = source.path if word and out is None else None
+    target = _beside(source, ending) if word and out is None else file_path("to", to if out is None else out)
+    root = None if beside is None else beside.parent
+    durable.place_of(target, root)
+    if not replaces and os.path.lexists(target):
+        raise SceneError([f"{target}: is there already; give overwrite=True (--overwrite), or another name"])
+    if source.folder is not None:
+        check_whole(source.folder)
+    if word == "netcdf":
+        write = _whole_store(source)
+    else:
+        write = _some_members(source.result(), ending, members, _where(origin, start))
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with fault_of_library(str(word or target.name), target), durable.placed(target, root) as unfinished:
+        write(unfinished, callback(progress) or _nothing)
+    return target
+
+
+@dataclass(frozen=True)
+class Source:
+    """The run that is exported: its result, the store that it is in, and the path beside which a file of it lies."""
+
+    result: Callable[[], Result]
+    folder: Folder | None = None
+    path: Path | None = None
+
+
+def _source(run: Any) -> Source:
+    """Find the run that the user means."""
+    if isinstance(run, Result):
+        folder = None if run.store is None else Folder(run.store)
+        return Source(lambda: run, folder, run.store)
+    path = path_of("run", run)
+    file = path if path.suffix == ".npz" else _only_result(path)
+    if file is not None:
+        return Source(lambda: Result.load(file), None, file)
     folder = Folder(folder_of(path))
     if not folder.complete:
         raise SceneError([f"{folder.path}: is not complete; go on with `lgvi-warp resume {folder.path.parent}` first"])
-    target = Path(out) if out is not None else folder.path.with_suffix(FORMATS[to])
-    root = None if out is not None else folder.path.parent
-    durable.place_of(target, root)
-    check_whole(folder)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with fault_of_library(to, target), durable.placed(target, root) as beside:
-        {"netcdf": _netcdf, "parquet": _parquet}[to](folder, beside)
-    return target
+    return Source(lambda: open_run(folder.path), folder, folder.path)
+
+
+def _only_result(path: Path) -> Path | None:
+    """The one result.npz of a folder without a store; None where there is none, or a store."""
+    if path.suffix == ".zarr" or not path.is_dir() or any(path.glob("*.zarr")):
+        return None
+    files = sorted(path.glob("result*.npz"))
+    if len(files) > 1:
+        raise SceneError([f"{path}: holds {len(files)} results; name one: {', '.join(map(str, files[:5]))}"])
+    # A folder from elsewhere could otherwise lead to any file of the user.
+    return inside(path, files[0].name) if files else None
+
+
+def _ending(to: Any) -> str:
+    """The ending of the file that the user names, in lower case; refuse what no file can be made of."""
+    ending = Path(to).suffix.lower() if isinstance(to, str | os.PathLike) else ""
+    if ending not in WRITERS:
+        known = f"{', '.join(WRITERS)}, or a word of {', '.join(FORMATS)}"
+        raise refusal("to", to, "is no file of a known kind", f"give a name that ends in {known}")
+    return ending
+
+
+def _beside(source: Source, ending: str) -> Path:
+    """The file beside the run."""
+    if source.path is None:
+        raise refusal("out", None, "is missing, and the run is in memory", "give the file")
+    return source.path.with_suffix(ending)
+
+
+def _where(origin: Any, start: Any) -> Environment | None:
+    """Origin and start that the user gives; None for neither."""
+    if origin is None and start is None:
+        return None
+    try:
+        return Environment(origin=origin, start=start)
+    except SceneError as error:
+        # The user gave arguments of this function, not keys of a scene.
+        faults = (fault.removeprefix("environment.") for fault in error.faults)
+        raise SceneError(faults) from None
+
+
+def _environment_of(result: Result, given: Environment | None) -> Environment:
+    """Origin and start of the run, or those given in their place."""
+    origin, start = (recorded(result.provenance, "scene", "environment", name) for name in ("origin", "start"))
+    own = Environment(origin=origin, start=start)
+    if given is None:
+        return own
+    origin = own.origin if given.origin is None else given.origin
+    return Environment(origin=origin, start=own.start if given.start is None else given.start)
+
+
+Write = Callable[[Path, Report], None]
+
+
+def _whole_store(source: Source) -> Write:
+    """What writes all of a store."""
+    folder = source.folder
+    if folder is None:
+        raise refusal("to", "netcdf", "is all that a store holds, and the run is in none", "give a file: to='run.nc'")
+    return functools.partial(whole_store.netcdf, folder)
+
+
+def _some_members(result: Result, ending: str, members: Any, given: Environment | None) -> Write:
+    """What writes members of a run into a file with this ending."""
+    tracks = tracks_of(result, members, _environment_of(result, given))
+    if ending in DRAWN and members is None and tracks.count > MOST_DRAWN:
+        problem = f"are {tracks.count:,}, more than the {MOST_DRAWN:,} that a {ending} file of all members may have"
+        raise refusal("members", None, problem, "choose some: members=range(100) (--members 0:100)")
+    return functools.partial(WRITERS[ending], tracks)
+
+
+def _nothing(fraction: float) -> None:
+    """Show no progress."""
 
 
 @contextlib.contextmanager
@@ -79,6 +216,8 @@ def fault_of_library(to: str, target: Path) -> Iterator[None]:
     """Say of what a library of the format raises which file it is about, and what helps."""
     try:
         yield
+    except MissingExtra as error:
+        raise SceneError([f"to = {to!r}: {error}"]) from error
     except ImportError as error:
         raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error
     except (OSError, RuntimeError) as error:
@@ -94,127 +233,3 @@ def check_whole(folder: Folder) -> None:
         unfinished = content["blocks"] - content["finished"]
         damage = content["damage"][:5] or [f"{unfinished} blocks are not marked as finished"]
         raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in damage)
-
-
-def _netcdf(folder: Folder, target: Path) -> None:
-    """Write the run, and its kept members and statistics in groups of their own."""
-    import netCDF4
-
-    with netCDF4.Dataset(target, "w") as file:
-        _netcdf_group(folder, file)
-        if (kept := folder.kept()) is not None:
-            _netcdf_group(kept, file.createGroup(KEPT))
-    if statistics := open_run(folder.path).statistics:
-        statistics.dataset.to_netcdf(target, mode="a", group="statistics", engine="netcdf4")
-
-
-def _netcdf_group(folder: Folder, file: Any) -> None:
-    """Write every array with its attributes, a block of members at a time."""
-    group = folder.group()
-    for name, value in group.attrs.asdict().items():
-        file.setncattr(name, np.int8(value) if isinstance(value, bool) else value)
-    for name, array in dict(group.arrays()).items():
-        dims = array.metadata.dimension_names
-        shape = [folder.members if dim in MEMBERS else size for dim, size in zip(dims, array.shape, strict=True)]
-        for dim, size in zip(dims, shape, strict=True):
-            if dim not in file.dimensions:
-                file.createDimension(dim, size)
-        chunks = [min(c, size) for c, size in zip(array.chunks, shape, strict=True)]
-        variable = file.createVariable(name, array.dtype.name, dims, chunksizes=chunks, fill_value=False)
-        for key, value in array.attrs.asdict().items():
-            variable.setncattr(key, np.asarray(value, array.dtype) if key in ("flag_values", "flag_masks") else value)
-        for at in _pieces(array, folder.runs):
-            variable[at] = array[at]
-        if name == "failure_time":
-            _netcdf_end_time(folder, file, variable, group)
-
-
-def _netcdf_end_time(folder: Folder, file: Any, failures: Any, group: Any) -> None:
-    """Write when members ended beside when they failed."""
-    ends = file.createVariable("end_time", "f8", failures.dimensions, chunksizes=failures.chunking(), fill_value=False)
-    for key, value in END_TIME.items():
-        ends.setncattr(key, value)
-    for run in folder.runs:
-        at = slice(run.first, run.stop)
-        ends[at] = _end_time(group["failure_time"][at], group)
-
-
-def _pieces(array: zarr.Array[Any], runs: list[Block]) -> Iterator[tuple[slice, ...]]:
-    """Slices that cover an array, a block of members at a time, or at once if it has no dimension of members."""
-    axis = next((i for i, dim in enumerate(array.metadata.dimension_names) if dim in MEMBERS), None)
-    if axis is None:
-        yield (slice(None),) * array.ndim
-        return
-    for run in runs:
-        yield (*(slice(None),) * axis, slice(run.first, run.stop), *(slice(None),) * (array.ndim - axis - 1))
-
-
-def _parquet(folder: Folder, target: Path) -> None:
-    """Write a row for each member and time that has samples, or for each member if there are none.
-
-    A row group is a block. Columns: realization, time, each component of the samples and of what varies, status,
-    failure_time. Units are in the metadata of the columns, and for pandas in its `attrs`.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    if not _timed(folder.group()):
-        folder = folder.kept() or folder
-    group = folder.group()
-    units = {name: str(array.attrs["units"]) for name, array in group.arrays() if "units" in array.attrs}
-    writer = None
-    try:
-        for run in folder.runs:
-            rows = _rows(group, run)
-            unit_of = {name: units[array] for name, (array, _) in rows.items() if array in units}
-            table = pa.table({name: values for name, (_, values) in rows.items()})
-            fields = [
-                column.with_metadata({"units": unit_of[column.name]}) if column.name in unit_of else column
-                for column in table.schema
-            ]
-            content = {name: str(group.attrs[name]) for name in ("Conventions", "source", "provenance")}
-            table = table.cast(pa.schema(fields, content | {"PANDAS_ATTRS": json.dumps({"units": unit_of})}))
-            writer = writer or pq.ParquetWriter(target, table.schema)
-            writer.write_table(table)
-    finally:
-        if writer is not None:
-            writer.close()
-
-
-def _timed(group: Any) -> list[str]:
-    """Names of the fields with samples."""
-    return [name for name in SAVED if name in group]
-
-
-def _rows(group: Any, run: Block) -> dict[str, tuple[str, np.ndarray]]:
-    """A block's columns, member by member: by column name, the name of its array and its numbers."""
-    at, timed = np.arange(run.first, run.stop), _timed(group)
-    if "chosen" in group:
-        at = at[group["chosen"][run.first : run.stop] == 1]
-    time = group["time"][:] if timed else np.zeros(1)
-    columns = {"realization": ("realization", np.repeat(group["realization"].oindex[at], len(time)))}
-    if timed:
-        columns["time"] = ("time", np.tile(time, len(at)))
-    for name in timed:
-        columns |= _components(name, np.swapaxes(group[name].oindex[:, at], 0, 1).reshape(-1, *group[name].shape[2:]))
-    for name in (name for name, _ in group.arrays() if "." in name):
-        columns |= _components(name, np.repeat(group[name].oindex[at], len(time), axis=0))
-    ends = {name: group[name].oindex[at] for name in ("status", "event", "failure_time") if name in group}
-    ends |= {WEIGHT: group[WEIGHT].oindex[at]} if WEIGHT in group else {}
-    ends["end_time"] = _end_time(ends["failure_time"], group)
-    return columns | {name: ("failure_time" if name == "end_time" else name, np.repeat(values, len(time)))
-                      for name, values in ends.items()}  # fmt: skip
-
-
-def _end_time(failure_time: np.ndarray, group: Any) -> np.ndarray:
-    """When members ended [s]: at their event, at their failure, or at the end of the run."""
-    return np.where(np.isnan(failure_time), group["time"][-1], failure_time)
-
-
-def _components(name: str, values: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
-    """Split an array of rows (n, ...) into a column for each component: position_0, attitude_12, vehicle.mass."""
-    if values.ndim == 1:
-        return {name: (name, values)}
-    places = itertools.product(*map(range, values.shape[1:]))
-    flat = values.reshape(len(values), -1).T
-    return {f"{name}_{''.join(map(str, at))}": (name, column.copy()) for at, column in zip(places, flat, strict=True)}

@@ -28,6 +28,8 @@ STUDY_FILES = {
     "sweep": "sweep.json",
     "rare": "rare.json",
     "derivatives": "derivatives.json",
+    "margins": "margins.json",
+    "worst_case": "worst_case.json",
 }
 
 

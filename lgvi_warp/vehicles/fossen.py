@@ -24,9 +24,9 @@ from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.common.reading import MOST_BYTES, MOST_OTHERS, file_text
 from lgvi_warp.common.toml_text import parsed
 from lgvi_warp.physics.notation import hat
+from lgvi_warp.physics.terms.quadratic_form import FORCES, VELOCITIES
 from lgvi_warp.physics.vehicle import LITTLE, ROUND_OFF, shortage
 
-FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
 STANDARD_GRAVITY = 9.80665  # m/s2, ISO 80000-3
 # x ahead, y to port, z up (SDF, ROS) <-> x ahead, y to starboard, z down: half a turn about x.
 HALF_TURN = np.array([1.0, -1.0, -1.0])
@@ -46,7 +46,7 @@ def vehicle_names() -> list[str]:
     Examples:
         >>> import lgvi_warp as lw
         >>> lw.vehicles.names()
-        ['bluerov2_heavy', 'nordkvist_sanyal', 'remus_100', 'sphere', 'torpedo']
+        ['bluerov2_heavy', 'nordkvist_sanyal', 'remus_100', 'seawing', 'sphere', 'torpedo']
     """
     folder = resources.files("lgvi_warp.vehicles")
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
@@ -251,8 +251,8 @@ def from_fossen(
     Of a pair such as Y_rdot, N_vdot one suffices. These are refused:
 
     * X_qq and the like, which are even in the velocity and so no drag;
-    * products (Y_uv, X_wq): those of the added mass follow from its matrix, and those with u are a hull's lift, which
-      the term body_lift has;
+    * products (Y_uv, X_wq): those of the added mass follow from its matrix, those with u are a hull's lift, which
+      the term body_lift has, and the term quadratic_form has any;
     * second-order moduli such as Y_|v|r (Fossen 2021, nonlinear damping), which are drag of the flow across the hull:
       the force of speed and yaw rate together, for which a drag matrix has no place. The term cross_flow has that
       force, found along the hull.
@@ -337,10 +337,14 @@ def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None
         faults.add(key, value, "is the same for either sign of the velocity, so it is no drag", remedy)
     elif name.kind == "modulus":
         problem = "is the product of one velocity and the modulus of another, drag of the flow across the hull"
-        remedy = "give the hull's cross-flow drag as a term cross_flow, and leave it out (ignore=)"
+        remedy = (
+            "give the hull's cross-flow drag as a term cross_flow, or a term quadratic_form, and leave it out (ignore=)"
+        )
         faults.add(key, value, problem, remedy)
     else:
-        remedy = "leave it out (ignore=) if it comes from the added mass, which implies it"
+        remedy = (
+            "leave it out (ignore=) if it comes from the added mass, which implies it, or give a term quadratic_form"
+        )
         lift = "; lift with the speed ahead is a term body_lift, lift of fins a term fins" if 0 in name.columns else ""
         faults.add(key, value, "is a product of two velocities", remedy + lift)
 

@@ -97,7 +97,7 @@ def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, lin
             matrices["quadratic drag"][row, column] += value
             even += [child.tag] if value and not bars else []
         elif value != 0.0:
-            remedy = "only |v| v of one velocity is a drag: leave it out, or add a term of your own"
+            remedy = "only |v| v of one velocity is a drag: leave it out here, and give a term quadratic_form"
             faults.add(f"<{child.tag}>", value, "is a product of velocities", remedy)
     if even:
         tags = ", ".join(f"<{tag}>" for tag in even)

@@ -38,6 +38,8 @@ OUTCOME_STYLES = {
     Status.BOX: OutcomeStyle("#CC79A7", "s"),
     Status.TIME: OutcomeStyle("#8C8C8C", "o"),
     Status.CONDITION: OutcomeStyle("#C9B400", "D"),
+    Status.BATTERY: OutcomeStyle("#6A3D9A", "p"),
+    Status.OUTSIDE: OutcomeStyle("#56B4E9", "h"),
 }
 FAILURES = [code for code in Status if code not in OUTCOME_STYLES]
 OUTCOME_STYLES |= {code: OutcomeStyle("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1+23", strict=True)}

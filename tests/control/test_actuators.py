@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.reference.control.bounded_least_squares import BoundedLeastSquares
 from lgvi_warp.reference.control.depth_pid import DepthPID
 from lgvi_warp.reference.control.heading_pid import HeadingPID
 from lgvi_warp.reference.control.loop import Fault, Loop
@@ -92,15 +93,20 @@ def effect_of(law):
     return np.array(columns).T
 
 
-def rov(lost):
+def rov(lost, Allocation=PseudoInverse):
     """The twin of a vehicle with thrusters alone: laws, allocation and faults."""
     thrusters = DrivenThrusters(
         **arrays(THRUSTERS), **CURVES, forward=np.array(COEFFICIENTS[0]), backward=np.array(COEFFICIENTS[1])
     )
     wrenches = ASKED * np.hstack([thrusters.direction, np.cross(thrusters.position, thrusters.direction)]).T
-    allocation = [PseudoInverse(to="thrusters", effect=wrenches, weights=WEIGHTS, losses=((4, lost),))]
+    allocation = [Allocation(to="thrusters", effect=wrenches, weights=WEIGHTS, losses=((4, lost),))]
     faults = [Fault("thrusters", 4, lost), Fault("thrusters", **WEAK)]
     return {"thrusters": thrusters}, allocation, faults
+
+
+def weak_rov(lost):
+    """The same with another allocation."""
+    return rov(lost, BoundedLeastSquares)
 
 
 def auv(lost):
@@ -117,16 +123,14 @@ def auv(lost):
     return {"control_fins": fins, "thrusters": pair}, allocation, []
 
 
+ROV = [lw.terms.Thrusters(**THRUSTERS, **CURVES, coefficient=COEFFICIENTS[0], coefficient_astern=COEFFICIENTS[1])]
+FAULTS = [
+    lw.control.Fault(name="dead", of="thrusters", channel=4, time=LOST[0], known=True),
+    lw.control.Fault(name="weak", of="thrusters", **WEAK),
+]
 SCENES = {
-    "rov": (
-        rov,
-        [lw.terms.Thrusters(**THRUSTERS, **CURVES, coefficient=COEFFICIENTS[0], coefficient_astern=COEFFICIENTS[1])],
-        [lw.control.PseudoInverse(to="thrusters", weights=WEIGHTS)],
-        [
-            lw.control.Fault(name="dead", of="thrusters", channel=4, time=LOST[0], known=True),
-            lw.control.Fault(name="weak", of="thrusters", **WEAK),
-        ],
-    ),
+    "rov": (rov, ROV, [lw.control.PseudoInverse(to="thrusters", weights=WEIGHTS)], FAULTS),
+    "rov within": (weak_rov, ROV, [lw.control.BoundedLeastSquares(to="thrusters", weights=WEIGHTS)], FAULTS),
     "auv": (
         auv,
         [lw.terms.ControlFins(**FINS), lw.terms.Thrusters(**PAIR)],
@@ -181,7 +185,7 @@ def solved(name, method, h, steps, every):
 
 # Round-off of 1e-15 a step, of loops that damp it. Near the turn of the polynomial a command is known to half of its digits:
 # its thrust to all, its torque and its losses to 1e-8.
-ROUND_OFF = {"rov": 1e-8, "auv": 1e-9}
+ROUND_OFF = {"rov": 1e-8, "rov within": 1e-8, "auv": 1e-9}
 
 
 @pytest.mark.slow_but("*-psi_s-100")
@@ -197,8 +201,9 @@ def test_the_loop_is_the_twins(name, method, steps):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["rov", "auv"])
 def test_psi_x_meets_other_methods(name):
+    # Not of "rov within": what it tells back begins at a threshold, and so integrals wait by a tick more or less.
     # In axes of its own. Its error falls by 4 with half of the step; steps in which a fin meets its command blur that.
     truth = solved(name, "rk4", H / 8, 3200, 3200)[-1]
     errors = [

@@ -75,7 +75,8 @@ def test_the_examples_of_the_pages():
     tables = tomllib.loads(text)["controller"]
     matrix = [[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]]
     controller = CONTROLLER | {"allocation": [{"type": "matrix", "to": "control_fins", "matrix": matrix}]} | tables
-    scene = lw.Scene.from_dict({"vehicle": {"name": "remus_100"}, "controller": controller})
+    floor = {"type": "floor", "depth": 40.0}
+    scene = lw.Scene.from_dict({"vehicle": {"name": "remus_100"}, "controller": controller, "events": [floor]})
     assert [part.key for part in scene.controller.faults] == ["stuck_rudder", "blind"]
     assert scene.parameters()["log.noise"].tolist() == [0.01, 0.01, 0.02]
 

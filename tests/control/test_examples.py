@@ -55,6 +55,21 @@ def test_an_integral_takes_the_vehicle_back_to_the_legs(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_loop_fails_by_its_estimate_and_not_by_its_law(tmp_path):
+    picture = tmp_path / "lost_bottom.png"
+    command = [sys.executable, ROOT / "examples" / "controllers" / "lost_bottom.py", picture, "50"]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path).stdout.splitlines()
+    well, silent, turned = lines[:3]
+    assert lines[3] == str(picture)
+    assert number(well, "m off the true") < 2.0
+    for lost in (silent, turned):
+        assert number(lost, "m off the true") > 2.0 * number(lost, "m off the believed")
+    # 600 m times the sine of 2 degrees, less what lies before the end of the line.
+    assert 15.0 < number(turned, "m off the true") < 21.0
+    assert number(turned, "m off the believed") < 1.0
+
+
+@pytest.mark.slow
 def test_gains_for_the_worst_cost_less_there_and_more_on_average(tmp_path):
     mean, worst = printed("sweeps/tune_worst_5_percent", tmp_path)
     assert number(worst, "m s2 in the worst") < 0.9 * number(mean, "m s2 in the worst")

@@ -147,10 +147,16 @@ kr = [10.0, 10.0, 10.0]; kw = [4.0, 4.0, 4.0]; feedforward = "restoring"
         toml("""
 [vehicle]; mass = 30.0; added_mass = [1.0, 30.0, 30.0]; inertia = [0.2, 3.5, 3.5]; buoyancy = 296.0
 [[terms]]; type = "control_wrench"; limit = [25.0, 20.0, 15.0, 2.0, 2.5, 3.0]
+[[events]]; type = "floor"; depth = [[40.0, 41.0], [42.0, 45.0]]; spacing = [50.0, 50.0]
 [run]; step = 0.05; duration = 0.5
 """),
         toml("""
 [controller]; period = 0.1
+[[controller.sensors]]; type = "altimeter"; most = 60.0; noise = 0.05
+[[controller.sensors]]; type = "imu"; gyroscope_noise = 5e-5
+[[controller.sensors]]; type = "dvl"; noise = 0.01
+[[controller.sensors]]; type = "error_state_filter"; dvl = "dvl"
+[[controller.guidance]]; type = "altitude"; altitude = 5.0
 [[controller.sensors]]; type = "low_pass"; of = "velocity"; time_constant = 0.5
 [[controller.sensors]]; type = "complementary_filter"; time_constant = 5.0
 [[controller.sensors]]; type = "sensor"; name = "gyroscope"; of = "angular_velocity"; noise = [0.001, 0.001, 0.002]
@@ -167,6 +173,7 @@ k_sigma_r = [0.5, 0.6, 0.7]; k_d_r = [3.0, 4.0, 5.0]
 [[controller.laws]]; type = "state_feedback"
 K = [[1,0,0,0,0,0,1,0,0,0,0,0],[0,1,0,0,0,0,0,1,0,0,0,0],[0,0,1,0,0,0,0,0,1,0,0,0],[0,0,0,1,0,0,0,0,0,1,0,0],
      [0,0,0,0,1,0,0,0,0,0,1,0],[0,0,0,0,0,1,0,0,0,0,0,1]]
+[[controller.allocation]]; type = "bounded_least_squares"; to = "control_wrench"; rounds = 2
 [[controller.faults]]; of = "gyroscope"; channel = 1; offset = 0.1
 """),
     ),

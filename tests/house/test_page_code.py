@@ -24,9 +24,12 @@ OF_TESTS = {
         "docs/guide/sensitivity.md docs/guide/statistics.md docs/guide/vehicles.md",
     "control/test_bad_sensors.py": "docs/controllers/faults.md docs/controllers/sensors.md",
     "control/test_gym.py": "docs/controllers/gym.md",
+    "control/test_navigation.py": "docs/controllers/navigation.md",
     "studies/test_derivatives.py": "docs/guide/derivatives.md",
     "studies/test_estimating.py": "docs/guide/least_cost.md",
     "studies/test_margins.py": "docs/controllers/margins.md docs/guide/worst_case.md",
+    "laws/test_current_from_data.py": "docs/guide/ocean_data.md",
+    "unit/ocean/test_floor_data.py": "docs/guide/sea_floor.md",
     "house/test_develop_pages.py":
         "docs/develop/add_a_method.md docs/develop/add_a_sampling.md docs/develop/add_a_statistic.md",
     "house/test_gallery.py": "docs/gallery.md",
@@ -39,8 +42,8 @@ TERMS = [f"docs/guide/terms/{path.name}" for path in sorted((DOCS / "guide" / "t
 PARTS = ["docs/controllers/guidance.md", "docs/controllers/laws.md"]
 OF_A_RESULT = ["docs/guide/pictures.md", "docs/guide/recordings.md"]
 SCRIPT_NAMES = (
-    "assimilation choose_method_and_step compare_with_your_simulator current going_on notebooks resume tangents "
-    "your_vehicle"
+    "assimilation choose_method_and_step compare_with_your_simulator current energy_used exports geodetic_places going_on "
+    "notebooks resume tangents your_vehicle"
 )
 SCRIPTS = [f"docs/guide/{name}.md" for name in SCRIPT_NAMES.split()]
 
@@ -75,8 +78,14 @@ def test_parts_of_controllers_fit_a_vehicle(page, tmp_path, monkeypatch):
     everything = {"type": "set_point", "heading": 0.0, "speed": 0.5, "position": [0.0, 0.0, 5.0]}
     held = {"type": "heading_pid", "kp": 1.0}
     for parts in found:
-        controller = {"period": 0.1, "guidance": [everything], "laws": [held]} | parts
-        scene = lw.Scene.from_dict({"vehicle": {"name": "bluerov2_heavy"}, "controller": controller})
+        controller = {
+            "period": 0.1,
+            "sensors": [{"type": "altimeter"}],
+            "guidance": [everything],
+            "laws": [held],
+        } | parts
+        floor = {"type": "floor", "depth": 40.0}
+        scene = lw.Scene.from_dict({"vehicle": {"name": "bluerov2_heavy"}, "controller": controller, "events": [floor]})
         for section, tables in parts.items():
             assert [part.type for part in getattr(scene.controller, section)] == [table["type"] for table in tables]
         assert lw.Scene.from_dict(scene.to_dict()).to_dict() == scene.to_dict()

@@ -79,7 +79,7 @@ def table(kinds, base):
     """The rows of a table of types: each type with the keys that the base class does not have."""
     shared = {field.name for field in dataclasses.fields(base)} if base else set()
     keys = {
-        name: "; ".join(key(field) for field in dataclasses.fields(kind) if field.name not in shared)
+        name: "; ".join(key(field) for field in dataclasses.fields(kind) if field.init and field.name not in shared)
         for name, kind in sorted(kinds.items())
         # Other tests have classes of their own.
         if kind.__module__.startswith("lgvi_warp.") and name not in IN_WORDS

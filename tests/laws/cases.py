@@ -4,9 +4,10 @@
 import numpy as np
 
 from lgvi_warp.physics import terms
+from lgvi_warp.reference.terms.moving_mass import MovingMass
 from lgvi_warp.reference.terms.thrusters import Thrusters
 from lgvi_warp.reference.terms.wrench import WrenchSchedule
-from tests.laws import cases_lift, cases_water
+from tests.laws import cases_glider, cases_lift, cases_water
 from tests.laws.case import Case, case, matrix
 
 LINEAR, QUADRATIC = (3.0, 4.0, 5.0, 0.3, 0.4, 0.5), (10.0, 30.0, 40.0, 1.0, 2.0, 3.0)
@@ -37,6 +38,12 @@ TABLE_OF_THRUST = (
     ((-9.0, -8.0, -5.0), (-2.0, -3.0, -1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (5.0, 3.0, 4.0), (20.0, 12.0, 9.0)),
 )
 
+# A battery that goes forward and aside, and back.
+SLIDING = dict(
+    mass=6.0, times=(0.1, 0.45, 1.2), places=((0.05, 0.0, 0.06), (0.25, -0.1, 0.06), (-0.1, 0.05, 0.1)),
+    reference=(0.0, 0.02, 0.05), inertia=False,
+)  # fmt: skip
+
 CASES = {
     "linear drag": case(terms.Drag, linear=LINEAR, quadratic=(0.0,) * 6),
     "quadratic drag": case(terms.Drag, linear=(0.0,) * 6, quadratic=QUADRATIC),
@@ -55,10 +62,16 @@ CASES = {
         terms.Tether, anchor=(0.0, 0.0, 10.0), stiffness=5.0, attachment=(0.1, 0.0, 0.0), rest_length=50.0
     ),
     "wrench": case(terms.Wrench, force=(1.0, -2.0, 0.5), torque=(0.1, 0.2, -0.3)),
+    "energy use": case(terms.EnergyUse, hotel=7.0),
     "wrench schedule": Case((terms.WrenchSchedule(**TABLE),), (WrenchSchedule(**TWIN_TABLE),), False),
     "wrench in steps": Case(
         (terms.WrenchSchedule(**TABLE, interpolation="steps"),),
         (WrenchSchedule(**TWIN_TABLE, steps=True),),
+        False,
+    ),
+    "moving mass": Case(
+        (terms.MovingMass(**SLIDING),),
+        (MovingMass(**{key: np.asarray(value) for key, value in SLIDING.items()}, gravity=9.8),),
         False,
     ),
     "thrusters": Case(
@@ -116,15 +129,16 @@ CASES = {
     ),
 }  # fmt: skip
 
-CASES |= cases_water.CASES | cases_lift.CASES
+CASES |= cases_water.CASES | cases_lift.CASES | cases_glider.CASES
 
 
 def together(*names):
     """A Case with the laws of several."""
     cases = [CASES[name] for name in names]
+    laws = sum((case.laws for case in cases), ())
     return Case(
         sum((case.terms for case in cases), ()),
-        sum((case.laws for case in cases), ()),
+        tuple(law.beside(laws) for law in laws),
         all(case.smooth for case in cases),
     )
 
@@ -132,6 +146,7 @@ def together(*names):
 # One of each type.
 CASES["all together"] = together(
     "drag matrix", "current", "current field", "current profile", "current harmonics", "waves", "Gauss-Markov current",
-    "tether", "wrench", "wrench schedule", "wrench noise", "thrusters", "fins", "control fins with rates", "cross-flow",
-    "hull loads", "body lift", "stratification",
+    "energy use", "tether", "wrench", "wrench schedule", "wrench noise", "moving mass", "thrusters", "fins",
+    "control fins with rates", "cross-flow", "hull loads", "body lift", "stratification", "ballast with pumps",
+    "buoyancy engine", "polar", "surface buoyancy", "quadratic form",
 )  # fmt: skip

@@ -9,6 +9,7 @@ from lgvi_warp.reference.terms.cross_flow import CrossFlow
 from lgvi_warp.reference.terms.fins import Fins
 from lgvi_warp.reference.terms.hull_loads import HullLoads
 from lgvi_warp.reference.terms.lift import BodyLift
+from lgvi_warp.reference.terms.quadratic_form import QuadraticForm
 from lgvi_warp.reference.terms.waves import Waves
 from tests.laws.case import Case
 
@@ -41,6 +42,36 @@ HULL = dict(
 )
 ADDED_MASS = (1.0, 12.0, 30.0, 28.0, 0.0)
 STEEP_WAVES = dict(amplitudes=(0.5, 0.4), periods=(4.0, 5.0), headings_deg=(20.0, 150.0), phases=(0.5, -0.9))
+# Products by name, and where they stand: kind, force, factor, velocity.
+PRODUCTS = {
+    "X_vr": (20.0, "c", 0, 1, 5),
+    "X_u|u|": (-6.0, "d", 0, 0, 0),
+    "Y_uv": (-15.0, "c", 1, 0, 1),
+    "Y_|v|r": (-4.0, "d", 1, 1, 5),
+    "Z_w|q|": (-3.0, "d", 2, 4, 2),
+    "Z_w|vw|": (-30.0, "h", 2, 1, 2),
+    "Z_uu": (2.0, "c", 2, 0, 0),
+    "K_p|p|": (-1.5, "d", 3, 3, 3),
+    "K_wr": (0.7, "c", 3, 2, 5),
+    "M_uw": (4.0, "c", 4, 0, 2),
+    "M_pr": (-0.8, "c", 4, 3, 5),
+    "M_|vw|q": (-3.0, "h", 4, 1, 4),
+    "N_r|r|": (-2.5, "d", 5, 5, 5),
+    "N_uv": (-3.0, "c", 5, 0, 1),
+}
+
+
+def form():
+    """Products of all kinds beside dense tables of the same values."""
+    twin = {"c": np.zeros((6, 6, 6)), "d": np.zeros((6, 6, 6)), "h": np.zeros((6, 6))}
+    for value, kind, i, j, k in PRODUCTS.values():
+        twin[kind][(i, k) if kind == "h" else (i, j, k)] = value
+    return Case(
+        (terms.QuadraticForm(products=tuple(PRODUCTS), values=[entry[0] for entry in PRODUCTS.values()]),),
+        (QuadraticForm(**twin),),
+    )
+
+
 LIFT = np.random.default_rng(5).normal(size=(6, 6)) * np.array([4.0, 4.0, 4.0, 0.5, 0.5, 0.5])
 
 
@@ -69,5 +100,6 @@ CASES = {
             Waves(**arrays(STEEP_WAVES), gravity=9.8),
         ),
     ),
+    "quadratic form": form(),
     "body lift": Case((terms.BodyLift(matrix=LIFT),), (BodyLift(matrix=LIFT),)),
 }

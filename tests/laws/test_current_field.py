@@ -103,3 +103,29 @@ def test_a_member_of_a_scenario_that_is_not_there_is_refused():
     field = lw.terms.CurrentField(velocities=np.ones((2, 1, 1, 1, 1, 3)), spacing=[1.0, 1.0, 1.0])
     with pytest.raises(lw.SceneError, match=r"current_field.scenario of member 0 = 2.0"):
         lw.Ensemble(scene(field), 2, 0, {"current_field.scenario": lw.distributions.Choice([2.0])})
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("levels", [1, 4])
+def test_a_large_grid_gives_what_its_part_gives(dtype, levels):
+    # All members share the numbers of a large grid, and each packet has its own of a small one: other reads, the same water.
+    rng = np.random.default_rng(5)
+    small = 0.3 * rng.normal(size=(2, 3, 3, levels, 3))
+    large = np.zeros((2, 30, 40, levels, 3))
+    large[:, 13:16, 20:23] = small
+    shape = dict(spacing=[10.0, 10.0, 5.0], times=[0.0, 2.0])
+    part = lw.terms.CurrentField(velocities=small, **shape)
+    whole = lw.terms.CurrentField(velocities=large, origin=[-130.0, -200.0, 0.0], **shape)
+    # Seventeen members in cells of their own, and as many in one: more than a packet of each.
+    places = np.vstack([rng.uniform([1.0, 1.0, 1.0], [19.0, 19.0, 9.0], (17, 3)), np.full((17, 3), 3.0)])
+    still, upright = np.zeros((34, 3)), np.tile(np.eye(3), (34, 1, 1))
+    ends = [
+        lw.solve(
+            lw.Ensemble.from_states(scene(field), places, upright, still, still), "rk4", h=0.1, t1=1.0, dtype=dtype
+        )
+        for field in (part, whole)
+    ]
+    tolerance = 1e-13 if dtype == "float64" else 2e-5
+    assert np.ptp(ends[0].velocity[-1], axis=0).min() > 0.01
+    np.testing.assert_allclose(ends[1].velocity[-1], ends[0].velocity[-1], rtol=0.0, atol=tolerance)
+    np.testing.assert_allclose(ends[1].position[-1], ends[0].position[-1], rtol=0.0, atol=30.0 * tolerance)

@@ -18,6 +18,7 @@ from lgvi_warp.reference.terms.thrusters import Thrusters
 from lgvi_warp.reference.terms.weight import Weight
 from tests.laws.case import Case
 from tests.laws.cases import CASES, PROPELLERS, TABLE_OF_THRUST, THRUSTERS
+from tests.laws.cases_glider import HELD_BALLAST
 from tests.laws.test_parity import GRAVITY, STATE, VEHICLE
 
 # Long enough for several turns of a command.
@@ -34,6 +35,7 @@ IMPLIED = {
 }
 ALONE = IMPLIED | {name: case for name, case in CASES.items() if len(case.terms) == 1}
 (LAGGING,), (LAGGING_TWIN,), _ = CASES["thrusters"]
+ALONE["held ballast"] = HELD_BALLAST
 ALONE["prompt thrusters"] = Case(
     (replace(LAGGING, time_constant=0.0),), (type(LAGGING_TWIN)(**vars(LAGGING_TWIN) | {"time_constant": np.zeros(3)}),)
 )
@@ -91,8 +93,9 @@ def measured(bench, elsewhere):
         values["damping"] = -np.einsum("kij,kj->ki", values["damping"].reshape(-1, 6, 6), twist)
     if elsewhere:
         # Water and potentials are asked for at the user's origin only.
-        values = {role: value for role, value in values.items() if role in ("law", "damping", "push")}
-        for role, value in values.items():
+        values = {role: value for role, value in values.items() if role in ("law", "damping", "push", "power")}
+        for role in values.keys() - {"power"}:
+            value = values[role]
             force, torque = value[:, :3] @ TURN.T, value[:, 3:] @ TURN.T
             values[role] = np.concatenate([force, torque + np.cross(ORIGIN, force)], axis=1)
     return values, kept
@@ -108,7 +111,7 @@ def expected(law, views):
     """The same of the twin: by role (k, numbers), and the memory after either half of the kick, and what follows."""
     if hasattr(law, "seed0"):
         law = type(law)(**vars(law) | {"seed0": SEED & 0xFFFFFFFF, "seed1": SEED >> 32})
-    values = {role: [] for role in ("law", "damping", "flow", "energy")}
+    values = {role: [] for role in ("law", "damping", "flow", "energy", "power")}
     kept = [], [], []
     for i, (R, b, nu, Om, t) in enumerate(zip(*vars(views).values(), strict=True)):
         view = View(R, b, nu, Om, t, KICK, STEP, i, law.start())
@@ -118,6 +121,7 @@ def expected(law, views):
         values["damping"].append(-law.damping(view) @ np.concatenate([nu, Om]))
         values["flow"].append(np.concatenate([flow.velocity, flow.rate, flow.gradient.T.reshape(9)]))
         values["energy"].append([law.potential(view)])
+        values["power"].append([law.power(view)])
         kept[0].append(view.memory)
         view = replace(view, memory=law.evolve(view, True))
         kept[1].append(view.memory)
@@ -134,6 +138,43 @@ def test_a_law_gives_what_its_twin_gives(name, elsewhere):
     (term,), (law,) = ALONE[name].terms, ALONE[name].laws
     bench = bench_of(term, "laws", aligned=not elsewhere)
     assert hasattr(bench.module, "push") == hasattr(bench.module, "damping")
+    compare(bench, law, elsewhere)
+
+
+WATTS = dict(
+    power_commands=(-0.9, -0.2, 0.0, 0.3, 0.8),
+    power=((60.0, 80.0, 50.0), (20.0, 10.0, 9.0), (1.0, 2.0, 0.0), (15.0, 12.0, 30.0), (90.0, 70.0, 100.0)),
+)
+SHAFT = dict(shaft_speed=(40.0, 30.0, 50.0), efficiency=(0.5, 0.8, 1.0))
+
+
+def powered(case, **numbers):
+    """A case's thrusters in a scene that accounts their power, beside their twin."""
+    (term,), (law,), _ = case
+    twin = type(law)(**vars(law) | {name: np.array(value) for name, value in numbers.items()})
+    if "power" in numbers:
+        twin.power_table = twin.power
+        del twin.power
+    return Case((replace(term, **numbers).beside_account(True),), (twin,))
+
+
+POWERED = {
+    "lagging, watts": powered(CASES["thrusters"], **WATTS),
+    "prompt, watts": powered(ALONE["prompt thrusters"], **WATTS),
+    "held, watts": powered(ALONE["held thrusters"], **WATTS),
+    "held, shaft": powered(ALONE["held thrusters"], **SHAFT),
+    "held propellers, shaft": powered(ALONE["held propellers"], **SHAFT),
+    "propellers, shaft": powered(CASES["thrusters with a table"], **SHAFT),
+    "propellers, watts": powered(CASES["thrusters with a table"], **WATTS),
+}
+
+
+@pytest.mark.parametrize("elsewhere", [False, True])
+@pytest.mark.parametrize("name", POWERED)
+def test_thrusters_take_the_power_that_their_twin_takes(name, elsewhere):
+    (term,), (law,) = POWERED[name].terms, POWERED[name].laws
+    bench = bench_of(term, "laws", aligned=not elsewhere)
+    assert "power" in bench.roles
     compare(bench, law, elsewhere)
 
 

@@ -18,6 +18,7 @@ from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
 from tests.laws.case import Case, case, matrix
 from tests.laws.cases import CASES, together
+from tests.laws.cases_water import BALL
 from tests.support.tools import TURN, difference, from_state, last, one, slope
 
 GRAVITY = 9.8
@@ -161,7 +162,7 @@ def test_forces_that_turn_the_momenta():
 
 # Velocities at the nodes of a field that are linear in place and time, so that no slope jumps between two cells.
 LINEAR_FIELD = 0.1 * np.moveaxis(np.indices((2, 3, 5, 4, 3)), 0, -1) @ np.random.default_rng(9).normal(size=(5, 3))
-# Numbers for which nothing of "all together" jumps: schedules that stay, noise too small to be seen.
+# Numbers for which nothing of "all together" jumps: schedules that stay, noise too small to be seen, a hull of one part.
 HELD = {
     "current_field": {"velocities": LINEAR_FIELD},
     "wrench_schedule": {"force": ((5.0, -2.0, 1.0),) * 4, "torque": ((0.2, -0.2, 0.1),) * 4},
@@ -169,6 +170,7 @@ HELD = {
     "control_fins": {"command": None, "command_schedule": ((0.1, 0.15, -0.2),) * 4},
     "wrench_noise": {"force": (1e-30,) * 3, "torque": (1e-30,) * 3},
     "gauss_markov_current": {"standard_deviation": (1e-30,) * 3},
+    "surface_buoyancy": BALL,
 }
 SMOOTH = {name: case.terms for name, case in CASES.items() if case.smooth} | {
     "all together": tuple(replace(term, **HELD.get(term.type, {})) for term in CASES["all together"].terms)

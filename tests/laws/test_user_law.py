@@ -165,7 +165,7 @@ def test_a_class_made_again_replaces_the_former(monkeypatch):
 
 
 def test_the_law_on_the_page_is_right(tmp_path):
-    lines = (ROOT / "docs" / "develop" / "add_a_force.md").read_text().split("## Eight roles")[0].splitlines()
+    lines = (ROOT / "docs" / "develop" / "add_a_force.md").read_text().split("## Nine roles")[0].splitlines()
     code = "\n".join(line[4:] for line in lines if line.startswith("    ") or not line)
     page = load(tmp_path / "page.py", code)
     assert lw.laws.check_law(page.spring, scene=lw.Scene(own_law.vehicle, start=lw.Start(position=[0.0, 0.0, 20.0]))).ok

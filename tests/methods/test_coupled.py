@@ -12,6 +12,7 @@ from lgvi_warp.reference import coupled
 from lgvi_warp.reference.submaps import Body, K, State, look, start, water
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.stratification import Stratification
+from lgvi_warp.reference.terms.surface_buoyancy import SurfaceBuoyancy
 from lgvi_warp.reference.terms.weight import Weight
 from tests.laws.cases import CASES
 from tests.support.tools import difference, last, one
@@ -43,9 +44,10 @@ def body_of(laws):
     displaced = BUOYANCY / GRAVITY
     moment = BUOYANCY * LIFT - WEIGHT * CENTER
     M, C, J = coupled.blocks(INERTIA)
-    # This law's numbers are partly the vehicle's.
+    # These laws' numbers are partly the vehicle's.
     own = {"buoyancy": BUOYANCY, "center_of_buoyancy": LIFT}
-    laws = tuple(Stratification(**vars(law) | own) if isinstance(law, Stratification) else law for law in laws)
+    of_vehicle = Stratification | SurfaceBuoyancy
+    laws = tuple(type(law)(**vars(law) | own) if isinstance(law, of_vehicle) else law for law in laws)
     laws = (Weight(net=WEIGHT - BUOYANCY), Restoring(moment=moment), *laws)
     return Body(M, J, laws, displaced - MASS, displaced * LIFT - MASS * CENTER, MASS, MASS * CENTER, C=C)
 

@@ -22,7 +22,8 @@ from tests.support.tools import difference, last, one
 TABLEAUX = {"rk4": RK4, "rk5": DOPRI5, "rk5_ck": CASH_KARP, "rk8": DOP853}
 METHODS = (*TABLEAUX, "cg3", "rkmk4")
 # Laws without memory, which an explicit method cannot advance. Noise is held over the step.
-WITHOUT_MEMORY = [name for name in CASES if not any(word in name for word in ("Gauss", "thrusters", "rates", "all"))]
+HAVE_MEMORY = ("Gauss", "thrusters", "rates", "pumps", "engine", "all together")
+WITHOUT_MEMORY = [name for name in CASES if not any(word in name for word in HAVE_MEMORY)]
 
 
 def advanced(scene, body, method, h, steps, at):

@@ -11,9 +11,8 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.law import div, mul, neg, ones, positive, sub, vec3  # noqa: F401
 from lgvi_warp.common.status import Status, under_way
-from lgvi_warp.control import Callback, HeadingPID, PseudoInverse, SetPoint
+from lgvi_warp.control import Callback, HeadingPID, PseudoInverse, SetPoint, signals
 from lgvi_warp.control.base import ControlLaw
-from lgvi_warp.control.signals import SAVED, SIGNALS
 from lgvi_warp.engine import launches
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
@@ -23,6 +22,11 @@ from lgvi_warp.store.folder import Folder
 from tests.support.stores import differing
 from tests.unit.views.test_recording import rows
 
+# Those of a scene without a filter.
+SIGNALS, SAVED = (
+    tuple(name for name in names if name not in (*signals.OF_A_FILTER, signals.ENERGY_USED))
+    for names in (signals.SIGNALS, signals.SAVED)
+)
 H, EVERY, STEPS, MEMBERS = 0.01, 5, 60, 600
 LIMIT, LAG, DELAY = 0.4, 0.1, 2
 KP, KD, LEVEL = 1.0, 2.0, 3.0

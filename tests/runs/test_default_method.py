@@ -124,7 +124,7 @@ def test_braking_bounds_the_twin(name, rng):
         assert rate(derivative(law, nu)) <= bound * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize("name", [*LIFTING, *DRAGS])
+@pytest.mark.parametrize("name", [*LIFTING, *DRAGS, "polar"])
 def test_braking_takes_numbers_that_vary_alone(name):
     """One number of three members, all others shared: as if all were given for each member."""
     (term,) = CASES[name].terms
@@ -138,7 +138,7 @@ def test_braking_takes_numbers_that_vary_alone(name):
         )
 
 
-@pytest.mark.parametrize("name", DRAGS)
+@pytest.mark.parametrize("name", [*DRAGS, "polar"])
 def test_braking_of_drag_is_the_derivative(name, rng):
     (term,), (law,) = CASES[name].terms, CASES[name].laws
     numbers = {key: np.asarray(value)[None] for key, value in term.parameters().items()}

@@ -174,7 +174,7 @@ def test_outcomes_look_different():
     seen = [(look.color, look.marker) for look in looks.OUTCOME_STYLES.values()]
     assert set(looks.OUTCOME_STYLES) == set(Status)
     assert len(set(seen)) == len(seen)
-    assert len({look.color for code, look in looks.OUTCOME_STYLES.items() if code == Status.OK or code.stopped}) == 6
+    assert len({look.color for code, look in looks.OUTCOME_STYLES.items() if code == Status.OK or code.stopped}) == 8
 
 
 def test_nothing_to_draw_says_why(mixed, tmp_path):
@@ -227,9 +227,10 @@ def test_terms_say_of_energy_what_their_device_code_does(name):
     from lgvi_kernels import built_in
 
     for term in cases.CASES[name].terms:
-        module = built_in("laws", term.device)
+        module = built_in("laws", term.device_in(True))
         follows = getattr(module, "POTENTIAL", False) and not hasattr(module, "damping") and not hasattr(module, "flow")
-        assert ("energy" in term.conserves) == follows
+        # An account acts on nothing.
+        assert ("energy" in term.conserves) == (follows or term.accounts)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)

@@ -246,7 +246,7 @@ def test_a_factor_of_1_changes_nothing(loop):
     scene = dataclasses.replace(autopilot(), start=lw.Start(velocity=(1.54, 0.0, 0.0), position=(0.0, 0.0, 1.0)))
     fleet = lw.Ensemble(scene, 3, 1, {"heading_pid.ki": Uniform(0.1, 0.3), "depth_pid.ki": Uniform(0.01, 0.03)})
     members = study.Study(fleet, loop, 20.0, 20.0, 10.0, 1e-3, None, 0.01)
-    numbers = {FACTOR: np.ones(3), DELAY: np.zeros(3)}
+    numbers = {FACTOR: np.ones((3, 6)), DELAY: np.zeros(3)}
     motion = members.bench.run(np.arange(3), None, 0, members.begin, numbers)
     expected = lw.solve(fleet, t1=20.0)
     # Without the merged lead the steps are the same but for round-off, 2000 times eps, which an unstable vehicle multiplies.

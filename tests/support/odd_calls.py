@@ -65,6 +65,8 @@ def goods(scene, fleet, result, folder):
         "KernelDensity": {"draws": [1.0, 2.0, 4.0]}, "gather": {"statistics": [lw.statistics.Mean("depth")]},
         "Copula": {"correlation": np.eye(1), "marginals": [lw.distributions.Normal(std=1.0)]},
         "Derived": {"functions": {"vehicle.mass": lambda k: k}, "k": lw.distributions.Normal(std=1.0)},
+        "Waypoints": {"points": [[0.0, 0.0, 1.0], [9.0, 0.0, 1.0]]}, "export": {"run": result},
+        "BuoyancyEngine": dict(pump_rate=1e-5, volume_down=-1e-4, volume_up=1e-4, depth_top=1.0, depth_bottom=2.0),
         "Tether": {"anchor": [0.0] * 3, "stiffness": 1.0},
         "from_fossen": {"mass": 20.0, "inertia": [1.5, 4.0, 4.5]},
     }  # fmt: skip

@@ -20,6 +20,7 @@ from lgvi_kernels.advance.watching import make_watching
 from lgvi_kernels.lanes.arithmetic import add, any_positive, mul, ones, sub  # noqa: F401
 from lgvi_kernels.lanes.packet import failures, turned_too_far
 from lgvi_kernels.lanes.sums import at_rest, choose
+from lgvi_kernels.maps.accounting import account_of, put_account
 
 # Where every step is a sample, steps between two looks at the energy: this is how late a failure may be seen.
 SINGLE_LOOKS = 8
@@ -97,6 +98,7 @@ def make_stopped(spec):
     State, Constants, Monitor, Lane, Ints = types.State, types.Constants, types.Monitor, types.Lane, types.Ints
     at_step, held, one_step, arrival = stepping.at_step, stepping.held, stepping.one_step, make_retry(spec).arrival
     watched, stills, remembers, controlled = spec.watched, spec.still, spec.memory, spec.control is not None
+    accounted = spec.accounted
     fail, keep = make_fail(width), make_resting(spec)[0]
     keep_signals, _, _ = make_signals(types)
     _, _, back_up = make_rows(Lane, State, spec.paced, spec.compensated)
@@ -109,6 +111,8 @@ def make_stopped(spec):
         """good: the state before the step; codes: why lanes fail in it. Returns: the codes."""
         landed = good
         code = codes
+        if wp.static(accounted):
+            used, low = account_of(c, 0)
         if wp.static(watched):
             begun = at_step(good, k, h)
             part, still = arrival(begun, x, landed, code, c, k, h, stage_h, lead_h, opening)
@@ -127,11 +131,14 @@ def make_stopped(spec):
                     held(begun, c, monitor, k, 1, h, stage_h, lead_h, first_h, opening)
                 else:
                     begun = one_step(begun, c, monitor, k, h, stage_h, lead_h, first_h, opening)
+                if wp.static(accounted):
+                    # That of the states that go on, of which some were made in parts.
+                    put_account(c, 0, used, low)
         fail(code, k, c.packet, status, failed_step)
         for j in range(wp.static(width)):
             if code[j] > real(0.0):
                 failed_size[c.packet][j] = x.alarm.size[j]
-        if wp.static(controlled):
+        if wp.static(spec.signalled):
             keep_signals(c, monitor, c.memory.shape[1] // 2, code)
         keep(landed, c, code, state)
         return code

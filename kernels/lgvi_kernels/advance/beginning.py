@@ -29,7 +29,7 @@ def make_constants(spec):
         types.Constants, types.DragFlow, types.Inertia, types.Params, types.Events
     )  # fmt: skip
     Lane, Number, Monitor, real, prepare = types.Lane, types.Number, types.Monitor, spec.real, stepping.method.prepare
-    watched, dragged, controlled = spec.watched, spec.dragged, spec.control is not None
+    watched, dragged, controlled, accounted = spec.watched, spec.dragged, spec.control is not None, spec.accounted
 
     @wp.func(inline=True)
     def constants(c: wp.ref[Constants], i: int, inertia: wp.array(dtype=Inertia), params: wp.array(dtype=Params),
@@ -47,6 +47,8 @@ def make_constants(spec):
             c.events = events[i % events.shape[0]]
         if wp.static(controlled):
             c.loop = monitor.loop[i % monitor.loop.shape[0]]
+        if wp.static(accounted):
+            c.account = monitor.account
         if wp.static(dragged):
             c.drag = prepare(DragFlow(), c.params.own, real(h))
 
@@ -116,6 +118,9 @@ def make_opening(spec):
                 if monitor.slots > 0:
                     if begins != wp.static(STARTS) and k0 == monitor.first_tick * monitor.every:
                         recall(x, c, monitor, k0, h, opening)
+        if wp.static(spec.signalled and not controlled):
+            if begins > 0:
+                first_signals(c, monitor, frozen)
 
     return opening_of
 
@@ -158,7 +163,7 @@ def make_begun(spec):
         if wp.static(watched or (controlled and checked)):
             if any_positive(early):
                 fail(early, k0, c.packet, status, failed_step)
-                if wp.static(controlled):
+                if wp.static(spec.signalled):
                     keep_signals(c, monitor, 0, early)
                 keep(x, c, early, state)
                 frozen = frozen + early

@@ -57,7 +57,7 @@ def make_sampled(spec):
         # Backward over its length, the lead of the next step is undone.
         y = opened(at_step(x, k, h), c, -opening)
         sample(out, c.packet, first, columns, y, c, real(h), monitor, frozen)
-        if wp.static(controlled):
+        if wp.static(spec.signalled):
             if wp.static(reports):
                 note_actuators(x, c, h, k)
             sample_signals(out, first + numbers, c, monitor, frozen)

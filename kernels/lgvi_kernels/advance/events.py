@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import absolute, add, div, mul, neg, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.maps.accounting import account_of, put_account
 from lgvi_kernels.maps.submaps import look, rotate
 
 # Status of the first event of a scene; the next have the next numbers.
@@ -166,11 +167,13 @@ def make_water_around(types, water_velocity, part_step, real):
     return water_around
 
 
-def make_arrival(types, watch, part_step, choose, water_velocity, real, width, most_parts):
+def make_arrival(types, watch, part_step, choose, water_velocity, real, width, most_parts, accounted):
     """The function that makes the last step of members that reach an event: the part of it that ends there.
 
     part_step: (x, c, k, h, part, parts, ...) -> the state after `parts` equal steps of part h from step k on; water_velocity:
     (x, c, h) -> R^T u, or None where a sample can compute it later; most_parts: how many parts one without a solution gets.
+    accounted: the energy used is remembered, and an event may look at it. That of the lanes that stop goes into the memory's
+    second half, which holds what was remembered before the step.
     """
     State, Constants, Lane = types.State, types.Constants, types.Lane
     spacing, spacing_of, nearest = SPACINGS * EPSILON[real], watch.spacing, watch.nearest
@@ -189,7 +192,15 @@ def make_arrival(types, watch, part_step, choose, water_velocity, real, width, m
         begin, begin_margin, begin_code = nearest(good, c, real(h), between)
         end, end_margin, end_code = nearest(x, c, real(h), between)
         part_of_step = begin - begin
+        if wp.static(accounted):
+            half = c.memory.shape[1] // 2
+            end_used, end_low = account_of(c, 0)
+            used, used_low = account_of(c, half)
         still, end_still = water_around(good, x, c, k, h, stage_h, lead_h, opening, part_of_step)
+        if wp.static(accounted):
+            # A part without length: the memory is then that of the step's begin.
+            begun = part_step(good, c, k, h, real(0.0), 0, stage_h, lead_h, opening, ones(begin))
+            begin, begin_margin, begin_code = nearest(begun, c, real(h), between)
         for j in range(wp.static(width)):
             if code[j] >= real(wp.static(float(FIRST))):
                 lane = ones(begin) - ones(begin)
@@ -209,6 +220,9 @@ def make_arrival(types, watch, part_step, choose, water_velocity, real, width, m
                     code[j] = end_code[j]
                     stopped = choose(lane, x, stopped)
                     still = positive(lane, end_still, still)
+                    if wp.static(accounted):
+                        used = positive(lane, end_used, used)
+                        used_low = positive(lane, end_low, used_low)
                     if high_distance > end_margin[j]:
                         # The step ends less than a margin beyond the event: search a little further than its end.
                         high = wp.min(real(2.0), real(1.0) + real(2.0) * high_distance / (low_distance - high_distance))
@@ -243,12 +257,18 @@ def make_arrival(types, watch, part_step, choose, water_velocity, real, width, m
                             stopped = choose(lane, y, stopped)
                             if wp.static(water_velocity is not None):
                                 still = positive(lane, water_velocity(y, c, real(h)), still)
+                            if wp.static(accounted):
+                                new, new_low = account_of(c, 0)
+                                used = positive(lane, new, used)
+                                used_low = positive(lane, new_low, used_low)
                             if high_distance >= -margin[j]:
                                 low = high
                             if side == -1:
                                 low_distance = real(0.5) * low_distance
                             side = int(-1)
                 part_of_step[j] = part
+        if wp.static(accounted):
+            put_account(c, half, used, used_low)
         return part_of_step, still
 
     return arrival

@@ -16,8 +16,8 @@ from lgvi_kernels.maps.seeing import seeing_laws
 
 # Role of the law -> its columns of `out`, as (first, count); a role that the law does not have leaves zeros.
 COLUMNS = {"law": (0, 6), "damping": (6, 36), "push": (59, 6), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1),
-           "load": (65, 42)}  # fmt: skip
-OUT_FIELDS = 107
+           "load": (65, 42), "carried_inertia": (107, 36), "carried_momentum": (143, 6), "power": (149, 1)}  # fmt: skip
+OUT_FIELDS = 150
 
 
 class Examine(NamedTuple):
@@ -53,7 +53,11 @@ def make_examine(module, numbers, width, real):
     roles = ("law", "damping", "push", "flow", "evolve", "follow")
     law, damping, push, flow, evolve, follow = (superpose((module,), role) for role in roles)
     load = superpose_loads((module,))
+    inertia, momentum, depart = (
+        superpose((module,), role) for role in ("carried_inertia", "carried_momentum", "depart")
+    )
     distance, energy = plays(module, "distance"), superpose((module,), "energy")
+    power = superpose((module,), "power")
 
     @wp.func
     def put_rows(out: wp.array2d(dtype=Lane), i: int, first: int, m: Any):
@@ -101,6 +105,8 @@ def make_examine(module, numbers, width, real):
             if wp.static(evolve is not None):
                 view.second = second
                 view = evolve(view, view, p)
+            if wp.static(depart is not None):
+                view = depart(view, view, p)
         else:
             if wp.static(law is not None):
                 w = law(Wrench(), view, p)
@@ -124,6 +130,16 @@ def make_examine(module, numbers, width, real):
                 put_rows(out, i, 86, D_load.torque_rate)
                 put(out, i, 101, w_load.force)
                 put(out, i, 104, w_load.torque)
+            if wp.static(inertia is not None):
+                D_carried = inertia(Damping(), view, p)
+                put_rows(out, i, 107, D_carried.force_velocity)
+                put_rows(out, i, 110, D_carried.force_rate)
+                put_rows(out, i, 125, D_carried.torque_velocity)
+                put_rows(out, i, 128, D_carried.torque_rate)
+            if wp.static(momentum is not None):
+                w_carried = momentum(Wrench(), view, p)
+                put(out, i, 143, w_carried.force)
+                put(out, i, 146, w_carried.torque)
             if wp.static(flow is not None):
                 f = flow(Flow(), view, p)
                 put(out, i, 42, f.velocity)
@@ -135,5 +151,7 @@ def make_examine(module, numbers, width, real):
                 out[i, 57] = distance(view, p.own)
             if wp.static(energy is not None):
                 out[i, 58] = energy(view.b.x - view.b.x, view, p)
+            if wp.static(power is not None):
+                out[i, 149] = power(view.b.x - view.b.x, view, p)
 
     return Examine(examine, Lane, Params)

@@ -13,6 +13,7 @@ from lgvi_kernels.advance.gathering import make_gather, make_gather_motion
 from lgvi_kernels.advance.noting import (
     MEASURED_ROW,
     REFERENCE_ROW,
+    SEEN_NOTES,
     bit,
     make_put_measured,
     make_put_reference,
@@ -42,15 +43,32 @@ def make_feed(spec, types, method, at_step, opened):
     """
     State, Constants, Monitor = types.State, types.Constants, types.Monitor
     Reference, truth = reference_struct(spec.lanes, spec.real), make_truth(spec, types, method)
-    seen, acted = make_seen(spec, types, method, truth, at_step, opened), make_acted(spec, types)
-    gather = make_gather(spec, types, at_step)
+    plain, noted = (make_seen(spec, types, method, truth, at_step, opened, notes) for notes in (False, True))
+    acted, gather = make_acted(spec, types), make_gather(spec, types, at_step)
+    keep_motion = make_keep_motion(spec, types, method, truth, at_step, opened)
+
+    # Not inlined, and before the tick itself: what is noted costs the tick no register, and no bit.
+    @wp.func(inline=False)
+    def note(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
+    ):
+        """Measure and guide for the notes alone: what the parts remember is put back."""
+        for j in range(monitor.part_rows):
+            c.memory[c.packet, monitor.spare + j] = c.memory[c.packet, monitor.parts + j]
+        y, r = noted(x, c, monitor, k, h, opening)
+        for j in range(monitor.part_rows):
+            c.memory[c.packet, monitor.parts + j] = c.memory[c.packet, monitor.spare + j]
 
     @wp.func(inline=False)
     def feed(
         x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
     ):
         """Measure, guide, control, allocate, send."""
-        y, r = seen(x, c, monitor, k, h, opening)
+        if monitor.slots > 0:
+            keep_motion(x, c, monitor, k, h, opening)
+        if (monitor.noting & wp.static(SEEN_NOTES)) != 0:
+            note(x, c, monitor, k, h, opening)
+        y, r = plain(x, c, monitor, k, h, opening)
         acted(x, y, r, c, monitor)
         gather(x, c, monitor, k, h)
 
@@ -59,7 +77,9 @@ def make_feed(spec, types, method, at_step, opened):
         x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
     ):
         """Measure and guide."""
-        y, r = seen(x, c, monitor, k, h, opening)
+        if monitor.slots > 0:
+            keep_motion(x, c, monitor, k, h, opening)
+        y, r = noted(x, c, monitor, k, h, opening)
         gather(x, c, monitor, k, h)
 
     @wp.func(inline=False)
@@ -70,18 +90,12 @@ def make_feed(spec, types, method, at_step, opened):
         acted(x, y, r, c, monitor)
         gather(x, c, monitor, k, h)
 
-    gather_motion = make_gather_motion(spec.compensated, "origin" in spec.parts)
-    momentum = method.momentum
-
     @wp.func(inline=False)
     def recall(
         x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
     ):
         """Gather the motion at this tick, and what the memory has of it."""
-        z = opened(at_step(x, k, h), c, -opening)
-        if wp.static(momentum is not None):
-            z.p = momentum(z)
-        gather_motion(truth(z, c, monitor, k, h), z, c, monitor)
+        keep_motion(x, c, monitor, k, h, opening)
         gather(x, c, monitor, k, h)
 
     return (ask, respond, recall) if spec.control.asked else (feed, method.step, recall)
@@ -138,12 +152,28 @@ def make_truth(spec, types, method):
     return truth
 
 
-def make_seen(spec, types, method, truth, at_step, opened):
-    """(x, c, monitor, k, h, opening) -> what is measured and what is wanted after k steps, both noted."""
+def make_keep_motion(spec, types, method, truth, at_step, opened):
+    """(x, c, monitor, k, h, opening): gather the motion after k steps."""
+    State, Constants, Monitor, real = types.State, types.Constants, types.Monitor, spec.real
+    gather_motion, momentum = make_gather_motion(spec.compensated, "origin" in spec.parts), method.momentum
+
+    @wp.func(inline=False)
+    def keep_motion(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real
+    ):
+        z = opened(at_step(x, k, h), c, -opening)
+        if wp.static(momentum is not None):
+            z.p = momentum(z)
+        gather_motion(truth(z, c, monitor, k, h), z, c, monitor)
+
+    return keep_motion
+
+
+def make_seen(spec, types, method, truth, at_step, opened, notes):
+    """(x, c, monitor, k, h, opening) -> what is measured and what is wanted after k steps; notes: both are noted."""
     State, Constants, Monitor, real = types.State, types.Constants, types.Monitor, spec.real
     Reference, momentum = reference_struct(spec.lanes, real), method.momentum
     measure, guide = (in_turn(spec.control.parts, role) for role in ("measure", "guide"))
-    gather_motion = make_gather_motion(spec.compensated, "origin" in spec.parts)
     put_measured, put_reference = make_put_measured(spec.control.headings), make_put_reference(spec.control.headings)
 
     @wp.func
@@ -162,16 +192,15 @@ def make_seen(spec, types, method, truth, at_step, opened):
         if wp.static(momentum is not None):
             z.p = momentum(z)
         y = truth(z, c, monitor, k, h)
-        if monitor.slots > 0:
-            gather_motion(y, z, c, monitor)
         r = upright(y.position.x)
         if wp.static(measure is not None):
             y = measure(y, r, y, c.loop)
-        # Each as soon as it is known, so that what is noted alone need not be kept in registers.
-        put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW), monitor.noting)
+        if wp.static(notes):
+            put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW), monitor.noting)
         if wp.static(guide is not None):
             r = guide(r, r, y, c.loop)
-        put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW), monitor.noting)
+        if wp.static(notes):
+            put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW), monitor.noting)
         return y, r
 
     return seen

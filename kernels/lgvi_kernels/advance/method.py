@@ -13,6 +13,7 @@ from lgvi_kernels.lanes.state import damping_struct, flow_struct, matrix3_struct
 from lgvi_kernels.lanes.view import to_body
 from lgvi_kernels.laws import drag, drag_directions
 from lgvi_kernels.maps import turns
+from lgvi_kernels.maps.accounting import make_kick_account, make_map_account
 from lgvi_kernels.maps.collocation import make_G
 from lgvi_kernels.maps.compose import superpose, superpose_loads
 from lgvi_kernels.maps.coupled import make_W
@@ -227,7 +228,8 @@ def make_method(spec):
         "D": make_D(rotation_struct(width, real), solve, spec.compensated),
     }
     if "K" in used:
-        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E, V)
+        kick_account = make_kick_account(laws, velocities_of_forces) if spec.accounted else None
+        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E, V, kick_account)
     if "W" in used:
         letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
     if "modified" in spec.parts:
@@ -260,7 +262,8 @@ def make_method(spec):
         _, forces, current, _ = make_forces(*acting, loads)
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)
-        letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)
+        account = make_map_account(View, laws, velocities_of_forces) if spec.accounted else None
+        letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages, account)
     maps = maps_of(spec, letters)
     step = fold_pair(maps) if spec.paired else fold(maps)
     # Without a lead, step stands in its place, and is called nowhere.

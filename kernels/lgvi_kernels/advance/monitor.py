@@ -76,7 +76,7 @@ def seen_struct(width, real):
 
 
 @functools.cache
-def monitor_struct(width, real, rows, energy, backward, substep, still, loop=None):
+def monitor_struct(width, real, rows, energy, backward, substep, still, loop=None, accounted=False):
     """The kernel's argument: limits, one entry or one a packet, and the results of looks, by packet.
 
     warned: bits; warned_step and warned_size: steps made at the first crossing of the most serious row, and its square.
@@ -84,11 +84,13 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
     still: R^T u where and when a lane was frozen, three rows.
     loop: of a controller, the struct given, one entry or one a packet; every: steps between its ticks; start: the step of the
     first one; commands: how many are in the first rows of the memory; bus: the first row of what ticks note; noting: bits of
-    what they do. signals: rows of the memory that are saved with a sample; kept: the first of as many rows, what frozen lanes
-    save; first_signals: what they are at the first sample.
+    what they do; parts, part_rows: rows that the parts remember, put aside from `spare` on while they note. signals: rows of
+    the memory that are saved with a sample; kept: the first of as many rows, what frozen lanes save; first_signals: what they
+    are at the first sample.
     ticks: what is gathered at ticks, (slots times numbers, packets), `numbers` rows for each; slots: how many ticks it holds,
     0 for none gathered; first_tick: the number of the one in the first slot; columns: for each number of SAMPLE_FIELDS in turn
     its row of a tick, -1 if it is not gathered.
+    account: of a scene that sums the energy used, its row of the memory (see maps/accounting.py).
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}
@@ -107,9 +109,14 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
     if loop is not None:
         fields |= {"loop": wp.array(dtype=loop), "every": wp.int32, "commands": wp.int32, "bus": wp.int32}
         fields |= {"noting": wp.int32, "kept": wp.int32, "start": wp.int32}
+        fields |= dict.fromkeys(("parts", "part_rows", "spare"), wp.int32)
         fields |= {"signals": wp.array(dtype=wp.int32), "first_signals": wp.array2d(dtype=Lane)}
         fields |= {"ticks": wp.array2d(dtype=Lane), "slots": wp.int32, "first_tick": wp.int32, "numbers": wp.int32}
         fields["columns"] = wp.array(dtype=wp.int32)
+    elif accounted:
+        fields |= {"kept": wp.int32, "signals": wp.array(dtype=wp.int32), "first_signals": wp.array2d(dtype=Lane)}
+    if accounted:
+        fields["account"] = wp.int32
     return struct("Monitor", **fields) if fields else struct("NoMonitor", unused=wp.uint8)
 
 

@@ -27,6 +27,8 @@ def bit(group, row):
     return 1 << BITS_OF_ROWS[group][row]
 
 
+# The bits of what is measured and wanted.
+SEEN_NOTES = ALL_NOTES & ~bit("demand", 0)
 MEASURED_ROW = NOTED["demand"]
 REFERENCE_ROW = MEASURED_ROW + NOTED["measured"]
 

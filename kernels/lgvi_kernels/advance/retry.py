@@ -17,6 +17,7 @@ from lgvi_kernels.advance.stepping import make_stepping
 from lgvi_kernels.lanes.arithmetic import add, any_positive, mul, neg, ones, positive, sub  # noqa: F401
 from lgvi_kernels.lanes.packet import failures, turned_too_far
 from lgvi_kernels.lanes.sums import at_rest, choose, settled
+from lgvi_kernels.maps.accounting import account_of, put_account
 
 # A step without a solution is divided into at most so many parts.
 MOST_PARTS = 1024
@@ -84,7 +85,7 @@ def make_retry(spec):
     types, stepping, real, width = make_types(spec), make_stepping(spec), spec.real, spec.width
     Lane, State, Constants = types.Lane, types.State, types.Constants
     method, watch, watched, in_parts = stepping.method, stepping.watch, spec.watched, make_in_parts(spec)
-    to_event = watch.alarm if watched else method.step
+    to_event, accounted = watch.alarm if watched else method.step, spec.accounted
 
     @wp.func(inline=False)
     def retried(good: wp.ref[State], x: wp.ref[State], codes: wp.ref[Lane], c: wp.ref[Constants], k: int, h: wp.float64,
@@ -97,6 +98,8 @@ def make_retry(spec):
         for j in range(wp.static(width)):
             if codes[j] == real(1.0) or codes[j] == real(2.0) or codes[j] == real(4.0):
                 pending[j] = real(1.0)
+        if wp.static(accounted):
+            used, low = account_of(c, 0)
         parts = int(1)
         while parts < wp.static(MOST_PARTS) and any_positive(pending):
             parts = 2 * parts
@@ -116,9 +119,16 @@ def make_retry(spec):
                     pending[j] = real(0.0)
                     codes[j] = new_codes[j]
             x = choose(solved, y, x)
+            if wp.static(accounted):
+                new, new_low = account_of(c, 0)
+                used = positive(solved, new, used)
+                low = positive(solved, new_low, low)
+        if wp.static(accounted):
+            put_account(c, 0, used, low)
 
     arrival = method.step
     if watched:
         water = method.water_velocity if spec.still else None
-        arrival = make_arrival(types, watch, in_parts, choose, water, real, width, MOST_PARTS if spec.substep else 1)
+        most_parts = MOST_PARTS if spec.substep else 1
+        arrival = make_arrival(types, watch, in_parts, choose, water, real, width, most_parts, accounted)
     return Retry(retried, arrival)

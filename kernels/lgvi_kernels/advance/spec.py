@@ -11,6 +11,7 @@ from lgvi_kernels.advance.rows import PACE_FIELDS, STATE_FIELDS
 from lgvi_kernels.lanes.arithmetic import int_lane, lane
 from lgvi_kernels.lanes.state import alarm_struct, inertia_struct, state_struct, struct, table_number, view_struct
 from lgvi_kernels.laws import drag
+from lgvi_kernels.maps.accounting import keeps_account
 from lgvi_kernels.maps.compose import params_of
 
 # Steps between two looks at the alarms. A chunk with an alarm is repeated one step at a time by the same code.
@@ -119,6 +120,16 @@ class Spec(NamedTuple):
         return self.watched and self.flow in ("uniform", "varying")
 
     @property
+    def accounted(self) -> bool:
+        """Whether the energy that laws use is summed."""
+        return any(map(keeps_account, self.laws))
+
+    @property
+    def signalled(self) -> bool:
+        """Whether samples may have rows of the memory: signals of a controller, or the energy used."""
+        return self.control is not None or self.accounted
+
+    @property
     def state_fields(self) -> int:
         """Numbers of a packet's state."""
         return STATE_FIELDS * (1 + self.compensated) + PACE_FIELDS * self.paced
@@ -171,6 +182,7 @@ def make_types(spec):
         **({"events": Events} if spec.events else {}),
         **({"drag": DragFlow} if spec.dragged else {}),
         **({"loop": Loop} if spec.control else {}),
+        **({"account": wp.int32} if spec.accounted else {}),
         **_rules(spec),
     )
     return Types(
@@ -187,7 +199,7 @@ def make_types(spec):
         Events,
         monitors.limits_struct(width, real, spec.warning_rows),
         monitors.monitor_struct(
-            width, real, spec.warning_rows, spec.energy, spec.backward, spec.substep, spec.still, Loop
+            width, real, spec.warning_rows, spec.energy, spec.backward, spec.substep, spec.still, Loop, spec.accounted
         ),
         Loop,
     )

@@ -7,6 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
+from lgvi_kernels.cells import cell_of
 from lgvi_kernels.law import *
 
 FLOW = "varying"
@@ -24,18 +25,6 @@ def params(width, real):
     vectors = dict.fromkeys(("origin", "inverse", "last"), Lane3)
     words = ("first", "north", "east", "depth", "time", "scenario")
     return struct("CurrentField", **lanes, **vectors, **dict.fromkeys(words, wp.int32))
-
-
-@wp.func
-def cell_of(x: Any, origin: Any, inverse: Any, last: Any):
-    """The cell that x is in, how far it is through it, 0 to 1, and 1 / spacing: of the nearest where x is outside, then 0."""
-    unity = ones(x)
-    zero = unity - unity
-    u = (x - origin) * inverse
-    # Of NaN the first.
-    held = positive(u, positive(u - last, last, u), zero)
-    cell = greatest(least(below(held), last - unity), zero)
-    return cell, held - cell, positive(u, positive(last - u, inverse, zero), zero)
 
 
 @wp.func

@@ -14,6 +14,7 @@ class Driven(NamedTuple):
 
     params: the struct of its numbers; place: (view, p, i) -> where channel i is; evolve, follow, report: roles of its law.
     look_up, found: (view, p), then (view, p, i) as place, for a law that needs all channels; None where place costs no more.
+    commanded: (view, p, i, t) -> the command of a schedule; None behind a controller.
     """
 
     params: Any
@@ -23,6 +24,7 @@ class Driven(NamedTuple):
     report: Any
     look_up: Any = None
     found: Any = None
+    commanded: Any = None
 
 
 @wp.func

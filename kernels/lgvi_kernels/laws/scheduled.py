@@ -229,5 +229,5 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
         return remembered(view, p.work + i)
 
     if moves:
-        return Driven(params, place, evolve, follow, None)
-    return Driven(params, place, None, None, None, look_up, found)
+        return Driven(params, place, evolve, follow, None, commanded=commanded)
+    return Driven(params, place, None, None, None, look_up, found, commanded)

@@ -16,7 +16,6 @@ from lgvi_kernels.law import *
 # place, the least slope, and the coefficients from the lowest power up.
 START_SIZE = 16
 INVERSE_ROWS = 4 + START_SIZE
-NEWTON_STEPS = 2
 
 
 @wp.func
@@ -35,15 +34,6 @@ def square_curve(view: Any, p: Any, first: int, w: Any):
 def table_curve(view: Any, p: Any, first: int, w: Any):
     """Linear between the knots, constant outside."""
     return table1(view, first, p.size, w)
-
-
-@wp.func
-def row_of_side(view: Any, row: int, astern: int, side: Any):
-    """A number of the curve ahead where side > 0, else of that astern, `astern` rows behind; 0: both are the same."""
-    value = row1(view, row)
-    if astern > 0:
-        value = positive(side, value, row1(view, row + astern))
-    return value
 
 
 def make_horner(count, sided):
@@ -88,53 +78,81 @@ def make_polynomial_curve(powers, odd):
     return polynomial_curve
 
 
-# A polynomial by Estrin's scheme, whose sums need not wait for each other.
-@wp.func
-def two(view: Any, row: int, astern: int, side: Any, z: Any):
-    """a + b z."""
-    return row_of_side(view, row, astern, side) + row_of_side(view, row + 1, astern, side) * z
+def make_estrin(sided):
+    """(view, row, astern, side, z) -> a polynomial with sixteen coefficients, whose sums need not wait for each other.
 
-
-@wp.func
-def four(view: Any, row: int, astern: int, side: Any, z: Any, z2: Any):
-    """A polynomial with four coefficients."""
-    return two(view, row, astern, side, z) + two(view, row + 2, astern, side, z) * z2
-
-
-@wp.func
-def sixteen(view: Any, row: int, astern: int, side: Any, z: Any):
-    """A polynomial with sixteen coefficients, from the lowest power up."""
-    z2 = z * z
-    z4 = z2 * z2
-    low = four(view, row, astern, side, z, z2) + four(view, row + 4, astern, side, z, z2) * z4
-    high = four(view, row + 8, astern, side, z, z2) + four(view, row + 12, astern, side, z, z2) * z4
-    return low + high * (z4 * z4)
-
-
-@wp.func
-def polynomial_inverse(view: Any, first: int, size: int, powers: int, t: Any, side: Any, sided: int):
-    """The w at which a polynomial, which rises up to a largest value, has the value t or that largest one.
-
-    It begins with a polynomial in s, t = (largest value) (1 - (1 - s^2)^2), in which w is smooth where t begins as a square
-    and where it turns; Newton's steps follow. powers: first row of the polynomial; sided: whether it is another one astern.
+    It goes by Estrin's scheme, from the lowest power up; sided: see make_horner.
     """
-    unity = ones(t)
-    zero = unity - unity
-    astern = sided * wp.static(INVERSE_ROWS)
-    highest = row_of_side(view, first + 2, astern, side)
-    slope_floor = row_of_side(view, first + 3, astern, side)
-    value = least(t, row_of_side(view, first + 1, astern, side))
-    part = least(value * row_of_side(view, first, astern, side), unity)
-    s = root(part / (unity + root(unity - part)))
-    z = s + s - unity
-    w = clamp(sixteen(view, first + 4, astern, side, z), zero, highest)
-    for step in range(wp.static(NEWTON_STEPS)):
-        # The polynomial is w g, and its slope g + w g'.
-        g = row_of_side(view, powers + size - 1, sided * size, side)
+
+    @wp.func
+    def two(view: Any, row: int, astern: int, side: Any, z: Any):
+        """a + b z."""
+        a = row1(view, row)
+        b = row1(view, row + 1)
+        if wp.static(sided):
+            a = positive(side, a, row1(view, row + astern))
+            b = positive(side, b, row1(view, row + 1 + astern))
+        return a + b * z
+
+    @wp.func
+    def four(view: Any, row: int, astern: int, side: Any, z: Any, z2: Any):
+        """A polynomial with four coefficients."""
+        return two(view, row, astern, side, z) + two(view, row + 2, astern, side, z) * z2
+
+    @wp.func
+    def sixteen(view: Any, row: int, astern: int, side: Any, z: Any):
+        z2 = z * z
+        z4 = z2 * z2
+        low = four(view, row, astern, side, z, z2) + four(view, row + 4, astern, side, z, z2) * z4
+        high = four(view, row + 8, astern, side, z, z2) + four(view, row + 12, astern, side, z, z2) * z4
+        return low + high * (z4 * z4)
+
+    return sixteen
+
+
+@functools.cache
+def make_polynomial_inverse(powers, sided):
+    """(view, first, polynomials, t, side) -> the w at which a polynomial, which rises up to a largest value, has the value t.
+
+    Beyond the largest value it is where that is. It begins with a polynomial in s, t = (largest value) (1 - (1 - s^2)^2), in
+    which w is smooth where t begins as a square and where it turns; a step of Halley's follows, with one division. first: rows
+    of the inverse; polynomials: first row of the one ahead, with so many powers; sided: whether it is another one astern.
+    """
+    sixteen = make_estrin(sided)
+
+    @wp.func
+    def side_row(view: Any, row: int, astern: int, side: Any):
+        """A number ahead where side > 0, else the one astern."""
+        value = row1(view, row)
+        if wp.static(sided):
+            value = positive(side, value, row1(view, row + astern))
+        return value
+
+    @wp.func
+    def polynomial_inverse(view: Any, first: int, polynomials: int, t: Any, side: Any):
+        unity = ones(t)
+        zero = unity - unity
+        half = view.h.dtype(0.5)
+        astern = wp.static(INVERSE_ROWS)
+        highest = side_row(view, first + 2, astern, side) * unity
+        slope_floor = side_row(view, first + 3, astern, side) * unity
+        value = least(t, side_row(view, first + 1, astern, side) * unity)
+        part = least(value * side_row(view, first, astern, side), unity)
+        # Round-off of s near 0 is repaired by the step.
+        s = root(unity - root(unity - part))
+        w = clamp(sixteen(view, first + 4, astern, side, s + s - unity), zero, highest)
+        # The polynomial is w g, its slope g + w g', and that of the slope 2 (g' + w g''/2).
+        g = side_row(view, polynomials + wp.static(powers - 1), wp.static(powers), side) * unity
         g_slope = zero
-        for i in range(size - 1):
-            g_slope = g_slope * w + g
-            g = g * w + row_of_side(view, powers + size - 2 - i, sided * size, side)
-        slope = greatest(g + w * g_slope, slope_floor)
-        w = clamp(w + (value - w * g) / slope, zero, highest)
-    return w
+        g_bend = zero
+        for i in range(wp.static(powers - 1)):
+            g_bend = fused(g_bend, w, g_slope)
+            g_slope = fused(g_slope, w, g)
+            g = fused(g, w, side_row(view, polynomials + wp.static(powers - 2) - i, wp.static(powers), side) * unity)
+        slope = greatest(fused(w, g_slope, g), slope_floor)
+        short = value - w * g
+        # slope^2 + short slope' / 2, which is positive near a solution.
+        below = greatest(fused(short, fused(w, g_bend, g_slope), slope * slope), half * slope * slope)
+        return clamp(w + short * slope / below, zero, highest)
+
+    return polynomial_inverse

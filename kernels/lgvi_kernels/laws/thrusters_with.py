@@ -18,21 +18,28 @@ from lgvi_kernels.laws.thrust_curves import beyond
 ROWS = 9
 PROPELLER_ROWS = 16
 
+# Further whole numbers of thrusters that take power or not: power: the place of its rows among those that all share;
+# power_size: intervals of a table. Of a shaft each thruster has two rows: power per |n|^3, and the loss per n |n| and speed.
+WORDS = {False: ("plain",), True: ("plain", "power", "power_size")}
+
 
 @functools.cache
 def made(features):
-    """The law of thrusters with these features: "scheduled" or "driven", "lag", "rate", a curve, "propeller".
+    """The law of thrusters with these features: "scheduled" or "driven", "lag", "rate", a curve, "propeller", and power.
+
+    Power is "watts" of a table, or that of the "shaft".
 
     The curve is "table", "powers9" of a polynomial with nine powers, and else the square. p.plain: whether in all members
     there is no dead band, and both sides are alike: one coefficient, and one odd curve. What is left out then adds exactly 0.
     """
     propeller, tables = "propeller" in features, "table" in features
+    of_shaft, powered = "shaft" in features, bool({"shaft", "watts"} & set(features))
     powers = sum(int(word.removeprefix("powers")) for word in features if word.startswith("powers"))
     first_of_motion = PROPELLER_ROWS if propeller else ROWS
     rows = first_of_motion + 3
     name, places = f"Thrusters_{'_'.join(features)}", (rows, first_of_motion, first_of_motion + 1, first_of_motion + 2)
     make = make_driven if "driven" in features else make_scheduled
-    following = make(name, *places, features, ("plain",))
+    following = make(name, *places, features, WORDS[powered])
     place, look_up = following.place, following.look_up
     found = following.found or place
 
@@ -103,7 +110,27 @@ def made(features):
             w.torque = w.torque - thrust * about - (speed * row1(view, at + 15)) * row3(view, at + 9)
         return w
 
+    @wp.func
+    def thruster_power(watts: Any, view: Any, p: Any):
+        """The sum of what each takes at its command beyond the dead band, after lag and limits."""
+        for i in range(p.count):
+            at = p.first + wp.static(rows) * i
+            n = beyond(place(view, p, i), row1(view, at + 8))
+            if wp.static(of_shaft):
+                along = row3(view, at)
+                about = row3(view, at + 3)
+                a = dot(along, view.nu) + dot(about, view.Om)
+                shaft = p.first + p.shared + p.power + 2 * i
+                taken = absolute(n) * (row1(view, shaft) * n * n - row1(view, shaft + 1) * n * a)
+                # What drives the shaft gives nothing back.
+                watts = watts + greatest(taken, n - n)
+            else:
+                watts = watts + table1(view, p.first + p.shared + p.power + i * (1 + 3 * p.power_size), p.power_size, n)
+        return watts
+
     roles = {"evolve": following.evolve, "follow": following.follow, "report": following.report}
     if propeller:
         roles |= {"damping": thruster_damping, "push": thruster_push}
+    if powered:
+        roles |= {"power": thruster_power}
     return device(__name__, features, params=following.params, law=thruster_law, **roles)

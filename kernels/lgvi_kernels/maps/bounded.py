@@ -23,6 +23,10 @@ ROLES = (
     "supply",
     "steady_size",
     "report",
+    "carried_inertia",
+    "carried_momentum",
+    "depart",
+    "power",
 )
 
 

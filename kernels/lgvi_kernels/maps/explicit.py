@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, mul  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, cross, mul, ones, sub  # noqa: F401
 from lgvi_kernels.lanes.matrix3 import factor_struct
 from lgvi_kernels.lanes.rotations import rotation_struct
 from lgvi_kernels.lanes.state import damping_struct, struct, view_struct, wrench_struct
 from lgvi_kernels.laws.drag import make_resistance
+from lgvi_kernels.maps.accounting import make_power_at, spend, with_power
+from lgvi_kernels.maps.carried import make_carried, make_carried_rates, make_departing, make_ride
 from lgvi_kernels.maps.compose import plays, superpose
 from lgvi_kernels.maps.dissipation import make_implicit
 from lgvi_kernels.maps.linearly_implicit import make_damped, make_damped_stages, make_factor
@@ -239,13 +241,18 @@ def make_stages(Rates, rates, ys, kept):
     return stages
 
 
-def make_fixed(stages, finish, push, timed, recall):
-    """One step of length h. push, recall: as in make_stage."""
+def make_fixed(stages, finish, push, timed, recall, used=None):
+    """One step of length h. push, recall: as in make_stage; used: (energy, slopes, h) -> energy plus that of the step."""
 
     @wp.func
     def step(x: Any, c: Any, h: Any):
         """y + h sum_i b_i k_i."""
-        x = finish(x, stages(x, c, h), h)
+        if wp.static(used is not None):
+            k = stages(x, c, h)
+            spend(c, used(ones(x.b.x) - ones(x.b.x), k, h))
+            x = finish(x, k, h)
+        else:
+            x = finish(x, stages(x, c, h), h)
         if wp.static(push is not None):
             x = push(x, c, h)
         if wp.static(timed):
@@ -263,7 +270,7 @@ def make_implicit_stages(spec, rates, states, velocities, slope):
     states: those of the stages (see make_stage); slope: the matrix of damping (see make_forces).
     """
     method, width, real, coupled = spec.explicit, spec.lanes, spec.real, "coupled" in spec.parts
-    Rates = rates_struct(width, real, method.kind)
+    Rates = rates_struct(width, real, method.kind, spec.accounted)
     damped = [make_damped(Rates, make_moves, row, coupled) for row in method.implicit]
     implicit = make_implicit(damping_struct(width, real), factor_struct(width, real), coupled)
     factor = make_factor(implicit, velocities, slope, method.implicit[0][0])
@@ -296,7 +303,7 @@ def make_explicit(spec, types, everything, velocities, slope):
     """
     method, width, real, timed = spec.explicit, spec.lanes, spec.real, spec.timed
     Wrench = wrench_struct(width, real)
-    Rates = rates_struct(width, real, method.kind)
+    Rates = rates_struct(width, real, method.kind, spec.accounted)
     turned = make_turned(rotation_struct(width, real), real)
     moves = {"vector": (along, completed), "inertial": (along_known, completed)}
     move, complete = moves.get(method.kind, (make_act(turned), None))
@@ -304,13 +311,20 @@ def make_explicit(spec, types, everything, velocities, slope):
     push = make_push(Wrench, View, spec.laws) if method.kind == "inertial" else None
     shape = (spec.mass, "coupled" in spec.parts or bool(spec.inverse), spec.flow != "none", spec.scaled)
     drag = make_resistance(spec.drag) if spec.drag else None
-    rates = make_rates(Rates, Wrench, everything, velocities, method.kind, *shape, drag)
+    carried = make_carried(spec, velocities)
+    power_at = make_power_at(View, spec.laws) if spec.accounted else None
+    if carried:
+        drifts = spec.flow != "none"
+        rates = make_carried_rates(Rates, Wrench, everything, carried.velocities, method.kind, drifts, power_at)
+    else:
+        rates = make_rates(Rates, Wrench, everything, velocities, method.kind, *shape, drag, power_at)
     roles = sum(plays(law, role) is not None for law in spec.laws for role in ("law", "push", "matrix", "flow"))
     if roles * len(method.b) > MOST_INLINED:
         rates = make_called(rates, types.State, types.Constants, real)
     follow = superpose(spec.laws, "follow") if spec.memory else None
     if method.kind == "munthe_kaas":
-        return make_munthe_kaas(rates, move, turned, timed, make_recall(View, follow, 0.0, 0.5))
+        step = make_munthe_kaas(rates, move, turned, timed, make_recall(View, follow, 0.0, 0.5), spec.accounted)
+        return make_ride(step, carried, carried.depart) if carried else step
     a, c = method.a, method.c
     # An estimate of one number more asks for the slope at the end of the step, whose row of `a` is b.
     if method.adaptive and len(method.errors[0]) > len(a):
@@ -325,10 +339,15 @@ def make_explicit(spec, types, everything, velocities, slope):
         stages = make_implicit_stages(spec, rates, states, velocities, slope)
     else:
         stages = make_stages(Rates, rates, states, kept)
+    if carried and carried.depart:
+        stages = make_departing(stages, carried.depart)
     finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)
+    used = make_moves(with_power, method.b, None) if spec.accounted else None
     if not method.adaptive:
-        return make_fixed(stages, finish, push, timed, last)
+        step = make_fixed(stages, finish, push, timed, last, used)
+        return make_ride(step, carried) if carried else step
     errors = make_errors(Rates, [make_moves(along, row, None) for row in method.errors])
-    return make_adaptive(
-        stages, finish, errors, method.estimate, spec.width, real, timed, copy_memory if kept else None
+    step = make_adaptive(
+        stages, finish, errors, method.estimate, spec.width, real, timed, copy_memory if kept else None, used
     )
+    return make_ride(step, carried) if carried else step

@@ -8,6 +8,7 @@ import warp as wp
 from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, mul, ones, sub  # noqa: F401
 from lgvi_kernels.lanes.functions import root, sine
 from lgvi_kernels.lanes.rotations import rodrigues, transpose_apply
+from lgvi_kernels.maps.accounting import spend
 
 # Added under a root that is divided by: the least that keeps 0/0 away.
 TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
@@ -47,8 +48,11 @@ def make_act(turned):
     return act
 
 
-def make_munthe_kaas(rates, act, turned, timed, recall):
-    """Munthe-Kaas & Owren (1999): order 4 with two commutators. recall: of half a step, see make_recall."""
+def make_munthe_kaas(rates, act, turned, timed, recall, accounted=False):
+    """Munthe-Kaas & Owren (1999): order 4 with two commutators. recall: of half a step, see make_recall.
+
+    accounted: the energy used is summed (see accounting.py).
+    """
 
     @wp.func
     def later(y: Any, x: Any, h: Any):
@@ -85,6 +89,8 @@ def make_munthe_kaas(rates, act, turned, timed, recall):
         k.pi = k1.pi + two * (k2.pi + k3.pi) + k4.pi
         k.Om = k1.Om + two * (k2.Om + k3.Om) + k4.Om
         sixth = h / h.dtype(6.0)
+        if wp.static(accounted):
+            spend(c, sixth * (k1.power + two * (k2.power + k3.power) + k4.power))
         y = moved(x, k, sixth, (half * sixth) * cross(k1.Om, k4.Om))
         return later(y, x, h)
 

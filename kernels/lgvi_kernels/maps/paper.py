@@ -80,8 +80,11 @@ def make_remember(View, evolve):
     return remember
 
 
-def make_phi(maps, laws, alpha, beta):
-    """(Phi, Phi*). maps: Ab, Ap, D; laws: View, Wrench, potential, forces, current, evolve, velocities."""
+def make_phi(maps, laws, alpha, beta, account=None):
+    """(Phi, Phi*). maps: Ab, Ap, D; laws: View, Wrench, potential, forces, current, evolve, velocities.
+
+    account: the energy used (see accounting.make_map_account), at the end of Phi and the begin of Phi*.
+    """
     Ab, Ap, D = maps
     View, Wrench, potential, forces, current, evolve, velocities = laws
     equation_15 = make_equation_15(alpha, beta)
@@ -105,7 +108,10 @@ def make_phi(maps, laws, alpha, beta):
         x = D(x, c, h)
         w = equation_15(old, forces(x, c, h, nu, Om), h)
         x = kicked(x, c, h, sum_of(w, conservative(x, c, h)))
-        return munk(x, c, h)
+        x = munk(x, c, h)
+        if wp.static(account is not None):
+            account(x, c, h)
+        return x
 
     @wp.func
     def attempt(x: Any, c: Any, h: Any, w: Any, u: Any):
@@ -120,6 +126,8 @@ def make_phi(maps, laws, alpha, beta):
     @wp.func
     def Phi_adjoint(x: Any, c: Any, h: Any):
         """Eq. (19)-(23): phi* and tau*, which depend on all that is new, by fixed-point iteration in each lane."""
+        if wp.static(account is not None):
+            account(x, c, h)
         w = conservative(x, c, h)
         nu, Om = velocities(c.inertia, x.p, x.pi)
         w_star = forces(x, c, h, nu, Om)

@@ -6,25 +6,29 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, lane3, mul, sub  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, cross, lane, lane3, mul, sub  # noqa: F401
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.maps.submaps import rotate
 
 
 @functools.cache
-def rates_struct(width, real, kind):
-    """b', pi', p' unless it is known, and the first and last row of R' = R hat(Om); on the group, Om instead of them."""
+def rates_struct(width, real, kind, accounted=False):
+    """b', pi', p' unless it is known, and the first and last row of R' = R hat(Om); on the group, Om instead of them.
+
+    accounted: also the power that is used [W].
+    """
     Lane3 = lane3(width, real)
     turning = {"R0": Lane3, "R2": Lane3} if kind in ("vector", "inertial") else {"Om": Lane3}
     pushing = {} if kind == "inertial" else {"p": Lane3}
-    return struct("Rates", b=Lane3, **turning, **pushing, pi=Lane3)
+    power = {"power": lane(width, real)} if accounted else {}
+    return struct("Rates", b=Lane3, **turning, **pushing, pi=Lane3, **power)
 
 
-def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drifts, scaled, drag):
+def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drifts, scaled, drag, power_at=None):
     """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
 
     scaled: momenta are divided by max J; drag: the function that adds drag along the axes, where it is not among
-    `everything`, or None.
+    `everything`, or None; power_at: of a scene that sums the energy used (see accounting.py), or None.
     """
     isotropic, munk = mass == "isotropic", make_munk(mass == "diagonal")
     group, inertial = kind not in ("vector", "inertial"), kind == "inertial"
@@ -70,6 +74,8 @@ def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drift
         k.pi = w.torque
         if wp.static(drag is not None):
             k = drag(k, x, c.params.own)
+        if wp.static(power_at is not None):
+            k.power = power_at(x, c, h, nu, Om)
         return k
 
     return rates

@@ -7,6 +7,7 @@ import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import absolute, add, div, dot, mul, ones, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.functions import greatest, root
+from lgvi_kernels.maps.accounting import spend
 
 NON_FINITE = 3
 STEP_TOO_SMALL = 5
@@ -110,10 +111,11 @@ def make_verdicts(width, real):
     return worst_of, given_up
 
 
-def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_memory):
+def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_memory, used=None):
     """From one step of the grid to the next, by steps that the packet's worst lane decides.
 
-    copy_memory: (constants, source, target), where a law remembers (see maps/explicit.py); else None.
+    copy_memory: (constants, source, target), where a law remembers (see maps/explicit.py); else None. used: as of
+        make_fixed there.
     """
     # Of PI control: this exponent is that of the step's own error, BETA that of the error before.
     power = 0.75 * BETA - 1.0 / estimate
@@ -146,6 +148,8 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_mem
             tried += 1
             x.pace.tried = x.pace.tried + real(1.0)
             if worst <= real(1.0):
+                if wp.static(used is not None):
+                    spend(c, used(ones(error) - ones(error), k, taken))
                 new.pace = x.pace
                 new.alarm = x.alarm
                 x = new

@@ -143,12 +143,13 @@ def make_at_user_origin(shifted):
     return at_user_origin
 
 
-def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
+def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V, account=None):
     """The kick by these laws, each of them None where a scene has none.
 
     law: forces from position and time; evolve: laws that remember, half before and half after; flow: the water carries
     the vehicle, half before and half after, and where it varies in space or time also pushes it; shifted: the origin of
     the forces is not the user's; E: exact flow of drag, or V: velocity-dependent laws, between two half kicks. Order 2.
+    account: the energy used (see accounting.make_kick_account).
     """
     drifts, damped, forced = flow is not None, E is not None or V is not None, law is not None or flow_varies
     at_user_origin = make_at_user_origin(shifted)
@@ -159,6 +160,9 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
         view = look(View(), x, c, h)
         half = h.dtype(0.5) * h
         # Drag in the middle, all else half before and half after it in mirrored order: so the kick has order 2.
+        if wp.static(account is not None):
+            p = x.p
+            pi = x.pi
         if wp.static(evolve is not None):
             # The view stands for the sum that folded laws hand on (see compose.superpose): these add nothing to it.
             view = evolve(view, view, c.params)
@@ -194,6 +198,8 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V):
         if wp.static(drifts):
             # From the start, not from half way: b is rounded once.
             x = moved_from(x, start, h * water.velocity)
+        if wp.static(account is not None):
+            account(x, c, h, view, p, pi)
         if wp.static(evolve is not None):
             view.second = 1
             view = evolve(view, view, c.params)

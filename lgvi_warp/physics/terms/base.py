@@ -90,6 +90,20 @@ class Packed(NamedTuple):
     normals: np.ndarray | None = None
 
 
+class Inner(NamedTuple):
+    """What a mass that moves in the vehicle adds to its momenta and its energy, each (k, n, ...).
+
+    Args:
+        momenta: Linear and angular momentum about the body's origin, (k, n, 6) [N s, N m s], body axes.
+        kinetic: Kinetic energy (k, n) [J].
+        potential: Potential energy (k, n) [J].
+    """
+
+    momenta: np.ndarray
+    kinetic: np.ndarray
+    potential: np.ndarray
+
+
 def number(
     shape: tuple[Any, ...],
     unit: str,
@@ -152,7 +166,8 @@ class Term:
 
     Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the module
     of lgvi_kernels.laws by name (by default the type), or any object with the same functions; `timed` says whether the law
-    depends on time; `dissipative`, whether its damping never creates energy; `strengths` names the numbers without which it
+    depends on time; `dissipative`, whether its damping never creates energy; `brakes`, whether it takes energy on the whole
+    even if some motions gain by it; `strengths` names the numbers without which it
     does nothing; `carries` says whether it is a current that is the same everywhere and at all times, which exerts no force;
     `anchored`, whether it holds the vehicle to a place, so that a current does work. docs/develop/add_a_force.md shows how to
     write one.
@@ -172,9 +187,12 @@ class Term:
     device: ClassVar[Any] = ""
     timed: ClassVar[bool] = False
     dissipative: ClassVar[bool] = True
+    brakes: ClassVar[bool] = False
     # Numbers without which it does nothing: it is absent where all of them are zero. None named: it always acts.
     strengths: ClassVar[tuple[str, ...]] = ()
     carries: ClassVar[bool] = False
+    # Whether it changes the vehicle's inertia in time: only methods that take another inertia at each stage can have it.
+    carried: ClassVar[bool] = False
     anchored: ClassVar[bool] = False
     # Device code of its exact flow, a sub-map of its own: for axes that are principal ones, and for any, one after the other.
     # None named: it has none. `Drag` has the methods that go with it.
@@ -184,6 +202,11 @@ class Term:
     # The bus of a controller that drives it (see lgvi_warp/control), and the numbers that then do not act.
     driver: ClassVar[Any] = None
     driven_fields: ClassVar[tuple[str, ...]] = ()
+    # Whether it keeps the account of the energy used; whether some term of its scene does, so that its power is asked for;
+    # whether an event looks at that energy.
+    accounts: ClassVar[bool] = False
+    accounted: ClassVar[bool] = False
+    looks_at_energy: ClassVar[bool] = False
     # Fields that follow from another one, of which alone a fault is told; set by a term before its fields are checked.
     following: ClassVar[tuple[str, ...]] = ()
     # Numbers with whose sizes the diagonal of `braking` grows, as it does with the speeds and the density where there are any.
@@ -262,6 +285,46 @@ class Term:
             return self
         term = copy.copy(self)
         object.__setattr__(term, "driver", bus)
+        return term
+
+    def of_vehicle(self, numbers: Numbers) -> Any:
+        """The same term, knowing the vehicle of its scene.
+
+        Args:
+            numbers: The numbers of the vehicle and its environment by name, each in its own shape.
+
+        Returns:
+            By default the term itself.
+
+        Raises:
+            SceneError: Where it does not go with this vehicle.
+        """
+        return self
+
+    def beside(self, terms: Sequence[Term]) -> Any:
+        """The same term in a scene, for one that follows from other terms as well; by default it does not.
+
+        Args:
+            terms: All terms of the scene.
+
+        Returns:
+            A copy, or the term where nothing changes.
+        """
+        return self
+
+    def beside_account(self, accounted: bool) -> Any:
+        """The same term in a scene that accounts the energy used, or in one that does not.
+
+        Args:
+            accounted: Whether it does.
+
+        Returns:
+            A copy, or the term where nothing changes.
+        """
+        if accounted == self.accounted:
+            return self
+        term = copy.copy(self)
+        object.__setattr__(term, "accounted", accounted)
         return term
 
     @property
@@ -362,10 +425,28 @@ class Term:
         """
         device = self.device
         follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential
-        more = (
-            self.timed or self.memory or any(hasattr(device, role) for role in ("damping", "flow", "evolve", "seeing"))
-        )
+        others = ("damping", "flow", "evolve", "seeing", "carried_inertia")
+        more = self.timed or self.memory or any(hasattr(device, role) for role in others)
         return frozenset({"energy"} if follows and not more else ())
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on odd numbers, which `lgvi-warp check` and the messages of a run show; by default none."""
+        return ()
+
+    @property
+    def own_events(self) -> tuple[Any, ...]:
+        """Events that the term brings along; by default none."""
+        return ()
+
+    def check_times(self, faults: Faults, first: float, last: float) -> None:
+        """Add a fault where the term does not know what happens in a run; by default there is none.
+
+        Args:
+            faults: Collects the faults.
+            first: Start of the run [s].
+            last: End of the run [s].
+        """
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
         """The entries of the term's matrices that some member has, for a term with a `pattern_device`.
@@ -500,6 +581,21 @@ class Term:
         """
         return 0.0
 
+    def inner(self, numbers: Numbers, time: Array, twist: Array, down: Array, parameters: Numbers) -> Inner | None:
+        """What a mass that moves in the vehicle adds to momenta and energy at sampled states.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            time: Times (k,) [s].
+            twist: Velocities (nu; Om) through the water, (k, n, 6) [m/s, rad/s], body axes about the body's origin.
+            down: The vertical in body axes, (k, n, 3).
+            parameters: All parameters of the scene, by name.
+
+        Returns:
+            What it adds to those of a vehicle with constant inertia; None, the default, for nothing, or what is not known.
+        """
+        return None
+
     def to_dict(self) -> dict[str, Any]:
         """The term as a table of a scene file.
 
@@ -586,9 +682,23 @@ def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
 
 
 def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray:
-    """Rows of tables for the device: the first value, then for each interval its place, 1 / length and change of the value.
+    """Rows of a table that the device reads by `table1` and `table3`: linear between its knots, constant outside.
 
-    Between the knots `at` (n, k), rising, a table of values (n, k, d) is linear, outside it is constant.
+    Args:
+        at: Places of the knots (1 or n, k), rising, in the unit of the table's argument; k is 2 or more.
+        values: Values there, (1 or n, k, 1) for `table1`, (1 or n, k, 3) for `table3`.
+        steps: Whether each value holds up to the next knot, and then jumps.
+
+    Returns:
+        Rows (1 or n, d + (k - 1) (d + 2)), d numbers a value: the first value, then of each interval its place, 1 / length and
+        the change of the value. `table1` and `table3` take k - 1 as their count.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> import numpy as np
+        >>> depths, speeds = np.array([[0.0, 10.0, 30.0]]), np.array([[[0.5], [0.3], [0.0]]])
+        >>> lw.laws.knots(depths, speeds).round(3).tolist()
+        [[0.5, 0.0, 0.1, -0.2, 10.0, 0.05, -0.3]]
     """
     at, values = repeated(at, values)
     inverse = np.full((len(at), at.shape[1] - 1), STEEP) if steps else 1.0 / np.diff(at, axis=1)
@@ -618,6 +728,8 @@ def rows_of(value: Any) -> int:
 
 def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
     """Build a term of one type from its table in a scene file."""
+    if "file" in table and (reader := getattr(kind, "of_table", None)):
+        return reader(where, table)
     faults = Faults()
     fields = {word_of(item): item for item in dataclasses.fields(kind) if item.init}
     values = {key: value for key, value in table.items() if key != "type"}

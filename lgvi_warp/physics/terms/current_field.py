@@ -3,13 +3,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, ClassVar
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.declared import word
+from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.events import Outside
+
+if TYPE_CHECKING:
+    from lgvi_warp.ocean.field_data import FieldData
+
+OUTSIDE = ("hold", "stop")
+# Numbers that are those of a data set.
+OF_DATA = ("velocities", "origin", "spacing", "times")
+# Part of a time that is round-off.
+ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -25,6 +38,8 @@ class CurrentField(Term):
         spacing: Distance of the nodes along north, east and depth, (3,) [m].
         times: Time of the first field and time between two of them, (2,) [s]; None, the default: they do not change.
         scenario: Which of the scenarios, a whole number from 0; 0 by default.
+        outside: What happens outside the grid: "hold", the default, the nearest node's velocity; or "stop": a member that
+            leaves it stops with the status OUTSIDE, and a run that ends after the last time is refused.
 
     Raises:
         SceneError: Where the shape of `velocities` does not fit, and as `Term`.
@@ -50,6 +65,91 @@ class CurrentField(Term):
     spacing: Any = number((3,), "m", above=0.0)
     times: Any = number((2,), "s", None, optional=True)
     scenario: Any = number((), "1", 0.0, least=0.0)
+    outside: str = word("hold", known=OUTSIDE)
+    # Where the numbers come from, of `from_dataset`.
+    data: FieldData | None = field(default=None, init=False, repr=False)
+
+    # Keys of a table with the key `file`, in a scene file, beside those of `of_file`.
+    of_file_besides: ClassVar[tuple[str, ...]] = ("file", "around", "outside", "scenario", "name")
+
+    @classmethod
+    def from_dataset(
+        cls,
+        source: Any,
+        origin: Any,
+        *,
+        start: Any = None,
+        region: Any = None,
+        speed: float | None = None,
+        duration: float | None = None,
+        around: Any = (0.0, 0.0, 0.0),
+        variables: Any = None,
+        spacing: Any = None,
+        fill: str = "nearest",
+        checksum: int | None = None,
+        outside: str = "stop",
+        scenario: float = 0.0,
+        name: str = "",
+    ) -> Self:
+        """Read a current from a data set in the CF conventions, as CMEMS, HYCOM and ROMS write them.
+
+        Only the region and the times that are asked for are read, field by field. Latitudes and longitudes become metres in
+        the plane that touches the Earth at `origin`, and velocities are turned into its axes.
+
+        Args:
+            source: Path of a NetCDF file, or an xarray Dataset.
+            origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,).
+            start: Moment that is t = 0: a datetime, or a text as ISO 8601 writes it, in UTC where it names no zone; by
+                default the first of the data.
+            region: Least and largest north, east and depth that are read, (3, 2) [m]; by default all the data.
+            speed: Bound of the speed over ground [m/s], in place of `region`: read is what a vehicle that starts at `around`
+                can reach in `duration`.
+            duration: Time from the start on that is read [s]; by default to the end of the data.
+            around: Where members start [m], (3,), for `speed`; zeros by default.
+            variables: Names of the variables: eastward and northward, and upward if there is one; by default those with the
+                standard_name, or the name, that models give them.
+            spacing: Distances of the nodes that are made [m], (3,); by default at least as fine as the data's own, in depth
+                with 100 levels at most.
+            fill: What stands where values are missing, on land and below the sea floor: "nearest", the default, "zero", or
+                "refuse".
+            checksum: That of the numbers of a file, so that another file is not taken for it; by default whatever is there.
+            outside: As of the class, but "stop" by default.
+            scenario: As of the class. Scenarios are the dimension `realization`, `member`, `ensemble` or `number`.
+            name: As of `Term`.
+
+        Returns:
+            The field. Its `data` says how many values were missing, and what the regular grid changed [m/s].
+
+        Raises:
+            SceneError: Where the data set has no velocities that are known, axes that are not understood, or neither the
+                region nor the times; with the remedy.
+            MissingExtra: Where xarray, a reader of NetCDF or pyproj is not installed.
+
+        Examples:
+            A shear of 1 m/s in 0.1 degrees to the north, and where it is 5 km north of the origin.
+
+            >>> import lgvi_warp as lw
+            >>> import numpy as np
+            >>> import xarray as xr
+            >>> lat, lon = np.linspace(41.0, 42.0, 11), np.linspace(-71.0, -70.0, 11)
+            >>> east = np.repeat(10.0 * (lat[:, None] - 41.5), 11, axis=1)
+            >>> known = {"units": "m s-1", "standard_name": "eastward_sea_water_velocity"}
+            >>> still = {"units": "m s-1", "standard_name": "northward_sea_water_velocity"}
+            >>> ds = xr.Dataset({"uo": (("lat", "lon"), east, known), "vo": (("lat", "lon"), 0.0 * east, still)},
+            ...                 {"lat": lat, "lon": lon})
+            >>> field = lw.terms.CurrentField.from_dataset(ds, (41.5, -70.5), region=[[-1e4, 1e4], [-1e4, 1e4], [0.0, 50.0]])
+            >>> field.velocities.shape
+            (1, 1, 3, 4, 1, 3)
+            >>> float(np.round(field.velocities[0, 0, 2, 0, 0, 1], 2))
+            0.9
+        """
+        from lgvi_warp.ocean.field_reader import read_field
+
+        wanted = {"origin": origin, "start": start, "region": region, "speed": speed, "duration": duration,
+                  "variables": variables, "spacing": spacing, "fill": fill, "checksum": checksum}  # fmt: skip
+        numbers = read_field(source, cls.of_file()(**wanted), outside=outside, around=around)
+        known = {key: getattr(numbers, key) for key in OF_DATA}
+        return _with_data(cls(**known, outside=outside, scenario=scenario, name=name), numbers.data)
 
     def __post_init__(self) -> None:
         velocities = np.asarray(self.velocities)
@@ -60,6 +160,76 @@ class CurrentField(Term):
         if velocities.ndim == 6:
             object.__setattr__(self, "velocities", velocities)
         super().__post_init__()
+
+    @classmethod
+    def of_file(cls) -> Any:
+        """The class whose fields a table with the key `file` may have, in a scene file."""
+        from lgvi_warp.ocean.field_data import FieldRequest
+
+        return FieldRequest
+
+    @classmethod
+    def of_table(cls, where: str, table: Mapping[str, Any]) -> Self:
+        """The field of a file that a table of a scene file names.
+
+        Args:
+            where: The table's place in the scene.
+            table: The key `file`, and those of `from_dataset` besides.
+
+        Returns:
+            The field.
+
+        Raises:
+            SceneError: As `from_dataset`.
+        """
+        known = [*(item.name for item in dataclasses.fields(cls.of_file())), *cls.of_file_besides]
+        values = {key: value for key, value in table.items() if key != "type"}
+        faults = Faults()
+        faults.keys(where, values, known)
+        faults.raise_if_any()
+        try:
+            return cls.from_dataset(values.pop("file"), values.pop("origin", None), **values)
+        except SceneError as error:
+            raise error.prefixed(f"{where}.") from error
+
+    def with_fields(self, fields: Mapping[str, Any]) -> Any:
+        # Other velocities are not those of the data.
+        changed = super().with_fields(fields)
+        return _with_data(changed, self.data) if fields.keys().isdisjoint(OF_DATA) else changed
+
+    def to_dict(self) -> dict[str, Any]:
+        content = super().to_dict()
+        content.pop("data", None)
+        if self.data is None or self.data.file is None:
+            return content
+        return {key: value for key, value in content.items() if key not in OF_DATA} | self.data.table()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        return () if self.data is None else self.data.remarks
+
+    @property
+    def own_events(self) -> tuple[Any, ...]:
+        if self.outside != "stop":
+            return ()
+        return (Outside(field=self.key, name="" if self.key == self.type else f"{self.key}_outside"),)
+
+    def check_times(self, faults: Faults, first: float, last: float) -> None:
+        if self.times is None:
+            return
+        begin, end = float(self.times[0]), float(self.times[0] + (self.velocities.shape[1] - 1) * self.times[1])
+        if self.data is not None and self.data.more and last > end * (1.0 + ROUND_OFF):
+            known = f"is read to {end:.9g} s alone, and the run ends at {last:.9g} s"
+            faults.add(f"{self.key}.duration", end, known, f"give duration = {last:.9g} to the field, or a shorter run")
+        elif self.outside == "stop" and (first < begin or last > end * (1.0 + ROUND_OFF)):
+            problem = f"ends the field at {end:.9g} s" if first >= begin else f"begins the field at {begin:.9g} s"
+            remedy = "give outside = 'hold' to hold its last velocities, or a shorter run"
+            faults.add(
+                f"{self.key}.times",
+                self.times,
+                f"{problem}, and the run lasts from {first:.9g} to {last:.9g} s",
+                remedy,
+            )
 
     @property
     def timed(self) -> bool:  # type: ignore[override]
@@ -86,8 +256,8 @@ class CurrentField(Term):
         return "current_field:time" if self.timed else "current_field"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        field = numbers["velocities"]
-        counts = np.array(field.shape[1:6])
+        velocities = numbers["velocities"]
+        counts = np.array(velocities.shape[1:6])
         # Rows from one node to the next along each axis; 0 where there is one node.
         rows = 3 * np.array([np.prod(counts[i + 1 :], dtype=np.int64) for i in range(5)])
         words = dict(
@@ -103,17 +273,17 @@ class CurrentField(Term):
             "last_time": np.array([counts[1] - 1.0]),
             "chosen": numbers["scenario"],
         }
-        return Packed(values | words, field.reshape(len(field), -1))
+        return Packed(values | words, velocities.reshape(len(velocities), -1))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
         from scipy.ndimage import map_coordinates
 
         n = position.shape[1]
-        field = numbers["velocities"]
+        nodes = numbers["velocities"]
         times = numbers.get("times", np.array([[0.0, 1.0]]))
         result = np.empty(position.shape)
         for i in range(n):
-            values = field[i % len(field)][int(numbers["scenario"][i % len(numbers["scenario"])])]
+            values = nodes[i % len(nodes)][int(numbers["scenario"][i % len(numbers["scenario"])])]
             first, between = times[i % len(times)]
             place = (position[:, i] - numbers["origin"][i % len(numbers["origin"])]) / numbers["spacing"][
                 i % len(numbers["spacing"])
@@ -122,6 +292,12 @@ class CurrentField(Term):
             for axis in range(3):
                 result[:, i, axis] = map_coordinates(values[..., axis], at, order=1, mode="nearest")
         return result
+
+
+def _with_data(field: Any, data: FieldData | None) -> Any:
+    """The field, which knows where its numbers come from."""
+    object.__setattr__(field, "data", data)
+    return field
 
 
 def _no_scenario(scenario: np.ndarray, count: int) -> np.ndarray:

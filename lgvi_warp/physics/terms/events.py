@@ -9,9 +9,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.declared import text
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.status import Status
-from lgvi_warp.physics.terms.base import Numbers, Term, build, check_list, number
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, build, check_list, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,25 +48,6 @@ class Surface(Event):
     status: ClassVar[Status] = Status.SURFACE
 
     depth: Any = number((), "m", 0.0)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Floor(Event):
-    """Stop where the body's origin sinks to the sea floor.
-
-    Args:
-        depth: Depth of the floor [m].
-
-    Examples:
-        >>> import lgvi_warp as lw
-        >>> lw.Scene.named("remus_100", events=[lw.events.Floor(depth=40.0)]).parameters()["floor.depth"]
-        array(40.)
-    """
-
-    type: ClassVar[str] = "floor"
-    status: ClassVar[Status] = Status.FLOOR
-
-    depth: Any = number((), "m")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -119,6 +101,76 @@ class StopTime(Event):
 
     at: Any = number((), "s", least=0.0)
 
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Battery(Event):
+    """Stop a member where the energy that it has used reaches the capacity of its battery.
+
+    The scene accounts that energy by a term `lw.terms.EnergyUse`.
+
+    Args:
+        capacity: Energy that the battery gives [J]: 3.6e6 is 1 kWh.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> account, battery = lw.terms.EnergyUse(hotel=20.0), lw.events.Battery(capacity=50.0)
+        >>> result = lw.solve(lw.Scene.named("remus_100", terms=[account], events=[battery]), h=0.1, t1=5.0)
+        >>> print(f"{lw.Status(result.status[0]).text}, after {result.failure_time[0]:.6g} s")
+        stopped by an event: it used the capacity of its battery, after 2.5 s
+    """
+
+    type: ClassVar[str] = "battery"
+    status: ClassVar[Status] = Status.BATTERY
+    looks_at_energy: ClassVar[bool] = True
+
+    capacity: Any = number((), "J", above=0.0)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        # Where the account lies is filled in with the rows of the memory.
+        return Packed({"capacity": numbers["capacity"], "account_row": 0})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Outside(Event):
+    """Stop where the body's origin leaves the grid of a `current_field`, or sinks below its last level.
+
+    A field with `outside = "stop"` brings it along; a scene has it for no other field. Along an axis of one node, and above
+    the first level, nothing stops.
+
+    Args:
+        field: Name of the field; "current_field" by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> import numpy as np
+        >>> field = lw.terms.CurrentField(velocities=np.zeros((3, 3, 1, 3)), spacing=[50.0, 50.0, 1.0], outside="stop")
+        >>> scene = lw.Scene.named("sphere", terms=[field], start={"position": [50.0, 90.0, 5.0], "velocity": [0.0, 1.5, 0.0]})
+        >>> result = lw.solve(scene, "rk4", h=0.05, t1=20.0)
+        >>> result.status.counts(), float(np.round(result.position[-1, 0, 1], 6))
+        ({'outside': 1}, 100.0)
+    """
+
+    type: ClassVar[str] = "outside"
+    status: ClassVar[Status] = Status.OUTSIDE
+    device: ClassVar[Any] = "box"
+
+    field: str = text("is no name", "give the name of a current_field", "current_field")
+
+    @classmethod
+    def lanes(cls) -> tuple[tuple[str, int], ...] | None:
+        return Box.lanes()
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        origin, spacing = (context.parameters[f"{self.field}.{name}"] for name in ("origin", "spacing"))
+        # Nodes along north, east and depth.
+        counts = np.array(context.parameters[f"{self.field}.velocities"].shape[3:6])
+        upper = np.where(counts > 1, origin + (counts - 1.0) * spacing, FAR)
+        lower = np.where((counts > 1) & np.array([True, True, False]), origin, -FAR)
+        return Packed({"lower": lower, "upper": upper})
+
+
+# Farther away than any field reaches [m].
+FAR = 1e9
 
 TYPES = Event.kinds
 

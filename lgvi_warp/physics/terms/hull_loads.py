@@ -8,14 +8,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, rows_of, side_by_side
-from lgvi_warp.physics.terms.cross_flow import ACROSS, GAUSS, strip_braking
-from lgvi_warp.physics.terms.fins import twist
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
+from lgvi_warp.physics.terms.strips import GAUSS, StripTerm, across
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class HullLoads(Term):
+class HullLoads(StripTerm):
     """Loads on a slender hull in water that varies along it, as waves do, by strips (Lighthill 1960; Newman 1977, 7.4).
 
     The vehicle's added mass and the water at its origin make the loads of water that is the same all along the hull. This term
@@ -41,33 +39,18 @@ class HullLoads(Term):
 
     type: ClassVar[str] = "hull_loads"
     dissipative: ClassVar[bool] = False
-    braking_grows_with: ClassVar[tuple[str, ...]] = ("drag_coefficient", "diameters")
 
-    stations: Any = number(("k",), "m", rising=True)
-    diameters: Any = number(("k",), "m", least=0.0)
     added_mass: Any = number(("k",), "kg/m", None, least=0.0, optional=True)
     drag_coefficient: Any = number(("k",), "1", 0.0, least=0.0)
-
-    def __post_init__(self) -> None:
-        self.repeat(rows_of(self.stations), "drag_coefficient")
-        super().__post_init__()
-
-    def check(self, faults: Faults) -> None:
-        if len(self.stations) < 2:
-            faults.add("stations", self.stations, "has one station", "give two or more, from stern to bow")
 
     def present(self, numbers: Numbers) -> bool:
         # Whether some member has a hull.
         return bool(np.any(numbers["diameters"]) or np.any(numbers.get("added_mass", 0.0)))
 
-    def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        return strip_braking(numbers, speeds, water_density)
-
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        frame, origin = context.frame, np.zeros((1, 3))
-        a, b = (twist(frame, origin, direction) for direction in ACROSS)
-        values: dict[str, Any] = {"a": a[:, :3], "a_arm": a[:, 3:], "b": b[:, :3], "b_arm": b[:, 3:]}
-        values |= {"axis": frame.vector(np.array([[1.0, 0.0, 0.0]])), "origin": frame.point(origin)}
+        frame = context.frame
+        values: dict[str, Any] = across(context)
+        values |= {"axis": frame.vector(np.array([[1.0, 0.0, 0.0]])), "origin": frame.point(np.zeros((1, 3)))}
         density = context.parameters["environment.water_density"][:, None]
         x, D, Cd = (numbers[name] for name in ("stations", "diameters", "drag_coefficient"))
         half = 0.5 * np.diff(x)

@@ -13,14 +13,21 @@ from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, Pack
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stratification(Term):
-    """Buoyancy that varies with depth: B (1 + gradient (d - reference_depth)), d the depth of the centre of buoyancy.
+    """Buoyancy that varies with depth: B (1 + gradient x) (1 - compressibility x), x = d - reference_depth.
 
-    B is the vehicle's buoyancy.
+    B is the vehicle's buoyancy, d the depth of the centre of buoyancy.
 
     Args:
-        gradient: Relative change of buoyancy per depth [1/m]: positive where denser water lies below, negative for a hull
-            that is compressed.
+        gradient: Relative change of buoyancy per depth [1/m]: positive where denser water lies below. Without
+            `compressibility` it is that of the water less that of the hull's volume, else that of the water alone.
         reference_depth: Depth [m] at which buoyancy is B; 0 by default.
+        compressibility: Relative loss of the hull's volume per depth [1/m] (Eriksen et al. 2001); none by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> water = lw.terms.Stratification(gradient=5e-6, compressibility=4e-6, reference_depth=100.0)
+        >>> lw.Scene.named("seawing", terms=[water]).parameters()["stratification.compressibility"]
+        array(4.e-06)
     """
 
     type: ClassVar[str] = "stratification"
@@ -28,6 +35,13 @@ class Stratification(Term):
 
     gradient: Any = number((), "1/m")
     reference_depth: Any = number((), "m", 0.0)
+    compressibility: Any = number((), "1/m", None, optional=True)
+
+    def device_in(self, aligned: bool) -> str:
+        return "stratification" if self.compressibility is None else "stratification_compressed"
+
+    def present(self, numbers: Numbers) -> bool:
+        return super().present(numbers) or bool(np.any(numbers.get("compressibility", 0.0)))
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -37,11 +51,23 @@ class Stratification(Term):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Only the deviation from B, since B itself is part of `Weight`.
         center = context.frame.point(context.parameters["vehicle.center_of_buoyancy"])
-        stiffness = context.parameters["vehicle.buoyancy"] * numbers["gradient"]
-        return Packed({"stiffness": stiffness, "center": center, "reference_depth": numbers["reference_depth"]})
+        stiffness, curve = _deviation(numbers, context.parameters["vehicle.buoyancy"])
+        values = {"stiffness": stiffness, "center": center, "reference_depth": numbers["reference_depth"]}
+        return Packed(values if curve is None else values | {"curve": curve})
 
     def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
-        # Energy U = B gradient (d - reference_depth)^2 / 2, (k, n) [J].
+        # Energy U = stiffness x^2 / 2 - curve x^3 / 3, (k, n) [J].
         center = np.sum(parameters["vehicle.center_of_buoyancy"] * attitude[..., 2, :], axis=-1)
-        depth = position[..., 2] + center - numbers["reference_depth"]
-        return 0.5 * parameters["vehicle.buoyancy"] * numbers["gradient"] * depth**2
+        x = position[..., 2] + center - numbers["reference_depth"]
+        stiffness, curve = _deviation(numbers, parameters["vehicle.buoyancy"])
+        energy = 0.5 * stiffness * x**2
+        return energy if curve is None else energy - curve * x**3 / 3.0
+
+
+def _deviation(numbers: Numbers, buoyancy: Array) -> tuple[Array, Array | None]:
+    """Stiffness [N/m] and curve [N/m2] of B's deviation, stiffness x - curve x^2; None for a hull without compressibility."""
+    gradient = numbers["gradient"]
+    if "compressibility" not in numbers:
+        return buoyancy * gradient, None
+    kappa = numbers["compressibility"]
+    return buoyancy * (gradient - kappa), buoyancy * gradient * kappa

@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
+from lgvi_warp.physics.terms import thruster_power
 from lgvi_warp.physics.terms.actuators import (
     Commanded,
     motion,
@@ -55,6 +56,13 @@ class Thrusters(Commanded):
         torque_coefficient: Torque on the vehicle about the direction, for a unit of w |w|, (n,) [N m per unit^2]: its sign is
             that of the propeller's hand. None by default.
         torque_loss: Loss of torque, (n,) [N m per unit and m/s], with the sign of the torque; 0 by default.
+        power_commands: Commands of a table of power, (s,) [unit], rising, counted from the dead band as those of thrust; by
+            default `table_commands`.
+        power: Electrical power at these commands, (s, n) [W], or (s,) for n equal thrusters, linear between them and constant
+            outside. None by default: they take no power (see `EnergyUse`).
+        shaft_speed: Rate of turn of the propeller for a unit of w, (n,) [rad/s per unit], in place of a table: the power is
+            that of the shaft's torque. None by default.
+        efficiency: Mechanical power of the shaft over electrical power, (n,); 1 by default.
         dead_band: Size of the command below which there is no thrust, (n,) [unit]; 0 by default.
         limit: Largest size of the command, (n,) [unit]; 1e6 by default.
         time_constant: Time constant of the first-order lag from the command to u, (n,) [s]; 0 by default, no lag.
@@ -91,6 +99,10 @@ class Thrusters(Commanded):
     advance_loss_astern: Any = number(("n",), "N per unit and m/s", None, least=0.0, optional=True)
     torque_coefficient: Any = number(("n",), "N m per unit^2", None, optional=True)
     torque_loss: Any = number(("n",), "N m per unit and m/s", None, optional=True)
+    power_commands: Any = number(("s",), "unit", None, rising=True, optional=True)
+    power: Any = number(("s", "n"), "W", None, least=0.0, optional=True)
+    shaft_speed: Any = number(("n",), "rad/s per unit", None, least=0.0, optional=True)
+    efficiency: Any = number(("n",), "1", None, above=0.0, most=1.0, optional=True)
     dead_band: Any = number(("n",), "unit", None, least=0.0)
     limit: Any = number(("n",), "unit", None, least=0.0)
     time_constant: Any = number(("n",), "s", None, least=0.0)
@@ -117,6 +129,7 @@ class Thrusters(Commanded):
         if np.ndim(np.asarray(self.table_thrusts, dtype=object)) == 1:
             object.__setattr__(self, "table_thrusts", [[value] * n for value in self.table_thrusts])
         self.repeat(n, *OPTIONAL)
+        thruster_power.settle(self, n)
         defaults = {"coefficient_astern": self.coefficient, "dead_band": np.zeros(n), "limit": np.full(n, 1e6),
                     "time_constant": np.zeros(n)}  # fmt: skip
         if self.command_schedule is None:
@@ -135,6 +148,11 @@ class Thrusters(Commanded):
     def propels(self) -> bool:
         """Whether thrust falls with the advance speed, or propellers turn the vehicle."""
         return any(getattr(self, name) is not None for name in PROPELLER)
+
+    @property
+    def powered(self) -> str:
+        """How its power follows from a command, in a scene that accounts it (see thruster_power.kind_of)."""
+        return thruster_power.kind_of(self) if self.accounted else ""
 
     @property
     def shape(self) -> str:
@@ -167,7 +185,7 @@ class Thrusters(Commanded):
 
     def device_in(self, aligned: bool) -> str:
         if self.pushes_steadily:
-            return "thrusters_held"
+            return "thrusters_held:power" if self.powered else "thrusters_held"
         driven = self.driver is not None
         # Members may bring in a lag where the scene has a limited rate.
         motions = motion(self) if driven else {"lag": self.slow, "rate": self.rate_limit is not None}
@@ -175,7 +193,7 @@ class Thrusters(Commanded):
             {"driven": driven, "scheduled": not driven}
             | {name: acts and self.memory for name, acts in motions.items()}
             | {"table": self.shape == "table", f"powers{self.powers}": self.shape == "polynomial"}
-            | {"propeller": self.propels}
+            | {"propeller": self.propels, self.powered: bool(self.powered)}
         )
         return f"thrusters_with:{','.join(name for name, present in features.items() if present)}"
 
@@ -266,6 +284,7 @@ class Thrusters(Commanded):
                 )
         if self.torque_loss is not None and self.torque_coefficient is None:
             faults.add("torque_loss", self.torque_loss, "is given without torque_coefficient", "give both")
+        thruster_power.check(self, faults)
         if vars(self)["commanded_twice"]:
             faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
 
@@ -316,10 +335,15 @@ class Thrusters(Commanded):
             curves, odd = parted(curves)
         alike = np.all(numbers["coefficient"] == numbers["coefficient_astern"]) and not np.any(numbers["dead_band"])
         words = {"plain": int(odd and alike)}
+        shared = curves
+        if self.powered:
+            watts, intervals = thruster_power.rows(self, numbers)
+            shared = side_by_side(curves, watts)
+            words |= {"power": curves.shape[1], "power_size": intervals}
         # Where nothing is remembered, commands are looked up in rows to work with.
         work = 0 if self.memory or self.driver is not None else self.channels
         each = side_by_side(force, torque, *blocks)
-        return packed_following(self, numbers, each, curves, size, work, words, context.time)
+        return packed_following(self, numbers, each, shared, size, work, words, context.time)
 
     def _packed_push(
         self, numbers: Numbers, context: PackingContext, direction: np.ndarray, arms: np.ndarray
@@ -333,7 +357,10 @@ class Thrusters(Commanded):
             if self.torque_coefficient is not None:
                 torque = torque + _summed(numbers["torque_coefficient"] * w * np.abs(w), direction)
             force, torque = repeated(force, torque)
-            return Packed({"force": context.frame.vector(force), "torque": context.frame.torque(torque, force)})
+            values = {"force": context.frame.vector(force), "torque": context.frame.torque(torque, force)}
+            if self.powered:
+                values["power"] = thruster_power.at_rest(self, numbers, w).sum(axis=1)
+            return Packed(values)
 
     def curve_rows(self, numbers: Numbers) -> tuple[np.ndarray, int]:
         """The curves as an allocation reads them.

@@ -39,7 +39,7 @@ class Waves(Harmonics):
             fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
             remedy = f"give gravity above 0, or leave {self.key} out"
             raise refusal("environment.gravity", float(g.min()), fault, remedy)
-        rows = np.stack(np.broadcast_arrays(*_components(numbers, g)), axis=-1)
+        rows = np.stack(np.broadcast_arrays(*components(numbers, g)), axis=-1)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
@@ -48,7 +48,7 @@ class Waves(Harmonics):
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
         for j in range(numbers["periods"].shape[1]):
-            north, east, k, omega, phase, *speed = (table[:, j] for table in _components(numbers, gravity))
+            north, east, k, omega, phase, *speed = (table[:, j] for table in components(numbers, gravity))
             theta = north * x + east * y + (phase - omega * time[:, None])
             e = np.exp(-k * np.maximum(depth, 0.0))
             cosine, sine = e * np.cos(theta), e * np.sin(theta)
@@ -56,8 +56,8 @@ class Waves(Harmonics):
         return total
 
 
-def _components(numbers: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The device table of the components, each entry of shape (n, k), n = 1 or the number of members."""
+def components(numbers: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Of each wave wavenumber north, east and in all, omega, phase, and speed at the surface likewise: (n, k) each."""
     omega, heading = 2.0 * np.pi / numbers["periods"], np.radians(numbers["headings_deg"])
     k = omega**2 / gravity[:, None]
     speed, along, across = numbers["amplitudes"] * omega, np.cos(heading), np.sin(heading)

@@ -14,9 +14,14 @@ from lgvi_warp.reference.rotation import Array
 
 
 class Sensor(Part):
-    """Numbers as those of `lw.control.Sensor`, those of a 3-vector for all axes or (3,); the key of its random numbers."""
+    """Numbers as those of `lw.control.Sensor`, those of a 3-vector for all axes or (3,); the key of its random numbers.
 
+    handed: None, or {name: what is handed on}, shared by sensors and a filter; key: its name there.
+    """
+
+    key, handed = "sensor", None
     noise = bias = drift = quantum = dropout = 0.0
+    deepest = math.inf
     every, latency = 1, 0
     seed0 = seed1 = channel = 0
 
@@ -41,8 +46,11 @@ class Sensor(Part):
             v = np.where(q > 0.0, np.rint(v / np.where(q > 0.0, q, 1.0)) * q, v)
             z = with_values(z, self.of, v)
         # Phi of a standard normal is uniform.
-        lost = 0.5 * math.erfc(-first[3] / math.sqrt(2.0)) < self.dropout
+        lost = 0.5 * math.erfc(-first[3] / math.sqrt(2.0)) < self.dropout or y.position[2] > self.deepest
         old = y.tick % self.every != 0
+        if self.handed is not None:
+            self.handed[self.key] = {"values": values(z, self.of), "fresh": not (old or lost)}
+            return y
         self.arrived.append(self.arrived[-1] if self.arrived and (old or lost) else z)
         delayed = self.arrived[max(y.tick - self.latency, 0)]
         if self.of == "attitude":

@@ -80,9 +80,29 @@ class Law:
         """D (6, 6) and w (6,) with (force; torque) = w - D (nu; Om), of a law that looks at the water."""
         return np.zeros((6, 6)), np.zeros(6)
 
+    def carried(self, view: View) -> tuple[Array, Array]:
+        """D (6, 6), the change of the vehicle's inertia, and w (6,), the momentum of what moves in it, in body axes."""
+        return np.zeros((6, 6)), np.zeros(6)
+
+    def depart(self, view: View) -> Array:
+        """What it remembers of the step of view.h that begins at view.t."""
+        return view.memory
+
+    def power(self, view: View) -> float:
+        """The power that it takes [W]."""
+        return 0.0
+
+    def spent(self, view: View, memory: Array) -> float:
+        """The energy that it takes [J] while what it remembers becomes `memory`, beside its power."""
+        return 0.0
+
     def potential(self, view: View) -> float:
         """Potential energy U(b, R) [J]; 0 by default."""
         return 0.0
+
+    def beside(self, laws: tuple["Law", ...]) -> "Law":
+        """The same law among all laws of a vehicle, for one that follows from them as well."""
+        return self
 
     def start(self) -> Array:
         """What it remembers at t = 0."""

@@ -11,16 +11,19 @@ class Stratification(Law):
     """Numbers as those of `lw.terms.Stratification`; buoyancy [N], center_of_buoyancy (3,) [m, body]."""
 
     potential_force = True
+    compressibility = 0.0
 
     def excess_depth(self, view: View) -> float:
         """d - d0 of the centre of buoyancy [m]."""
         return float(view.b[2] + view.R[2] @ self.center_of_buoyancy - self.reference_depth)
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """f = -B gradient (d - d0) R^T e3 at the centre of buoyancy."""
-        f = np.asarray(-self.buoyancy * self.gradient * self.excess_depth(view) * view.down)
+        """f = -B ((1 + gradient x) (1 - compressibility x) - 1) R^T e3 at the centre of buoyancy."""
+        x, gradient, kappa = self.excess_depth(view), self.gradient, self.compressibility
+        f = np.asarray(-self.buoyancy * (gradient * x - kappa * x - gradient * kappa * x**2) * view.down)
         return f, cross(self.center_of_buoyancy, f)
 
     def potential(self, view: View) -> float:
-        """U = B gradient (d - d0)^2 / 2 [J]."""
-        return 0.5 * self.buoyancy * self.gradient * self.excess_depth(view) ** 2
+        """U = B ((gradient - compressibility) x^2 / 2 - gradient compressibility x^3 / 3) [J]."""
+        x, gradient, kappa = self.excess_depth(view), self.gradient, self.compressibility
+        return float(self.buoyancy * ((gradient - kappa) * x**2 / 2.0 - gradient * kappa * x**3 / 3.0))

@@ -21,6 +21,10 @@ class Thrusters(Following):
     advance_loss_astern: Array | float = 0.0
     torque_coefficient: Array | float = 0.0
     torque_loss: Array | float = 0.0
+    power_commands: Any = None
+    power_table: Any = None
+    shaft_speed: Array | float = 0.0
+    efficiency: Array | float = 1.0
 
     def beyond(self, n: Array) -> Array:
         """w, the places (n,) less the dead band."""
@@ -47,6 +51,17 @@ class Thrusters(Following):
         forces = self.thrust(n)[:, None] * self.direction
         torque = sum((cross(r, f) for r, f in zip(self.position, forces, strict=True)), np.zeros(3))
         return forces.sum(axis=0), torque + (self.torque_coefficient * w * np.abs(w)) @ self.direction
+
+    def power(self, view: View) -> float:
+        """Watts of a table (k, n) at w, or the shaft's speed times the torque against its turn over the efficiency."""
+        w = self.beyond(self.place(view))
+        if self.power_table is not None:
+            columns = zip(w, np.transpose(self.power_table), strict=True)
+            return float(sum(np.interp(x, self.power_commands, watts) for x, watts in columns))
+        speeds = [d @ (view.nu + cross(view.Om, r)) for r, d in zip(self.position, self.direction, strict=True)]
+        torque = self.torque_coefficient * w * np.abs(w) - self.torque_loss * np.abs(w) * np.array(speeds)
+        hand = np.sign(self.torque_coefficient)
+        return float(np.sum(np.maximum(self.shaft_speed * w * hand * torque, 0.0) / self.efficiency))
 
     def damping(self, view: View) -> Array:
         """Thrust falls by c_u |w| a, torque by k_u |w| a, where a is the speed of the thruster along its direction."""

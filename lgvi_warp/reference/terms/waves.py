@@ -28,3 +28,14 @@ class Waves(Law):
         )
         by_place = -1j * k * along + np.array([0.0, 0.0, -k if depth > 0.0 else 0.0])
         return Flow(wave.real, (1j * omega * wave).real, np.outer(wave, by_place).real)
+
+    def elevation(self, view: View) -> float:
+        """How far the surface is above still water at view.b [m]."""
+        total = 0.0
+        for a, period, heading_deg, phase in zip(
+            self.amplitudes, self.periods, self.headings_deg, self.phases, strict=True
+        ):
+            omega, heading = 2.0 * math.pi / period, math.radians(heading_deg)
+            along = math.cos(heading) * view.b[0] + math.sin(heading) * view.b[1]
+            total += a * math.cos(omega**2 / self.gravity * along - omega * view.t + phase)
+        return float(total)

@@ -13,7 +13,7 @@ from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
-from lgvi_warp.control.signals import CHANNELS, SAVED, SIGNALS, ordered
+from lgvi_warp.control.signals import CHANNELS, ENERGY_USED, SAVED, SIGNALS, ordered
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
 from lgvi_warp.statistics.values.quantity import Quantity, named
@@ -163,7 +163,7 @@ class ActuatorEnergy(OfChannels):
     """The integral over time of |power| that the delivered wrench gives to the motion [J]; then statistics of it.
 
     The power is (demand - unmet) . (velocity, angular velocity), by the trapezoidal rule between ticks: mechanical, without
-    the losses of motors and propellers, which no term tells.
+    the losses of motors and propellers. `ElectricalEnergy` has these, in a scene that accounts them.
 
     Args:
         of: "demand", the default.
@@ -185,6 +185,30 @@ class ActuatorEnergy(OfChannels):
 
 
 _POWER = Quantity("demand", _power, "W", ("velocity", "angular_velocity", "demand", "unmet"))
+
+
+@dataclass(frozen=True, eq=False)
+class ElectricalEnergy(OfChannels):
+    """The energy that each member uses [J], by the account of `lw.terms.EnergyUse`; then statistics of it.
+
+    It is what was used between the first tick and the last: electrical, with the hotel load and all losses that terms tell. A
+    sweep over a scene that keeps this account means it by "energy", too.
+
+    Args:
+        of: "energy_used", the default.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+    """
+
+    type: ClassVar[str] = "electrical_energy"
+    default: ClassVar[str | None] = ENERGY_USED
+
+    def meant(self) -> Quantity:
+        if not among(self.of, (ENERGY_USED,)):
+            raise refusal("electrical_energy.of", self.of, "is not the energy used", "leave it out")
+        return named("electrical_energy.of", self.of, self.of)
+
+    def follow(self, state: State, ticks: Ticks) -> State:
+        return {"sum": accumulated(state["sum"], ticks, ticks.x[:, 0] - ticks.before[:, 0])}
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.physics.terms.floor import Floor
 from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks
 from lgvi_warp.statistics.values.quantity import Quantity
 
@@ -26,10 +27,6 @@ Side = tuple[int, float, np.ndarray]
 LEAST = float(np.nextafter(0.0, 1.0))
 
 
-def _above_floor(number: Number) -> list[Side]:
-    return [(2, -1.0, number("depth"))]
-
-
 def _below_surface(number: Number) -> list[Side]:
     return [(2, 1.0, -number("depth"))]
 
@@ -41,19 +38,29 @@ def _inside_box(number: Number) -> list[Side]:
 
 # Type of an event -> its sides: each has the distance (sign * position[axis] + offset) [m], as lgvi_kernels.stops has it.
 SIDES: Mapping[str, Callable[[Number], list[Side]]] = {
-    "floor": _above_floor,
     "surface": _below_surface,
     "box": _inside_box,
 }
-COUNTS = {"floor": 1, "surface": 1, "box": 6}
+COUNTS = {Floor.type: 1, "surface": 1, "box": 6}
 
 
-def distance(kind: str, position: np.ndarray, number: Number) -> np.ndarray:
-    """The distance (...) [m] of positions (..., n, 3) to an event of this type."""
-    return np.asarray(
-        functools.reduce(
-            np.minimum, [sign * position[..., axis] + offset for axis, sign, offset in SIDES[kind](number)]
-        )
+def distance(event: Any, position: np.ndarray, number: Number) -> np.ndarray:
+    """The distance (...) [m] of positions (..., n, 3) to an event; number: its numbers by name, each (1 or n, ...)."""
+    still = np.zeros_like(position)
+    return np.asarray(functools.reduce(np.minimum, _distances_and_rates(event, position, still, number)[0]))
+
+
+def _distances_and_rates(
+    event: Any, position: np.ndarray, velocity: np.ndarray, number: Number
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """The distances (..., n) [m] to the sides of an event, and their rates [m/s], by velocities (..., n, 3), inertial axes."""
+    if isinstance(event, Floor):
+        height, rate = event.height(position, velocity, {name: number(name) for name in event.parameters()})
+        return [height], [rate]
+    sides = SIDES[event.type](number)
+    return (
+        [sign * position[..., axis] + offset for axis, sign, offset in sides],
+        [sign * velocity[..., axis] for axis, sign, _ in sides],
     )
 
 
@@ -110,17 +117,17 @@ class Nearest(Metric):
         name, kind = self.of, self.of if self.kind is None else self.kind
         if not isinstance(name, str) or not name:
             raise refusal("nearest.of", name, "is no name", 'give the name of an event, "floor"')
-        if kind not in SIDES:
-            remedy = f"say what it is: kind=..., {closest(str(kind), SIDES)}"
+        if kind not in COUNTS:
+            remedy = f"say what it is: kind=..., {closest(str(kind), COUNTS)}"
             raise refusal("nearest.of", name, "is of no type whose distance is known", remedy)
-        sides = SIDES[kind]
 
         def distances(samples: Fields, members: Members) -> np.ndarray:
             place, v = (samples[field].astype(np.float64, copy=False) for field in ("position", "velocity"))
-            rows, rates = [], []
-            for axis, sign, offset in sides(lambda field: members.parameters[f"{name}.{field}"]):
-                rows.append(sign * place[..., axis] + offset)
-                rates.append(sign * (samples["attitude"][..., axis, :] * v).sum(axis=-1))
+            event = next(event for event in samples.events if event.key == name)
+            over_ground = np.stack([(samples["attitude"][..., axis, :] * v).sum(axis=-1) for axis in range(3)], axis=-1)
+            rows, rates = _distances_and_rates(
+                event, place, over_ground, lambda field: members.parameters[f"{name}.{field}"]
+            )
             return np.moveaxis(np.stack(rows + rates, axis=1), 1, 2)
 
         labels = tuple(f"{what} {i} of {name}" for what in ("distance", "rate") for i in range(COUNTS[kind]))

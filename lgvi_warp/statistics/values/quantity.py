@@ -18,6 +18,7 @@ from lgvi_warp.control.signals import CHANNELS, SIGNALS, ordered
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, TABLE, Field
+from lgvi_warp.physics.terms.floor import altitude_over
 
 if TYPE_CHECKING:
     from lgvi_warp.physics.terms.base import Term
@@ -36,8 +37,8 @@ class Quantity:
     Args:
         name: name in results and messages.
         function: function(samples, members) that returns (k, n) numbers, or (k, n, d) for d components.
-            samples["position"] is (k, n, 3) and so on, samples.time (k,) [s], samples.terms the scene's terms; members
-            are those that lw.Ensemble.select returns.
+            samples["position"] is (k, n, 3) and so on, samples.time (k,) [s], samples.terms and samples.events the
+            scene's; members are those that lw.Ensemble.select returns.
         unit: unit of the numbers; by default "".
         fields: names of the samples that the function reads; by default all.
         labels: names of the d components; by default `name`, for one component.
@@ -108,6 +109,11 @@ def _euler(samples: Fields, members: Members) -> np.ndarray:
     return np.stack([np.arctan2(R[..., 2, 1], R[..., 2, 2]), pitch, np.arctan2(R[..., 1, 0], R[..., 0, 0])], axis=-1)
 
 
+def _altitude(samples: Fields, members: Members) -> np.ndarray:
+    """Height above the highest floor of the scene, as `Result.altitude`."""
+    return altitude_over(samples.events, samples["position"], members.parameters)
+
+
 def _energy(samples: Fields, members: Members) -> np.ndarray:
     """Mechanical energy [J], as `Result.energy`."""
     terms: Sequence[Term] = samples.terms
@@ -133,6 +139,7 @@ KNOWN: dict[str, Quantity] = {
     for quantity in (
         _known("position", ("position",), _field("position")),
         _known("depth", ("position",), lambda samples, members: samples["position"][..., 2]),
+        _known("altitude", ("position",), _altitude),
         _known("velocity", ("velocity",), _field("velocity")),
         _known("velocity_inertial", ("attitude", "velocity"), _velocity_inertial),
         _known("speed", ("velocity",), _speed),

@@ -20,6 +20,7 @@ class Fields(dict[str, np.ndarray]):
     steps: (k,), number of steps made before each sample time.
     ends: function that returns the status (n,) of the members, and the last step (n,) after which each was still running.
     controller: the controller of the scene; None (the default) for none.
+    events: the events of the scene; by default none.
     """
 
     def __init__(
@@ -30,10 +31,11 @@ class Fields(dict[str, np.ndarray]):
         terms: Sequence[Any],
         ends: Callable[[], tuple[np.ndarray, np.ndarray]],
         controller: Any = None,
+        events: Sequence[Any] = (),
     ):
         super().__init__(fields)
         self.time, self.terms, self._steps, self._when_ended = time, terms, steps, ends
-        self.controller = controller
+        self.controller, self.events = controller, events
 
     def last(self) -> Fields:
         """Return the samples at the last of these times."""
@@ -42,7 +44,7 @@ class Fields(dict[str, np.ndarray]):
     def at(self, places: np.ndarray) -> Fields:
         """Return the samples at some of these times, by their indices (m,)."""
         values = {name: values[places] for name, values in self.items()}
-        others = self.time[places], self._steps[places], self.terms, self._when_ended, self.controller
+        others = self.time[places], self._steps[places], self.terms, self._when_ended, self.controller, self.events
         return type(self)(values, *others)
 
     @functools.cached_property

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfResult
 from lgvi_warp.results.result import Result
@@ -29,7 +30,7 @@ class StopTimeRuns(CopyRuns):
         h = float(settings["h"])
         self._event, self._h, self._first = event, h, max(0, step + NODES[0])
         steps = self._first + np.arange(len(NODES))
-        scene = replace(copies.scene, events=())
+        scene = replace(copies.scene, events=seen_floors(copies.scene.controller, copies.scene.events))
         about = {"save": SaveAt(at=[float(k * h) for k in steps], fields=("position",)), "t1": float(steps[-1] * h)}
         super().__init__(replace(copies, scene=scene), [OfResult("position", lambda result: result.position[-1])],
                          {**settings, **about})  # fmt: skip
@@ -47,7 +48,7 @@ class StopTimeRuns(CopyRuns):
         def number(name: str) -> np.ndarray:
             return np.asarray(numbers.get(f"{event.key}.{name}", np.asarray(own[name])[None]))
 
-        distances = distance(event.type, positions, number)
+        distances = distance(event, positions, number)
         times = [self._h * (self._first + root) for root in (_root(distances, 3), _root(distances, 2))]
         return replace(ends, values=np.stack(times, axis=1)), added
 

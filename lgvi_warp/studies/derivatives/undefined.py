@@ -18,7 +18,7 @@ from lgvi_warp.results.quantities import EndQuantity, MetricQuantity, OfResult
 from lgvi_warp.results.result import Result
 from lgvi_warp.sampling.final import MEMORY
 from lgvi_warp.scene.variations import Target
-from lgvi_warp.statistics.metrics.nearest import SIDES
+from lgvi_warp.statistics.metrics.nearest import COUNTS
 from lgvi_warp.studies.derivatives.extrapolation import FEW, KINK, ROUGH, STEPS, Extrapolated
 
 # Growth of small differences beyond which a derivative says nothing of the path.
@@ -82,7 +82,7 @@ def is_end_time(interest: OfResult) -> TypeGuard[EndQuantity]:
 
 def timed_events(scene: Any) -> dict[str, Any]:
     """Events by name whose distance is known, so that the time at which they stop members has a derivative."""
-    return {event.key: event for event in scene.events if event.type in SIDES}
+    return {event.key: event for event in scene.events if event.type in COUNTS}
 
 
 def quanta(scene: Any, numbers: Mapping[str, np.ndarray]) -> dict[str, float]:

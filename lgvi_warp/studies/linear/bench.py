@@ -12,6 +12,7 @@ import numpy as np
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.control.controller import Controller
 from lgvi_warp.control.matrix import AllocationMatrix
+from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.control.set_point import SetPoint
 from lgvi_warp.control.state_feedback import StateFeedback
 from lgvi_warp.engine.packets import Packets
@@ -104,7 +105,9 @@ class MotionBench:
         if plan.kernel_choice.lead is not None:
             scene: Any = fleet.scene
             # Kernels that look for events have no lead, and else the same method.
-            fleet = fleet.in_scene(replace(scene, events=[StopTime(at=NEVER)]))
+            fleet = fleet.in_scene(
+                replace(scene, events=[*seen_floors(scene.controller, scene.events), StopTime(at=NEVER)])
+            )
             plan = replace(request, fleet=fleet, method=plan.method).plan()
         plan.compile()
         self.fleet, self.plan = fleet, plan

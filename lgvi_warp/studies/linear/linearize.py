@@ -11,7 +11,11 @@ import numpy as np
 
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
-from lgvi_warp.control.sensor import Sensor
+from lgvi_warp.control.dvl import DVL
+from lgvi_warp.control.error_state_filter import ErrorStateFilter
+from lgvi_warp.control.imu import IMU
+from lgvi_warp.control.over_floor import seen_floors
+from lgvi_warp.control.sensor import HANDED, Sensor
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS, ControlWrench
@@ -178,7 +182,7 @@ def linearize(
         scene = replace(scene, start=about.start)
         method, h = about.method if method is None else method, about.h if h is None else h
     h = step_of(scene, h)
-    scene = replace(scene, events=())
+    scene = replace(scene, events=seen_floors(scene.controller, scene.events))
     if closed:
         check_parts(scene.controller, "closed")
         return _closed_model(scene, about if isinstance(about, int | float) else 0.0, method, h, step)
@@ -281,10 +285,12 @@ def check_parts(controller: Any, purpose: str, refused: Collection[str] | None =
         problem = f"lets no motion be steady, as {purpose} need it"
     faults = Faults()
     for part in controller.sensors:
+        if isinstance(part, IMU | DVL | ErrorStateFilter):
+            faults.add("sensors", part.key, problem, "leave it out of this scene")
         if isinstance(part, Sensor):
             numbers = {name: np.asarray(value)[None] for name, value in part.parameters().items()}
             for word in part.features(numbers):
-                if word in refused if refused else word != "bias":
+                if word in refused if refused else word not in ("bias", HANDED):
                     faults.add(f"{part.key}.{word}", getattr(part, word), problem, "leave it out of this scene")
     faults.raise_if_any()
 

@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.control.loop_gain import FACTOR, with_factor
+from lgvi_warp.control.loop_gain import FACTOR, LoopGain, of_all, with_factor
+from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.control.set_point import SetPoint
 from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies.linear.bench import Motion, MotionBench
 from lgvi_warp.studies.linear.sampled_loop import DELAY, delayed
@@ -40,7 +42,8 @@ LEAST_TICKS = 30
 class Study:
     """Members whose factor and delay are their own; its arguments are those of `margins`.
 
-    Loops are looked at after `begin` steps, and at last after `last`; a run has `ticks` ticks.
+    Loops are looked at after `begin` steps, and at last after `last`; a run has `ticks` ticks. `components` are those of the
+    loop's demand.
     """
 
     def __init__(
@@ -52,10 +55,14 @@ class Study:
         self.period = period
         # With some delay in the scene, commands may be delayed in any lane.
         laws = with_factor(controller.laws, loop)
+        asks = next(law.asks for law in laws if isinstance(law, LoopGain))
+        self.components = tuple(COMPONENTS.index(name) for name in asks)
         acted = replace(controller, laws=laws, delay=controller.delay if controller.delay > 0.0 else period)
         first, ticks = (max(1, round(time / period)) for time in (about, seconds))
         last = max(first, round(settle / period))
-        inside = fleet.in_scene(replace(scene, controller=acted, events=()), (FACTOR, DELAY))
+        inside = fleet.in_scene(
+            replace(scene, controller=acted, events=seen_floors(scene.controller, scene.events)), (FACTOR, DELAY)
+        )
         self.fleet, self.tilt, self.nominal = fleet, tilt, float(controller.delay)
         length = (last + 1 + ticks + ticks // 2) * period
         self.bench = MotionBench(inside, method, h, length, period, (*FIELDS, "command"))
@@ -84,7 +91,7 @@ class Study:
         while True:
             latest.clear()
             # Each time from the start: of commands that are on their way, members remember as many as those beside them.
-            numbers = {FACTOR: np.ones(len(pending)), DELAY: delay[pending] * h}
+            numbers = {FACTOR: of_all(np.ones(len(pending))), DELAY: delay[pending] * h}
             end = due + bench.every
             motion = bench.run(places[pending], None, 0, end, numbers, keep)
             steady = np.all(_apart(latest[1], latest[0], limits[pending]) <= REPEATS, axis=1).tolist()
@@ -201,7 +208,8 @@ class Loops:
             within &= (aside & ~at_limit(values["command"][third == 2], limits).any(axis=2)).all(axis=0)
             last[:] = _what_repeats(values, self.study.held)[-1]
 
-        after = bench.run(self.places[some], motion, k0, k1, {FACTOR: factor, DELAY: steps * bench.plan.grid.h}, watch)
+        numbers = {FACTOR: of_all(factor), DELAY: steps * bench.plan.grid.h}
+        after = bench.run(self.places[some], motion, k0, k1, numbers, watch)
         near, swing = np.zeros(m, bool), highest - lowest
         rates, commands = np.linalg.norm(swing[..., :3], axis=2), np.linalg.norm(swing[..., 3:], axis=2)
         within &= np.isfinite(after.position).all(axis=1) & (rates[2] * self.study.period < TILTS * tilt)

@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,24 +17,29 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.files import Saved
 from lgvi_warp.studies.linear.bench import calm
+from lgvi_warp.studies.linear.disk import disks
 from lgvi_warp.studies.linear.edges import edges
 from lgvi_warp.studies.linear.linearize import RANDOM, check_parts
 from lgvi_warp.studies.linear.loops import IDLE, LEAST_TICKS, UNSETTLED, Loops, Study
 from lgvi_warp.studies.linear.sampled_loop import SampledLoop
 from lgvi_warp.studies.linear.trim import step_of
 
-OF, WAYS = ("gain", "delay"), ("eigenvalues", "runs")
+OF, WAYS = ("gain", "delay", "disk"), ("eigenvalues", "runs")
 # Members whose margins are sought together.
 GROUP = 2048
 # Width of the last brackets, in the logarithm of the factor: of eigenvalues, and of runs, which judge to some 0.4 %.
 NARROW = {"eigenvalues": 1e-6, "runs": 2e-3}
 PERCENTILES = (0.0, 5.0, 25.0, 50.0, 75.0, 95.0, 100.0)
-UNITS = {"gain_lower": "", "gain_upper": "", "delay": "s"}
+UNITS = {"delay": "s", "disk_phase": "rad", "disk_frequency": "rad/s"}
+GAINS = ("gain_lower", "gain_upper")
+DISKS = ("disk", "disk_gain_lower", "disk_gain_upper", "disk_phase", "disk_frequency")
+NAMES = {"gain": GAINS, "delay": ("delay",), "disk": DISKS}
 
 
 @dataclass(frozen=True)
-class Margins:
+class Margins(Saved):
     """Margins of a loop by member.
 
     Each is NaN for a member whose loop does not settle as it is, of which `why` tells more.
@@ -43,13 +48,16 @@ class Margins:
         loop: key of the law; "all laws" for the whole controller.
         values: by name, (n,): "gain_lower" and "gain_upper", between which the factors on the demand lie that the loop bears
             (0 and infinite where it bears all that were asked); "delay", the largest delay [s] beside the loop's own, in whole
-            steps.
+            steps; "disk", the disk margin of all components of the demand at once, what it says of factors
+            ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where ("disk_frequency" [rad/s]).
         by_runs: the same, as runs show them; without those that were not asked.
         why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
             nothing" where its commands have no effect, "failed"; "" where it has.
         step: step of the runs [s], to which delays are known.
         messages: what the user should know, such as that the step was shortened to fit the period.
     """
+
+    study: ClassVar[str] = "margins"
 
     loop: str
     values: Mapping[str, np.ndarray]
@@ -91,6 +99,21 @@ class Margins:
         }
         return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), "messages": list(self.messages), **ways}
 
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        values, by_runs = (
+            {name: np.array([np.nan if v is None else float(v) for v in column]) for name, column in columns.items()}
+            for columns in (content.get(way, {}) for way in WAYS)
+        )
+        why = np.array(content["why"], dtype=object)
+        return cls(str(content["loop"]), values, by_runs, why, float(content["step"]), tuple(content["messages"]))
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        by_runs = {f"{name}_by_runs": column for name, column in self.by_runs.items()}
+        for member, why in enumerate(self.why.tolist()):
+            columns = {name: float(column[member]) for name, column in (*self.values.items(), *by_runs.items())}
+            yield {"member": member, "why": why, **columns}
+
     def percentiles(self, of: Sequence[float] = PERCENTILES) -> dict[str, np.ndarray]:
         """Find how margins are distributed over the members that settle as they are.
 
@@ -113,7 +136,7 @@ class Margins:
         """Find the distribution of a margin for a picture: how many members have less.
 
         Args:
-            name: "gain_lower", "gain_upper" or "delay".
+            name: "gain_lower", "gain_upper", "delay", "disk" or another of `values`.
             by: "eigenvalues" or "runs"; None, the default, for the first of them that was asked.
 
         Returns:
@@ -128,14 +151,14 @@ class Margins:
 
         Args:
             count: how many (default 10).
-            name: by which margin; None, the default, for the first of "gain_upper" and "delay" that was asked.
+            name: by which margin; None, the default, for the first of "gain_upper", "delay" and "disk" that was asked.
 
         Returns:
             Indices (count,), the least first; members that do not settle as they are before all others.
         """
         columns = self._columns()
-        chosen = name or ("gain_upper" if "gain_upper" in columns else "delay")
-        values = columns[chosen] * (-1.0 if chosen == "gain_lower" else 1.0)
+        chosen = name or next(word for word in ("gain_upper", "delay", "disk") if word in columns)
+        values = columns[chosen] * (-1.0 if chosen.endswith("lower") else 1.0)
         return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[:count]
 
     @property
@@ -150,16 +173,18 @@ class Margins:
         lines = [f"{self.loop}: margins of {self.members} members"]
         if self.reasons:
             lines.append(f"{sum(self.reasons.values())} of them have none ({self.reasons_text}); the others:")
-        lines.append(f"{'':16}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
+        lines.append(f"{'':22}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
         for name, row in self.percentiles().items():
-            lines.append(f"{f'{name} {UNITS[name]}'.strip():16}" + "".join(f"{value:10.4g}" for value in row))
+            lines.append(
+                f"{f'{name} {UNITS.get(name, str())}'.strip():22}" + "".join(f"{value:10.4g}" for value in row)
+            )
         return "\n".join([*lines, *self.messages])
 
 
 def margins(
     fleet: Ensemble | Scene,
     loop: str | None = None,
-    of: Sequence[str] = OF,
+    of: Sequence[str] = ("gain", "delay"),
     *,
     by: Sequence[str] = ("eigenvalues",),
     about: float = 60.0,
@@ -168,6 +193,7 @@ def margins(
     tilt: float = 1e-3,
     most: float = 100.0,
     longest: float = 10.0,
+    skew: float = 0.0,
     method: str | Method | None = None,
     h: float | None = None,
 ) -> Margins:
@@ -189,10 +215,15 @@ def margins(
 
     Where the answer changes more than once, the edge is one of them.
 
+    The disk margin is that of the sampled loop, opened at all components of the law's demand: at any frequency each may have
+    a complex factor of its own in the disk (1 + (1 - skew) d / 2) / (1 - (1 + skew) d / 2), |d| < margin (Seiler, Packard,
+    Gahinet 2020, IEEE Control Systems 40(5)). It is 1 / the largest structured singular value of S + (skew - 1) / 2.
+
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is meant; without waves and noise.
         loop: Key of the law, such as "heading_pid"; None, the default, for all laws together.
-        of: "gain", "delay", or both, the default. A delay is that of all commands.
+        of: Some of "gain", "delay" and "disk"; the first two by default. A delay is that of all commands; "disk" is by
+            eigenvalues only.
         by: "eigenvalues", the default, "runs", or both.
         about: Time after which the loop is looked at [s]; 60 by default.
         settle: Longest time that a member is given to be steady [s]; 1200 by default.
@@ -200,6 +231,7 @@ def margins(
         tilt: Angle by which they begin aside, about each axis of the body [rad]; 0.001 by default.
         most: Largest factor, and one over the least; 100 by default.
         longest: Longest delay that is added [s]; 10 by default.
+        skew: Skew of the disk, from -1 to 1: 0, the default, for factors and their inverses alike; 1 for the sensitivity S.
         method: As of `lw.solve`; default that of the scene.
         h: Step [s]; default that of the scene.
 
@@ -231,6 +263,10 @@ def margins(
     for name, value in {"about": about, "settle": settle, "seconds": seconds, "longest": longest, "tilt": tilt}.items():
         faults.positive(name, value)
     faults.number("most", most, "", 1.0)
+    if not -1.0 <= float(skew) <= 1.0:
+        faults.add("skew", skew, "is out of bounds", "give a number from -1 to 1")
+    if "disk" in of and "eigenvalues" not in by:
+        faults.add("by", by, "has no disk margins, which are of a linear model", 'add "eigenvalues"')
     _check_loop(faults, scene.controller, loop, seconds)
     faults.raise_if_any()
     calm(scene, "margins")
@@ -239,17 +275,18 @@ def margins(
     else:
         check_parts(scene.controller, "margins", RANDOM)
     study = Study(ensemble, loop, about, settle, seconds, tilt, method, step_of(scene, h))
-    names = (("gain_lower", "gain_upper") if "gain" in of else ()) + (("delay",) if "delay" in of else ())
+    names = {way: [name for word in of if word != "disk" or way != "runs" for name in NAMES[word]] for way in by}
     n = ensemble.members
-    answers: Answers = {way: {name: np.full(n, np.nan) for name in names} if way in by else {} for way in WAYS}
+    answers: Answers = {way: {name: np.full(n, np.nan) for name in names.get(way, ())} for way in WAYS}
     why: np.ndarray = np.full(n, "", dtype=object)
     for first in range(0, n, GROUP):
         places = np.arange(first, min(first + GROUP, n))
         groups, why[places] = study.loops(places)
         for loops in groups:
-            why[loops.places], of_loops = _group(loops, of, by, most, longest)
-            for way, name in ((way, name) for way in by for name in names):
-                answers[way][name][loops.places] = of_loops[way][name]
+            why[loops.places], of_loops = _group(loops, of, by, most, longest, skew)
+            for way in by:
+                for name in names[way]:
+                    answers[way][name][loops.places] = of_loops[way][name]
     grid = study.bench.plan.grid
     return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, grid.h, grid.messages)
 
@@ -272,7 +309,7 @@ Answers = dict[str, dict[str, np.ndarray]]
 
 
 def _group(
-    loops: Loops, of: Sequence[str], by: Sequence[str], most: float, longest: float
+    loops: Loops, of: Sequence[str], by: Sequence[str], most: float, longest: float, skew: float
 ) -> tuple[np.ndarray, Answers]:
     """Why loops have no margins (n,), and margins by way and by name."""
     bench, n, delays_now = loops.study.bench, len(loops.places), loops.delay
@@ -282,10 +319,13 @@ def _group(
     why: np.ndarray = np.where(loops.return_to_it(), "", UNSETTLED).astype(object)
     ways: dict[str, Any] = {"runs": loops.settle} if "runs" in by else {}
     if "eigenvalues" in by:
-        sampled = SampledLoop(bench, loops.places, loops.motion, loops.begin)
+        apart = loops.study.components if "disk" in of else ()
+        sampled = SampledLoop(bench, loops.places, loops.motion, loops.begin, apart)
         ways = {"eigenvalues": sampled.stable} | ways
         why[(why == "") & ~sampled.moves] = IDLE
         why[(why == "") & ~sampled.stable(unity, delays_now, every)] = UNSETTLED
+        if "disk" in of:
+            answers["eigenvalues"] = _disks(sampled, delays_now, why == "", skew, loops.study.period)
     start = np.where(why == "", 1.0, np.nan)
     for way, holds in ways.items():
         known = answers["eigenvalues"]
@@ -310,3 +350,14 @@ def _group(
             held = np.where(np.isinf(brackets[:, 1]), np.inf, brackets[:, 0])
             answers[way]["delay"] = np.where(why == "", held * h, np.nan)
     return why, answers
+
+
+def _disks(
+    sampled: SampledLoop, delays: np.ndarray, settled: np.ndarray, skew: float, period: float
+) -> dict[str, np.ndarray]:
+    """Disk margins by name (n,) of loops with delays in steps; NaN where they do not settle."""
+    values = {name: np.full(len(delays), np.nan) for name in DISKS}
+    for opened in sampled.opened(delays, np.flatnonzero(settled)):
+        for name, column in disks(opened, skew, period).items():
+            values[name][opened.some] = column
+    return values

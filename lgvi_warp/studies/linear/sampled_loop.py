@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgvi_warp.control.loop_gain import FACTOR
+from lgvi_warp.control.loop_gain import FACTOR, of_all
 from lgvi_warp.studies.linear.bench import Motion, MotionBench
 from lgvi_warp.studies.linear.differences import Differences, Row
 from lgvi_warp.studies.linear.linearize import remembered
@@ -36,14 +37,26 @@ def delayed(bench: MotionBench, motion: Motion, k: int, steps: np.ndarray) -> Mo
     return replace(motion, memory=memory)
 
 
+class Opened(NamedTuple):
+    """Loops that are opened at their demands: x' = A x + B w of some members, whose laws demand w = C x at the tick.
+
+    some: (m,), A: (m, n, n), B: (m, n, r), C: (m, r, n).
+    """
+
+    some: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+
+
 class SampledLoop:
     """x' = P x + Q1 u of q ticks ago + Q0 u of the tick before that; u' and what parts remember follow from x' at the tick.
 
     u' is affine in the factor. P, Q1, Q0 for each delay within a period, and what the tick does, are differences in lanes.
-    Its `moves` (n,) is whether the demand of the loop moves anything.
+    Its `moves` (n,) is whether the demand of the loop moves anything. apart: components of the demand at which it is opened.
     """
 
-    def __init__(self, bench: MotionBench, places: np.ndarray, motion: Motion, k: int):
+    def __init__(self, bench: MotionBench, places: np.ndarray, motion: Motion, k: int, apart: Sequence[int] = ()):
         bus: Any = bench.bus
         n, C, self.every = len(places), bus.channels, bench.every
         zero = np.zeros(n)
@@ -53,23 +66,30 @@ class SampledLoop:
         commands = [Row("", i, f"command {i}") for i in range(C)]
         acting = [Row("", bus.acting + i, f"acting {i}") for i in range(C)]
         s = 12 + len(terms)
-        ticks, self._bounded = [], np.ones(n, bool)
+        self._bounded = np.ones(n, bool)
         of_period = Differences(bench, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts])
-        for factor in (0.0, 1.0):
-            derivatives = self._without_failed(of_period(places, still, {FACTOR: zero + factor, DELAY: zero}))
+
+        def tick(factors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            """The derivatives of a period, and of what the tick does, with factors (6,) on the demand."""
+            numbers = {FACTOR: np.tile(factors, (n, 1)), DELAY: zero}
+            derivatives = self._without_failed(of_period(places, still, numbers))
             # A tick sees the motion alone: what it does of x is found behind the period that was between.
             of_motion = np.linalg.solve(
                 np.swapaxes(derivatives[:, :12, :12], 1, 2), np.swapaxes(derivatives[:, s:, :12], 1, 2)
             )
-            ticks.append(np.concatenate([np.swapaxes(of_motion, 1, 2), derivatives[:, s:, s + C :]], axis=2))
+            return derivatives, np.concatenate([np.swapaxes(of_motion, 1, 2), derivatives[:, s:, s + C :]], axis=2)
+
+        without = tick(np.zeros(6))[1]
+        derivatives, with_loop = tick(np.ones(6))
         self._P, total = derivatives[:, :s, :s], derivatives[:, :s, s : s + C]
         # [u, parts] by [x, parts]: of the laws outside of the loop, and what the loop adds.
-        self._tick, self._more = ticks[0], ticks[1] - ticks[0]
+        self._tick, self._more = without, with_loop - without
+        self._each = [with_loop - tick(1.0 - np.eye(6)[i])[1] for i in apart]
         self._late = [total]
         of_late = Differences(bench, k, bench.every, acting, terms, motion=False)
         for steps in range(1, bench.every):
             later = delayed(bench, motion, k, np.full(n, steps))
-            numbers = {FACTOR: zero + 1.0, DELAY: zero + steps * bench.plan.grid.h}
+            numbers = {FACTOR: of_all(zero + 1.0), DELAY: zero + steps * bench.plan.grid.h}
             self._late.append(self._without_failed(of_late(places, later, numbers)))
         self._C, self._s, self._m = C, s, len(parts)
         self.moves = np.abs(total @ self._more[:, :C]).max(axis=(1, 2)) > 0.0
@@ -128,6 +148,26 @@ class SampledLoop:
                     alike = self._ranks[some[each]] == count
                     answer[each[alike]] = _settles(self._of_seen(A[alike], some[each][alike], int(count)))
         return answer & self._bounded[some]
+
+    def opened(self, steps: np.ndarray, places: np.ndarray) -> Iterator[Opened]:
+        """Some loops (m,), opened at the components of their demand; those of one delay, in steps (n,), together."""
+        s, m, C = self._s, self._m, self._C
+        for q in np.unique(steps[places] // self.every):
+            some = places[steps[places] // self.every == q]
+            A = self._matrices(np.zeros(len(some)), int(q), steps[some] % self.every, some)
+            B, rows = (
+                np.zeros((len(some), A.shape[1], len(self._each))),
+                np.zeros((len(some), len(self._each), A.shape[1])),
+            )
+            for r, each in enumerate(self._each):
+                # What one component does is of rank 1: what it writes, times what the laws see.
+                left, sizes, right = np.linalg.svd(each[some], full_matrices=False)
+                written, seen = left[:, :, 0] * sizes[:, :1], right[:, 0]
+                written[sizes[:, 0] < SEES] = 0.0
+                B[:, s + m : s + m + C, r], B[:, s : s + m, r] = written[:, :C], written[:, C:]
+                rows[:, r] = np.einsum("ki,kij->kj", seen[:, :12], A[:, :12])
+                rows[:, r, s : s + m] += seen[:, 12:]
+            yield Opened(some, A, B, rows)
 
     def _of_seen(self, A: np.ndarray, some: np.ndarray, count: int) -> np.ndarray:
         """The loops' matrices of what laws see, and of commands."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics import notation
 from lgvi_warp.scene.ensemble import Ensemble
@@ -54,6 +55,17 @@ class Trim:
     def free(self) -> tuple[str, ...]:
         """Names of what was free, in the order of the values."""
         return tuple(self.values)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Convert the motion to plain values, for JSON.
+
+        Returns:
+            "start" as the section of a scene file, "commands" and "residual" as lists, "values", "fixed", "method" and "step".
+        """
+        commands = {key: each.tolist() for key, each in self.commands.items()}
+        found = {"start": self.start.to_dict(), "commands": commands, "values": dict(self.values)}
+        method = {"method": self.method.name, "step": self.h}
+        return {**found, "fixed": dict(self.fixed), "residual": self.residual.tolist(), **method}
 
     def __str__(self) -> str:
         units = {name: "rad" for name in ANGLES} | {"speed": "m/s"}
@@ -106,7 +118,9 @@ def trim(
     scene = scene_of(scene)
     calm(scene, "steady motions")
     h = step_of(scene, h)
-    bench = MotionBench(Ensemble(plant(replace(scene, events=()), h), 1), method, h, 2.0 * h, h)
+    bench = MotionBench(
+        Ensemble(plant(replace(scene, events=seen_floors(scene.controller, scene.events)), h), 1), method, h, 2.0 * h, h
+    )
     problem = _Problem(scene, bench, speed, free, dict(fixed or {}))
     best: Any = None
     for part in GUESSES:

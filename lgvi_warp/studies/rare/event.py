@@ -16,7 +16,7 @@ from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.statistics.base import TYPES, Statistic
 from lgvi_warp.statistics.member_metrics import names_a_statistic
-from lgvi_warp.statistics.metrics.nearest import LEAST, SIDES, named
+from lgvi_warp.statistics.metrics.nearest import COUNTS, LEAST, named
 from lgvi_warp.statistics.values.functional import functional
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.tracking import check_wanted
@@ -128,7 +128,7 @@ def _of_text(text: str, scene: Any) -> RareCondition:
 
 
 def _of_event(event: Any) -> RareCondition:
-    if event.type not in SIDES:
+    if event.type not in COUNTS:
         problem = f"is an event whose distance is not known here ({event.type})"
         raise refusal("limit", event.key, problem, "give a quantity, or a function of a Result, that grows towards it")
     key, metric = metric_of("limit", named(event))

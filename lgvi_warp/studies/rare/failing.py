@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import failed
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.metrics.nearest import LEAST, SIDES, named
+from lgvi_warp.statistics.metrics.nearest import COUNTS, LEAST, named
 from lgvi_warp.studies.rare.event import RareCondition
 from lgvi_warp.studies.sweeps.setup import metric_of
 from lgvi_warp.studies.sweeps.success import Success
@@ -53,7 +53,7 @@ def failing_of(success: Success, metrics: Mapping[str, Statistic], scene: Any) -
     known = {name: metrics[name] for name in success.limits}
     ended = [event for event in scene.events if not Success(success.status).passed(np.array([event.status]), {})[0]]
     for event in ended:
-        if event.type in SIDES:
+        if event.type in COUNTS:
             name, metric = metric_of("success", named(event))
             known.setdefault(name, metric)
     if not known:

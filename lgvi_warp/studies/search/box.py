@@ -43,7 +43,7 @@ class SearchBox:
             faults.add(key, bounds, "maps no names to bounds", f"give {example}")
         for name, pair in bounds.items() if not faults else ():
             with faults.including():
-                scene_value(scene, name)
+                scene_value(scene, name, key)
             values = tuple(pair) if isinstance(pair, list | tuple | np.ndarray) else ()
             log = len(values) == 3 and values[2] == "log"
             ends = faults.finite(f'{key}."{name}"', values[:2] if log or len(values) == 2 else pair, (2,))

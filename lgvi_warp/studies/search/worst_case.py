@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.search.box import LEAST, POPULATION, SearchBox, search
 from lgvi_warp.studies.search.numbers import Numbers
@@ -25,7 +26,7 @@ WORST = ("largest", "smallest")
 
 
 @dataclass(frozen=True)
-class WorstCase:
+class WorstCase(Saved):
     """The worst member that a search found: a lower bound of the true worst.
 
     Attributes:
@@ -36,9 +37,12 @@ class WorstCase:
         at_bounds: by name, "low", "high" or "" of the numbers.
         restarts: (r,), the worst value of each evolution: where they differ, more may be found.
         runs: number of members that were run.
-        fleet: the member, to run it again.
+        fleet: the member, to run it again; None where this was read from a file, beside which the numbers lie as the table
+            worst_case.csv: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")) is the member.
         of_metric: whether the quantity is a metric, which is infinite where a loop never gets there; by default False.
     """
+
+    study: ClassVar[str] = "worst_case"
 
     parameters: Mapping[str, float]
     value: float
@@ -47,8 +51,22 @@ class WorstCase:
     at_bounds: Mapping[str, str]
     restarts: np.ndarray
     runs: int
-    fleet: Ensemble
+    fleet: Ensemble | None
     of_metric: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        return finite_or_none({item.name: getattr(self, item.name) for item in fields(self) if item.name != "fleet"})
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        # What is not finite is a member that failed, or never got there.
+        worse = math.inf if content["worst"] == "largest" else -math.inf
+        restarts = np.array(with_missing_as(content["restarts"], worse), np.float64)
+        value = math.inf if content["value"] is None else content["value"]
+        return cls(**content | {"value": value, "restarts": restarts, "fleet": None})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        yield dict(self.parameters)
 
     def __str__(self) -> str:
         where = ", ".join(

@@ -16,6 +16,7 @@ from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.studies.sweeps.setup import END, SweepCell
 from lgvi_warp.studies.sweeps.success import Probability, probability
 from lgvi_warp.studies.sweeps.sweep_table import SUCCESS, SweepTable
+from lgvi_warp.studies.sweeps.verdicts import verdict
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,8 @@ class PairedComparison:
     """A difference between two cases on the same members, at one point of the grid.
 
     only: how many members pass with the first alone, and with the second alone.
+    matters: the least difference that matters, in its unit; NaN where none was given.
+    more_is_better: whether the second is better where its value is more.
     """
 
     first: str
@@ -35,14 +38,24 @@ class PairedComparison:
     p: float = np.nan
     real: bool = False
     only: tuple[int, int] | None = None
+    matters: float = np.nan
+    more_is_better: bool = True
+
+    @property
+    def verdict(self) -> str:
+        """What the second is beside the first: "better", "worse", "equivalent" or "undecided"; "" where none was given."""
+        if np.isnan(self.matters):
+            return ""
+        return verdict(self.difference, self.matters, self.real, self.more_is_better)
 
     def row(self) -> dict[str, Any]:
         """The comparison as a record of a table."""
         d, only, values = self.difference, self.only or (None, None), self.values
+        judged = {"matters": self.matters, "verdict": self.verdict} if self.verdict else {}
         return {"first": self.first, "second": self.second, **self.point, "of": self.of, "value_first": values[0],
                 "value_second": values[1], "difference": d.value, "lower": d.lower, "upper": d.upper, "p": d.p,
                 "p_holm": self.p, "real": self.real, "pairs": d.pairs, "test": self.test, "only_first": only[0],
-                "only_second": only[1]}  # fmt: skip
+                "only_second": only[1], **judged}  # fmt: skip
 
 
 def compared(table: SweepTable, a: SweepCell, b: SweepCell, quantile: float | None) -> list[PairedComparison]:
@@ -63,8 +76,16 @@ def compared(table: SweepTable, a: SweepCell, b: SweepCell, quantile: float | No
             test, number = "bootstrap of members", functools.partial(np.quantile, q=quantile)
         finite = np.isfinite(x) & np.isfinite(y)
         first, second = (float(number(v[finite])) if finite.any() else np.nan for v in (x, y))
-        rows.append(PairedComparison(a.case.name, b.case.name, a.point, name, (first, second), d, test))
+        least, more = table.matters.get(name, np.nan), _more_is_better(table, name)
+        rows.append(PairedComparison(a.case.name, b.case.name, a.point, name, (first, second), d, test, matters=least,
+                                     more_is_better=more))  # fmt: skip
     return rows
+
+
+def _more_is_better(table: SweepTable, metric: str) -> bool:
+    """Whether more of a metric is better: where success limits it from below alone; of others less is."""
+    above, below = table.conditions.limits.get(metric, (-np.inf, np.inf))
+    return bool(np.isfinite(above) and not np.isfinite(below))
 
 
 def _of_success(table: SweepTable, a: SweepCell, b: SweepCell) -> PairedComparison:
@@ -72,7 +93,9 @@ def _of_success(table: SweepTable, a: SweepCell, b: SweepCell) -> PairedComparis
     only = int((x & ~y).sum()), int((y & ~x).sum())
     d = paired.proportions(*only, len(x), table.confidence)
     values = float(x.mean()), float(y.mean())
-    return PairedComparison(a.case.name, b.case.name, a.point, SUCCESS, values, d, "McNemar, exact", only=only)
+    least = table.matters.get(SUCCESS, np.nan) / 100.0
+    return PairedComparison(a.case.name, b.case.name, a.point, SUCCESS, values, d, "McNemar, exact", only=only,
+                            matters=least)  # fmt: skip
 
 
 def corrected(rows: list[PairedComparison], confidence: float) -> list[PairedComparison]:

@@ -17,7 +17,8 @@ from lgvi_warp.scene.scene import Scene
 
 KEYS = ("scene", "members", "seed", "sampling", "confidence", "interval", "vary", "cases", "grid", "metrics", "success",
         "compare", "run", "rare")  # fmt: skip
-# Keys of [run], and the arguments that they are.
+# Keys of [compare]; keys of [run], and the arguments that they are.
+COMPARE = ("baseline", "matters")
 RUN = {"method": "method", "step": "h", "duration": "t1", "dtype": "dtype"}
 
 
@@ -34,14 +35,13 @@ def arguments_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
         if not isinstance(content.get(name, kind() if kind is list else {}), kind):
             faults.add(name, content[name], "is no list" if kind is list else "is no table", f"see {KEYS_PAGE}")
     faults.raise_if_any()
-    faults.keys("compare", content.get("compare", {}), ("baseline",))
+    faults.keys("compare", content.get("compare", {}), COMPARE)
     faults.keys("run", content.get("run", {}), RUN)
     arguments = {
         name: content[name] for name in KEYS[1:] if name in content and name not in ("compare", "run", "vary", "cases")
     }
     arguments |= {RUN[name]: value for name, value in content.get("run", {}).items() if name in RUN}
-    if "baseline" in content.get("compare", {}):
-        arguments["baseline"] = content["compare"]["baseline"]
+    arguments |= {name: value for name, value in content.get("compare", {}).items() if name in COMPARE}
     scene_path = folder / content["scene"]
     with faults.including():
         arguments["scene"] = Scene.load(scene_path)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.files import write_text
-from lgvi_warp.common.status import Status, failed
+from lgvi_warp.common.status import failed
 from lgvi_warp.common.tables import write_csv
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.result import Result
@@ -24,10 +25,11 @@ from lgvi_warp.studies.files import finite_or_none
 from lgvi_warp.studies.rare.answer import RareEvent
 from lgvi_warp.studies.sweeps.comparisons import PairedComparison, compared, corrected, ranks
 from lgvi_warp.studies.sweeps.rare import RareComparison
-from lgvi_warp.studies.sweeps.rare_output import provenance_of_rare, rare_against_baseline, rare_lines, rare_rows
+from lgvi_warp.studies.sweeps.rare_output import provenance_of_rare, rare_against_baseline, rare_rows
 from lgvi_warp.studies.sweeps.setup import END, SweepCell, rerun_members_of
-from lgvi_warp.studies.sweeps.success import none_text
+from lgvi_warp.studies.sweeps.summary import against_baseline, summary
 from lgvi_warp.studies.sweeps.sweep_table import SUCCESS, SweepTable
+from lgvi_warp.studies.sweeps.verdicts import matters_of
 
 # Worst members that are listed.
 LISTED = 20
@@ -45,10 +47,16 @@ class Sweep(SweepTable):
         confidence: confidence level of all intervals.
         interval: how intervals of probabilities are formed.
         rares: rare failures of the cells that ask for them; None where none does.
+        matters: the least difference that matters, by "success" [points] and metric [its unit]; those that were given.
     """
 
     def compare(
-        self, first: str, second: str, at: Mapping[str, Any] | None = None, quantile: float | None = None
+        self,
+        first: str,
+        second: str,
+        at: Mapping[str, Any] | None = None,
+        quantile: float | None = None,
+        matters: Any = None,
     ) -> list[PairedComparison]:
         """Compare two cases on the same members: their success and each metric, at each point of the grid.
 
@@ -62,15 +70,18 @@ class Sweep(SweepTable):
             second: name of another case; differences are second less first.
             at: values of the grid by name; None (default) for all points.
             quantile: level of the quantile to compare in place of means; None (default) for means.
+            matters: the least difference that matters, as of `lw.sweep`; None (default) for that of the sweep.
 
         Returns:
-            The comparisons, success first at each point; `row()` of one is a record of a table.
+            The comparisons, success first at each point; `row()` of one is a record of a table, and `verdict` "better",
+            "worse", "equivalent" or "undecided" where it is known what matters.
 
         Raises:
-            SceneError: there is no such case or point.
+            SceneError: there is no such case, point or metric.
         """
         pairs = [(a, b) for a in self.cells_of(first, at) for b in self.cells_of(second, at) if a.point == b.point]
-        return self.corrected_for_number([row for a, b in pairs for row in compared(self, a, b, quantile)])
+        judged = self if matters is None else replace(self, matters=matters_of(matters, self.metrics, SUCCESS))
+        return self.corrected_for_number([row for a, b in pairs for row in compared(judged, a, b, quantile)])
 
     def corrected_for_number(self, rows: list[PairedComparison]) -> list[PairedComparison]:
         """Correct p of comparisons that were made together for their number, by Holm.
@@ -267,17 +278,11 @@ class Sweep(SweepTable):
         return files + [write_text(target / name, text, target) for name, text in texts.items()]
 
     def __str__(self) -> str:
-        return _summary(self)
+        return summary(self)
 
 
 def _median(x: np.ndarray) -> float:
     return float(np.median(x)) if len(x) else np.nan
-
-
-def against_baseline(sweep: Sweep) -> list[PairedComparison]:
-    """The comparisons of all other cases with the baseline."""
-    rivals = [case for case in sweep.cases if case != sweep.baseline]
-    return sweep.corrected_for_number([row for case in rivals for row in sweep.compare(sweep.baseline, case)])
 
 
 def provenance(table: SweepTable) -> dict[str, Any]:
@@ -292,7 +297,7 @@ def provenance(table: SweepTable) -> dict[str, Any]:
     return {"scene": scene, "ensemble": setup.members.to_dict(), "metrics": metrics, "success": table.conditions.to_dict(),
             "baseline": table.baseline, "confidence": table.confidence, "interval": table.interval,
             "settings": {name: as_json(value) for name, value in setup.settings.items()}, "cells": cells,
-            "versions": machine.versions()}  # fmt: skip
+            "versions": machine.versions()} | ({"matters": dict(table.matters)} if table.matters else {})  # fmt: skip
 
 
 def as_json(value: Any) -> Any:
@@ -302,77 +307,3 @@ def as_json(value: Any) -> Any:
     if isinstance(value, float) and not np.isfinite(value):
         return str(value)
     return value if isinstance(value, int | float | str | bool | list | None) else str(value)
-
-
-def percent(value: float) -> str:
-    """A fraction in percent, as text."""
-    return f"{100.0 * value:.4g}"
-
-
-def _summary(sweep: Sweep) -> str:
-    """The sweep in words, as Markdown."""
-    size = f"{sweep.members_count:,} members, the same in {len(sweep.cells)} cells"
-    lines = ["# Sweep", "", f"{size}; intervals at {sweep.confidence:.0%}.", "", "## Success", ""]
-    kind = sweep.setup.members.sampling.kind
-    if kind != "random":
-        lines += [f"Intervals are those of independent members, which a {kind} does not give: they need not fit.", ""]
-    lines += [f"- {_cell_text(sweep, cell)}" for cell in sweep.cells]
-    if len(sweep.cases) > 1:
-        lines += ["", "## Rank", ""]
-        for row in sweep.ranking():
-            better = f"; better than {row['better_by']}" if row["better_by"] else ""
-            lines.append(f"{row['rank']}. {row['case']}: {percent(row['value'])} % "
-                         f"({percent(row['lower'])} to {percent(row['upper'])}){better}")  # fmt: skip
-        lines += ["", f"## Against {sweep.baseline}", ""]
-        # With a grid metrics would be too many for a page.
-        real = [row for row in against_baseline(sweep) if row.real and (row.of == SUCCESS or not sweep.setup.axes)]
-        lines += [f"- {_compared_text(sweep, row)}" for row in real] or ["- No difference of success is real."]
-        lines += ["", "comparison.csv has the differences of all metrics."]
-    if sweep.rares is not None:
-        lines += ["", "## Rare failures", "", *rare_lines(sweep)]
-    lines += ["", "## What failures go with", ""]
-    causes = [text for cell in sweep.cells if (text := _causes_text(sweep, cell))]
-    lines += causes or ["- With nothing that varies, as far as seen."]
-    lines += ["", "## Worst members", ""]
-    for row in sweep.worst(5):
-        at = ", ".join(f"{name} = {row[name]}" for name in sweep.setup.axes)
-        status = Status(row["status"]).name.lower()
-        lines.append(f"- member {row['member']} of {row['case']}{' at ' + at if at else ''}, status {status}")
-    return "\n".join(lines) + "\n"
-
-
-def _causes_text(sweep: Sweep, cell: SweepCell) -> str:
-    """The inputs that really explain success in a cell; "" for none."""
-    if sweep.record(cell).refused:
-        return ""
-    rows = [row for row in sweep.causes(cell.case.name, cell.point) if row["p"] < 1.0 - sweep.confidence]
-    texts = []
-    for row in rows[:3]:
-        medians = f"median {row['median_failed']:.4g} where it fails, {row['median_passed']:.4g} where it passes"
-        texts.append(f"{row['input']} (explains {percent(row['lower'])} to {percent(row['upper'])} %; {medians})")
-    return f"- {cell.name}: {'; '.join(texts)}" if texts else ""
-
-
-def _cell_text(table: SweepTable, cell: SweepCell) -> str:
-    record = table.record(cell)
-    if record.refused:
-        return f"{cell.name}: refused: {record.refused}"
-    passed = table.passed(cell)
-    value, lower, upper = table.success(cell.case.name, cell.point)
-    counts = f"{int(passed.sum()):,} of {len(passed):,}, {percent(value)} %"
-    text = f"{cell.name}: passes {percent(lower)} to {percent(upper)} % ({counts})"
-    more = none_text(int(passed.sum()), len(passed), table.confidence)
-    return f"{text}; {more}" if more else text
-
-
-def _compared_text(table: SweepTable, row: PairedComparison) -> str:
-    d, at = row.difference, ", ".join(f"{name} = {value}" for name, value in row.point.items())
-    where = f" at {at}" if at else ""
-    if row.of == SUCCESS:
-        word = "better" if d.value > 0.0 else "worse"
-        ends = sorted((abs(d.lower), abs(d.upper)))
-        counts = f"{row.only[1]:,} pass only there, {row.only[0]:,} only with {row.first}" if row.only else ""
-        points = f"{percent(ends[0])} to {percent(ends[1])} points"
-        return f"{row.second}{where}: {word} by {points}, seen on the same members ({counts})"
-    unit = "" if table.unit(row.of) == "1" else f" {table.unit(row.of)}"
-    return f"{row.second}{where}: {row.of} {d.value:+.4g}{unit} ({d.lower:+.4g} to {d.upper:+.4g}), from {row.values[0]:.4g}"

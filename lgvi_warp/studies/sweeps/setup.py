@@ -25,7 +25,7 @@ from lgvi_warp.scene.functions import Own, ToldApart, functions_of
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.member_metrics import metric_of, numbers_of_members
-from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure
+from lgvi_warp.statistics.metrics.actuator_metrics import ElectricalEnergy, TimeToFailure
 from lgvi_warp.statistics.values.tracking import check_wanted
 from lgvi_warp.studies.sweeps.cases import Case, cases_of, check_rare, ensemble_of, grid_of, known_names, points_of
 from lgvi_warp.studies.sweeps.record import Record, key_of
@@ -139,6 +139,7 @@ def setup_of(
     faults = Faults()
     base, together = _base(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
+    metrics = electrical(metrics, base.scene)
     for name, read, value in (("cases", cases_of, cases), ("axes", grid_of, grid), ("metrics", metrics_of, metrics)):
         with faults.including():
             parts[name] = read(value)
@@ -236,6 +237,14 @@ def _base(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
         remedy = 'give {"vehicle.mass": lw.distributions.Normal(...)}'
         raise refusal("vary", vary, "does not map names to distributions", remedy)
     return scene, {**scene.vary, **(vary or {})}
+
+
+def electrical(entries: Any, scene: Any) -> Any:
+    """The metrics, "energy" as what is used where the scene keeps an account of it, and not as mechanical work."""
+    if isinstance(entries, str | Mapping) or not isinstance(entries, Sequence):
+        return entries
+    accounted = any(term.accounts for term in scene.terms)
+    return [ElectricalEnergy(name="energy") if accounted and entry == "energy" else entry for entry in entries]
 
 
 def metrics_of(entries: Any) -> dict[str, Statistic]:

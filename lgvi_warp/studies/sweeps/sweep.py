@@ -19,6 +19,8 @@ from lgvi_warp.studies.sweeps.rare_output import rare_against_baseline
 from lgvi_warp.studies.sweeps.record import Record, Records
 from lgvi_warp.studies.sweeps.setup import Setup, SweepCell, setup_of
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
+from lgvi_warp.studies.sweeps.sweep_table import SUCCESS
+from lgvi_warp.studies.sweeps.verdicts import matters_of
 
 # Parts of the progress of a rare failure, where a cell's own members are one.
 RARE_PARTS = 20
@@ -41,6 +43,7 @@ def sweep(
     baseline: str | None = None,
     confidence: float = 0.95,
     interval: str = "wilson",
+    matters: Any = None,
     rare: Any = None,
     out: str | os.PathLike[str] | None = None,
     threads: int | None = None,
@@ -72,6 +75,10 @@ def sweep(
         baseline: Name of the case that others are compared with; default the first one.
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
         interval: Of probabilities: "wilson" (default) or "clopper_pearson".
+        matters: The least difference that matters: of success in points, 1.0; and of metrics in their units, {"success": 1.0,
+            "overshoot depth": 0.1}. Comparisons then say better or worse by more than that, equivalent where the interval
+            lies within it, or undecided. Less of a metric is better, but where success limits it from below alone. By
+            default None.
         rare: True for the probability that a member does not pass, however small, by lw.rare_event, in every cell whose case
             says nothing else; or some of its arguments, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}.
             Cells are compared by failing members of either. None (default) for those whose case asks.
@@ -114,12 +121,12 @@ def sweep(
     """
     setup = setup_of(scene, cases, grid, vary, members, seed, sampling, metrics, settings, rare)
     execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
-    return swept(setup, success, baseline, confidence, interval, out, callback(progress), execution)
+    return swept(setup, success, baseline, confidence, interval, out, callback(progress), execution, matters)
 
 
 def swept(
     setup: Setup, success: Any, baseline: str | None, confidence: float, interval: str,
-    out: str | os.PathLike[str] | None, progress: Any, execution: Mapping[str, Any],
+    out: str | os.PathLike[str] | None, progress: Any, execution: Mapping[str, Any], matters: Any = None,
 ) -> Sweep:  # fmt: skip
     """Run the cells of a setup, as `sweep` says; execution: threads, executor and scheduler."""
     faults = Faults()
@@ -129,7 +136,9 @@ def swept(
     faults.choice("interval", interval, INTERVALS)
     baseline = setup.cases[0].name if baseline is None else baseline
     faults.choice("baseline", baseline, [case.name for case in setup.cases])
-    conditions = None
+    conditions, least = None, dict[str, float]()
+    with faults.including():
+        least = matters_of(matters, tuple(setup.metrics), SUCCESS)
     with faults.including():
         conditions = success_of(success, tuple(setup.metrics))
     faults.raise_if_any()
@@ -143,7 +152,7 @@ def swept(
     records.check()
     total = len(setup.cells) + RARE_PARTS * asking
     cells = list(_run(setup, records, progress, total, execution))
-    found = Sweep(setup, cells, records, conditions, baseline, float(confidence), interval, rares)
+    found = Sweep(setup, cells, records, conditions, baseline, float(confidence), interval, rares, least)
     if rares is not None:
         _run_rare(rares, found, progress, total, execution)
     return found

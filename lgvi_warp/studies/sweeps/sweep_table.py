@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,6 +41,7 @@ class SweepTable:
     confidence: float
     interval: str
     rares: RareFailures | None = None
+    matters: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         points = len(self.cells) // len(self.cases)

@@ -99,9 +99,7 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
         run, studies = run_in(folder), studies_in(folder)
         if run is None and not studies:
             fault = "holds no run and no study"
-            remedy = (
-                "give a folder that lgvi-warp run, tradeoff, stability, sensitivity, sweep, rare or derivatives wrote"
-            )
+            remedy = f"give a folder that lgvi-warp run, {', '.join(STUDY_FILES)} wrote".replace("_", "-")
             raise SceneError([f"{folder}: {fault}; {remedy}"])
         place, parts = folder.resolve().name, list[str]()
         if run is not None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A picture of margins: how many members of a fleet bear less than so much gain or delay."""
+"""A picture of margins: how many members of a fleet bear less than so much gain, delay or both."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ LABELS = {
     "gain_lower": "lower gain margin, a factor",
     "gain_upper": "upper gain margin, a factor",
     "delay": "delay margin [s]",
+    "disk": "disk margin",
+    "disk_gain_upper": "disk margin as a factor",
+    "disk_phase": "disk margin as a phase [rad]",
 }
 # The share of members whose margin is marked: one in twenty bears less, or, of a lower margin, more.
 MARKED = 0.05
@@ -45,11 +48,11 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
     if not steady.any():
         fault = f"none of the {found.members} members has margins ({found.reasons_text})"
         raise NothingToDraw(f"{fault}: there is nothing to draw")
-    names = list(found.values or found.by_runs)
-    ways = [way for way, values in (("eigenvalues", found.values), ("runs", found.by_runs)) if values]
+    ways = {way: values for way, values in (("eigenvalues", found.values), ("runs", found.by_runs)) if values}
+    names = [name for name in next(iter(ways.values())) if name in LABELS]
     with panels(figure, path, (1, len(names)), (1.0 + 4.5 * len(names), 4.5), sharey=True) as grid:
         for axes, name in zip(grid[0], names, strict=True):
-            for i, way in enumerate(ways):
+            for i, way in enumerate(way for way in ways if name in ways[way]):
                 _curve(axes, *found.curve(name, way), label=f"by {way}", **style(i))
             _mark(axes, found.curve(name)[0], name)
             axes.set(xlabel=LABELS[name], ylim=(0.0, 102.0))

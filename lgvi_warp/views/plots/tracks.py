@@ -16,6 +16,7 @@ from lgvi_warp.views.plots.canvas import COLORS, STYLES, legend_below, mark, out
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import quantity_of, selected, values_of, with_samples
 from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
+from lgvi_warp.views.sea_floor import reliefs
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
@@ -24,6 +25,8 @@ MOST_PATHS = 12
 MOST_AXES = 1
 # A view from above shows at least this much [m].
 LEAST_VIEW = 0.01
+# Contours of a floor, about so many; their colour.
+LEVELS, FLOOR = 8, "#7A4A00"
 
 
 @picture
@@ -64,7 +67,7 @@ def draw_paths(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
 
 @picture
 def plan_view(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw paths of some members from above: north up, east to the right, in the same scale.
+    """Draw paths of some members from above: north up, east to the right, in the same scale, with the contours of the floor.
 
     Args:
         result: A result with positions, in memory or in a store.
@@ -90,6 +93,23 @@ def draw_plan(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
     axes.autoscale_view()
     axes.locator_params(nbins=6)
     axes.set_aspect("equal", adjustable="datalim")
+    _contours(axes, result)
+
+
+def _contours(axes: Any, result: Result) -> None:
+    """Draw the depths of floors on grids, in what is in view and as far beyond it as an equal scale may show."""
+    across, up = np.array(axes.get_xlim()), np.array(axes.get_ylim())
+    shown = axes.dataLim.frozen()
+    reach = 0.75 * max(np.ptp(across), np.ptp(up))
+    middle = np.array([up.mean(), across.mean()])
+    for relief in reliefs(result.provenance["scene"], middle - reach, middle + reach):
+        if np.ptp(relief.depth) > 0.0:
+            lines = axes.contour(relief.east, relief.north, relief.depth, levels=LEVELS, colors=FLOOR, linewidths=0.6,
+                                 linestyles="solid", alpha=0.6, zorder=0.5)  # fmt: skip
+            axes.clabel(lines, fmt="%g m", fontsize="x-small")
+    # What is in view is that of the paths.
+    axes.dataLim.set(shown)
+    axes.autoscale_view()
 
 
 @picture

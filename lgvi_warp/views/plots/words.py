@@ -12,6 +12,7 @@ from lgvi_warp.statistics.values.functional import quantity
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
+from lgvi_warp.views.sea_floor import flat_depths
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
@@ -52,8 +53,8 @@ def is_depth(of: Quantity) -> bool:
 
 
 def floors(result: Result) -> dict[str, list[float]]:
-    """Depths of the scene's floors [m], by the word for them."""
-    return {"floor": [float(event["depth"]) for event in events(result) if event["type"] == "floor"]}
+    """Depths of the scene's flat floors [m], by the word for them."""
+    return {"floor": flat_depths(result.provenance["scene"])}
 
 
 def floors_of_each(results: Mapping[str, Result]) -> dict[str, list[float]]:

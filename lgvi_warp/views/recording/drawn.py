@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import Status, stop_time, under_way
-from lgvi_warp.control.signals import CHANNELS
+from lgvi_warp.control.signals import CHANNELS, ENERGY_USED
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.outcomes import outcomes
@@ -138,7 +138,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     if members is not None:
         kept = np.arange(result.members) if source is result else result.kept_members
         choice = dataclasses.replace(choice, members=places_of(members, result.members, kept))
-    few = choices.few(source, choice.members, (*FIELDS, *CHANNELS), choice.frames)
+    few = choices.few(source, choice.members, (*FIELDS, *CHANNELS, ENERGY_USED), choice.frames)
     counted = under_way(few)
     fans, ranked, above = _survey(source, choice, _directions(few, counted))
     fans = tuple(streamed(result, fan, choice.frames) for fan in fans)
@@ -148,6 +148,9 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
         levels = at_levels(energy.values, counted, LEVELS)
         title = f"{energy.name} [J] of {of_members(len(choice.members), result.members)}"
         fans = (*fans, Fan("energy", title, "J", levels))
+    if ENERGY_USED in few.samples:
+        title = f"Energy used [J] of {of_members(len(choice.members), result.members)}"
+        fans = (*fans, Fan(ENERGY_USED, title, "J", at_levels(few.energy_used, counted, LEVELS)))
     depth = np.where(count, position[..., 2], np.nan)
     finite = depth[np.isfinite(depth)]
     bins = np.linspace(*_range(finite), 41)

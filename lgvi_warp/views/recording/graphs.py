@@ -85,6 +85,8 @@ MARKERS = {
     Status.BOX: "square",
     Status.TIME: "circle",
     Status.CONDITION: "diamond",
+    Status.BATTERY: "plus",
+    Status.OUTSIDE: "asterisk",
 }
 MOST_MARKS = 12
 

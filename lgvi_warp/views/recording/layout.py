@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.control.signals import CHANNELS
+from lgvi_warp.control.signals import CHANNELS, ENERGY_USED
 from lgvi_warp.views.recording.drawn import Drawn, Fan
 from lgvi_warp.views.recording.eye import ASPECT, SIGHT, distance
 from lgvi_warp.views.recording.world import TIMELINE, WorldBox
@@ -76,8 +76,8 @@ def _right(runs: list[Drawn]) -> Any:
         below = _high(group[0], limits)
         views[name] = _curve(f"curves/{name}", group[0].title, all_times, limits, name == "height", below)
     height = views.pop("height")
-    energy = views.pop("energy", None)
-    motion = rrb.Tabs(views["speed"], *([energy] if energy else []), active_tab=0)
+    energies = [views[name] for name in ("energy", ENERGY_USED) if name in views]
+    motion = rrb.Tabs(views["speed"], *energies, active_tab=0)
     angles = rrb.Tabs(*(views[name] for name in ("pitch", "roll", "heading")), active_tab=0)
     commands = [_curve_of_channels(all_times)] if any(name in runs[0].few.samples for name in CHANNELS) else []
     facts = rrb.Tabs(

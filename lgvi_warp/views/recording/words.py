@@ -14,7 +14,7 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.recording.drawn import Drawn
 from lgvi_warp.views.recording.hull import shape_of
-from lgvi_warp.views.recording.world import WorldBox, chosen_member, floors_of
+from lgvi_warp.views.recording.world import WorldBox, chosen_member, floors_of, reliefs_of
 
 # Versions that are among the ten lines, which have room for few words; the provenance has all.
 TOLD = ("lgvi-warp", "warp-lang", "rerun")
@@ -74,8 +74,10 @@ def lines(run: Drawn, box: WorldBox, scale: int) -> dict[str, str]:
 def water_text(run: Drawn, box: WorldBox) -> str:
     """Say where the water ends, and whether members leave it."""
     kinds = {event["type"] for event in run.result.provenance["scene"].get("events", ())}
-    floors = floors_of(run)
-    floor = f"floor at {' and '.join(f'{depth:g}' for depth in floors)} m" if floors else "no floor"
+    floors = [f"{depth:g}" for depth in floors_of(run)]
+    reliefs = [relief.depth for relief in reliefs_of(run, box.low, box.high)]
+    floors += [f"{depth.min():.3g} to {depth.max():.3g}" for depth in reliefs]
+    floor = f"floor at {' and '.join(floors)} m" if floors else "no floor"
     grid = f"grid of {box.grid:g} m"
     if "surface" in kinds:
         return f"surface and {floor}; {grid}"

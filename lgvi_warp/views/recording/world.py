@@ -15,6 +15,7 @@ from lgvi_warp.views.choice import finite_rows
 from lgvi_warp.views.recording.drawn import Drawn, quaternion_xyzw
 from lgvi_warp.views.recording.eye import ASPECT, far_pixel
 from lgvi_warp.views.recording.hull import Mesh, hull_of, mesh_of, shape_of
+from lgvi_warp.views.sea_floor import Relief, flat_depths, reliefs
 
 TIMELINE = "sim_time"
 TRAILS = 40
@@ -25,6 +26,10 @@ UNSEEN = 1e-6
 # A hull across the sight is drawn at least so many pixels long and thick, at the far end of what is in view.
 LONG, THICK = 25.0, 5.0
 TRAIL, WATER, SAND, CURRENT = (150, 165, 180, 150), (90, 170, 230, 40), (78, 88, 102, 120), (0, 200, 200)
+# Colours of a floor on a grid, at its deepest and at its shallowest place.
+DEEP, SHALLOW = (52, 60, 76), (176, 152, 112)
+# How far the surface and the floor are drawn beyond the paths, as a part of the diagonal of what is in view.
+AROUND = 0.08
 # Axes are labelled at the corner of the grid.
 AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 255)))
 
@@ -61,6 +66,7 @@ def box_of(runs: list[Drawn]) -> WorldBox:
     narrow = np.maximum(least - (high - low), 0.0)
     low, high = low - 0.5 * narrow, high + 0.5 * narrow
     high[2] = max([high[2], *(floor for run in runs for floor in floors_of(run))])
+    high[2] = max([high[2], *(float(relief.depth.max()) for run in runs for relief in reliefs_of(run, low, high))])
     reach = float(np.linalg.norm(high - low))
     surface = bool(low[2] < 0.5 * reach)
     if surface:
@@ -69,9 +75,14 @@ def box_of(runs: list[Drawn]) -> WorldBox:
 
 
 def floors_of(run: Drawn) -> list[float]:
-    """Depths of the floors of a run's own scene [m], the upper first."""
-    events = run.result.provenance["scene"].get("events", ())
-    return sorted(float(event["depth"]) for event in events if event["type"] == "floor")
+    """Depths of the flat floors of a run's own scene [m], the upper first."""
+    return sorted(flat_depths(run.result.provenance["scene"]))
+
+
+def reliefs_of(run: Drawn, low: np.ndarray, high: np.ndarray) -> list[Relief]:
+    """The floors on grids of a run's own scene, within a box (3,) and around it."""
+    around = AROUND * float(np.linalg.norm(high - low))
+    return reliefs(run.result.provenance["scene"], low[:2] - around, high[:2] + around)
 
 
 def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
@@ -218,7 +229,7 @@ def _planes(recording: Any, run: Drawn, box: WorldBox) -> None:
     """Log the surface and the floor where they are in view, with a grid in metres; unbounded water has no sheet at depth 0."""
     import rerun as rr
 
-    margin = 0.08 * box.size
+    margin = AROUND * box.size
     low, high = box.low - margin, box.high + margin
     floors = floors_of(run)
     planes = [("surface", 0.0, WATER)] * box.surface
@@ -231,12 +242,29 @@ def _planes(recording: Any, run: Drawn, box: WorldBox) -> None:
         points = [(*corner, depth) for corner in corners]
         sheet = rr.Mesh3D(vertex_positions=points, triangle_indices=both_sides, albedo_factor=color)
         log_static(recording, run.path("world", "water", name), sheet)
+    uneven = reliefs_of(run, box.low, box.high)
+    for i, relief in enumerate(uneven):
+        log_static(recording, run.path("world", "water", f"relief_{i}" if i else "relief"), _mesh(relief))
     # Without a floor, a grid below the fleet tells sizes.
-    below = [] if floors else [("depth", high[2], TRAIL)]
+    below = [] if floors or uneven else [("depth", high[2], TRAIL)]
     for name, depth, color in [*planes, *below]:
         lines = _grid(low[:2], high[:2], float(depth), box.grid)
         grid = rr.LineStrips3D(lines, colors=[(*color[:3], 120)], radii=rr.Radius.ui_points(0.5))
         log_static(recording, run.path("world", "water", f"{name}_grid"), grid)
+
+
+def _mesh(relief: Relief) -> Any:
+    """A floor as a mesh seen from both sides, the lighter the shallower."""
+    import rerun as rr
+
+    a, b = relief.depth.shape
+    points = np.stack([*np.meshgrid(relief.north, relief.east, indexing="ij"), relief.depth], axis=-1)
+    corner = (np.arange(a - 1)[:, None] * b + np.arange(b - 1)).reshape(-1, 1)
+    one_side = np.concatenate([corner + np.array(side) for side in ((0, 1, b + 1), (0, b + 1, b))])
+    share = (relief.depth.max() - relief.depth) / max(float(np.ptp(relief.depth)), 1e-9)
+    light = np.array(DEEP) + share.reshape(-1, 1) * np.subtract(SHALLOW, DEEP)
+    return rr.Mesh3D(vertex_positions=points.reshape(-1, 3), vertex_colors=np.round(light).astype(np.uint8),
+                     triangle_indices=np.concatenate([one_side, one_side[:, ::-1]]))  # fmt: skip
 
 
 def _grid(low: np.ndarray, high: np.ndarray, depth: float, step: float) -> list[np.ndarray]:

@@ -3,6 +3,7 @@
 
 import json
 from pathlib import Path
+from unittest.mock import ANY
 
 import pytest
 
@@ -62,7 +63,8 @@ def test_damage_is_listed_to_a_limit(store, options, count, shown, more):
 def test_contents_of_a_folder(tmp_path):
     names = {"result": ["result.npz", "result_part.npz"], "tradeoff": ["tradeoff.json"],
              "sensitivity": ["sensitivity.json"], "stability": ["stability.json", "stability_mass.json"],
-             "sweep": ["sweep.json"], "rare": ["rare.json"], "derivatives": ["derivatives.json"]}  # fmt: skip
+             "sweep": ["sweep.json"], "rare": ["rare.json"], "derivatives": ["derivatives.json"],
+             "margins": ["margins.json"], "worst_case": ["worst_case.json"]}  # fmt: skip
     expected = [Content(kind, tmp_path / name) for kind, found in names.items() for name in found]
     for content in expected:
         content.path.write_text("{}")
@@ -234,7 +236,8 @@ def test_a_run_is_exported_and_reported(tmp_path, capsys):
     write, page, opened = Study(tmp_path / "a.nc"), Study([tmp_path / "report.html", tmp_path / "b.html"]), []
     assert main(["export", "a", "--to", "netcdf", "--out", "b"], write=write) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.nc (0.1 MB)\n"
-    assert write.calls == [((Path("a"), "netcdf", Path("b")), {})]
+    settings = {"members": None, "origin": None, "start": None, "overwrite": False, "progress": ANY}
+    assert write.calls == [((Path("a"), "netcdf", Path("b")), settings)]
     assert main(["report", "a"], write=page, browse=opened.append) == 0
     assert opened == []
     assert capsys.readouterr().out == f"file        {tmp_path}/report.html (0.1 MB)\n"

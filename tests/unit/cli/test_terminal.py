@@ -105,7 +105,7 @@ def test_verbose_says_where_an_error_came_from(capsys):
 
 def test_every_verb_is_of_those_that_write_or_of_those_that_do_not():
     writing = {"run", "resume", "merge", "export", "tradeoff", "sensitivity", "stability", "sweep", "rare",
-               "derivatives", "new", "plot", "report", "view"}  # fmt: skip
+               "derivatives", "margins", "worst-case", "new", "plot", "report", "view"}  # fmt: skip
     assert writing | set(command.READING) == set(command.VERBS) == set(cli.parser().verbs)
     assert not writing & set(command.READING)
 
@@ -231,7 +231,7 @@ def test_bash_completes_verbs_options_values_and_files(bash):
     assert bash("run", "x", "--dtype", "f") == ["float64", "float32", "float32_compensated"]
     assert bash("--color", "ne") == ["never"]
     assert bash("--color", "never", "exp") == ["export"]
-    assert bash("help", "tr") == ["tradeoff"]
+    assert bash("help", "tr") == ["tradeoff", "trim"]
     assert bash("--color", "auto", "run", "--solver", "new") == ["newton"]
     assert bash("check", "sce") == ["scene file.toml"]
     # Readline's words of --method=psi_, and of a list.

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_kernels.laws.thrust_curves import NEWTON_STEPS, START_SIZE
+from lgvi_kernels.laws.thrust_curves import START_SIZE
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.control import pseudo_inverse
-from lgvi_warp.control.pseudo_inverse import inverse_rows
+from lgvi_warp.control import efforts
+from lgvi_warp.control.efforts import inverse_rows
 from lgvi_warp.physics.terms.thrust_curves import side_of_table
 from lgvi_warp.scene import plausibility
 
@@ -128,24 +128,24 @@ def test_the_inverse_of_a_polynomial():
     np.testing.assert_allclose(rows[:2, 1:3], [[14.0, 2.0], [0.25, 0.5]], rtol=1e-15)
     assert rows[2, 0] == rows[2, 1] == 0.0
     assert rows.shape == (3, 4 + START_SIZE)
-    assert pseudo_inverse.START_SIZE == START_SIZE
+    assert efforts.START_SIZE == START_SIZE
     s = np.linspace(0.0, 1.0, 101)
     start = np.polynomial.polynomial.polyval(2.0 * s - 1.0, rows[:2, 4:].T)
     exact = np.sqrt(1.0 + 12.0 * 14.0 * (1.0 - (1.0 - s**2) ** 2)) - 1.0, 3.0 * (1.0 - (1.0 - s**2))
-    # What a polynomial of this degree leaves: Newton's steps square it. The second inverse is a polynomial itself.
+    # What a polynomial of this degree leaves: A step of Halley's cubes it. The second inverse is a polynomial itself.
     np.testing.assert_allclose(start[0], exact[0] / 6.0, atol=3e-4)
     np.testing.assert_allclose(start[1], exact[1] / 6.0, atol=1e-9)
 
 
 def test_the_inverse_of_bluerov2s_polynomial():
-    """As the kernel does it: the start, and Newton's steps."""
+    """As the kernel does it: the start, and a step of Halley's."""
     curve = np.array([8.9, 0.0, 176.0, 0.0, -404.1, 0.0, 389.9, 0.0, -140.3])
     value, slope = np.polynomial.Polynomial([0.0, *curve]), np.polynomial.Polynomial([0.0, *curve]).deriv()
     (inverse, most, top, floor, *start) = inverse_rows(curve[None], np.ones(1))[0]
     t = most * np.linspace(0.0, 1.0, 2001)
     w = np.clip(np.polynomial.Polynomial(start)(2.0 * np.sqrt(1.0 - np.sqrt(1.0 - t * inverse)) - 1.0), 0.0, top)
-    for _ in range(NEWTON_STEPS):
-        w = np.clip(w + (t - value(w)) / np.maximum(slope(w), floor), 0.0, top)
+    short, steep = t - value(w), np.maximum(slope(w), floor)
+    w = np.clip(w + short * steep / np.maximum(steep**2 + 0.5 * short * slope.deriv()(w), 0.5 * steep**2), 0.0, top)
     assert np.abs(value(w) - t).max() < 1e-8 * most
     # The polynomial turns before its limit: beyond the largest thrust the command is that of the turn.
     assert 0.97 < w[-1] < 0.972

@@ -22,6 +22,7 @@ RUDDER = {"type": "control_fins", "position": POINT, "chord": AHEAD, "normal": A
           "drag": 0.02}  # fmt: skip
 # The hull of the vehicle above: 1.6 m long, 0.2 m wide. Its inertia may be 30 (1.6^2 + 0.2^2)/4 = 19.5 kg m2.
 HULL = {"type": "cross_flow", "stations": [-0.8, 0.0, 0.8], "diameters": [0.1, 0.2, 0.1], "drag_coefficient": 1.1}
+LOADS = HULL | {"type": "hull_loads"}
 WEIGHT = 30.0 * 9.80665
 HOT = 1.0 + 1e-6
 
@@ -96,6 +97,10 @@ LIMITED = {
     "rigid body's inertia": (lambda J: scene(full(J), terms=[HULL]), LARGEST / HOT, LARGEST * HOT,
                              "vehicle.rigid_body_mass_matrix"),
     "added inertia": (lambda J: scene(carried(J), terms=[HULL]), STRIPS / HOT, STRIPS * HOT, "vehicle.added_mass_matrix"),
+    "two hulls": (lambda Cd: scene(terms=[HULL, LOADS | {"drag_coefficient": Cd}]), 0.0, 1.1,
+                  "hull_loads.drag_coefficient", "cross_flow", "twice"),
+    "bow and stern": (lambda x: scene(terms=[HULL, LOADS | {"drag_coefficient": 1.1, "stations": [x, x + 0.1, 2.0]}]), 0.8,
+                      0.7, "hull_loads.drag_coefficient", "cross_flow"),
 }  # fmt: skip
 LOOKS = {name: (make(usual), make(odd), words) for name, (make, usual, odd, *words) in LIMITED.items()}
 

@@ -39,6 +39,14 @@ def test_what_a_scene_writes_of_itself_fits(name):
     assert faults(scene.to_dict(), SCHEMA) == []
 
 
+def test_a_current_of_a_file_fits():
+    term = {"type": "current_field", "file": "roms.nc", "origin": [41.5, -70.5], "start": "2024-05-01", "speed": 2.0}
+    content = {"vehicle": {"name": "sphere"}, "terms": [term]}
+    assert faults(content, SCHEMA) == []
+    assert faults({**content, "terms": [term | {"velocity": 1.0}]}, SCHEMA) != []
+    assert faults({**content, "terms": [term | {"fill": 1.0, "speed": "fast"}]}, SCHEMA) != []
+
+
 @pytest.mark.parametrize(("key", "value", "place"), [
     ("vehicle.mas", 1.0, ".vehicle.mas: unknown"),
     ("vehicle.mass", "heavy", ".vehicle.mass: 'heavy' is no number"),
@@ -76,7 +84,7 @@ def test_keys_are_described():
     assert mass == {"type": "number", "description": "Dry mass [kg]. Simple form."}
     floor = next(entry for entry in SCHEMA["properties"]["events"]["items"]["anyOf"]
                  if entry["properties"]["type"] == {"const": "floor"})  # fmt: skip
-    assert floor["properties"]["depth"]["description"] == "Depth of the floor [m]."
+    assert floor["properties"]["depth"]["description"].startswith("Depth of the floor [m]; or a grid of depths")
     assert sorted(floor["required"]) == ["depth", "type"]
 
 

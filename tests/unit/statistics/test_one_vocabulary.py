@@ -31,8 +31,11 @@ def result(scene):
                "angular_velocity": random.normal(size=(K, N, 3))}  # fmt: skip
     none = np.full(N, np.nan)
     status = np.zeros(N, np.uint8)
-    parameters = {name: value[None] for name, value in scene.parameters().items()}
-    return lw.Result(np.arange(float(K)), samples, status, none, none, status, none, none, status, parameters, (), {})
+    parameters = {name: value[None] for name, value in scene.parameters().items()} | {"floor.depth": np.full(1, 9.0)}
+    made_of = {"scene": {"events": [{"type": "floor", "depth": 9.0}]}}
+    return lw.Result(
+        np.arange(float(K)), samples, status, none, none, status, none, none, status, parameters, (), made_of
+    )
 
 
 def other(result, change):
@@ -74,7 +77,8 @@ def test_what_is_not_known_is_known_nowhere(text):
 
 def test_statistics_and_sensitivity_have_the_same_numbers(result):
     members = SimpleNamespace(parameters=result.parameters, count=N)
-    samples = type("Samples", (dict,), {"time": result.time, "terms": ()})(result.samples)
+    known = {"time": result.time, "terms": (), "events": (lw.events.Floor(depth=9.0),)}
+    samples = type("Samples", (dict,), known)(result.samples)
     for text in AT_EACH_TIME:
         values = quantity("of", text)(samples, members)
         np.testing.assert_array_equal(quantities(text)[0].values(result), values[-1].T, err_msg=text)

@@ -10,14 +10,20 @@ from lgvi_kernels import device
 from lgvi_kernels.law import *
 
 
+@wp.func
+def by_component(a: Any, b: Any):
+    return vec3(a.x * b.x, a.y * b.y, a.z * b.z)
+
+
 @functools.cache
 def made(features):
     """The code of the first place, "begin", which notes the demand so far, or of the second, "end"."""
     ends = "end" in features
 
     def params(width, real):
-        """Params: the factor; first of six rows of the memory that both share."""
-        return struct("LoopGain", **({"factor": lane(width, real)} if ends else {}), demand=wp.int32)
+        """Params: factors on force and torque by component; first of six rows of the memory that both share."""
+        factors = dict.fromkeys(("of_force", "of_torque"), lane3(width, real)) if ends else {}
+        return struct("LoopGain", **factors, demand=wp.int32)
 
     @wp.func
     def begin(w: Any, r: Any, y: Any, p: Any):
@@ -35,8 +41,8 @@ def made(features):
         at = p.demand
         force = vec3(remembered(y, at), remembered(y, at + 1), remembered(y, at + 2))
         torque = vec3(remembered(y, at + 3), remembered(y, at + 4), remembered(y, at + 5))
-        w.force = force + p.factor * (w.force - force)
-        w.torque = torque + p.factor * (w.torque - torque)
+        w.force = force + by_component(p.of_force, w.force - force)
+        w.torque = torque + by_component(p.of_torque, w.torque - torque)
         return w
 
     return device(__name__, features, params=params, control=end if ends else begin)

@@ -8,16 +8,13 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.law import *
+from lgvi_kernels.laws.control.efforts import ROWS, make_size_for
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
-from lgvi_kernels.laws.thrust_curves import polynomial_inverse
 
 # For each set of channels that may be lost together, the empty one first: rows of rest.py, and the lines (6) of the
-# pseudo-inverse, one a channel. Then for each channel: the wrench of a unit of effort (6), limit of the command, coefficient
-# ahead and astern, dead band, the time from which it is known to be lost, what this adds to the number of the set, and the
-# largest effort ahead and astern, without the coefficient. Then the curves and their inverses.
-ROWS = 14
+# pseudo-inverse, one a channel. Then the rows of each channel (efforts.py), the curves and their inverses.
 REST = rest_rows
 
 
@@ -39,26 +36,11 @@ def positive3(a: Any, b: Any, c: Any):
 
 @functools.cache
 def made(features):
-    """The allocation for efforts that are "linear" in the command, its "square", a "polynomial" or a "table".
+    """The allocation for efforts as of efforts.py.
 
     The feature "lost" says that channels may be known to be lost.
     """
-    loses, linear = "lost" in features, "linear" in features
-    tables, polynomials = "table" in features, "polynomial" in features
-
-    @wp.func
-    def size_for(y: Any, p: Any, i: int, t: Any, side: Any):
-        """The size of the command, less the dead band, for an effort of size t; side: above 0 for ahead."""
-        w = t
-        if wp.static(polynomials):
-            first = p.first + p.shared
-            w = polynomial_inverse(y, first + 2 * p.size, p.size, first, t, side, p.sided)
-        elif wp.static(tables):
-            inverse = p.first + p.shared + (p.count + 2 * i) * (1 + 3 * p.size)
-            w = positive(side, table1(y, inverse, p.size, t), table1(y, inverse + 1 + 3 * p.size, p.size, t))
-        elif wp.static(not linear):
-            w = root(t)
-        return w
+    loses, size_for = "lost" in features, make_size_for(features)
 
     @wp.func
     def allocate_efforts(w: Any, y: Any, p: Any):

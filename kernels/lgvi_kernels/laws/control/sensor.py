@@ -13,7 +13,7 @@ from lgvi_kernels.laws.control.readings import make_reading, remember3, remember
 
 # Features that draw random numbers, and those by which a reading is not that of its own tick.
 DRAWING = ("noise", "drift", "dropout")
-KEEPING = ("every", "latency", "dropout")
+KEEPING = ("every", "latency", "dropout", "deepest")
 
 
 # Not inlined, for the sake of the compiler: a scene may have many sensors.
@@ -21,6 +21,16 @@ KEEPING = ("every", "latency", "dropout")
 def drawn(like: Any, key: Any, tick: int, stream: int):
     """Four standard normals of a tick, side by side."""
     return normals(like, key.member, tick, key.channel + stream, key.seed0, key.seed1)
+
+
+@wp.func
+def is_due(tick: int, every: Any):
+    """1 at each `every`-th tick, else 0."""
+    unity = ones(every)
+    half = every.dtype(0.5) * unity
+    now = every.dtype(tick) * unity
+    rest = now - every * below((now + half) / every)
+    return positive(half - rest, unity, unity - unity)
 
 
 @wp.func
@@ -118,6 +128,7 @@ def made(features):
     features: what it reads (see readings.py), its numbers that are not idle, and "given" where the call gives its normals.
     """
     of, *others = features
+    handed, deep = "handed" in others, "deepest" in others
     reading = make_reading(of)
     count, values, with_values, shifted = reading.count, reading.values, reading.with_values, reading.shifted
     biased, noisy, drifting, quantised, rare, late, lossy = (
@@ -125,12 +136,12 @@ def made(features):
     )
     listed = "given" in others and any(name in others for name in DRAWING)
     draws = not listed and any(name in others for name in DRAWING)
-    keeps = any(name in others for name in KEEPING)
+    keeps = any(name in others for name in KEEPING) and not handed
     kept = make_kept(reading, drifting, rare, late)
     given = make_given(count, noisy, drifting, lossy) if listed else kept
 
-    def params(width, real):
-        """Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings that it keeps.
+    def fields(width, real):
+        """Of Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings it keeps.
 
         Its rows: the walk; how many ticks the last reading is old; that of this tick; `sets` readings, the latest first.
         """
@@ -142,13 +153,33 @@ def made(features):
             from lgvi_kernels.lanes.given_draws import given_ticks
 
             key = {"key": given_ticks()}
-        return struct("Sensor", **vectors, **lanes, **key, memory=wp.int32, sets=wp.int32)
+        words = {"memory": wp.int32, "sets": wp.int32} | ({"handed": wp.int32} if handed else {})
+        return vectors | lanes | key | words
+
+    def params(width, real):
+        return struct("Sensor", **fields(width, real))
+
+    @wp.func
+    def hand_on(y: Any, p: Any, lost: Any):
+        """Write the reading for an estimator, and 1 where it is new."""
+        unity = ones(y.position.x)
+        fresh = unity
+        if wp.static(rare):
+            fresh = is_due(y.tick, p.every)
+        v = values(y)
+        if wp.static(count == 1):
+            remember(y, p.handed, v.x)
+        else:
+            remember3(y, p.handed, v)
+        remember(y, p.handed + wp.static(count), positive(lost, unity - unity, fresh))
 
     @wp.func
     def measure(y: Any, p: Any):
         """The truth, plus bias, walk and noise, rounded to the quantum; then what has arrived of it."""
         unity = ones(y.position.x)
         zero = unity - unity
+        if wp.static(handed):
+            before = y
         e = vec3(zero, zero, zero)
         lost = zero
         if wp.static(biased):
@@ -173,12 +204,17 @@ def made(features):
                     remember3(y, p.memory, walks + spread * (p.drift * steps))
         if wp.static(listed):
             e, lost = given(y, p, e)
+        if wp.static(deep):
+            lost = positive(y.position.z - p.deepest, unity, lost)
         if wp.static(biased or noisy or drifting):
             y = shifted(y, e)
         if wp.static(quantised):
             y = with_values(y, on_grid(values(y), p.quantum))
         if wp.static(keeps):
             y = kept(y, p, lost)
+        if wp.static(handed):
+            hand_on(y, p, lost)
+            y = before
         return y
 
-    return device(__name__, features, params=params, measure=measure)
+    return device(__name__, features, params=params, fields=fields, measure=measure)

@@ -20,9 +20,26 @@ def params(width, real):
 
 
 @functools.cache
+def range_params(width, real):
+    """Params of an altimeter's fault: first step, gain and offset of each lane; row of the reading."""
+    Lane = lane(width, real)
+    return struct("RangeFault", begin=Lane, gain=Lane, offset=Lane, row=wp.int32)
+
+
+@wp.func
+def measure_range(y: Any, p: Any):
+    """As any sensor's fault, of the reading of an altimeter."""
+    reading = remembered(y, p.row)
+    remember(y, p.row, positive(since(y, p.begin), p.gain * reading + p.offset, reading))
+    return y
+
+
+@functools.cache
 def made(features):
-    """The device code of a fault of a sensor, which reads what the only feature names (see readings.py)."""
+    """The device code of a fault of a sensor, which reads what the only feature names (see readings.py), or "range"."""
     of = features[0]
+    if of == "range":
+        return device(__name__, features, params=range_params, measure=measure_range)
     reading = make_reading(of)
     values, with_values = reading.values, reading.with_values
 

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The energy used reaches the capacity of a battery."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import *
+
+
+@functools.cache
+def params(width, real):
+    """Params: capacity [J]; where the energy used lies in the memory."""
+    return struct("Battery", capacity=lane(width, real), account_row=wp.int32)
+
+
+@wp.func
+def distance(view: Any, p: Any):
+    """Energy left [J]: near the end, all digits of the sum and of its low part."""
+    return (p.capacity - remembered(view, p.account_row)) - remembered(view, p.account_row + 1)

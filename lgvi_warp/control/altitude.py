@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Guidance at an altitude above the sea floor."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.declared import word
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.altimeter import Altimeter, unit
+from lgvi_warp.control.base import Guidance
+from lgvi_warp.control.over_floor import chosen, packed_over, with_floor
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, own
+
+SOURCES = ("altimeter", "chart")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Altitude(Guidance):
+    """An altitude above the sea floor: the wanted depth is that of the floor less the altitude, so that depth laws follow it.
+
+    By an altimeter the floor's depth is the measured depth and what the measured attitude makes of the reading: where the beam
+    meets the floor. A beam that looks ahead makes the vehicle climb before a slope. Without an echo the vehicle goes deeper
+    until there is one. By the chart the floor's depth is that of the scene's floor at the measured place, or `look_ahead`
+    ahead of it where that is shallower.
+
+    Args:
+        altitude: Wanted altitude [m], above 0.
+        source: "altimeter", the default, or "chart".
+        altimeter: Name of the altimeter; "" by default, for the only one of the controller.
+        floor: Name of the floor of the chart; "" by default, for the only one of the scene.
+        look_ahead: How far ahead the chart is looked up as well, along the heading [m]; 0 by default.
+        shallowest: Least depth that is wanted [m]; 0 by default.
+        deepest: Largest depth that is wanted [m]; 12,000 by default.
+
+    Raises:
+        SceneError: Where `shallowest` is below `deepest`, or `look_ahead` is given without the chart; and as `Term`. A scene
+            refuses it where the altimeter or the floor is missing.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.control.Altitude(altitude=5.0, source="chart", look_ahead=10.0).gives
+        ('depth',)
+    """
+
+    type: ClassVar[str] = "altitude"
+    # The altimeter or the floor; set for a part of a scene.
+    sounder: ClassVar[Any] = None
+    ground: ClassVar[Any] = None
+
+    altitude: Any = number((), "m", above=0.0)
+    source: str = word("altimeter", known=SOURCES)
+    altimeter: str = ""
+    floor: str = ""
+    look_ahead: Any = number((), "m", 0.0, least=0.0)
+    shallowest: Any = number((), "m", 0.0)
+    deepest: Any = number((), "m", 12_000.0)
+
+    def check(self, faults: Faults) -> None:
+        if self.shallowest > self.deepest:
+            remedy = f"give at most deepest = {float(self.deepest):g}"
+            faults.add("shallowest", float(self.shallowest), "is below deepest", remedy)
+        if self.source == "altimeter" and self.look_ahead > 0.0:
+            remedy = 'give source = "chart", or let the beam look ahead: direction = [1, 0, 1] of the altimeter'
+            faults.add("look_ahead", float(self.look_ahead), "is given beside an altimeter", remedy)
+
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        bad = super().unphysical(numbers)
+        return bad | {"shallowest": bad["shallowest"] | (numbers["shallowest"] > numbers["deepest"])}
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        return ("depth",)
+
+    def in_scene(self, faults: Faults, events: Sequence[Term], sensors: Sequence[Any]) -> Any:
+        if self.source == "chart":
+            return with_floor(self, faults, events)
+        able = [sensor for sensor in sensors if isinstance(sensor, Altimeter)]
+        remedy = 'give [[controller.sensors]] type = "altimeter", or source = "chart"'
+        part = copy.copy(self)
+        where = f"{self.key}.altimeter"
+        object.__setattr__(part, "sounder", chosen(faults, where, self.altimeter, able, "altimeter", remedy))
+        return part
+
+    def device_in(self, aligned: bool) -> Any:
+        return f"altitude:{self.source}"
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        values = {name: numbers[name] for name in ("altitude", "shallowest", "deepest")}
+        if self.source == "chart":
+            return packed_over(self.ground, context, values | {"look_ahead": numbers["look_ahead"]})
+        beam = own(self.sounder, context.parameters)
+        row = {"row": self.bus.ranges[self.sounder.key]}
+        return Packed(values | {"beam": unit(beam["direction"]), "point": beam["point"]} | row)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What parts of a controller know of the sea floor of their scene."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.physics.terms.base import Packed, PackingContext, Term, own
+from lgvi_warp.physics.terms.floor import Floor
+
+
+def chosen(faults: Faults, where: str, name: Any, able: Sequence[Term], what: str, remedy: str) -> Any:
+    """The one of some things that a name says, or the only one for ""; None after adding a fault to `where`."""
+    keys = [thing.key for thing in able]
+    if name and name not in keys:
+        faults.add(where, name, f"is no {what} of the scene", closest(str(name), keys) if keys else remedy)
+    elif not name and len(able) != 1:
+        article = "an" if what[0] in "aeiou" else "a"
+        problem = f"does not say which of {len(able)} {what}s" if able else f"needs {article} {what}"
+        faults.add(where, name, problem, f"name one: {', '.join(keys)}" if able else remedy)
+    else:
+        return next(thing for thing in able if name in ("", thing.key))
+    return None
+
+
+def with_floor(part: Any, faults: Faults, events: Sequence[Term]) -> Any:
+    """A copy of a part that knows the floor which its field `floor` names."""
+    floors = [event for event in events if isinstance(event, Floor)]
+    remedy = 'give the scene one, such as [[events]] type = "floor", depth = 40.0'
+    part = copy.copy(part)
+    object.__setattr__(part, "ground", chosen(faults, f"{part.key}.floor", part.floor, floors, "floor", remedy))
+    return part
+
+
+def packed_over(ground: Floor, context: PackingContext, values: dict[str, Any]) -> Packed:
+    """What the device code reads that looks the floor's depth up, each member's own, with other values."""
+    return ground.packed_grid(own(ground, context.parameters), values)
+
+
+# A clearance so far below the floor that nothing stops there [m].
+NOWHERE = -1e6
+
+
+def seen_floors(controller: Any, events: Sequence[Any]) -> tuple[Floor, ...]:
+    """The floors that a controller looks at, of all events of its scene, as floors at which no member stops."""
+    parts = controller.parts if controller is not None else ()
+    grounds = {part.ground.key for part in parts if getattr(part, "ground", None) is not None}
+    return tuple(replace(event, clearance=NOWHERE) for event in events if event.key in grounds)

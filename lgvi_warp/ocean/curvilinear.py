@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where places are in a grid of cells with four corners each, such as a turned or a curved grid: how far along y and x."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Cells are looked through until a place is in one; a smooth grid needs a few steps.
+MOST_STEPS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedGrid:
+    """Nodes of a grid in metres to the north and the east, (y, x) each."""
+
+    north: np.ndarray
+    east: np.ndarray
+
+    def fractions(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Numbers of the row and of the column (...) of places, with parts of a cell; beyond the grid too.
+
+        A cell is bilinear in its corners. Newton's method, from the cell whose middle is nearest, goes from cell to cell.
+        """
+        places = np.stack([np.ravel(north), np.ravel(east)], axis=-1)
+        row, column = self._nearest_cells(places)
+        at = np.stack([row + 0.5, column + 0.5], axis=-1)
+        scale = np.max(np.abs(places), initial=1.0)
+        for _ in range(MOST_STEPS):
+            cell, corners = self._cells(at)
+            part = at - cell
+            value, slopes = _bilinear(corners, part)
+            off = value - places
+            if np.max(np.abs(off), initial=0.0) < 1e-12 * scale:
+                break
+            # At most one and a half cells at a time.
+            at = at - np.clip(np.linalg.solve(slopes, off[..., None])[..., 0], -1.5, 1.5)
+        shape = np.shape(north)
+        return at[:, 0].reshape(shape), at[:, 1].reshape(shape)
+
+    def directions(self, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Unit vectors (..., 2), to the north and the east, along which columns and rows are counted at places of the grid."""
+        at = np.stack([np.ravel(rows), np.ravel(columns)], axis=-1)
+        cell, corners = self._cells(at)
+        _, slopes = _bilinear(corners, at - cell)
+        unit = slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
+        shape = (*np.shape(rows), 2)
+        return unit[:, :, 1].reshape(shape), unit[:, :, 0].reshape(shape)
+
+    def _nearest_cells(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        from scipy.spatial import cKDTree
+
+        middles = [0.25 * (x[1:, 1:] + x[1:, :-1] + x[:-1, 1:] + x[:-1, :-1]) for x in (self.north, self.east)]
+        _, index = cKDTree(np.stack([x.ravel() for x in middles], axis=-1)).query(places)
+        row, column = np.divmod(index, middles[0].shape[1])
+        return row, column
+
+    def _cells(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """First corner (n, 2) of the cell that a place is in or next to, and its corners (n, 2, 2, 2): y, x, coordinate."""
+        most = np.array(self.north.shape) - 2
+        cell = np.clip(np.floor(at).astype(int), 0, most)
+        j, i = cell[:, 0], cell[:, 1]
+        nodes = np.stack([self.north, self.east], axis=-1)
+        corners = np.stack([np.stack([nodes[j + a, i + b] for b in (0, 1)], axis=1) for a in (0, 1)], axis=1)
+        return cell, corners
+
+
+def _bilinear(corners: np.ndarray, part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n, 2) in cells, and their slopes (n, 2, 2) along y and along x."""
+    y, x = part[:, 0, None], part[:, 1, None]
+    first, second = corners[:, 0], corners[:, 1]
+    along_x = (first[:, 1] - first[:, 0], second[:, 1] - second[:, 0])
+    low, high = first[:, 0] + x * along_x[0], second[:, 0] + x * along_x[1]
+    slopes = np.stack([high - low, along_x[0] + y * (along_x[1] - along_x[0])], axis=-1)
+    return low + y * (high - low), slopes

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The account of the energy that a vehicle uses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, PackingContext, Term, number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EnergyUse(Term):
+    """The account of the energy used: `energy_used` [J] is the time integral of the hotel load and of the power of all terms.
+
+    Thrusters tell their power by `power` or `shaft_speed`, pumps by `efficiency`; a scene without this term accounts nothing.
+    The sum begins with 0 and goes on where a run goes on. It is a sample, `lw.SaveAt(fields=[..., "energy_used"])`, and a
+    quantity of statistics.
+
+    Args:
+        hotel: Power of all that is always on, computers and sensors [W]; 0 by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> account = lw.terms.EnergyUse(hotel=20.0)
+        >>> scene = lw.Scene.named("remus_100", terms=[account])
+        >>> result = lw.solve(scene, h=0.1, t1=5.0, save=lw.SaveAt(fields=("position", "energy_used")))
+        >>> print(f"{result.samples['energy_used'][-1, 0]:.6g} J")
+        100 J
+    """
+
+    type: ClassVar[str] = "energy_use"
+    accounts: ClassVar[bool] = True
+
+    hotel: Any = number((), "W", 0.0, least=0.0)
+
+    @property
+    def memory(self) -> bool:
+        # The energy used, and the digits that it cannot hold.
+        return True
+
+    @property
+    def conserves(self) -> frozenset[str]:
+        # It does nothing to the motion.
+        return CONSERVED
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        return Packed({"hotel": numbers["hotel"]}, memory=np.zeros((1, 2)))

@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sea floor, flat or on a grid: where it stops members, and how deep it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import Field, dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.status import Status
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, own
+from lgvi_warp.physics.terms.events import Box, Event
+
+# Depths between which the box of a grid lies [m]: beyond any sea.
+ABOVE, BELOW = -1e5, 1e5
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Floor(Event):
+    """Stop where the body's origin sinks to the sea floor: flat, or on a regular grid, where its depth is bilinear.
+
+    Between the nodes of a grid the depth is linear in north and in east; outside, the nearest edge holds. `edges` gives the
+    event that stops members there.
+
+    Args:
+        depth: Depth of the floor [m]; or a grid of depths, (x, y) [m], at the nodes along north and east.
+        origin: Place of the grid's first node, (2,) [m]: north and east; zeros by default.
+        spacing: Distance of the nodes along north and east, (2,) [m]; needed with a grid.
+        clearance: How far above the floor members stop [m]; 0 where it is left out. Give it where it is to vary.
+
+    Raises:
+        SceneError: Where a grid has no spacing, or a flat floor has one; and as `Term`.
+
+    Examples:
+        A slope that falls by 5 m on each 100 m to the north.
+
+        >>> import lgvi_warp as lw
+        >>> lw.Scene.named("remus_100", events=[lw.events.Floor(depth=40.0)]).parameters()["floor.depth"]
+        array(40.)
+        >>> slope = lw.events.Floor(depth=[[20.0, 20.0], [25.0, 25.0]], spacing=[100.0, 100.0])
+        >>> slope.depth_at(60.0, 0.0)
+        array(23.)
+    """
+
+    type: ClassVar[str] = "floor"
+    status: ClassVar[Status] = Status.FLOOR
+    # Keys of a table with the key `file`, in a scene file, beside those of `of_file`.
+    of_file_besides: ClassVar[tuple[str, ...]] = ("file", "clearance", "name")
+
+    depth: Any = number(("x", "y"), "m")
+    origin: Any = number((2,), "m", None, optional=True)
+    spacing: Any = number((2,), "m", None, above=0.0, optional=True)
+    # Absent where it is not given, so that a scene without it has no such parameter.
+    clearance: Any = number((), "m", None, optional=True)
+
+    @classmethod
+    def from_file(
+        cls,
+        file: Any,
+        origin: Any,
+        *,
+        region: Any = None,
+        spacing: Any = None,
+        variable: str | None = None,
+        positive: str = "",
+        fill: str = "refuse",
+        clearance: Any = None,
+        name: str = "",
+    ) -> Self:
+        """Read a floor on a grid from a file: NetCDF in the CF conventions, such as GEBCO's, or a GeoTIFF.
+
+        Args:
+            file: Path of the file, or an xarray Dataset.
+            origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,).
+            region: Least and largest north and east that are read, (2, 2) [m]; by default all that is in the file.
+            spacing: Distances of the nodes that are made along north and east, (2,) [m]; by default as fine as the file's.
+            variable: Name of the variable; by default the one that is a depth of the floor or an elevation.
+            positive: "up" where the numbers are elevations, "down" where they are depths; by default what the variable says,
+                and "up" of a GeoTIFF.
+            fill: What stands where depths are missing: "refuse", the default, nothing; "nearest"; or "zero", land.
+            clearance: How far above the floor members stop [m]; 0 where it is left out.
+            name: As of `Event`.
+
+        Returns:
+            The floor, which holds the depths: nothing looks at the file again.
+
+        Raises:
+            SceneError: Where the file cannot be read, has no floor, or does not cover the region; with the remedy.
+            MissingExtra: Where xarray, rasterio or pyproj is not installed.
+
+        Examples:
+            >>> import lgvi_warp as lw
+            >>> import numpy as np
+            >>> import xarray as xr
+            >>> lat, lon = np.linspace(54.0, 54.1, 25), np.linspace(7.8, 8.0, 49)
+            >>> up = xr.DataArray(np.broadcast_to(-20.0 - 100.0 * (lat[:, None] - 54.0), (25, 49)), dims=("lat", "lon"),
+            ...                   attrs={"standard_name": "height_above_mean_sea_level", "units": "m"})
+            >>> ds = xr.Dataset({"elevation": up}, {"lat": lat, "lon": lon})
+            >>> floor = lw.events.Floor.from_file(ds, (54.05, 7.9), region=[[-2000, 2000], [-1000, 1000]])
+            >>> float(floor.depth_at(0.0, 0.0).round(2))
+            25.0
+        """
+        from lgvi_warp.ocean.floor_data import read_floor
+
+        wanted = cls.of_file()(origin, region, spacing, variable, positive, fill)
+        numbers = read_floor(file, wanted)
+        at = {"depth": numbers.depth, "origin": numbers.origin, "spacing": numbers.spacing}
+        return cls(**at, clearance=clearance, name=name)
+
+    @classmethod
+    def of_file(cls) -> Any:
+        """What a table with the key `file` may have, a class with fields.
+
+        Returns:
+            lgvi_warp.ocean.floor_request.FloorRequest; a scene without a file does not load it.
+        """
+        from lgvi_warp.ocean.floor_request import FloorRequest
+
+        return FloorRequest
+
+    @classmethod
+    def of_table(cls, where: str, table: Mapping[str, Any]) -> Self:
+        """The floor of a file that a table of a scene file names.
+
+        Args:
+            where: The table's place in the scene.
+            table: The key `file`, and those of `from_file` besides.
+
+        Returns:
+            The floor.
+
+        Raises:
+            SceneError: As `from_file`.
+        """
+        values = {key: value for key, value in table.items() if key != "type"}
+        faults = Faults()
+        faults.keys(where, values, [*(item.name for item in dataclasses.fields(cls.of_file())), *cls.of_file_besides])
+        if "origin" not in values:
+            remedy = "give [latitude, longitude] of the origin of the axes [deg]"
+            faults.add(f"{where}.origin", "", "is missing", remedy)
+        faults.raise_if_any()
+        try:
+            return cls.from_file(values.pop("file"), values.pop("origin"), **values)
+        except SceneError as error:
+            raise error.prefixed(f"{where}.") from error
+
+    def __post_init__(self) -> None:
+        if self.on_grid and self.origin is None:
+            object.__setattr__(self, "origin", np.zeros(2))
+        super().__post_init__()
+
+    @functools.cached_property
+    def on_grid(self) -> bool:
+        """Whether the depth is that of a grid."""
+        return np.ndim(np.asarray(self.depth, dtype=object)) > 0
+
+    def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
+        # One number is a flat floor.
+        return () if item.name == "depth" and not self.on_grid else super().shape_of(item)
+
+    def check(self, faults: Faults) -> None:
+        if self.on_grid and self.spacing is None:
+            faults.add("spacing", None, "is missing for a grid of depths", "give the distances of its nodes, (2,) [m]")
+        for name in ("origin", "spacing"):
+            value = getattr(self, name)
+            if value is not None and not self.on_grid:
+                faults.add(name, value, "is given for a floor of one depth", "leave it out, or give a grid of depths")
+
+    def device_in(self, aligned: bool) -> str:
+        return "floor:grid" if self.on_grid else "floor"
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        clearance = numbers.get("clearance", np.zeros(1))
+        if not self.on_grid:
+            return Packed({"depth": numbers["depth"] - clearance})
+        return self.packed_grid(numbers, {"clearance": clearance})
+
+    def packed_grid(self, numbers: Numbers, others: Mapping[str, Any]) -> Packed:
+        """Pack the floor for device code that looks its depth up; a flat one is a grid of one node.
+
+        Args:
+            numbers: The floor's numbers by field, each of shape (n, ...).
+            others: More fields of the device struct.
+
+        Returns:
+            The fields that `lgvi_kernels.cells` reads, with the others, and the rows of depths.
+        """
+        depth, origin, inverse = self._grid(numbers)
+        counts = depth.shape[1:]
+        values = dict(others)
+        for i, axis in enumerate(("north", "east")):
+            values |= {f"origin_{axis}": origin[:, i], f"inverse_{axis}": inverse[:, i]}
+            values[f"last_{axis}"] = np.array([counts[i] - 1.0])
+        # Rows from one node to the next; 0 where there is one node.
+        values |= {"across_north": counts[1] * (counts[0] > 1), "across_east": int(counts[1] > 1)}
+        return Packed(values, depth.reshape(len(depth), -1))
+
+    def _grid(self, numbers: Numbers) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Depths (n, x, y) [m], place of the first node (n, 2) [m], 1 / spacing (n, 2) [1/m]."""
+        if self.on_grid:
+            return numbers["depth"], numbers["origin"], 1.0 / numbers["spacing"]
+        return numbers["depth"][:, None, None], np.zeros((1, 2)), np.ones((1, 2))
+
+    def depth_at(self, north: Any, east: Any, numbers: Numbers | None = None) -> np.ndarray:
+        """The depth of the floor at places.
+
+        Args:
+            north: North of the places [m], of any shape.
+            east: East of them [m], of the same shape.
+            numbers: The floor's numbers by field, each of shape (1 or n, ...), where the last dimension of the places is n
+                members; None, the default, for the floor's own.
+
+        Returns:
+            Depths [m], of the shape of the places.
+
+        Examples:
+            >>> import lgvi_warp as lw
+            >>> lw.events.Floor(depth=[[10.0, 20.0]], spacing=[50.0, 50.0]).depth_at([0.0, 9.0], [25.0, 500.0])
+            array([15., 20.])
+        """
+        if numbers is None:
+            numbers = {name: np.asarray(value)[None] for name, value in self.parameters().items()}
+        return self._looked_up(north, east, numbers)[0]
+
+    def height(self, position: np.ndarray, velocity: np.ndarray, numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
+        """Height above where members stop, and its rate.
+
+        Args:
+            position: Positions (..., n, 3) [m], inertial axes.
+            velocity: Velocities over ground (..., n, 3) [m/s], inertial axes.
+            numbers: The floor's numbers by field, each of shape (1 or n, ...).
+
+        Returns:
+            Heights (..., n) [m] and their rates (..., n) [m/s].
+        """
+        x, y, z = np.moveaxis(position, -1, 0)
+        depth, by_north, by_east = self._looked_up(x, y, numbers)
+        rate = by_north * velocity[..., 0] + by_east * velocity[..., 1] - velocity[..., 2]
+        return depth - numbers.get("clearance", np.zeros(1)) - z, rate
+
+    def _looked_up(self, north: Any, east: Any, numbers: Numbers) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Depths at places, and their slopes to the north and to the east, 0 outside."""
+        depth, origin, inverse = self._grid(numbers)
+        places = np.broadcast_arrays(np.asarray(north, float), np.asarray(east, float))
+        shape, corner, part, steep = places[0].shape, [], [], []
+        for i, place in enumerate(places):
+            last = depth.shape[1 + i] - 1
+            free = np.nan_to_num((place - origin[:, i]) * inverse[:, i])
+            u = np.clip(free, 0.0, last)
+            corner.append(np.clip(u.astype(int), 0, max(last - 1, 0)))
+            part.append(u - corner[i])
+            steep.append(inverse[:, i] * ((free > 0.0) & (free < last)))
+        (i, j), (x, y) = corner, part
+        i1, j1 = np.minimum(i + 1, depth.shape[1] - 1), np.minimum(j + 1, depth.shape[2] - 1)
+        member = np.arange(len(depth)) if len(depth) > 1 else 0
+        e0 = depth[member, i, j1] - depth[member, i, j]
+        e1 = depth[member, i1, j1] - depth[member, i1, j]
+        here, ahead = depth[member, i, j] + y * e0, depth[member, i1, j] + y * e1
+        known = np.where(np.isfinite(places[0]) & np.isfinite(places[1]), 1.0, np.nan)
+        values = (here + x * (ahead - here), steep[0] * (ahead - here), steep[1] * (e0 + x * (e1 - e0)))
+        found = [known * value if shape else (known * value).reshape(()) for value in values]
+        return found[0], found[1], found[2]
+
+    def edges(self, name: str = "edge of the chart") -> Box:
+        """The event that stops members which leave the grid.
+
+        Args:
+            name: Name of the event; "edge of the chart" by default.
+
+        Returns:
+            A box with the corners of the grid, from far above the sea to far below it.
+
+        Raises:
+            SceneError: Where the floor is flat, and has no edges.
+
+        Examples:
+            >>> import lgvi_warp as lw
+            >>> slope = lw.events.Floor(depth=[[20.0, 20.0], [25.0, 25.0]], spacing=[100.0, 100.0])
+            >>> lw.Scene.named("remus_100", events=[slope, slope.edges()]).events[1].upper[:2]
+            array([100., 100.])
+        """
+        if not self.on_grid:
+            faults = Faults(f"{self.key}.")
+            faults.add(
+                "depth", self.depth, "is that of a flat floor, which has no edges", "give a grid, or lw.events.Box"
+            )
+            faults.raise_if_any()
+        far = self.origin + self.spacing * (np.array(self.depth.shape) - 1.0)
+        return Box(name=name, lower=[*self.origin, ABOVE], upper=[*far, BELOW])
+
+
+def altitude_over(events: Sequence[Any], position: np.ndarray, parameters: Numbers) -> np.ndarray:
+    """Height (k, n) [m] of positions (k, n, 3) above the highest floor among the events of a scene.
+
+    parameters: all numbers of the scene by name, each (1 or n, ...). Raises SceneError where there is no floor.
+    """
+    floors = [event for event in events if isinstance(event, Floor)]
+    if not floors:
+        remedy = 'give the scene one, such as [[events]] type = "floor", depth = 40.0, or ask for "depth"'
+        raise refusal("of", "altitude", "needs a floor", remedy)
+    x, y, z = np.moveaxis(position.astype(np.float64, copy=False), -1, 0)
+    heights = [floor.depth_at(x, y, own(floor, parameters)) - z for floor in floors]
+    return np.asarray(np.minimum.reduce(heights))

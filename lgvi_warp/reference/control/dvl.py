@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Doppler velocity log: the velocities along four beams."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.reference.control import Measurement, Part
+from lgvi_warp.reference.random import normals
+from lgvi_warp.reference.rotation import Array
+
+# Azimuth of the beams from the bow, to starboard.
+AZIMUTHS = np.radians([45.0, 135.0, 225.0, 315.0])
+
+
+def beams(angle: float) -> Array:
+    """The directions (4, 3) of the beams, `angle` [rad] from straight down, body axes."""
+    s, c = math.sin(angle), math.cos(angle)
+    return np.stack([s * np.cos(AZIMUTHS), s * np.sin(AZIMUTHS), np.full(4, c)], axis=1)
+
+
+class DVL(Part):
+    """Numbers as those of `lw.control.DVL`; floor [m], the depth of the sea floor, inf for none; keys of its random numbers.
+
+    handed: None, or {name: what is handed on}, shared by sensors and filter.
+    """
+
+    key, handed = "dvl", None
+    place = np.zeros(3)
+    angle, noise, dropout, every = math.radians(30.0), 0.0, 0.0, 1
+    floor, least_range, greatest_range, silent_from, silent_to = math.inf, 0.0, math.inf, math.inf, math.inf
+    seed0 = seed1 = channel = 0
+
+    def begin(self) -> None:
+        """No reading yet."""
+        self.last: Array | None = None
+
+    def locked(self, y: Measurement, directions: Array) -> Any:
+        """Which beams (4,) have an echo from the floor at this tick."""
+        four = normals(self.seed0, self.seed1, y.member, y.tick, self.channel + 1)
+        kept = np.array([0.5 * math.erfc(-z / math.sqrt(2.0)) >= self.dropout for z in four])
+        kept &= not self.silent_from <= y.t < self.silent_to
+        if math.isfinite(self.floor):
+            altitude = self.floor - (y.position + y.R @ self.place)[2]
+            down = directions @ y.R[2]
+            kept &= (down > 0.0) & (self.least_range * down <= altitude) & (altitude <= self.greatest_range * down)
+        return kept & (y.tick % self.every == 0)
+
+    def measure(self, y: Measurement) -> Measurement:
+        """Hand the beams on, or let y have the velocity that follows from three of them or four; else the last one."""
+        directions = beams(self.angle)
+        four = normals(self.seed0, self.seed1, y.member, y.tick, self.channel)
+        along = directions @ (y.velocity + np.cross(y.angular_velocity, self.place)) + self.noise * four
+        kept = self.locked(y, directions)
+        if self.handed is not None:
+            self.handed[self.key] = {"along": along, "fresh": kept}
+            return y
+        if kept.sum() >= 3 or self.last is None:
+            chosen = np.ones(4, bool) if self.last is None else kept
+            self.last = np.linalg.lstsq(directions[chosen], along[chosen], rcond=None)[0]
+        return replace(y, velocity=self.last)

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Allocation within limits: beside SciPy's exact solution of the bounded least squares, demand by demand."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+import lgvi_warp as lw
+from lgvi_warp.control import BoundedLeastSquares, Fault, PosePID, PseudoInverse, SetPoint, StateFeedback
+from tests.support.refusals import refused, says
+
+NAMED = lw.Scene.named("bluerov2_heavy")
+(THRUSTERS,) = (term for term in NAMED.terms if term.type == "thrusters")
+EFFECT = np.concatenate([THRUSTERS.direction, np.cross(THRUSTERS.position, THRUSTERS.direction)], axis=1).T
+ARM = np.sqrt(np.square(EFFECT[3:]).sum() / np.square(EFFECT[:3]).sum())
+# The demand of the law is the place, and the rate about each axis.
+LAW = StateFeedback(K=-np.eye(12)[[0, 1, 2, 9, 10, 11]])
+
+
+def thrust(command):
+    """What a command makes, by the polynomial that the vehicle gives."""
+    return np.sign(command) * np.polynomial.polynomial.polyval(np.abs(command), [0.0, *THRUSTERS.polynomial])
+
+
+MOST = thrust(np.linspace(0.0, 1.0, 100_001)).max()
+
+
+def asked(allocation, demands, dtype="float64", faults=()):
+    """Commands, thrusts and what is told back, of demands (n, 6)."""
+    controller = lw.Controller(
+        period=0.1,
+        guidance=[SetPoint(position=[0.0] * 3, heading=0.0)],
+        laws=[LAW],
+        allocation=[allocation],
+        faults=faults,
+    )
+    scene = lw.Scene.named("bluerov2_heavy", controller=controller)
+    n = len(demands)
+    still = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
+    fleet = lw.Ensemble.from_states(scene, demands[:, :3], *still, demands[:, 3:])
+    save = lw.SaveAt(every=0.1, fields=("command", "demand", "unmet"))
+    result = lw.solve(fleet, "rk4", h=0.1, t1=0.1, dtype=dtype, save=save)
+    command, demand, unmet = (np.float64(getattr(result, name)[0]) for name in save.fields)
+    np.testing.assert_allclose(demand, demands, rtol=1e-6)
+    return command, thrust(command), unmet, demand
+
+
+def drawn(n, size, seed=0):
+    """Demands that some thruster is too weak for in 57 or 97 of 100 cases."""
+    scale = np.abs(EFFECT).sum(axis=1) * 9.0 * size
+    return np.random.default_rng(seed).normal(size=(n, 6)) * scale
+
+
+def nearest(demand, priorities, least=-MOST, most=MOST):
+    """The exact solution by SciPy's active sets, and its errors."""
+    s = np.array(priorities) / [1.0, 1.0, 1.0, ARM, ARM, ARM]
+    limits = np.broadcast_to(least, 8), np.broadcast_to(most, 8)
+    best = np.array([lsq_linear(s[:, None] * EFFECT, s * w, limits, tol=1e-14, method="bvls").x for w in demand])
+    return s, np.linalg.norm(s * (best @ EFFECT.T - demand), axis=1)
+
+
+def compared(allocation, n, size, dtype, priorities=(1.0,) * 6):
+    command, made, unmet, demand = asked(allocation, drawn(n, size), dtype)
+    assert np.all(np.abs(command) <= 1.0)
+    s, best = nearest(demand, priorities)
+    error = np.linalg.norm(s * (made @ EFFECT.T - demand), axis=1)
+    length = np.linalg.norm(s * demand, axis=1)
+    feasible = best < 1e-6 * length
+    return error, best, length, feasible, unmet, made @ EFFECT.T - demand
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize(
+    ("size", "n"), [(1.0, 300), (2.0, 300), *(pytest.param(k, 3000, marks=pytest.mark.slow) for k in (1.0, 2.0))]
+)
+def test_errors_are_those_of_the_exact_solution(size, n, dtype):
+    error, best, length, feasible, unmet, off = compared(BoundedLeastSquares(to="thrusters"), n, size, dtype)
+    assert 0.02 < feasible.mean() < 0.8
+    # The inverse of the polynomial is good to 1e-8 of the largest thrust; float32 to its digits.
+    exact = 1e-7 if dtype == "float64" else 1e-5
+    assert (error[feasible] <= exact * length[feasible]).all()
+    assert (unmet[feasible] == 0.0).all()
+    # Where the best error is small beside the demand, four rounds leave some of it.
+    assert error.mean() <= 1.01 * best.mean()
+    assert (error[~feasible] <= 1.1 * best[~feasible] + exact * length[~feasible]).all()
+    # What is told back is what is missing, but for components below a thousandth of the demand.
+    small = np.abs(off) * [1.0, 1.0, 1.0, *3 * [1.0 / ARM]] <= 1.001e-3 * length[:, None]
+    told = unmet != 0.0
+    np.testing.assert_allclose(unmet[told], -off[told], atol=1e-7 * MOST if dtype == "float64" else 3e-4 * MOST)
+    assert small[~told].all()
+
+
+@pytest.mark.slow
+def test_moments_before_forces():
+    first = (1.0, 1.0, 1.0, 10.0, 10.0, 10.0)
+    error, best, *_ = compared(BoundedLeastSquares(to="thrusters", priorities=first), 3000, 2.0, "float64", first)
+    assert error.mean() <= 1.01 * best.mean()
+    moments = []
+    for priorities in (first, (1.0,) * 6):
+        off = compared(BoundedLeastSquares(to="thrusters", priorities=priorities), 500, 2.0, "float64")[-1]
+        moments.append(np.linalg.norm(off[:, 3:], axis=1).mean())
+    assert moments[0] < 0.5 * moments[1]
+
+
+def test_what_is_within_the_limits_is_the_pseudo_inverses_to_the_last_digit():
+    demands = drawn(64, 0.1)
+    for sweeps in (0, 2):
+        ours = asked(BoundedLeastSquares(to="thrusters", sweeps=sweeps), demands)
+        theirs = asked(PseudoInverse(to="thrusters"), demands)
+        np.testing.assert_array_equal(ours[0], theirs[0])
+        np.testing.assert_array_equal(ours[2], 0.0)
+
+
+@pytest.mark.slow
+def test_the_redistributed_pseudo_inverse_misses_nothing_that_it_can_make():
+    def missed(allocation):
+        error, _, length, feasible, *_ = compared(allocation, 3000, 1.0, "float64")
+        return np.mean(feasible & (error > 1e-2 * length)), error.mean()
+
+    plain, again, best = (
+        missed(allocation)
+        for allocation in (
+            PseudoInverse(to="thrusters"), BoundedLeastSquares(to="thrusters", sweeps=0, rounds=2),
+            BoundedLeastSquares(to="thrusters"),
+        )
+    )  # fmt: skip
+    assert plain[0] > 0.1
+    assert again[0] < 0.005
+    assert best[1] <= again[1] < 0.8 * plain[1]
+
+
+@pytest.mark.parametrize("channels", [(4,), pytest.param((0, 4, 5, 6, 7), marks=pytest.mark.slow)])
+def test_lost_thrusters_make_nothing_however_many(channels):
+    faults = [Fault(name=f"dead_{c}", of="thrusters", channel=c, time=0.0, gain=0.0, known=True) for c in channels]
+    _, made, _, demand = asked(BoundedLeastSquares(to="thrusters"), drawn(200, 1.0), faults=faults)
+    np.testing.assert_array_equal(made[:, list(channels)], 0.0)
+    most = np.where(np.isin(np.arange(8), channels), 1e-12, MOST)
+    s, best = nearest(demand, (1.0,) * 6, -most, most)
+    error = np.linalg.norm(s * (made @ EFFECT.T - demand), axis=1)
+    assert error.mean() <= 1.01 * best.mean()
+
+
+def test_members_beside_others_keep_their_bits():
+    # One that is cut off, and one that is not, in lanes beside each other or alone.
+    demands = np.concatenate([drawn(3, 2.0), drawn(3, 0.1)])
+    together = asked(BoundedLeastSquares(to="thrusters"), demands)[0]
+    for i in (0, 5):
+        np.testing.assert_array_equal(asked(BoundedLeastSquares(to="thrusters"), demands[i : i + 1])[0][0], together[i])
+
+
+def test_a_demand_that_is_no_number_ends_the_member():
+    law = PosePID(kp=[1e200] * 3, kd=[1e200] * 3, kr=[1e308] * 3, kw=[1e308] * 3)
+    controller = lw.Controller(period=0.1, guidance=[SetPoint(position=[1e200, 0.0, 0.0], heading=0.0)], laws=[law],
+                               allocation=[BoundedLeastSquares(to="thrusters")])  # fmt: skip
+    result = lw.solve(lw.Scene.named("bluerov2_heavy", controller=controller), "rk4", h=0.05, t1=0.2)
+    assert "ok" not in result.status.counts()
+
+
+def test_bad_numbers():
+    says(refused(BoundedLeastSquares, to="thrusters", rounds=0), "rounds", "1 or more")
+    says(refused(BoundedLeastSquares, to="thrusters", sweeps=-1), "sweeps", "0 or more")
+    says(refused(BoundedLeastSquares, to="thrusters", priorities=[1.0, 0.0, 1.0, 1.0, 1.0, 1.0]), "priorities")

@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Inertial navigation: IMU, DVL and the error-state filter, against twins, closed forms and what chance allows."""
+
+import dataclasses
+import re
+import tomllib
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+import lgvi_warp as lw
+from lgvi_warp.reference.control import Measurement, imu
+from tests.conftest import ROOT
+from tests.control.bench import measured, scene
+from tests.support.navigating import (
+    BELIEFS,
+    GRAVITY,
+    LOG,
+    ON_BOARD,
+    PERIOD,
+    UNIT,
+    parts,
+    remus,
+    run_twins,
+    twins,
+    voyage,
+)
+from tests.support.pages import blocks
+from tests.support.refusals import refused
+from tests.support.tools import one
+
+H = 0.02
+# A right code misses such a band with a chance of 1e-4.
+TAILS = (5e-5, 1.0 - 5e-5)
+
+
+def fleet(listed, members, seed=0):
+    return lw.Ensemble(scene(listed, period=PERIOD), members, seed)
+
+
+def still(ticks, depth=10.0):
+    """At rest, level, heading north, (ticks, 1, 21)."""
+    truth = np.zeros((ticks, 1, 21))
+    truth[..., 2] = depth
+    truth[..., 3:12] = np.eye(3).reshape(-1)
+    return truth
+
+
+def test_estimates_are_the_twins():
+    truth, listed = voyage(300), parts()
+    seen = measured(fleet(listed, 2), truth, H)
+    for member in range(2):
+        wanted, _ = run_twins(listed, truth, member)
+        assert np.abs(seen[:, member] - wanted).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_estimates_are_the_twins_over_ten_minutes():
+    truth, listed = voyage(6000), parts()
+    seen = measured(fleet(listed, 2), truth, H)
+    wanted, _ = run_twins(listed, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    # What float32 loses: its eps of 16 m is 2e-6 m; sums of 6,000 ticks are corrected by readings.
+    single = measured(fleet(listed, 2), truth, H, "float32")
+    assert np.abs(single[:, 1] - wanted)[:, :3].max() < 1e-4
+
+
+def test_a_log_and_a_gyroscope_without_a_filter_are_the_twins():
+    listed = [lw.control.DVL(**LOG | {"dropout": 0.3, "silent_from": 20.0, "silent_to": 25.0}), lw.control.IMU(**UNIT)]
+    truth = voyage(300)
+    seen = measured(fleet(listed, 2), truth, H)
+    for member in range(2):
+        wanted, _ = run_twins(listed, truth, member)
+        assert np.abs(seen[:, member] - wanted).max() < 1e-12
+    # Silent from 20 s to 25 s: the last velocity stays.
+    assert np.array_equal(seen[200:249, :, 12:15], seen[201:250, :, 12:15])
+
+
+def errors_of(listed, truth, members):
+    """Errors of the position of filters (ticks, members, 3)."""
+    return measured(fleet(listed, members), truth, H)[..., :3] - truth[..., :3]
+
+
+def test_without_a_log_the_position_drifts_as_the_integral_of_the_accelerometers_noise():
+    # At rest, all else known: a walk of the velocity of N^2 T a tick, and the position by the mean of two velocities, so its
+    # variance after k ticks is N^2 T^3 k (4 k^2 - 1) / 12, which goes to N^2 t^3 / 3. The log is silent from 0 s on.
+    density, members, ticks, tiny = 0.01, 1000, 200, 1e-9
+    unit = dict(place=(0.0, 0.0, 0.0), accelerometer_noise=density)
+    start = dict(position_sigma=tiny, velocity_sigma=tiny, attitude_sigma=tiny)
+    listed = parts(
+        (), unit=unit, log_numbers=LOG | {"silent_from": 0.0}, accelerometer_sigma=tiny, gyroscope_sigma=tiny, **start
+    )
+    error = errors_of(listed, still(ticks + 1), members)
+    for k in (10, 100, ticks):
+        variance = density**2 * PERIOD**3 * k * (4 * k**2 - 1) / 12
+        low, high = chi2.ppf(TAILS, 3 * members)
+        assert low < (error[k] ** 2).sum() / variance < high
+        assert abs(variance / (density**2 * (k * PERIOD) ** 3 / 3) - 1.0) < 1 / k**2
+    each = run_twin_filter(listed, still(ticks + 1))
+    assert abs(each.sigma[0] ** 2 / variance - 1.0) < 1e-6
+
+
+def run_twin_filter(listed, truth):
+    """The twin of a filter after the last tick."""
+    each = twins(listed, 0)
+    for part in each:
+        part.begin()
+    for k, row in enumerate(truth[:, 0]):
+        y = Measurement(row[:3], row[3:12].reshape(3, 3), row[12:15], row[15:18], row[18:21], t=k * PERIOD, period=PERIOD,
+                        h=H, step=5 * k, tick=k)  # fmt: skip
+        for part in each:
+            y = part.measure(y)
+    return each[-1]
+
+
+def allan(rates, m):
+    """The overlapping Allan variance of mean rates (ticks, axes) over m ticks."""
+    sums = np.concatenate([np.zeros_like(rates[:1]), np.cumsum(rates, axis=0)])
+    second = sums[2 * m :] - 2.0 * sums[m:-m] + sums[: -2 * m]
+    return (second**2).mean() / (2.0 * m**2)
+
+
+def allan_of(noise, walk, m):
+    """That of white noise of a density, and of a bias that walks from tick to tick (IEEE Std 952-1997, annex C)."""
+    return noise**2 / (m * PERIOD) + walk**2 * PERIOD * (2 * m**2 + 1) / (6 * m)
+
+
+@pytest.mark.parametrize("which", ["gyroscope", "accelerometer"])
+def test_the_allan_deviation_is_as_set(which):
+    noise, walk, ticks, members = 1e-3, 2e-3, 1200, 60
+    if which == "gyroscope":
+        listed = [lw.control.IMU(gyroscope_noise=noise, gyroscope_walk=walk, gyroscope_bias=0.1)]
+        rates = measured(fleet(listed, members), still(ticks + 1), H)[1:, :, 18:21].reshape(ticks, -1)
+    else:
+        rates = np.zeros((ticks, 3 * members))
+        numbers = dict(accelerometer_noise=np.full(3, noise), accelerometer_walk=np.full(3, walk), gravity=GRAVITY)
+        for member in range(members):
+            unit = imu.IMU(**numbers, handed={})
+            unit.begin()
+            for k in range(ticks + 1):
+                unit.measure(
+                    Measurement(np.zeros(3), np.eye(3), *np.zeros((3, 3)), period=PERIOD, tick=k, member=member)
+                )
+                if k:
+                    force = unit.handed["imu"]["gained"] / PERIOD + np.array([0.0, 0.0, GRAVITY])
+                    rates[k - 1, 3 * member : 3 * member + 3] = force
+    for m in (1, 3, 10, 30, 60):
+        # Windows of 2 m ticks that do not overlap are the least that count: so many squares of 3 axes.
+        windows = rates.shape[1] * (ticks // (2 * m))
+        assert abs(allan(rates, m) / allan_of(noise, walk, m) - 1.0) < 4.0 * np.sqrt(2.0 / windows)
+
+
+def test_the_twins_errors_are_as_large_as_it_believes():
+    truth, listed, members = voyage(120), parts(attitude_sigma=0.005, velocity_sigma=0.02), 8
+    belief = np.stack([run_twins(listed, truth, member)[1] for member in range(members)], axis=1)
+    low, high = chi2.ppf(TAILS, 15 * members)
+    for k in (0, 60, 119):
+        assert low < belief[k, :, 0].sum() < high
+    low, high = chi2.ppf(TAILS, belief[..., 2].sum())
+    assert low < belief[..., 1].sum() < high
+
+
+def test_a_beam_whose_way_to_the_floor_is_beyond_its_range_has_no_echo():
+    # 10 m above the floor: 11.55 m along each beam where the vehicle is level; rolled by 0.1 rad, 11.15 m and 12.10 m.
+    level, rolled, c, s = slice(0, 200), slice(200, 400), np.cos(0.1), np.sin(0.1)
+    truth = np.repeat(still(2), 400, axis=1)
+    truth[:, rolled, 3:12] = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]).reshape(-1)
+    log = lw.control.DVL(noise=0.01, floor="ground", greatest_range=11.3)
+    base = scene([lw.control.IMU(), log, lw.control.ErrorStateFilter(dvl="dvl")], period=PERIOD)
+    ground = lw.events.Floor(name="ground", depth=20.0)
+    above = lw.Scene(base.vehicle, base.environment, base.terms, controller=base.controller, events=[ground])
+    seen = measured(lw.Ensemble(above, 400, 0), truth, H)[0, :, 12:15]
+    # The first estimate has errors of 0.1 m/s. Two beams leave them in one direction.
+    known = [(np.linalg.eigvalsh(np.cov(seen[which].T)) < 0.03**2).sum() for which in (level, rolled)]
+    assert known == [0, 2]
+
+
+def test_a_fix_below_the_surface_does_not_count():
+    listed = [lw.control.IMU(), lw.control.Sensor(name="gps", of="position", noise=0.1, deepest=9.0)]
+    listed.append(lw.control.ErrorStateFilter(fix="gps", position_sigma=100.0))
+    for depth, least, most in ((10.0, 50.0, 200.0), (5.0, 0.05, 0.2)):
+        error = errors_of(listed, still(2, depth), 200)[0]
+        assert least < error.std() < most
+
+
+def test_readings_of_members_that_vary():
+    truth, listed = voyage(60), parts(("depth",), position_sigma=1.0)
+    varied = {"cell.noise": np.array([0.02, 0.0, 0.5]), "error_state_filter.start_error": np.array([0.0, 1.0, 5.0])}
+    base = measured(fleet(listed, 3), truth, H)
+    seen = measured(one(scene(listed, period=PERIOD), parameters=varied), truth, H)
+    assert np.abs(seen[0, 0, :2] - truth[0, 0, :2]).max() < 0.05
+    assert not np.array_equal(seen[:, 2], base[:, 2])
+
+
+FAULTS = {
+    "imu": ([lw.control.ErrorStateFilter()], "error_state_filter.imu = 'imu'"),
+    "kind": ([lw.control.Sensor(name="imu", of="depth"), lw.control.ErrorStateFilter()], "is not of type imu"),
+    "noise": ([lw.control.IMU(), lw.control.DVL(), lw.control.ErrorStateFilter(dvl="dvl")], "dvl.noise"),
+    "before": ([lw.control.IMU(), lw.control.Sensor(of="depth"), lw.control.ErrorStateFilter()], "sensors = 'sensor'"),
+    "late": (
+        [lw.control.IMU(), lw.control.Sensor(name="cell", of="depth", noise=0.1, latency=1),
+         lw.control.ErrorStateFilter(depth="cell")],
+        "cell.latency",
+    ),
+    "two on their way": (
+        [lw.control.IMU(), lw.control.Sensor(name="usbl", of="position", noise=0.1, latency=5, every=5),
+         lw.control.ErrorStateFilter(delayed_fix="usbl")],
+        "usbl.latency",
+    ),
+    "after": ([lw.control.ErrorStateFilter(), lw.control.IMU()], "stands before the filter"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_what_does_not_fit_is_said(name):
+    sensors, text = FAULTS[name]
+    with pytest.raises(lw.SceneError, match=text):
+        scene(sensors, period=PERIOD)
+
+
+def test_a_fault_of_a_sensor_that_a_filter_uses_is_refused():
+    with pytest.raises(lw.SceneError, match="hands its readings to an estimator"):
+        scene(parts(("depth",)), [lw.control.Fault(of="cell", time=1.0)], PERIOD)
+
+
+def test_what_a_filter_believes_is_not_there_without_one():
+    with pytest.raises(lw.SceneError, match="error_state_filter"):
+        lw.solve(scene([lw.control.IMU()]), "psi_s", h=H, t1=0.1, save=lw.SaveAt(every=0.1, fields=("nees",)))
+
+
+MOTION = ("position", "attitude", "velocity", "angular_velocity")
+SETTINGS = dict(method="psi_x", h=0.05, threads=1)
+
+
+def sailed(members, t1, every, **settings):
+    """REMUS 100 by IMU, log and depth cell."""
+    ensemble = lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), members, seed=1)
+    saved = (*MOTION, *BELIEFS, "measured_position", "measured_velocity")
+    return lw.solve(ensemble, t1=t1, save=lw.SaveAt(every=every, fields=saved, final=True), **SETTINGS | settings)
+
+
+@pytest.fixture(scope="module")
+def voyages():
+    return sailed(200, 20.0, 0.5)
+
+
+def test_filters_of_an_ensemble_are_consistent(voyages):
+    judged = lw.metrics.consistency(voyages, level=0.999)
+    assert judged.nees_share == 1.0
+    assert judged.nis_share > 0.95
+    assert "200 filters at 41 times, 99.9 % bands" in repr(judged)
+    # NEES by the truth that the run saved, from the sigmas alone, is that of each state apart.
+    error = (voyages.measured_position - voyages.position)[-1]
+    size = (error**2 / voyages.estimate_sigma[-1, :, :3] ** 2).mean(axis=0)
+    low, high = chi2.ppf(TAILS, 200) / 200
+    assert np.all((low < size) & (size < high))
+
+
+def test_bands_are_those_of_chi_square(voyages):
+    judged = lw.metrics.consistency(voyages)
+    # The normal approximation of Wilson & Hilferty (1931) of the chi-square distribution.
+    for degrees, band in ((15 * 200, 200 * judged.nees_band[0]), (voyages.nis_count[0].sum(), None)):
+        spread = 2.0 / (9.0 * degrees)
+        ends = degrees * (1.0 - spread + np.array([-1.959964, 1.959964]) * np.sqrt(spread)) ** 3
+        mine = voyages.nis_count[0].sum() * judged.nis_band[0] if band is None else band
+        assert np.abs(mine / ends - 1.0).max() < 1e-4
+    with pytest.raises(lw.SceneError, match="level = 95"):
+        lw.metrics.consistency(voyages, level=95)
+
+
+def test_what_a_filter_believes_is_a_quantity_of_statistics(voyages):
+    ensemble = lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1)
+    run = lw.solve(ensemble, t1=2.0, save=lw.SaveAt(every=0.5, fields=("nees",)), **SETTINGS,
+                   statistics=[lw.statistics.Mean("nees"), lw.statistics.Mean("estimate_sigma")])  # fmt: skip
+    assert np.array_equal(run.nees, voyages.nees[:5])
+    assert abs(run.statistics["mean nees"].value[-1, 0] - voyages.nees[4].mean()) < 1e-9
+
+
+def test_a_filter_goes_on_where_a_run_ended(voyages):
+    first = sailed(200, 10.0, 0.5)
+    on = lw.solve(lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1), start=first.final, t1=20.0,
+                  save=lw.SaveAt(every=0.5, fields=("position", "nees")), **SETTINGS)  # fmt: skip
+    assert np.array_equal(on.nees[-1], voyages.nees[-1])
+    assert np.array_equal(on.position[-1], voyages.position[-1])
+
+
+@pytest.mark.slow
+def test_ten_thousand_filters_are_consistent():
+    judged = lw.metrics.consistency(sailed(10_000, 60.0, 1.0))
+    assert judged.nees_share >= 0.9
+    assert judged.nis_share >= 0.85
+
+
+@pytest.mark.slow
+def test_in_float32_filters_stay_consistent():
+    judged = lw.metrics.consistency(sailed(2000, 60.0, 1.0, dtype="float32"), level=0.999)
+    assert judged.nees_share == 1.0
+    assert judged.nis_share > 0.95
+
+
+@pytest.mark.slow
+def test_check_controller_covers_the_parts():
+    # As large as the random ticks that it makes: else their errors are a million sigmas, and NEES loses as many digits.
+    loud = dict.fromkeys(("accelerometer_noise", "gyroscope_noise", "accelerometer_walk", "gyroscope_walk"), 3.0)
+    spread = dict.fromkeys(("position", "velocity", "attitude", "accelerometer", "gyroscope"), 3.0)
+    listed = parts(
+        unit=UNIT | loud, log_numbers=LOG | {"noise": 3.0}, **{f"{name}_sigma": s for name, s in spread.items()}
+    )
+    base = scene(listed, period=PERIOD)
+    for part in (listed[-1], listed[0], listed[1], listed[4]):
+        report = lw.laws.check_controller(part, scene=base)
+        assert report.ok, report
+    for part in (lw.control.IMU(**UNIT), lw.control.DVL(**LOG)):
+        assert lw.laws.check_controller(part).ok
+
+
+def test_the_page_has_all_keys_and_its_blocks_run(capsys):
+    page = "docs/controllers/navigation.md"
+    text = (ROOT / page).read_text()
+    for kind in (lw.control.IMU, lw.control.DVL, lw.control.ErrorStateFilter):
+        assert {item.name for item in dataclasses.fields(kind)} - {"name"} <= set(re.findall(r"`(\w+)`", text))
+    listed = tomllib.loads("\n".join(blocks(page, "toml")))["controller"]["sensors"]
+    base = remus(listed)
+    assert base.parameters()["gps.deepest"] == 0.3
+    assert base.controller.sensors[-1].uses["delayed_fix"] == "usbl"
+    fleet = lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1)
+    (code,) = blocks(page, "python")
+    exec(code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.05, threads=1'), {"lw": lw, "fleet": fleet})
+    assert "Consistency of 200 filters at 2 times" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "study", [lambda a: lw.linear.margins(a), lambda a: lw.linear.linearize(a, 1.0, closed=True, h=H)]
+)
+def test_a_filter_has_no_linear_model(study):
+    told = refused(study, scene(parts(), period=PERIOD))
+    assert "leave it out of this scene" in told
+    assert "error_state_filter" in told

@@ -9,6 +9,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 # Table -> the page that it writes into, between the marks of its name.
 PAGES = {
+    "bars": "docs/guide/beside_others.md",
     "charts": "docs/explain/how_it_is_fast.md",
     "coupled": "docs/explain/coupled_inertia.md",
     "drift": "docs/explain/long_runs.md",
@@ -20,6 +21,7 @@ PAGES = {
     "rare": "docs/guide/rare_events.md",
     "roofline": "docs/reference/roofline.md",
     "sampling": "docs/reference/sampling_costs.md",
+    "sizes": "docs/start/install.md",
     "solver": "docs/explain/solvers.md",
     "term": "docs/reference/term_costs.md",
 }

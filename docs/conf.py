@@ -2,8 +2,10 @@
 """The documentation site: `make docs` builds it, without network, from the Markdown pages and the docstrings."""
 
 import inspect
+import os
 import re
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +22,21 @@ import lgvi_warp as lw  # noqa: E402
 
 project = "lgvi_warp"
 version = release = lw.__version__
-extensions = ["myst_nb", "sphinx.ext.autodoc"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_design"]
 exclude_patterns = ["index.md"]
 html_theme = "furo"
+html_static_path = ["site_parts/static"]
+html_css_files = ["site.css"]
+html_search_scorer = str(DOCS / "site_parts/static/scorer.js")
+templates_path = ["site_parts/templates"]
+SOURCE = tomllib.loads((DOCS.parent / "pyproject.toml").read_text())["project"]["urls"]["Source"]
+html_theme_options = {"source_repository": SOURCE, "source_branch": "main", "source_directory": "docs/"}
+# Versions that are published beside this one, newest first: `LGVI_WARP_SITES="0.2.0 0.1.0" make docs`.
+html_context = {"sites": os.environ.get("LGVI_WARP_SITES", "").split()}
+html_sidebars = {"**": [
+    "sidebar/brand.html", "versions.html", "sidebar/search.html", "sidebar/scroll-start.html", "sidebar/navigation.html",
+    "sidebar/scroll-end.html", "sidebar/variant-selector.html",
+]}  # fmt: skip
 html_title = f"lgvi_warp {release}"
 html_show_sphinx = html_show_copyright = False
 html_copy_source = False

@@ -3,7 +3,7 @@
 
 from lgvi_warp.common.doors import names_in_stub as _names_in_stub
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__, __getattr__, _ = _names_in_stub(__name__)
 

@@ -20,3 +20,4 @@ from lgvi_warp.views.plots.tracks import paths as paths
 from lgvi_warp.views.plots.tracks import phase as phase
 from lgvi_warp.views.plots.tracks import plan_view as plan_view
 from lgvi_warp.views.plots.tradeoffs import tradeoff as tradeoff
+from lgvi_warp.views.recording.movie import movie as movie

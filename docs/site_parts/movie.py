@@ -7,12 +7,9 @@ Vulkan driver; `apt-get install mesa-vulkan-drivers` has one for the CPU.
 
 from __future__ import annotations
 
-import io
 import sys
 import tempfile
-import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,11 +17,6 @@ ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "kernels")]
 MOVIE = ROOT / "docs" / "gallery" / "fleet.webp"
 FRAMES, PERIOD = 40, 120  # number, ms
-WINDOW, SIZE = "1100x700", (880, 515)  # pixels of the window, and of the picture
-# The part of the window that is no bar of the viewer: left, top, right, bottom.
-INSIDE = (0, 28, 1100, 672)
-# Seconds that the viewer takes to lay itself out, and to show another time.
-SETTLED, DRAWN = 4.0, 0.3
 
 
 def record(path: Path) -> np.ndarray:
@@ -54,41 +46,17 @@ def record(path: Path) -> np.ndarray:
     return np.asarray(result.time)
 
 
-def shoot(path: Path, times: np.ndarray, folder: Path) -> list[Any]:
-    """Take pictures of a recording at some times, in a viewer without a window.
-
-    Args:
-        path: The recording.
-        times: The times [s].
-        folder: Where the viewer writes its log.
-
-    Returns:
-        The pictures.
-    """
-    from PIL import Image
-
-    from tests.support.viewer import TIMELINE, viewer
-
-    frames = []
-    with viewer(folder, WINDOW) as window:
-        window.open(path)
-        time.sleep(SETTLED)
-        for when in times:
-            window.client.set_time(TIMELINE, duration=float(when), play_state="paused")
-            time.sleep(DRAWN)
-            picture = Image.open(io.BytesIO(window.client.take_screenshot())).convert("RGB")
-            frames.append(picture.crop(INSIDE).resize(SIZE, Image.Resampling.LANCZOS))
-    return frames
-
-
 def main() -> None:
     """Write the moving picture."""
     from site_parts.pictures import digest
 
+    from lgvi_warp.views.recording import movie
+
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         times = record(folder / "fleet.rrd")
-        frames = shoot(folder / "fleet.rrd", np.linspace(times[0], times[-1], FRAMES), folder)
+        shown = movie.of_recording(folder / "fleet.rrd", np.linspace(times[0], times[-1], FRAMES), folder)
+        frames = list(shown)
     look = {"duration": PERIOD, "loop": 0, "quality": 70, "method": 6, "xmp": digest(Path(__file__)).encode()}
     frames[0].save(MOVIE, save_all=True, append_images=frames[1:], **look)
     print(f"{MOVIE.name}: {len(frames)} frames, {MOVIE.stat().st_size / 1e6:.2f} MB")

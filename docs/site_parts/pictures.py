@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 LGVI = (sys.executable, "-m", "lgvi_warp")
 KEPT = (sys.executable, "-m", "benchmarks", "table", "fronts", "--kept")
+BARS = (sys.executable, "-m", "benchmarks", "table", "bars", "--kept")
 
 
 class Made(NamedTuple):
@@ -48,6 +49,12 @@ def of_script(script: str, *options: str) -> Made:
     return Made(sources_of(ROOT / script), (sys.executable, script, *options, "{}/picture.png"), "picture.png")
 
 
+def of_example(script: str, file: str) -> Made:
+    """A picture that an example writes into the folder where it runs."""
+    inside = "import os, runpy, sys; os.chdir(sys.argv[2]); runpy.run_path(sys.argv[1], run_name='__main__')"
+    return Made(sources_of(ROOT / script), (sys.executable, "-c", inside, str(ROOT / script), "{}"), file)
+
+
 FRONTS = "benchmarks/fronts_picture.py"
 STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out", "{}")
 SWEEP = "examples/sweeps/depth_gain_map.toml"
@@ -59,8 +66,10 @@ MADE = {
     "controllers/lost_bottom.png": of_script("examples/controllers/lost_bottom.py"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),
+    "guide/beside_others.png": Made(("benchmarks/rows/bars.json", "benchmarks/bars_picture.py"), BARS),
     "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
     "guide/glider_in_an_eddy.png": of_script("examples/studies/glider_in_an_eddy.py"),
+    "guide/where_to_search.png": of_example("examples/where_to_search.py", "where_to_search.png"),
     "guide/tune_worst_5_percent.png": of_script("examples/sweeps/tune_worst_5_percent.py"),
     **{
         f"guide/stability_{name}.png": Made(("examples/paper.toml", *room("plots")), STABILITY, f"stability_{name}.png")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.folders import Content, contents
-from lgvi_warp.cli.output import Part, tell
+from lgvi_warp.cli.output import Part, print_faults, tell
 from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.verb import as_verb
@@ -21,27 +21,33 @@ def view_arguments(verb: Any) -> None:
     verb.add_argument("dir", metavar="DIR", type=Path, help="the folder of a run, a store, or a result.npz")
     verb.add_argument("--members", metavar="LIST", help="draw these members, as 3,17 (default: a fair choice of 1,000)")
     verb.add_argument("--out", metavar="FILE", type=Path, help="write the recording there, and open no viewer")
+    movie = "write a moving picture there (.webp, .gif, .png), and open no viewer"
+    verb.add_argument("--movie", metavar="FILE", type=Path, help=movie)
 
 
 @as_verb("view", "look at a run in the rerun viewer", view_arguments)
 def view(chosen: argparse.Namespace, *, viewer: Part = None, log: Part = None) -> int:
     """Run the verb view: open a run in the rerun viewer, or write its recording."""
     members, content = indices(chosen.members), run_in(chosen.dir)
-    if chosen.out is not None:
-        place_of(chosen.out)  # before the run is read: a fault of the recording is none of the run
-    result = content.load()
+    files = [path for path in (chosen.out, chosen.movie) if path is not None]
+    for path in files:
+        place_of(path)  # before the run is read: a fault of the recording is none of the run
+    result, notes = content.load(), []
+    from lgvi_warp.views.recording import movie
     from lgvi_warp.views.recording.rerun import record, show
 
     try:
         with progress_bar(chosen.quiet, "drawing"), content.understood():
-            if chosen.out is None:
+            if not files:
                 (viewer or show)(result, members=members)
-            else:
+            if chosen.out is not None:
                 (log or record)(result, chosen.out, members=members)
+            if chosen.movie is not None and movie.write(result, chosen.movie, members=members) == "plot":
+                notes.append(f"{chosen.movie}: is drawn plainly, since the viewer cannot draw on this machine")
     except NothingToDraw as error:
         raise SceneError([str(error)]) from None
-    files = [] if chosen.out is None else [chosen.out]
     tell(chosen, lambda: {"files": files}, lambda: "\n".join(map(file_line, files)))
+    print_faults(notes)
     return 0
 
 

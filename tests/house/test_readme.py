@@ -12,20 +12,28 @@ from tests.support.pages import blocks, snippets
 matplotlib.use("Agg")
 
 
-def test_readme(monkeypatch, capsys):
-    monkeypatch.chdir(ROOT)
+def test_readme(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     _, code, output = snippets("README.md", "python")[0]
     exec(code, {})
     assert capsys.readouterr().out == output
-    assert output.count("\n") == 3
+    assert output.count("\n") == 1
+    assert (tmp_path / "where_to_search.png").stat().st_size > 1000
+
+
+def test_the_picture_of_readme_is_made_by_its_lines():
+    _, code, _ = snippets("README.md", "python")[0]
+    assert (ROOT / "examples" / "where_to_search.py").read_text().endswith('"""\n\n' + code)
 
 
 def test_the_readme_is_short_and_shows_what_comes_of_it():
     text = (ROOT / "README.md").read_text()
-    assert len(text.split()) < 1200
+    assert len(text.split()) < 600
     order = [
-        "fleet.webp", "pip install", "lgvi-warp run", "```python", "accuracy_paper.png", "## What is modelled",
-        "**No:**", "## Citation",
+        "How far off", "fleet.webp", "pip install", "```python", "where_to_search.png)", "make run", "make test",
+        "beside_others.png", "glider_in_an_eddy.png", "depth_gain_map.png", "accuracy_remus.png",
+        "## What is verified", "## What is not modelled",
+        "## Citation",
     ]  # fmt: skip
     assert sorted(order, key=text.index) == order
 

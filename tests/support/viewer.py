@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-TIMELINE = "sim_time"
-# What the viewer says on a machine without a graphics adapter, and what it warns of on one with a software renderer.
-NO_DRIVER = re.compile(
-    r"No graphics adapter|Failed to get render context|Failed to create render state|no adapter", re.I
-)
+from lgvi_warp.views.recording import headless
+from lgvi_warp.views.recording.headless import free_port
+
+# What the viewer warns of on a machine with a software renderer.
 EXPECTED = re.compile(r"[Ss]oftware rasterizer|not found for screenshot")
 PATIENCE = 60.0
 
@@ -30,16 +29,11 @@ class Viewer:
 
     def open(self, *paths):
         """Open recordings, one at a time."""
-        for path in paths:
-            self.client.open(str(Path(path).absolute()))
-        end = time.monotonic() + PATIENCE
-        while self.client.get_state().loading and time.monotonic() < end:
-            time.sleep(0.05)
+        headless.load(self.client, *paths)
 
     def pictures(self, when):
         """A picture (height, width, 3) of each view that is in sight, by class and origin, at a time [s]."""
-        self.client.set_time(TIMELINE, duration=float(when), play_state="paused")
-        time.sleep(0.4)
+        headless.show_time(self.client, when, 0.4)
         shots = {}
         for view in self.client.get_state().views:
             try:
@@ -65,13 +59,6 @@ def started_by(monkeypatch, folder, text):
         program.write_text(f"#!/bin/sh\n{text}\n")
         program.chmod(0o755)
     monkeypatch.setattr("lgvi_warp.views.recording.viewer.program", lambda: program)
-
-
-def free_port():
-    """A port of this machine that nothing listens at."""
-    with socket.socket() as trial:
-        trial.bind(("127.0.0.1", 0))
-        return trial.getsockname()[1]
 
 
 @contextlib.contextmanager
@@ -112,50 +99,14 @@ def receiver(path):
 
 
 @contextlib.contextmanager
-def viewer(folder, size="1000x700"):
+def viewer(folder, size=(1000, 700)):
     """A viewer; skips the test where the machine has no Vulkan driver."""
-    rerun_cli = pytest.importorskip("rerun_cli")
-    from rerun.experimental import ViewerClient
-
-    port = free_port()
-    program = Path(rerun_cli.__file__).with_name("rerun")
-    words = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", size, "--hide-welcome-screen"]
-    log = folder / "viewer.log"
-    with log.open("w") as file:
-        process = subprocess.Popen([str(program), *words, "--memory-limit", "2GB"], stdout=file, stderr=file)
+    pytest.importorskip("rerun_cli")
     try:
-        client = _client(ViewerClient, process, port)
-        if client is None:
-            text = log.read_text()
-            if NO_DRIVER.search(text):
-                pytest.skip("no Vulkan driver: recordings are not looked at; install one, such as mesa-vulkan-drivers")
-            raise RuntimeError(f"the viewer did not start: {text[-800:]}")
-        yield Viewer(client, f"rerun+http://127.0.0.1:{port}/proxy")
-    finally:
-        process.terminate()
-        try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-
-def _client(kind, process, port):
-    """A client of the viewer; None where it ended. Its port opens before its graphics start."""
-    end = time.monotonic() + PATIENCE
-    while process.poll() is None and time.monotonic() < end:
-        with contextlib.suppress(OSError):
-            socket.create_connection(("127.0.0.1", port), 0.2).close()
-            client = kind.connect(f"rerun+http://127.0.0.1:{port}/proxy")
-            try:
-                client.get_state()
-            except ConnectionError:
-                break
-            return client
-        time.sleep(0.05)
-    with contextlib.suppress(subprocess.TimeoutExpired):
-        process.wait(10)
-    return None
+        with headless.started(folder, size) as (client, address):
+            yield Viewer(client, address)
+    except headless.DriverMissingError as error:
+        pytest.skip(f"recordings are not looked at: {error}")
 
 
 def painted(picture):

@@ -18,7 +18,7 @@ from lgvi_warp.common.arguments import file_path, of_kind
 from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.status import Status
 from lgvi_warp.views.fleet import OUTCOME_STYLES
-from lgvi_warp.views.plots.picture import FilePath
+from lgvi_warp.views.plots.picture import STYLE, WIDTHS, FilePath
 
 # Colours of Okabe & Ito 2008, Color universal design, without the yellow, which is hardly seen on white.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -44,6 +44,10 @@ TEXTS = (
 # Matplotlib's settings are those of the process, and pictures are drawn side by side in threads; one picture draws in another.
 LOCK = threading.RLock()
 DPI = 100
+# Of pictures for a printed page.
+PRINTED_TEXT, PRINTED_DPI = 8.0, 300
+# The least height of a picture for a printed page, in parts of its width.
+LEAST_SHAPE = 0.75
 
 
 def figure_class() -> Any:
@@ -55,8 +59,20 @@ def figure_class() -> Any:
     return Figure
 
 
-def save_figure(figure: Any, path: FilePath, dpi: int = DPI) -> Path:
+def narrow() -> bool:
+    """Tell whether the picture is for one column of a printed page, where panels stand below each other."""
+    return STYLE.get() == "one_column"
+
+
+def printed_size(size: tuple[float, float]) -> tuple[float, float]:
+    """Size of a figure [in] in the style that is asked for: its shape stays, but that legends need room."""
+    style = STYLE.get()
+    return size if style is None else (WIDTHS[style], max(size[1] / size[0], LEAST_SHAPE) * WIDTHS[style])
+
+
+def save_figure(figure: Any, path: FilePath, dpi: int | None = None) -> Path:
     """Write a picture in the format of the file's ending; the file is there whole or not at all."""
+    dpi = dpi or (DPI if STYLE.get() is None else PRINTED_DPI)
     of_kind("figure", figure, "savefig", "a figure of Matplotlib", "give one, as axes.figure")
     target = file_path("path", path)
     with durable.placed(target) as beside:
@@ -72,7 +88,7 @@ def panel(
     of_class = figure_class()
     if ax is not None:
         of_kind("ax", ax, "figure plot", "axes of Matplotlib", "give those that plt.subplots returns, or leave it out")
-    figure = of_class(figsize=size, layout="constrained") if ax is None else ax.figure
+    figure = of_class(figsize=printed_size(size), layout="constrained") if ax is None else ax.figure
     with drawing(figure, path, ax is None):
         yield figure.add_subplot(projection=projection) if ax is None else ax
 
@@ -93,7 +109,7 @@ def panels(
     of_class = figure_class()
     if figure is not None:
         of_kind("figure", figure, "subplots get_figure", "a figure of Matplotlib", "give plt.figure(), or leave it out")
-    target = of_class(figsize=size, layout="constrained") if figure is None else figure
+    target = of_class(figsize=printed_size(size), layout="constrained") if figure is None else figure
     with drawing(target, path, figure is None):
         grid = target.subplots(*shape, squeeze=False, **options)
         for axes in grid.flat[used:] if used is not None else ():
@@ -121,6 +137,8 @@ def drawing(figure: Any, path: FilePath | None, sized: bool) -> Iterator[None]:
 
 def text_size(figure: Any) -> float:
     """Find the size of text for a figure."""
+    if STYLE.get() is not None:
+        return PRINTED_TEXT
     return max(LEAST_TEXT, TEXT * float(figure.get_figure(root=True).get_figwidth()))
 
 

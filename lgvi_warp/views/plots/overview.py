@@ -16,7 +16,7 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import AT_ONCE
 from lgvi_warp.views.fleet import members_of_run, title
-from lgvi_warp.views.plots.canvas import legend_below, line_marker, panel, panels, style, wrap_each, wrapped
+from lgvi_warp.views.plots.canvas import legend_below, line_marker, narrow, panel, panels, style, wrap_each, wrapped
 from lgvi_warp.views.plots.ends import draw_outcomes
 from lgvi_warp.views.plots.estimates import statistics
 from lgvi_warp.views.plots.fans import draw_fan, notes_on, text_of
@@ -73,8 +73,9 @@ def summary(result: Result, *, figure: Any = None, path: FilePath | None = None)
         drawings.append(partial(_outcomes, result))
     elif set(FIELDS) <= set(sampled.samples):
         drawings.append(partial(_fan, sampled, energy_of(sampled)))
-    rows = -(-len(drawings) // 2)
-    with panels(figure, path, (rows, 2), (12.0, 5.4 * rows), len(drawings)) as grid:
+    columns, height = (1, 4.2) if narrow() else (2, 5.4)
+    rows = -(-len(drawings) // columns)
+    with panels(figure, path, (rows, columns), (6.0 * columns, height * rows), len(drawings)) as grid:
         lines = [title(result)]
         for axes, draw in zip(grid.flat, drawings, strict=False):
             lines += draw(axes)

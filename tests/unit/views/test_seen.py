@@ -213,6 +213,6 @@ def test_a_fleet_is_seen_and_poses_that_are_not_finite_are_not(tmp_path):
     # One viewer for both: what a viewer shows of one recording does not hide faults of the next.
     whole = lw.record(fleet(60), tmp_path / "fleet.rrd")
     broken = broken_path("poses that are not finite", tmp_path)
-    with viewer(tmp_path, size="800x560") as window:
+    with viewer(tmp_path, size=(800, 560)) as window:
         assert faults_in(window, [whole], (0.0, 60.0)) == []
         assert any("invalid rotation" in fault for fault in faults_in(window, [broken], (0.0, 60.0)))

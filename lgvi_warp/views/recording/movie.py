@@ -101,7 +101,7 @@ def write(result: Result, path: str | os.PathLike[str], *, members: Any = None, 
         except MissingExtra:
             if by == "viewer":
                 raise
-    _save(_drawn(result, members, int(count)), target, length)
+    _save(plainly(result, members, int(count)), target, length)
     return "plot"
 
 
@@ -132,7 +132,7 @@ def _shot(result: Result, members: Any, count: int) -> Iterator[Any]:
         yield from of_recording(folder / "fleet.rrd", times, folder)
 
 
-def _drawn(result: Result, members: Any, count: int) -> Iterator[Any]:
+def plainly(result: Result, members: Any, count: int) -> Iterator[Any]:
     """Pictures by Matplotlib: members from above, and their depths over time, up to each time."""
     from PIL import Image
 

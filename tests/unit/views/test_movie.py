@@ -46,7 +46,7 @@ def test_a_line_stops_where_its_member_did(monkeypatch):
     kept = []
     monkeypatch.setattr("matplotlib.axes.Axes.plot", lambda axes, *a, _plot=__import__("matplotlib.axes").axes.Axes.plot, **k:
                         kept.append(_plot(axes, *a, **k)) or kept[-1])  # fmt: skip
-    list(movie._drawn(fleet_result(), None, 2))
+    list(movie.plainly(fleet_result(), None, 2))
     lengths = [len(lines[0].get_xdata()) for lines in kept]
     assert lengths == [31, 31, 31, 31, 11] * 2 + [5]
 

@@ -22,6 +22,7 @@ PAGES = {
     "sampling": "docs/reference/sampling_costs.md",
     "solver": "docs/explain/solvers.md",
     "term": "docs/reference/term_costs.md",
+    "validation": "docs/validation/README.md",
 }
 
 

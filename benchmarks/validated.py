@@ -17,11 +17,13 @@ from benchmarks.pages import ROOT, markdown
 
 sys.path.append(str(ROOT / "docs"))
 
-from site_parts import pictures  # noqa: E402
+from site_parts import pictures
 
 CASES = sorted(path.stem for path in (ROOT / "benchmarks" / "validation").glob("[a-z]*.py"))
 # Size in inches, drawn at this many pixels to the inch.
 SIZE, FINE = (10.0, 4.2), 110
+# What a comparison may be with, in the order of the overview.
+KINDS = ("experiment at sea", "published computation", "published code", "theory")
 PUBLISHED, COMPUTED = "#d55e00", "#0072b2"
 
 
@@ -95,7 +97,9 @@ def keep(name: str, content: Content) -> None:
 def kept(name: str) -> Content:
     """What is kept of a comparison."""
     content = json.loads(rows_of(name).read_text())
-    return Content([Row(*row) for row in content["rows"]], {key: tuple(pair) for key, pair in content["curves"].items()})
+    return Content(
+        [Row(*row) for row in content["rows"]], {key: tuple(pair) for key, pair in content["curves"].items()}
+    )
 
 
 def _short(value: float | None, digits: int) -> float | None:
@@ -157,8 +161,8 @@ def overview(contents: Mapping[str, Content]) -> str:
     """The table of all comparisons."""
     head = ["comparison", "with", "what stands for it", "published", "computed", "error", "within what is known"]
     lines = []
-    for name, content in contents.items():
-        module = case(name)
+    for name in sorted(contents, key=lambda name: KINDS.index(case(name).AGAINST)):
+        module, content = case(name), contents[name]
         (row,) = (row for row in content.rows if row.what == module.HEADLINE)
         lines.append([f"[{module.TITLE}]({name}.md)", module.AGAINST, f"{row.what} [{row.unit}]", number(row.published),
                       number(row.computed), f"{row.error:+.2g}", within(content.rows)])  # fmt: skip

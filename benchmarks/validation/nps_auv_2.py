@@ -12,7 +12,7 @@ from benchmarks.pages import ROOT
 from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "NPS AUV II: a turn"
-AGAINST = "published equations, by SciPy"
+AGAINST = "published code"
 PICTURE = "Path and yaw rate of the NPS AUV II under 10 degrees of rudder, by this package and by SciPy"
 HEADLINE = "all terms: steady yaw rate"
 SCENES = ("examples/validation/nps_auv_2.toml",)
@@ -91,7 +91,12 @@ def tables() -> dict[str, Any]:
         "run": {"method": "rk4", "step": 0.05, "duration": 120.0, "save_every": 0.5},
         "terms": [
             {"type": "quadratic_form", "products": list(products), "values": list(products.values())},
-            {"type": "cross_flow", "stations": stations.tolist(), "diameters": [BREADTH] * 11, "drag_coefficient": [SIDE] * 11},
+            {
+                "type": "cross_flow",
+                "stations": stations.tolist(),
+                "diameters": [BREADTH] * 11,
+                "drag_coefficient": [SIDE] * 11,
+            },
             {"type": "wrench", "force": [thrust, 0.0, 0.0]},
         ],
     }
@@ -168,20 +173,24 @@ def measured() -> Content:
     late = t >= 0.75 * t[-1]
     yaw = np.degrees(result.angular_velocity[:, 0, 2])
     roll = np.degrees(np.arctan2(R[:, 2, 1], R[:, 2, 2]))
-    here = (nu[late, 0].mean(), nu[late, 1].mean(), yaw[late].mean(), np.ptp(place[late, 1]), roll[late].mean(), place[-1, 2])
-    names = (("surge", "m/s"), ("sway", "m/s"), ("yaw rate", "deg/s"), ("diameter of the circle", "m"), ("roll", "deg"))
+    here = _steady(nu[late, 0], nu[late, 1], np.radians(yaw[late]), roll[late])
+    names = (("surge", "m/s"), ("sway", "m/s"), ("yaw rate", "deg/s"), ("turning diameter", "m"), ("roll", "deg"))
     rows, curves = [], {"path": curve(place[:, 1], place[:, 0]), "yaw": curve(t, yaw)}
     for published, words in ((False, "the scene's terms"), (True, "all terms")):
         y = independent(t, published)
-        there = (y[6, late].mean(), y[7, late].mean(), np.degrees(y[11, late].mean()), np.ptp(y[1, late]),
-                 np.degrees(y[3, late].mean()), y[2, -1])  # fmt: skip
-        for (name, unit), value, own in zip(names, there, here, strict=False):
+        there = _steady(y[6, late], y[7, late], y[11, late], np.degrees(y[3, late]))
+        for (name, unit), value, own in zip(names, there, here, strict=True):
             rows.append(Row(f"{words}: steady {name}", unit, value, None, own))
-        rows.append(Row(f"{words}: depth at the end", "m", there[5], None, here[5]))
+        rows.append(Row(f"{words}: depth at the end", "m", y[2, -1], None, place[-1, 2]))
         apart = np.linalg.norm(place.T - y[:3], axis=0).max()
         rows.append(Row(f"{words}: largest distance of the paths", "m", 0.0, None, apart))
         curves[f"path, {words}"], curves[f"yaw, {words}"] = curve(y[1], y[0], 120), curve(t, np.degrees(y[11]), 60)
     return Content(rows, curves)
+
+
+def _steady(u: Any, v: Any, r: Any, roll: Any) -> tuple[float, ...]:
+    """Means of surge, sway, yaw rate [deg/s], turning diameter and roll."""
+    return u.mean(), v.mean(), np.degrees(r.mean()), 2.0 * np.hypot(u, v).mean() / abs(r.mean()), roll.mean()
 
 
 def draw(content: Content, figure: Any) -> None:
@@ -189,8 +198,20 @@ def draw(content: Content, figure: Any) -> None:
     above, rates = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.0, 1.4)})
     for axes, name in ((above, "path"), (rates, "yaw")):
         axes.plot(*content.curves[name], color=COMPUTED, label="this package")
-        axes.plot(*content.curves[f"{name}, all terms"], ".", color=PUBLISHED, markersize=4, label="all published terms, SciPy")
-        axes.plot(*content.curves[f"{name}, the scene's terms"], "+", color="0.3", markersize=6, label="the scene's terms, SciPy")
+        axes.plot(
+            *content.curves[f"{name}, all terms"],
+            ".",
+            color=PUBLISHED,
+            markersize=4,
+            label="all published terms, SciPy",
+        )
+        axes.plot(
+            *content.curves[f"{name}, the scene's terms"],
+            "+",
+            color="0.3",
+            markersize=6,
+            label="the scene's terms, SciPy",
+        )
     above.set(xlabel="east [m]", ylabel="north [m]", aspect="equal")
     rates.set(xlabel="time [s]", ylabel="yaw rate [deg/s]")
     rates.legend(loc="upper right")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Free decay in roll and pitch of a REMUS 100 at rest: another program with the same coefficients, and the period of small swings."""
+"""Free decay in roll and pitch of a REMUS 100 at rest: another program, and the period of small swings."""
 
 from typing import Any
 
@@ -38,10 +38,13 @@ def measured() -> Content:
         rows.append(Row(f"period of small swings in {axis}", "s", small, 0.0005, _small(axis)))
         if axis == "roll":
             names = ("first", "second", "third", "fourth")
-            rows += [Row(f"{name} swing of roll", "deg", read, 0.05, -low) for name, read, low in zip(names, ROLLS, lows, strict=False)]
+            rows += [
+                Row(f"{name} swing of roll", "deg", read, 0.05, -low)
+                for name, read, low in zip(names, ROLLS, lows, strict=False)
+            ]
         else:
             rows.append(Row("first swing of pitch", "deg", PITCH, 0.05, -lows[0]))
-        curves[axis] = curve(t, angle)
+        curves[axis] = curve(t, angle, 1000)
     return Content(rows, curves)
 
 

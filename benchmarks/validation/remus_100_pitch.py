@@ -10,7 +10,7 @@ from benchmarks.pages import ROOT
 from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "REMUS 100: steps of the stern planes"
-AGAINST = "experiment at sea, and the simulation of the same thesis"
+AGAINST = "experiment at sea"
 PICTURE = "Pitch of a REMUS 100 after steps of its stern planes, as computed and as published"
 HEADLINE = "up: pitch at 3.8 s"
 WAYS = ("up", "down")
@@ -41,10 +41,17 @@ def measured() -> Content:
         for at, i, read in zip(AT, when, RATE[way], strict=True):
             rows.append(Row(f"{way}: pitch rate at {at:g} s", "deg/s", read, 0.1, rate[i]))
         found = (depth[last] - depth[0], *result.velocity[last, 0, ::2], turn[last])
-        names = (("change of depth", "m", 0.01), ("surge", "m/s", 0.01), ("heave", "m/s", 0.01), ("yaw rate", "deg/s", 0.1))
+        names = (
+            ("change of depth", "m", 0.01),
+            ("surge", "m/s", 0.01),
+            ("heave", "m/s", 0.01),
+            ("yaw rate", "deg/s", 0.1),
+        )
         for (name, unit, within), read, value in zip(names, LAST[way], found, strict=True):
             rows.append(Row(f"{way}: {name} at 3.8 s", unit, read, within, value))
-        for name, unit, read, value in zip(("depth", "pitch"), ("m", "deg"), SEA[way], (found[0], pitch[last] - pitch[0]), strict=True):
+        for name, unit, read, value in zip(
+            ("depth", "pitch"), ("m", "deg"), SEA[way], (found[0], pitch[last] - pitch[0]), strict=True
+        ):
             rows.append(Row(f"{way}, at sea: change of {name}", unit, read, None, value))
         curves[way] = curve(t, pitch)
         less = lw.solve(lw.Scene.load(ROOT / path).with_numbers({"drag_matrix.quadratic[4,4]": LESS}))
@@ -62,7 +69,9 @@ def draw(content: Content, figure: Any) -> None:
         axes.plot(*content.curves[f"{way}, less"], "--", color=COMPUTED, label=f"computed, M_qq = -{LESS:g}")
         read = [rows[f"{way}: pitch at {at:g} s"].published for at in AT]
         axes.plot(AT, read, "o", color=PUBLISHED, label="Prestero's simulation, figs. 8-7, 8-12")
-        axes.axhline(rows[f"{way}, at sea: change of pitch"].published, color="0.4", linestyle=":", label="at sea, about")
+        axes.axhline(
+            rows[f"{way}, at sea: change of pitch"].published, color="0.4", linestyle=":", label="at sea, about"
+        )
         axes.axvline(2.0, color="0.8", zorder=0)
         axes.set(title=f"Stern planes {planes} degrees after 2 s", xlabel="time [s]", ylabel="pitch [deg]")
         axes.legend(loc="upper left" if way == "up" else "lower left")

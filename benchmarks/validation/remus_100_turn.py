@@ -10,7 +10,7 @@ from benchmarks.pages import ROOT
 from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "REMUS 100: rudder steps"
-AGAINST = "experiment at sea, and the simulation of the same thesis"
+AGAINST = "experiment at sea"
 PICTURE = "Yaw rate and path of a REMUS 100 in two rudder steps, as computed and as published"
 HEADLINE = "mean yaw rate, 25 to 38 s"
 SCENES = ("examples/validation/remus_100_turn.toml",)
@@ -49,7 +49,11 @@ def draw(content: Content, figure: Any) -> None:
     rows = {row.what: row for row in content.rows}
     rates, above = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.6, 1.0)})
     rates.plot(*content.curves["yaw rate"], color=COMPUTED, label="computed")
-    for what, since, until in (("yaw rate at 14 s", 14.0, 14.0), (HEADLINE, 25.0, 38.0), ("mean yaw rate, 50 to 68 s", 50.0, 68.0)):
+    for what, since, until in (
+        ("yaw rate at 14 s", 14.0, 14.0),
+        (HEADLINE, 25.0, 38.0),
+        ("mean yaw rate, 50 to 68 s", 50.0, 68.0),
+    ):
         row = rows[what]
         look: dict[str, Any] = {"color": PUBLISHED, "linewidth": 2.5}
         rates.errorbar(0.5 * (since + until), row.published, row.within, 0.5 * (until - since), **look, capsize=4)
@@ -61,6 +65,5 @@ def draw(content: Content, figure: Any) -> None:
     rates.legend(loc="upper left")
     above.plot(*content.curves["path"], color=COMPUTED)
     south, north, west, east = (rows[f"farthest {side}"].published for side in ("south", "north", "west", "east"))
-    above.plot([west, east, east, west, west], [south, south, north, north, south], "--", color=PUBLISHED, label="extent, fig. 8-1")
-    above.set(xlabel="east [m]", ylabel="north [m]", aspect="equal")
-    above.legend(loc="lower left")
+    above.plot([west, east, east, west, west], [south, south, north, north, south], "--", color=PUBLISHED)
+    above.set(xlabel="east [m]", ylabel="north [m]", aspect="equal", title="path; dashed: extent, fig. 8-1")

@@ -40,7 +40,9 @@ def measured() -> Content:
     }
     rows = [Row(what, unit, value, within, found[what][-1]) for what, unit, value, within in SPIRAL]
     north, east, _ = result.position[:, 0].T
-    return Content(rows, {key: curve(t, found[key]) for key in ("roll", "pitch", "speed")} | {"path": curve(east, north)})
+    return Content(
+        rows, {key: curve(t, found[key]) for key in ("roll", "pitch", "speed")} | {"path": curve(east, north)}
+    )
 
 
 def draw(content: Content, figure: Any) -> None:

@@ -90,7 +90,13 @@ def measured() -> Content:
         Row("speed, the first dive", "m/s", known["speed_m_s"][0], None, speeds[0]),
         Row("speed, the last dive", "m/s", known["speed_m_s"][dives][-1], None, speeds[dives][-1]),
         Row("rms difference of a dive's speed, of 17", "m/s", 0.0, None, _rms(speeds - known["speed_m_s"], told)),
-        Row("rms difference of a leg's depth rate, of 26", "m/s", 0.0, None, _rms(rates - known["depth_rate_m_s"], later)),
+        Row(
+            "rms difference of a leg's depth rate, of 26",
+            "m/s",
+            0.0,
+            None,
+            _rms(rates - known["depth_rate_m_s"], later),
+        ),
     ]
     start = known["start_s"]
     curves = {
@@ -118,7 +124,9 @@ def draw(content: Content, figure: Any) -> None:
     """Speed of each dive, and depth rate of each leg."""
     speed, rate = figure.subplots(1, 2)
     speed.plot(*content.curves["speed, measured"], "o", color=PUBLISHED, label="measured by the Doppler log")
-    speed.plot(*content.curves["speed, computed"], "_", color=COMPUTED, markersize=14, markeredgewidth=2.5, label="computed")
+    speed.plot(
+        *content.curves["speed, computed"], "_", color=COMPUTED, markersize=14, markeredgewidth=2.5, label="computed"
+    )
     speed.set(xlabel="time of the dive [s]", ylabel="speed through the water [m/s]", ylim=(0.18, 0.36))
     speed.legend(loc="lower left")
     for name, marker in (("climbs", "^"), ("dives", "v")):
@@ -126,6 +134,8 @@ def draw(content: Content, figure: Any) -> None:
         rate.plot(*content.curves[f"rate, computed, {name}"], "_", color=COMPUTED, markersize=14, markeredgewidth=2.5)
     rate.plot([], [], "_", color=COMPUTED, markersize=14, markeredgewidth=2.5, label="computed")
     rate.axvspan(0.0, 3600.0, color="0.93", zorder=0)
-    rate.text(3500.0, 0.1385, "mass and drag\nfitted here", ha="right", color="0.4")
-    rate.set(xlabel="time of the leg [s]", ylabel="depth rate, either way [m/s]", ylim=(0.12, 0.155), xlim=(0.0, 15000.0))
+    rate.text(200.0, 0.1375, "mass and\ndrag fitted\nto these", color="0.4")
+    rate.set(
+        xlabel="time of the leg [s]", ylabel="depth rate, either way [m/s]", ylim=(0.12, 0.155), xlim=(0.0, 15000.0)
+    )
     rate.legend(loc="center right")

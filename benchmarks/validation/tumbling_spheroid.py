@@ -44,7 +44,7 @@ def pushed(scene: lw.Scene) -> list[float]:
 
 
 class Exact:
-    """The motion in closed form: the angle from broadside turns as half the angle of a pendulum, Lamb, art. 127."""
+    """The motion in closed form: the angle from broadside turns as half the angle of a pendulum, Lamb, art. 124 and after."""
 
     def __init__(self, scene: lw.Scene, turn: float):
         self.ahead, _, self.across = np.diag(scene.vehicle.mass_matrix)
@@ -77,7 +77,9 @@ class Exact:
         """Along and across the impulse: what is fixed in space is (A u, B w)."""
         a = self.angle(t)
         s, c = np.sin(a), np.cos(a)
-        return self.impulse * (c * c / self.across + s * s / self.ahead), self.impulse * s * c * (1.0 / self.across - 1.0 / self.ahead)
+        return self.impulse * (c * c / self.across + s * s / self.ahead), self.impulse * s * c * (
+            1.0 / self.across - 1.0 / self.ahead
+        )
 
 
 def measured() -> Content:
@@ -103,11 +105,17 @@ def measured() -> Content:
             Row(f"{way}: way across after 60 s", "m", exact.aside(t[-1]), None, place[-1, 0]),
         ]
         curves[f"{way}, angle"] = curve(t, np.degrees(angle))
-        curves[f"{way}, exact"] = curve(t, np.degrees(exact.angle(t)), 61)
+        curves[f"{way}, exact"] = curve(t, np.degrees(exact.angle(t)), 121)
         curves[f"{way}, path"] = curve(place[:, 0], place[:, 2])
     # Both of the printed numbers are rounded: the ratio to 0.01, k1 to 0.001.
     rows += [
-        Row(f"k1 of length / breadth {ratio:.2f}", "1", printed, 0.0005 + 0.5 * (end_on(ratio - 0.005) - end_on(ratio + 0.005)), found)
+        Row(
+            f"k1 of length / breadth {ratio:.2f}",
+            "1",
+            printed,
+            0.0005 + 0.5 * (end_on(ratio - 0.005) - end_on(ratio + 0.005)),
+            found,
+        )
         for (ratio, printed), found in zip(LAMB, pushed(scene), strict=True)
     ]
     return Content(rows, curves)
@@ -121,8 +129,7 @@ def draw(content: Content, figure: Any) -> None:
         angles.plot(*content.curves[f"{way}, exact"], "o", color=PUBLISHED, markersize=3.5)
         paths.plot(*content.curves[f"{way}, path"], style, color=COMPUTED, label=way)
     angles.plot([], [], "o", color=PUBLISHED, markersize=3.5, label="elliptic functions")
-    angles.set(xlabel="time [s]", ylabel="angle from broadside [deg]")
+    angles.set(xlabel="time [s]", ylabel="angle from broadside [deg]", xlim=(0.0, 20.5), ylim=(-150.0, 1150.0))
     angles.legend(loc="upper left")
-    paths.set(xlabel="across the impulse [m]", ylabel="along it [m]")
-    paths.invert_yaxis()
-    paths.legend(loc="lower left")
+    paths.set(xlabel="across the impulse [m]", ylabel="along it [m]", ylim=(20.0, 0.0), xlim=(-0.62, 0.22))
+    paths.legend(loc="lower right")

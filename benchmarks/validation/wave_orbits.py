@@ -67,19 +67,27 @@ def _crossed(level: Any, t: Any, x: Any, at: int) -> tuple[float, float]:
 def draw(content: Content, figure: Any) -> None:
     """The orbits, and the drift by depth."""
     rows = {row.what: row for row in content.rows}
-    orbits, drift = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.5, 1.0)})
+    panels = figure.subplot_mosaic([["near", "drift"], ["far", "drift"]], width_ratios=(1.6, 1.0))
+    near, far, drift = (panels[name] for name in ("near", "far", "drift"))
     angle = np.linspace(0.0, 2.0 * np.pi, 100)
-    for depth in DEPTHS:
-        orbits.plot(*content.curves[f"{depth:g}"], color=COMPUTED, linewidth=0.9)
+    for axes, depth in ((near, 2.0), (far, 5.0)):
+        axes.plot(*content.curves[f"{depth:g}"], color=COMPUTED, linewidth=0.9, label="computed, 20 periods")
         radius = rows[f"radius at {depth:g} m, down"].published
-        orbits.plot(radius * np.sin(angle), depth - radius * np.cos(angle), color=PUBLISHED, linewidth=2.0)
-    orbits.plot([], [], color=COMPUTED, label="computed, 20 periods")
-    orbits.plot([], [], color=PUBLISHED, linewidth=2.0, label="linear theory: the first orbit's circle")
-    orbits.set(xlabel="along the waves [m]", ylabel="depth [m]", xlim=(-1.0, 4.5), ylim=(22.5, 0.0))
-    orbits.legend(loc="lower right")
+        axes.plot(
+            radius * np.sin(angle),
+            depth - radius * np.cos(angle),
+            color=PUBLISHED,
+            linewidth=2.0,
+            label="linear theory",
+        )
+        axes.set(ylabel="depth [m]", aspect="equal", ylim=(depth + 0.45, depth - 0.45), xlim=(-0.5, 3.1))
+    far.set(xlabel="along the waves [m]")
+    far.legend(loc="lower right")
     fine = np.linspace(0.5, 22.0, 100)
     k, top = (2.0 * np.pi / 5.0) ** 2 / 9.81, rows["drift at 5 m"].published
     drift.semilogx(top * np.exp(-2.0 * k * (fine - 5.0)), fine, color=PUBLISHED, label="Stokes (1847)")
-    drift.semilogx([rows[f"drift at {depth:g} m"].computed for depth in DEPTHS], DEPTHS, "o", color=COMPUTED, label="computed")
+    drift.semilogx(
+        [rows[f"drift at {depth:g} m"].computed for depth in DEPTHS], DEPTHS, "o", color=COMPUTED, label="computed"
+    )
     drift.set(xlabel="drift [m/s]", ylabel="depth [m]", ylim=(22.5, 0.0))
     drift.legend(loc="lower right")

@@ -77,4 +77,4 @@ def draw(content: Content, figure: Any) -> None:
     depth.plot([0.0, 150.0], [10.0, rows[HEADLINE].published], "o", color=PUBLISHED, label="10 m, and about that again")
     depth.set(xlabel="time [s]", ylabel="depth [m]")
     depth.invert_yaxis()
-    depth.legend(loc="center")
+    depth.legend(loc="upper center")

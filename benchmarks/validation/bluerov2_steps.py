@@ -123,7 +123,7 @@ def draw(content: Content, figure: Any) -> None:
         speeds.plot(*content.curves[name], style, color=COMPUTED, label=f"{name}, this package")
         speeds.plot(*content.curves[f"{name}, SciPy"], ".", color=PUBLISHED)
     speeds.plot([], [], ".", color=PUBLISHED, label="published equations, SciPy")
-    speeds.set(xlabel="time [s]", ylabel="speed [m/s]")
+    speeds.set(xlabel="time [s]", ylabel="speed [m/s]", ylim=(-0.02, 0.42))
     speeds.legend(loc="upper left")
     turning.plot(*content.curves["yaw"], color=COMPUTED)
     turning.plot(*content.curves["yaw, SciPy"], ".", color=PUBLISHED)

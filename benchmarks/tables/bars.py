@@ -3,7 +3,7 @@
 
 Each tool uses the cheapest of its settings that is right to 1e-2 (position [m] and attitude of every member that is
 judged). Python Vehicle Simulator has no such settings: its REMUS, its autopilots and its own step of 0.02 s, one vehicle
-after the other, written afresh from its equations (tests/support/foreign_remus.py). The rows stay in benchmarks/rows;
+after the other, written afresh from its equations (benchmarks/foreign_remus.py). The rows stay in benchmarks/rows;
 `--kept` writes the table and the picture again without measuring. Other tools: `make .venv-peers/.done`.
 """
 
@@ -114,7 +114,7 @@ def timed(call: Any) -> float:
 
 def alone(size: Size) -> dict[str, Any]:
     """The simulator's loop: one vehicle, as long as all members would take one after the other."""
-    from tests.support import foreign_remus as simulator
+    from benchmarks import foreign_remus as simulator
 
     def call() -> None:
         simulator.simulate(10.0, 0.5, size.alone, simulator.Sea(), simulator.Choices())

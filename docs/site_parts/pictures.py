@@ -16,6 +16,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 LGVI = (sys.executable, "-m", "lgvi_warp")
+VALIDATION = (sys.executable, "-m", "benchmarks", "table", "validation", "--kept")
 KEPT = (sys.executable, "-m", "benchmarks", "table", "fronts", "--kept")
 BARS = (sys.executable, "-m", "benchmarks", "table", "bars", "--kept")
 
@@ -55,6 +56,20 @@ def of_example(script: str, file: str) -> Made:
     return Made(sources_of(ROOT / script), (sys.executable, "-c", inside, str(ROOT / script), "{}"), file)
 
 
+def of_comparison(name: str) -> Made:
+    """The picture of a comparison with a published experiment or code, drawn from its rows."""
+    drawn_by = (
+        f"benchmarks/rows/validation_{name}.json",
+        f"benchmarks/validation/{name}.py",
+        "benchmarks/validated.py",
+    )
+    scenes = tuple(
+        path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "examples/validation").glob(f"{name}*.*"))
+    )
+    return Made((*drawn_by, *scenes), (*VALIDATION, name))
+
+
+COMPARISONS = sorted(path.stem for path in (ROOT / "benchmarks/validation").glob("[a-z]*.py"))
 FRONTS = "benchmarks/fronts_picture.py"
 STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out", "{}")
 SWEEP = "examples/sweeps/depth_gain_map.toml"
@@ -79,6 +94,7 @@ MADE = {
         f"guide/accuracy_{name}.png": Made((f"benchmarks/rows/fronts_{name}.json", FRONTS), (*KEPT, name))
         for name in ("paper", "remus", "light", "short")
     },
+    **{f"validation/{name}.png": of_comparison(name) for name in COMPARISONS},
 }
 
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from tests.support import foreign_remus as remus
+from benchmarks import foreign_remus as remus
 from tests.support.foreign_remus_loop import CALM, CURRENT, WANTED, apart, ours, theirs
 
 

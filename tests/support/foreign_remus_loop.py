@@ -12,6 +12,7 @@ import numpy as np
 import warp as wp
 
 import lgvi_warp as lw
+from benchmarks import foreign_remus as remus
 from lgvi_kernels.lanes.held import held_command
 from lgvi_kernels.law import (  # noqa: F401
     absolute,
@@ -37,7 +38,6 @@ from lgvi_kernels.law import (  # noqa: F401
     to_body,
     vec3,
 )
-from tests.support import foreign_remus as remus
 
 # Numbers of the law, in the order of its struct; they are those of the NumPy loop.
 NUMBERS = {

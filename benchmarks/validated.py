@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a comparison with a published experiment or code keeps: its rows, the curves of its picture, and where both stand."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks.pages import ROOT, markdown
+
+sys.path.append(str(ROOT / "docs"))
+
+from site_parts import pictures
+
+CASES = sorted(path.stem for path in (ROOT / "benchmarks" / "validation").glob("[a-z]*.py"))
+# Size in inches, drawn at this many pixels to the inch.
+SIZE, FINE = (10.0, 4.2), 110
+# What a comparison may be with, in the order of the overview.
+KINDS = ("experiment at sea", "published computation", "published code", "theory")
+PUBLISHED, COMPUTED = "#d55e00", "#0072b2"
+
+
+class Row(NamedTuple):
+    """One compared number.
+
+    Attributes:
+        what: What it is, in words.
+        unit: Its unit.
+        published: What others measured, printed or computed.
+        within: How well that is known: half of a reading's step, or a standard deviation; None where nothing says so.
+        computed: What this package computes.
+    """
+
+    what: str
+    unit: str
+    published: float
+    within: float | None
+    computed: float
+
+    @property
+    def error(self) -> float:
+        """Computed less published."""
+        return self.computed - self.published
+
+
+class Content(NamedTuple):
+    """What is kept of a comparison.
+
+    Attributes:
+        rows: The compared numbers.
+        curves: Name -> (x, y) of what the picture draws.
+    """
+
+    rows: list[Row]
+    curves: dict[str, tuple[list[float], list[float]]]
+
+
+def curve(x: Any, y: Any, most: int = 400) -> tuple[list[float], list[float]]:
+    """Places and values of a curve, thinned to at most so many points."""
+    x, y = np.asarray(x, float), np.asarray(y, float)
+    chosen = np.unique(np.linspace(0, len(x) - 1, min(most, len(x))).round().astype(int))
+    return x[chosen].tolist(), y[chosen].tolist()
+
+
+def case(name: str) -> ModuleType:
+    """The module of a comparison."""
+    return importlib.import_module(f"benchmarks.validation.{name}")
+
+
+def rows_of(name: str) -> Path:
+    """Where the rows of a comparison are kept."""
+    return ROOT / "benchmarks" / "rows" / f"validation_{name}.json"
+
+
+def page_of(name: str) -> Path:
+    """The page of a comparison."""
+    return ROOT / "docs" / "validation" / f"{name}.md"
+
+
+def keep(name: str, content: Content) -> None:
+    """Write what is kept of a comparison, a row to a line."""
+    rows = ",\n  ".join(json.dumps([*row[:2], *(_short(value, 8) for value in row[2:])]) for row in content.rows)
+    curves = ",\n  ".join(
+        f"{json.dumps(key)}: {json.dumps([[_short(value, 5) for value in values] for values in pair])}"
+        for key, pair in content.curves.items()
+    )
+    rows_of(name).write_text(f'{{\n "rows": [\n  {rows}\n ],\n "curves": {{\n  {curves}\n }}\n}}\n')
+
+
+def kept(name: str) -> Content:
+    """What is kept of a comparison."""
+    content = json.loads(rows_of(name).read_text())
+    return Content(
+        [Row(*row) for row in content["rows"]], {key: tuple(pair) for key, pair in content["curves"].items()}
+    )
+
+
+def _short(value: float | None, digits: int) -> float | None:
+    """A number of so many digits."""
+    return None if value is None else float(f"{value:.{digits}g}")
+
+
+def draw(name: str, content: Content) -> None:
+    """Draw the picture of a comparison, with the hash of what made it."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    module = case(name)
+    with plt.rc_context({"font.size": 12, "axes.titlesize": 12, "legend.fontsize": 10.5}):
+        figure = plt.figure(figsize=getattr(module, "SIZE", SIZE), layout="constrained")
+        module.draw(content, figure)
+        target = page_of(name).with_suffix(".png")
+        figure.savefig(target, dpi=FINE)
+        plt.close(figure)
+    pictures.keep(target, target, script=pictures.made_of(f"validation/{target.name}"))
+
+
+def number(value: float | None) -> str:
+    """A number of a table."""
+    return "" if value is None else f"{value:.4g}"
+
+
+def percent(row: Row) -> str:
+    """The error in percent of what is published, or nothing where that is 0."""
+    return f"{100.0 * row.error / abs(row.published):.2g} %" if row.published else ""
+
+
+def table(rows: Sequence[Row]) -> str:
+    """The Markdown table of compared numbers."""
+    head = ["", "unit", "published", "known to", "computed", "error", "of it"]
+    cells = [
+        [row.what, row.unit, number(row.published), "" if row.within is None else f"+-{number(row.within)}",
+         number(row.computed), f"{row.error:+.2g}", percent(row)]
+        for row in rows
+    ]  # fmt: skip
+    return markdown(head, cells, "llrrrrr")
+
+
+def section(name: str, content: Content) -> str:
+    """What stands between the marks of a comparison's page: its picture and its table."""
+    module = case(name)
+    return "\n\n".join([f"![{module.PICTURE}]({name}.png)", table(content.rows)])
+
+
+def within(rows: Sequence[Row]) -> str:
+    """How many rows agree as well as the published number is known, of those of which that is said."""
+    told = [row for row in rows if row.within is not None]
+    return f"{sum(abs(row.error) <= row.within for row in told)} of {len(told)}" if told else ""  # type: ignore[operator]
+
+
+def overview(contents: Mapping[str, Content]) -> str:
+    """The table of all comparisons."""
+    head = ["comparison", "with", "what stands for it", "published", "computed", "error", "within what is known"]
+    lines = []
+    for name in sorted(contents, key=lambda name: KINDS.index(case(name).AGAINST)):
+        module, content = case(name), contents[name]
+        (row,) = (row for row in content.rows if row.what == module.HEADLINE)
+        lines.append([f"[{module.TITLE}]({name}.md)", module.AGAINST, f"{row.what} [{row.unit}]", number(row.published),
+                      number(row.computed), f"{row.error:+.2g}", within(content.rows)])  # fmt: skip
+    return markdown(head, lines, "lllrrrr")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The discrete principle of docs/theory/integrator.md: its variation by differences, and the paths of Phi that make it zero."""
+"""The discrete principle of docs/theory/integrator.md: its variation by differences, and that paths of Phi make it zero."""
 
 import numpy as np
 import pytest

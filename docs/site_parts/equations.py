@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Equations of docs/theory/: which functions hold them, and how the site shows them, as MathML that browsers draw themselves.
 
-A page has each equation in a fence of the language math, which GitHub draws. What has a number, by \\tag{13}, has below it a
+A page has each equation in a fence of the language math, which GitHub draws. What has a number, by a tag, has below it a
 line "Code:" with links to files, whose texts name the functions. A docstring names the page and the number in return.
 """
 
@@ -22,7 +22,7 @@ TAG = re.compile(r"\\tag\{(\w+)\}")
 LINK = re.compile(r"\[`([\w.]+)`\]\(([^)]+)\)")
 # In a docstring or comment: docs/theory/integrator.md, (13), (14)
 BACK = re.compile(r"docs/theory/(\w+)\.md((?:,\s+(?:#\s+)?\(\w+\))+)")
-NUMBER = re.compile(r"\((\d{1,2}|[A-Z]\d{1,2})\)")
+NUMBER = re.compile(r"(?<![\w)])\((\d{1,2}|[A-Z]\d{1,2})\)")
 
 
 class Holder(NamedTuple):

@@ -23,6 +23,17 @@ LINK = re.compile(r"\[`([\w.]+)`\]\(([^)]+)\)")
 # In a docstring or comment: docs/theory/integrator.md, (13), (14)
 BACK = re.compile(r"docs/theory/(\w+)\.md((?:,\s+(?:#\s+)?\(\w+\))+)")
 NUMBER = re.compile(r"(?<![\w)])\((\d{1,2}|[A-Z]\d{1,2})\)")
+# Of what docutils writes: a hat grows by the accent alone, pairs in angle brackets stay small, functions need a space.
+REPAIRS = (
+    (r'<mo accent="true">\^</mo>', '<mo accent="true" stretchy="true">&#x302;</mo>'),
+    (r'<mo class="mathopen">', '<mo class="mathopen" form="prefix">'),
+    (r"<mo>\|</mo>", '<mo form="postfix">|</mo>'),
+    (r"<mo>([⟨⟩])</mo>", r'<mo stretchy="false">\1</mo>'),
+    (
+        r'<mo>&ApplyFunction;</mo>(?=\s*<(?:mi|mn|msub|msup|mfrac|mo class="mathopen"))',
+        '<mspace width="0.17em"></mspace>',
+    ),
+)
 
 
 class Holder(NamedTuple):
@@ -105,7 +116,10 @@ def named_back(text: str) -> Iterator[tuple[str, str]]:
 
 def mathml(tex: str, block: bool) -> str:
     """An equation as MathML, by the converter of docutils, which Sphinx brings."""
-    return str(latex2mathml.tex2mathml(tex, as_block=block))
+    text = str(latex2mathml.tex2mathml(tex, as_block=block))
+    for pattern, put in REPAIRS:
+        text = re.sub(pattern, put, text)
+    return text
 
 
 def show_inline(writer: nodes.NodeVisitor, node: nodes.math) -> None:

@@ -15,6 +15,7 @@ from lgvi_warp.reference import classical, collocation, coupled, rotation
 from lgvi_warp.reference.control import Part
 from lgvi_warp.reference.control.loop import Loop
 from lgvi_warp.reference.submaps import Body, State
+from lgvi_warp.reference.terms.drag import Drag
 from lgvi_warp.reference.terms.driven import ControlWrench
 from lgvi_warp.reference.terms.following import chased
 from lgvi_warp.statistics.counts import Exceedance
@@ -22,6 +23,8 @@ from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.moments import Covariance, Mean
 from lgvi_warp.statistics.values.values import Values
 from lgvi_warp.studies.estimating import estimators, target
+from lgvi_warp.studies.rare.search import joined
+from lgvi_warp.studies.rare.subset import SubsetRun
 
 # The paper's example: J, and h Omega = h (0.3, 0.2, 0.1) with h = 0.01; larger steps beside it.
 J = np.array([5.46, 5.29, 5.72])
@@ -247,3 +250,27 @@ def test_levels_add_up_for_any_factors():
     assert left == pytest.approx(1.0 - np.corrcoef(x[0], x[1])[0, 1] ** 2, rel=1e-12)
     for other in (0.9 * factor, 1.1 * factor):
         assert np.var(x[0] - other * x[1]) > np.var(x[0] - factor * x[1])
+
+
+def test_runs_of_chains_are_joined_by_what_both_say():
+    # (B6): the sums, one by one; the spread between these runs is what chance explains.
+    P, spreads, N = np.array([1.1e-5, 0.9e-5, 1.2e-5]), np.array([0.11, 0.12, 0.1]), np.array([1000, 1000, 2000])
+    nothing = np.zeros(0)
+    runs = [
+        SubsetRun(p, spread, nothing, (), nothing, nothing.reshape(0, 1), nothing, int(size), int(size))
+        for p, spread, size in zip(P, spreads, N, strict=True)
+    ]
+    mean = N @ P / N.sum()
+    between, own = N @ (P / mean - 1.0) ** 2 / 2.0, np.mean(N * (1.2 * spreads) ** 2)
+    probability, spread, degrees = joined(runs)
+    assert (probability, degrees) == (pytest.approx(mean, rel=1e-13), 14.0)
+    assert spread == pytest.approx(np.sqrt((2.0 * between + 12.0 * own) / 14.0 / N.sum()), rel=1e-13)
+
+
+def test_drag_alone_by_its_equation():
+    # (S13): SciPy at 1e-10.
+    law, inertia = Drag(linear=np.full(6, 3.0), quadratic=np.full(6, 20.0)), np.full(6, 12.0)
+    end = scipy.integrate.solve_ivp(
+        lambda t, v: -(3.0 + 20.0 * abs(v)) * v / 12.0, (0.0, 0.7), [-1.3], rtol=1e-10, atol=1e-12
+    )
+    np.testing.assert_allclose(law.exact(inertia * -1.3, inertia, 0.7) / inertia, end.y[0, -1], rtol=1e-8)

@@ -23,12 +23,18 @@ LINK = re.compile(r"\[`([\w.]+)`\]\(([^)]+)\)")
 # In a docstring or comment: docs/theory/integrator.md, (13), (14)
 BACK = re.compile(r"docs/theory/(\w+)\.md((?:,\s+(?:#\s+)?\(\w+\))+)")
 NUMBER = re.compile(r"(?<![\w)])\((\d{1,2}|[A-Z]\d{1,2})\)")
-# Of what docutils writes: a hat grows by the accent alone, pairs in angle brackets stay small, functions need a space.
+# Of what docutils writes: a hat over more than a letter grows by the accent alone, pairs in angle brackets stay small,
+# functions need a space.
 REPAIRS = (
+    (
+        r'<mover accent="false">(\s*<mi[^>]*>[^<]*</mi>\s*)<mo accent="true">\^</mo>',
+        r'<mover accent="true">\1<mo stretchy="false">^</mo>',
+    ),
     (r'<mo accent="true">\^</mo>', '<mo accent="true" stretchy="true">&#x302;</mo>'),
     (r'<mo class="mathopen">', '<mo class="mathopen" form="prefix">'),
     (r"<mo>\|</mo>", '<mo form="postfix">|</mo>'),
     (r"<mo>([⟨⟩])</mo>", r'<mo stretchy="false">\1</mo>'),
+    (r"(</(?:mi|msub|msup|msubsup)>)(\s*<mi>(?:sin|cos|tan|arctan|exp)</mi>)", r'\1<mspace width="0.17em"></mspace>\2'),
     (
         r'<mo>&ApplyFunction;</mo>(?=\s*<(?:mi|mn|msub|msup|mfrac|mo class="mathopen"))',
         '<mspace width="0.17em"></mspace>',

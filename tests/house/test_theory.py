@@ -100,6 +100,15 @@ def test_each_numbered_equation_has_a_link(page):
 
 
 @pytest.mark.parametrize("page", equations.pages(), ids=lambda page: page.stem)
+def test_each_link_to_code_leads_there(page):
+    # Those within the text too.
+    links = [
+        equations.holder(target, name) for name, target in equations.LINK.findall(page.read_text()) if ".py" in target
+    ]
+    assert [fault for fault in map(missing, links) if fault] == []
+
+
+@pytest.mark.parametrize("page", equations.pages(), ids=lambda page: page.stem)
 def test_the_site_can_show_each_formula(page):
     assert fault_of(page.stem, page.read_text()) == ""
 

@@ -86,6 +86,7 @@ def equations() -> tuple[Equation, ...]:
     return tuple(each for page in pages() for each in equations_of(page.stem, page.read_text()))
 
 
+@cache
 def definitions(source: str) -> dict[str, tuple[int, int]]:
     """First and last line of each function, class and name that a module defines, methods as Class.method.
 

@@ -55,6 +55,20 @@ def test_the_root_of_the_quartic_solves_equation_24(h):
     np.testing.assert_allclose(rotation.quartic(a, np.diag(J)), F, atol=1e-11)
 
 
+def test_the_series_of_the_root():
+    # (R10) is off by the fourth power of x, of x itself by the third, and x goes as h^2: 64 from h to h / 2.
+    def missed(h):
+        _, minus_d1, q2, minus_q1, q0 = printed_quartic(h * J * np.array([0.3, 0.2, 0.1]))
+        x = q0 / -minus_q1
+        u, w = q2 * x / -minus_q1, -minus_d1 * x**2 / -minus_q1
+        root = scipy.optimize.brentq(lambda s: np.polyval(printed_quartic(h * J * np.array([0.3, 0.2, 0.1])), s), 0.0, 4 * x,
+                                     xtol=1e-18, rtol=1e-15)  # fmt: skip
+        return abs(x * (1.0 - u - w) / (1.0 - 2.0 * u) - root) / root
+
+    # The next order changes the ratio by some 25 h^2: 1.6 of 64 at h = 1/4.
+    assert missed(0.25) / missed(0.125) == pytest.approx(64.0, rel=0.05)
+
+
 def test_the_cubic_of_moser_and_veselov():
     # (R13): three points more than its degree in lambda^2, by the determinant itself; (R14) is then tested by (24).
     a, Jd = 0.4 * J * np.array([0.3, -0.5, 0.6]), 0.5 * J.sum() - J

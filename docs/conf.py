@@ -16,7 +16,7 @@ from sphinx.application import Sphinx
 DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS), str(DOCS.parent), str(DOCS.parent / "kernels")]
 
-from site_parts import pages  # noqa: E402
+from site_parts import equations, pages, sources  # noqa: E402
 
 import lgvi_warp as lw  # noqa: E402
 
@@ -45,6 +45,12 @@ autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 maximum_signature_line_length = 100
 myst_heading_anchors = 4
+# $a$ in a line, and fences of the language math, as GitHub has them. Browsers draw MathML: no script and no font to fetch.
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]
+html_math_renderer = "mathml"
+html_static_path = ["site_parts/static"]
+html_css_files = ["equations.css"]
 # Notebooks run anew in each build, and an error in one is an error of the build.
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
@@ -91,6 +97,13 @@ def link_public_names(app: Sphinx, tree: nodes.document) -> None:
             link += literal
 
 
+def link_theory(app: Sphinx, tree: nodes.document) -> None:
+    """Link the pages of the theory to the code, and numbers of equations to these."""
+    if app.env.docname.startswith("theory/"):
+        sources.link_sources(app.env.docname, tree)
+        equations.link_numbers(app.env.docname.removeprefix("theory/"), tree)
+
+
 def use_dashes(app: Sphinx, tree: nodes.document) -> None:
     """Put a dash between a parameter and its text, where Sphinx writes two hyphens."""
     for text in list(tree.findall(nodes.Text)):
@@ -106,3 +119,7 @@ def setup(app: Sphinx) -> None:
     app.connect("autodoc-process-signature", shorten)
     app.connect("doctree-read", link_public_names)
     app.connect("doctree-read", use_dashes)
+    # Before Sphinx takes links to files for downloads.
+    app.connect("doctree-read", link_theory, priority=400)
+    app.add_html_math_renderer("mathml", (equations.show_inline, None), (equations.show_block, None))
+    app.connect("html-collect-pages", sources.source_pages)

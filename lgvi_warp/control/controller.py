@@ -337,6 +337,8 @@ class Controller:
     def every(self, h: float) -> int:
         """Steps between two ticks.
 
+        docs/theory/control_loop.md, (C1).
+
         Args:
             h: Step of the run [s].
 

@@ -37,6 +37,7 @@ class Delay(Part):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # As many sets of commands, the latest first, as some member needs.
         # A delay that varies is that of the nearest whole step.
+        # docs/theory/control_loop.md, (C3).
         bus, every = self.bus, round(self.period / context.h)
         steps = np.rint(numbers["delay"] / context.h)
         periods = steps // every

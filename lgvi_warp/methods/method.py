@@ -23,6 +23,7 @@ Program = tuple[tuple[str, float], ...]
 # Phi: (10)-(14), Phi*: (19)-(23), Psi_h = Phi*_{h/2} after Phi_{h/2}, all of Nordkvist & Sanyal 2010 (conservative scenes).
 # Psi's two Ap(h/2) meet in the middle and act as one, since Ap changes neither p nor R.
 # psi_s, psi_1: symmetric splittings into symplectic flows, with two and with one solve of equation (24).
+# docs/theory/coupled.md, (X12), (X17); docs/theory/integrator.md, (I9); docs/theory/splitting.md, (S6), (S7), (S8).
 PROGRAMS: dict[str, Program] = {
     "phi": (("Ab", 1.0), ("D", 1.0), ("K", 1.0), ("Ap", 1.0)),
     "phi_adjoint": (("Ap", 1.0), ("K", 1.0), ("D", 1.0), ("Ab", 1.0)),
@@ -86,6 +87,7 @@ _G5 = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
 # Integration, 2nd ed., II.4 (triple jump, Suzuki) and V.3.2 (Kahan & Li 1997). yo6: Yoshida (1990), Phys. Lett. A 150,
 # 262, solution A. su8_15: Suzuki & Umeno (1993), the coefficients of McLachlan (1995), SIAM J. Sci. Comput. 16, 151.
 # ss*: Sofroniou & Spaletta (2005), Optim. Methods Softw. 20, 597.
+# docs/theory/splitting.md, (S9).
 COMPOSITIONS: dict[str, tuple[int, tuple[float, ...]]] = {
     "tj4": (4, _palindrome(_G3)),
     "su4": (4, _palindrome(_G5, _G5)),

@@ -28,6 +28,7 @@ class Tableau:
 
 
 # Kutta (1901): the classical method.
+# docs/theory/runge_kutta.md, (K5).
 RK4 = Tableau(
     order=4,
     a=((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)),
@@ -39,6 +40,7 @@ RK4 = Tableau(
 # Differential Equations II, IV.7): of order 3 whatever the matrix, L-stable with the true one, and without one the classical
 # method. Five of the seven numbers g solve its equations, b g 1 = b a g 1 = b g c = b g g 1 = 0 and R(infinity) = 0; the other
 # two, 0.37 and -0.42, are about those with the least errors of order 4.
+# docs/theory/runge_kutta.md, (K15).
 RKW3 = Tableau(
     order=3,
     a=RK4.a,
@@ -88,6 +90,7 @@ CASH_KARP = Tableau(
 
 # Crouch & Grossman (1993), order 3, on a Lie group: the moves by the stages follow one another, the last with `b`.
 # Hairer, Lubich & Wanner, Geometric Numerical Integration, IV.8.
+# docs/theory/runge_kutta.md, (K13).
 CG3 = Tableau(
     order=3,
     a=((), (-1 / 24,), (161 / 24, -6.0)),

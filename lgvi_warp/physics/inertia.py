@@ -70,6 +70,8 @@ def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
 def coupling(I6: np.ndarray) -> np.ndarray:
     """The coupling norm (n,) of mass matrices (n, 6, 6), from 0 to 1: the largest singular value of M^-1/2 C J^-1/2.
 
+    docs/theory/coupled.md, (X6).
+
     It is infinite where round-off or overflow leaves no positive definite matrix.
     """
     M, C, J = blocks(I6)

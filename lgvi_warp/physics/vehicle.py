@@ -305,7 +305,10 @@ def mass_matrix(p: Numbers) -> np.ndarray:
 
 
 def inertia6(p: Numbers) -> np.ndarray:
-    """Mass matrix (n, 6, 6) [kg, kg m, kg m2] of body and added mass about the user's origin, linear part first."""
+    """Mass matrix (n, 6, 6) [kg, kg m, kg m2] of body and added mass about the user's origin, linear part first.
+
+    docs/theory/coupled.md, (X1).
+    """
     return inertias.joined(*inertia_blocks(p))
 
 

@@ -15,7 +15,10 @@ Program = Sequence[tuple[str, float]]
 def step(
     x: State, body: Body, program: Program, h: float, stages: Sequence[float] = (1.0,), solve: Solver = newton
 ) -> State:
-    """One step of h [s]: the program with g h for each stage coefficient g."""
+    """One step of h [s]: the program with g h for each stage coefficient g.
+
+    docs/theory/splitting.md, (S6), (S7), (S8), (S9).
+    """
     for g in stages:
         for letter, coefficient in program:
             x = (SUBMAPS | FORCED)[letter](x, body, coefficient * g * h, solve)

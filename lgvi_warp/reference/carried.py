@@ -29,13 +29,16 @@ def carried(x: State, body: Body, h: float) -> tuple[Array, Array]:
 
 
 def velocities(x: State, body: Body, h: float) -> Array:
-    """(nu; Om) (6,) of a state with (P; Pi)."""
+    """(nu; Om) (6,) of a state with (P; Pi). docs/theory/coupled.md, (X19)."""
     D, w = carried(x, body, h) if changes(body) else (0.0, 0.0)
     return np.asarray(np.linalg.solve(body.I6 + D, np.concatenate([x.p, x.pi]) - w))
 
 
 def boarded(x: State, body: Body, h: float) -> State:
-    """The state with (P; Pi) where a step of h begins, and what laws remember of that step."""
+    """The state with (P; Pi) where a step of h begins, and what laws remember of that step.
+
+    docs/theory/coupled.md, (X19).
+    """
     if not changes(body):
         return x
     D, w = carried(x, body, h)
@@ -46,7 +49,7 @@ def boarded(x: State, body: Body, h: float) -> State:
 
 
 def landed(x: State, body: Body, h: float) -> State:
-    """The state with I6 (nu; Om) where a step ends."""
+    """The state with I6 (nu; Om) where a step ends. docs/theory/coupled.md, (X19)."""
     if not changes(body):
         return x
     P = body.I6 @ velocities(x, body, h)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The classical integrators that the paper compares with, on the continuous equations (1) and (3)."""
+"""The classical integrators that the paper compares with, on the continuous equations of its section II."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,10 @@ Stage = tuple[Array, Array, Array, Array]
 
 
 def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, Array, Array]:
-    """Eq. (1) and (3): db/dt in inertial axes, then dnu/dt and dOm/dt in body axes."""
+    """Eq. (1) and the dynamics of section II: db/dt in inertial axes, then dnu/dt and dOm/dt in body axes.
+
+    docs/theory/integrator.md, (1), (I1).
+    """
     force, torque = body.wrench(b, R)
     p, pi = body.M @ nu, body.J @ Om
     nu_rate = np.linalg.solve(body.M, cross(p, Om) + force)
@@ -24,7 +27,10 @@ def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, 
 
 
 def along_screw(b: Array, R: Array, d: Array, theta: Array) -> tuple[Array, Array]:
-    """(b, R) exp of the twist (d [m], theta) in SE(3): b + R V d and R exp(hat(theta)), V the integral of exp."""
+    """(b, R) exp of the twist (d [m], theta) in SE(3): b + R V d and R exp(hat(theta)), V the integral of exp.
+
+    docs/theory/runge_kutta.md, (K14).
+    """
     n, H = norm(theta), hat(theta)
     third = (n - math.sin(n)) / n**3 if n > 1e-2 else 1.0 / 6.0 - n**2 / 120.0 + n**4 / 5040.0
     V = np.eye(3) + 0.5 * sinc(0.5 * n) ** 2 * H + third * H @ H
@@ -32,12 +38,15 @@ def along_screw(b: Array, R: Array, d: Array, theta: Array) -> tuple[Array, Arra
 
 
 # Crouch & Grossman 1993; Hairer, Lubich & Wanner, Geometric Numerical Integration, IV.8: their method of order 3.
+# docs/theory/runge_kutta.md, (K13).
 CG3_A = ((), (-1.0 / 24.0,), (161.0 / 24.0, -6.0))
 CG3_B = (1.0, -2.0 / 3.0, 2.0 / 3.0)
 
 
 def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motion:
     """Crouch-Grossman, order 3, on SE(3) x R6: R <- R exp(h b1 Om1) exp(h b2 Om2) exp(h b3 Om3).
+
+    docs/theory/runge_kutta.md, (K14).
 
     b moves by the same screws. Returns b, R, nu, Om at k + 1.
     """
@@ -65,12 +74,18 @@ RK4_B = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)
 
 
 def inverse_dexp(theta: Array, Om: Array) -> Array:
-    """d exp^-1 to order 3, for R = R_k exp(hat(theta)): theta' = Om + theta x Om / 2 + theta x (theta x Om) / 12."""
+    """d exp^-1 to order 3, for R = R_k exp(hat(theta)): theta' = Om + theta x Om / 2 + theta x (theta x Om) / 12.
+
+    docs/theory/runge_kutta.md, (K9).
+    """
     return Om + 0.5 * cross(theta, Om) + cross(theta, cross(theta, Om)) / 12.0
 
 
 def rkmk4(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motion:
-    """Runge-Kutta-Munthe-Kaas, order 4 (HLW IV.8.2): RK4 for the rotation vector. Returns b, R, nu, Om at k + 1."""
+    """Runge-Kutta-Munthe-Kaas, order 4 (HLW IV.8.2): RK4 for the rotation vector. Returns b, R, nu, Om at k + 1.
+
+    docs/theory/runge_kutta.md, (K9).
+    """
     theta = np.zeros(3)
     rate: tuple[Array, ...] = (np.zeros(3),) * 4
     total = rate

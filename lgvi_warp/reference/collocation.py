@@ -39,7 +39,10 @@ def polynomials(x: Array, degree: int) -> Array:
 
 
 def gauss(s: int) -> Gauss:
-    """The method of s stages. With l_j = b_j sum_k (2k + 1) P_k(x_j) P_k, x = 2c - 1, a_ij is its integral to c_i."""
+    """The method of s stages. With l_j = b_j sum_k (2k + 1) P_k(x_j) P_k, x = 2c - 1, a_ij is its integral to c_i.
+
+    docs/theory/runge_kutta.md, (K17).
+    """
     x, w = legendre.leggauss(s)
     b, c, P = 0.5 * w, 0.5 * (x + 1.0), polynomials(x, s)
     # The integral of P_k from 0 to c_i is (P_k+1 - P_k-1) / (2 (2k + 1)).
@@ -68,6 +71,8 @@ def rates(x: State, body: Body, h: float) -> Array:
 def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tuple[Array, int]:
     """K_i = f(y + h sum_j a_ij K_j), (s, 18), by fixed-point iteration from a guess K (s, 18), and the number of iterations.
 
+    docs/theory/runge_kutta.md, (K18).
+
     The iteration ends where the change is round-off or no longer falls. Raises NotConverged.
     """
     y, smallest = pack(x), np.inf
@@ -83,6 +88,8 @@ def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tup
 
 def advance(x: State, body: Body, h: float, steps: int, s: int = 3) -> tuple[State, int]:
     """The state after so many steps of h [s], and the evaluations of the right-hand side. Raises NotConverged.
+
+    docs/theory/runge_kutta.md, (K18).
 
     Each step starts from the stages of the one before, extrapolated; the sum y + h sum b_i K_i is compensated.
     """

@@ -69,7 +69,7 @@ class Reduced:
     o: Array
 
     def velocity(self, p: Array, pi: Array) -> tuple[Array, Array]:
-        """nu = A p - E Om, Om = Js^-1 (pi - E^T p), at o_1 in the axes Q."""
+        """nu = A p - E Om, Om = Js^-1 (pi - E^T p), at o_1 in the axes Q. docs/theory/coupled.md, (X2)."""
         Om = (pi - self.E.T @ p) / self.Js
         return self.A @ p - self.E @ Om, Om
 
@@ -123,7 +123,10 @@ class ReducedW(Reduced):
 
 
 def blocks(I6: Array) -> tuple[Array, Array, Array]:
-    """M, C, J of I6 = [[M, C], [C^T, J]], (6, 6). Raises ValueError unless symmetric positive definite."""
+    """M, C, J of I6 = [[M, C], [C^T, J]], (6, 6). Raises ValueError unless symmetric positive definite.
+
+    docs/theory/coupled.md, (X1).
+    """
     size = np.sqrt(np.abs(np.diag(I6)))
     if not np.all(np.abs(I6 - I6.T) <= ASYMMETRY * np.outer(size, size)):
         raise ValueError("the inertia (6, 6) must be finite and symmetric")
@@ -133,7 +136,10 @@ def blocks(I6: Array) -> tuple[Array, Array, Array]:
 
 
 def shift(I6: Array, d: Array) -> Array:
-    """I6 about the origin O + d, d (3,) [m]: C' = C + M d^, J' = J - d^ M d^ - d^ C + C^T d^."""
+    """I6 about the origin O + d, d (3,) [m]: C' = C + M d^, J' = J - d^ M d^ - d^ C + C^T d^.
+
+    docs/theory/coupled.md, (X4).
+    """
     M, C, J = blocks(I6)
     H = hat(d)
     C1 = C + M @ H
@@ -147,14 +153,17 @@ def turn(I6: Array, Q: Array) -> Array:
 
 
 def coupling(I6: Array) -> float:
-    """k in 0..1: the largest singular value of M^-1/2 C J^-1/2, any square roots."""
+    """k in 0..1: the largest singular value of M^-1/2 C J^-1/2, any square roots. docs/theory/coupled.md, (X6)."""
     M, C, J = blocks(I6)
     half = np.linalg.solve(np.linalg.cholesky(M), C)
     return float(np.linalg.svd(np.linalg.solve(np.linalg.cholesky(J), half.T))[1][0])
 
 
 def removable(I6: Array) -> Array | None:
-    """The shift d (3,) [m] of the origin that makes C zero: d = -vee(E), where C M is skew; None where it is not."""
+    """The shift d (3,) [m] of the origin that makes C zero: d = -vee(E), where C M is skew; None where it is not.
+
+    docs/theory/coupled.md, (X5).
+    """
     M, C, _ = blocks(I6)
     CM = C @ M
     if not np.abs(CM + CM.T).max() <= SKEW * np.abs(C).max() * np.abs(M).max():
@@ -178,7 +187,10 @@ def in_the_axes_of_Js(I6: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def reduce_x(I6: Array) -> ReducedX:
-    """Section 3, set-up: d = (-E32, E31, -E21) makes U = E + d^ upper triangular; o_i = Q (d + a_i)."""
+    """Section 3, set-up: d = (-E32, E31, -E21) makes U = E + d^ upper triangular; o_i = Q (d + a_i).
+
+    docs/theory/coupled.md, (X7), (X8).
+    """
     Q, M, Js, E = in_the_axes_of_Js(I6)
     d = np.array([-E[2, 1], E[2, 0], -E[1, 0]])
     U = np.triu(E + hat(d))
@@ -194,12 +206,18 @@ def reduce_w(I6: Array) -> ReducedW:
 
 
 def slide(x: CoupledState, n: Array) -> CoupledState:
-    """b += R n, pi += p x n, n (3,) [m] in the body's axes: it moves the body, or the origin within the body."""
+    """b += R n, pi += p x n, n (3,) [m] in the body's axes: it moves the body, or the origin within the body.
+
+    docs/theory/coupled.md, (X9).
+    """
     return replace(x, b=x.b + x.R @ n, pi=x.pi + cross(x.p, n))
 
 
 def shears(V: Array, j: int, k: int, t: float) -> Array:
-    """The rows of V (n, 3) turned by F = cay(t e_i), V F: x += t z, z -= s x, x += t z on columns j, k (cyclic)."""
+    """The rows of V (n, 3) turned by F = cay(t e_i), V F: x += t z, z -= s x, x += t z on columns j, k (cyclic).
+
+    docs/theory/coupled.md, (X10).
+    """
     V, s = V.copy(), 2.0 * t / (1.0 + t * t)
     V[:, j] += t * V[:, k]
     V[:, k] -= s * V[:, j]
@@ -215,6 +233,8 @@ def T(x: CoupledState, body: Reduced, h: float) -> CoupledState:
 def R_i(x: CoupledState, body: ReducedX, i: int, h: float) -> CoupledState:
     """The screw of (pi_i - k_i p_i)^2 / (2 Js_i), standing at o_i, i = 1, 2, 3: slide by sl e_i, turn by cay(t e_i).
 
+    docs/theory/coupled.md, (X9).
+
     y^3/3 makes t1 = tan(y) to order 4. Symplectic, since the angle 2 atan(t1) + 2 atan(t2) and the slide are the
     derivatives of one function of (p_i, pi_i). Infinite where t1 t2 = 1: a turn by pi in one step.
     """
@@ -229,7 +249,10 @@ def R_i(x: CoupledState, body: ReducedX, i: int, h: float) -> CoupledState:
 
 
 def hop(x: CoupledState, body: ReducedX, i: int, j: int) -> CoupledState:
-    """The same state told at o_j instead of o_i (1, 2, 3): b += R d, pi -= d x p, d = a_j - a_i."""
+    """The same state told at o_j instead of o_i (1, 2, 3): b += R d, pi -= d x p, d = a_j - a_i.
+
+    docs/theory/coupled.md, (X8), (X11).
+    """
     return slide(x, body.a[j - 1] - body.a[i - 1])
 
 
@@ -241,17 +264,23 @@ def K(x: CoupledState, body: Reduced, h: float, wrench: Wrench, i: int = 1) -> C
 
 
 def w_matrix(D: Array, c: Array, al: Array, sg: Array) -> Array:
-    """diag(D - s) - k^ with k = al - 2 sg, s = al.c; D: twice the moments Js (3,); sg: S's modified inertia times P (3,)."""
+    """diag(D - s) - k^ with k = al - 2 sg, s = al.c; D: twice the moments Js (3,); sg: S's modified inertia times P (3,).
+
+    docs/theory/coupled.md, (X15).
+    """
     return np.diag(D - al @ c) - hat(al - 2.0 * sg)
 
 
 def w_turning(c: Array, S: Array) -> float:
-    """r = 2 c.S c / (1 + c.c) [m]."""
+    """r = 2 c.S c / (1 + c.c) [m]. docs/theory/coupled.md, (X15)."""
     return float(2.0 * c @ S @ c / (1.0 + c @ c))
 
 
 def w_guess(a: Array, P: Array, Js: Array, S: Array, sg: Array) -> Array:
-    """The initial guess of section 2 (a): r of c = a / D, then the root s0 of the quartic's linear part (see below)."""
+    """The initial guess of section 2 (a): r of c = a / D, then the root s0 of the quartic's linear part (see below).
+
+    docs/theory/coupled.md, (X16).
+    """
     D = 2.0 * Js
     D_jk, D_sum = np.array([D[1] * D[2], D[2] * D[0], D[0] * D[1]]), D.sum() - D
     al = a + w_turning(a / D, S) * P
@@ -264,6 +293,8 @@ def w_guess(a: Array, P: Array, Js: Array, S: Array, sg: Array) -> Array:
 
 def w_parameter(a: Array, P: Array, Js: Array, S: Array, newtons: int | None) -> Array:
     """c with [diag(D - s) - k^] c = al: F = cay(c) of W. Raises NoSolution (a ValueError).
+
+    docs/theory/coupled.md, (X15).
 
     a = h pi - S P and P = h p, (3,); Js (3,) [kg m2]; S (3, 3) [m], the gauge.
     """
@@ -306,6 +337,8 @@ def settled(value: Callable[[Array], Array], newton: Callable[[Array], Array], c
 def W(x: CoupledState, body: ReducedW, h: float, newtons: int | None = None) -> CoupledState:
     """Section 2 (a), for (pi - S p).Js^-1 (pi - S p) / 2: F of the coupled Moser-Veselov equation, then the motion.
 
+    docs/theory/coupled.md, (X13), (X14).
+
     Y = -vee(F Sd - Sd F^T); b += R Y, pi -= Y x p; R <- R F, p <- F^T p, pi <- F^T pi. newtons: so many Newton steps
     from the guess, or None for round-off. Raises NoSolution (a ValueError).
     """
@@ -316,7 +349,10 @@ def W(x: CoupledState, body: ReducedW, h: float, newtons: int | None = None) -> 
 
 
 def drag(x: CoupledState, body: Reduced, h: float, z: Direction) -> CoupledState:
-    """The exact flow of one direction: w+ = w e^-y / (1 + h L q |w| (1 - e^-y)/y), y = h L l, L = z.I^-1 z."""
+    """The exact flow of one direction: w+ = w e^-y / (1 + h L q |w| (1 - e^-y)/y), y = h L l, L = z.I^-1 z.
+
+    docs/theory/coupled.md, (X18).
+    """
     v, w = z.twist[:3], z.twist[3:]
     v, w = body.Q.T @ v, body.Q.T @ (w - cross(body.o[0], v))
     g_v, g_w = body.velocity(v, w)
@@ -370,7 +406,10 @@ def step(
     newtons: int | None = None,
     kick: Kick | None = None,
 ) -> CoupledState:
-    """One step of h from o_1 to o_1: a turn R_i is entered by the hop to o_i; kick: instead of K, user's frame."""
+    """One step of h from o_1 to o_1: a turn R_i is entered by the hop to o_i; kick: instead of K, user's frame.
+
+    docs/theory/coupled.md, (X12), (X17).
+    """
     at = 1
     for letter, coefficient in program:
         if letter == "T":
@@ -390,6 +429,9 @@ def step(
 def energy(
     b: Array, R: Array, nu: Array, Om: Array, I6: Array, potential: Callable[[Array, Array], float] | None = None
 ) -> float:
-    """(nu, Om).I6 (nu, Om)/2 + U(b, R) [J], user's origin and axes; potential: U, None for none."""
+    """(nu, Om).I6 (nu, Om)/2 + U(b, R) [J], user's origin and axes; potential: U, None for none.
+
+    docs/theory/coupled.md, (X3).
+    """
     xi = np.concatenate([nu, Om])
     return float(0.5 * xi @ I6 @ xi) + (potential(b, R) if potential else 0.0)

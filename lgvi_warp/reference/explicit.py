@@ -75,7 +75,7 @@ def pack(x: State) -> Array:
 
 
 def unpack(y: Array, x: State, t: float) -> State:
-    """The state with y (15,), see `pack`, at t, the rest as in x."""
+    """The state with y (15,), see `pack`, at t, the rest as in x. docs/theory/runge_kutta.md, (K4)."""
     first, last = y[3:6], y[6:9]
     return replace(x, b=y[:3], R=np.array([first, cross(last, first), last]), p=y[9:12], pi=y[12:], t=t)
 
@@ -96,7 +96,9 @@ def at(x: State, origin: Array) -> State:
 
 
 def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[Array, Array, Array, Array]:
-    """b' (3,), R' (3, 3), p' (3,), pi' (3,), eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws.
+    """b' (3,), R' (3, 3), p' (3,), pi' (3,), eq. (1) and the dynamics of Nordkvist & Sanyal 2010 with all laws.
+
+    docs/theory/integrator.md, (1), (I1); docs/theory/runge_kutta.md, (K1); docs/theory/water.md, (W1).
 
     b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; some laws look at the step h.
     """
@@ -150,7 +152,7 @@ def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USE
 
 
 def stages_and_powers(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> tuple[Array, Array]:
-    """The same, and the power that is taken at each stage, (stages,) [W]."""
+    """The same, and the power that is taken at each stage, (stages,) [W]. docs/theory/runge_kutta.md, (K2)."""
     y, K, watts = pack(x), np.zeros((len(tableau.b), 15)), np.zeros(len(tableau.b))
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
         stage = followed(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, c * h)
@@ -160,7 +162,10 @@ def stages_and_powers(x: State, body: Body, h: float, tableau: Tableau, origin: 
 
 
 def stepper(tableau: Tableau, origin: Array = USER) -> Step:
-    """step(x, body, h): y + h sum_i b_i k_i, with y taken at a point (3,) [m] of the body; x is at the user's origin."""
+    """step(x, body, h): y + h sum_i b_i k_i, with y taken at a point (3,) [m] of the body; x is at the user's origin.
+
+    docs/theory/runge_kutta.md, (K3).
+    """
 
     def step(x: State, body: Body, h: float) -> State:
         x = at(boarded(remembered_half(x, body, h, second=False), body, h), origin)
@@ -183,6 +188,8 @@ def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
 
 def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int, origin: Array = USER) -> State:
     """The state after so many steps of h [s] where forces never change in inertial axes: then R p = P + t F is known.
+
+    docs/theory/runge_kutta.md, (K6).
 
     y = (b, two rows of R, pi), (12,), of which p = R^T (R p) at every stage.
     """
@@ -210,6 +217,8 @@ def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int,
 def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
     """The error of a step over the tolerance, HNW (4.11); with two estimates, HNW II.10: e5^2 / sqrt(e5^2 + e3^2 / 100).
 
+    docs/theory/runge_kutta.md, (K7).
+
     K: Rates (stages, 15), with the rate at the end where the tableau asks for it.
     """
     norms = [float(np.mean((h * np.array(e) @ K / scale) ** 2)) for e in tableau.errors]
@@ -220,7 +229,10 @@ def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
 
 
 def next_factor(tableau: Tableau, error: float, before: float) -> float:
-    """PI control, h <- h factor; error and before: those of this step and of the last accepted."""
+    """PI control, h <- h factor; error and before: those of this step and of the last accepted.
+
+    docs/theory/runge_kutta.md, (K8).
+    """
     exponent = 1.0 / tableau.estimate - 0.75 * BETA
     factor = SAFETY * max(error, 1e-10) ** -exponent * max(before, 1e-4) ** BETA
     return min(GROW, max(SHRINK, factor))

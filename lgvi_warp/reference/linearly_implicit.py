@@ -23,7 +23,10 @@ class Implicit(Tableau, Protocol):
 
 
 def slope(x: State, body: Body, h: float) -> Array:
-    """D(s nu) (6, 6), near the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D."""
+    """D(s nu) (6, 6), near the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D.
+
+    docs/theory/runge_kutta.md, (K16).
+    """
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
     flow = water(look(x, body, h), body)
     q = h * float(np.trace(np.linalg.solve(body.I6, damping(x, body, h, nu, Om, flow))))
@@ -33,6 +36,8 @@ def slope(x: State, body: Body, h: float) -> Array:
 
 def stages(x: State, body: Body, h: float, tableau: Implicit, origin: Array = USER) -> Array:
     """k_i (stages, 15) of y = pack(x), x with b and pi at `origin`.
+
+    docs/theory/runge_kutta.md, (K15).
 
     With s_i = sum_j<i g_ij / g k_j, the equation of k_i is (1 - h g A) (k_i + s_i) = f + s_i.
     """

@@ -19,17 +19,22 @@ def algebra_rates(x: State, body: Body, h: float, origin: Array = USER) -> Array
 
 
 def bracket(u: Array, v: Array) -> Array:
-    """[u, v] of so(3) x R^9: the cross product of the first three, and zeros."""
+    """[u, v] of so(3) x R^9: the cross product of the first three, and zeros. docs/theory/runge_kutta.md, (K11)."""
     return np.concatenate([cross(u[:3], v[:3]), np.zeros(9)])
 
 
 def act(x: State, u: Array, t: float) -> State:
-    """R exp(hat(u[:3])) and (b, p, pi) + u[3:], at t; u (12,): an element of the algebra so(3) x R^9."""
+    """R exp(hat(u[:3])) and (b, p, pi) + u[3:], at t; u (12,): an element of the algebra so(3) x R^9.
+
+    docs/theory/runge_kutta.md, (K11).
+    """
     return replace(x, R=x.R @ exp(u[:3]), b=x.b + u[3:6], p=x.p + u[6:9], pi=x.pi + u[9:], t=t)
 
 
 def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
     """Munthe-Kaas & Owren (1999): order 4 with two commutators; R turns about origin.
+
+    docs/theory/runge_kutta.md, (K10).
 
     As in Hairer, Lubich & Wanner, IV.8, but in body axes, where the commutators have opposite signs.
     """
@@ -47,7 +52,10 @@ def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
 
 
 def cg3(x: State, body: Body, h: float, origin: Array = USER) -> State:
-    """Crouch & Grossman (1993), order 3, with any laws: classical.cg3 is the paper's, on SE(3) x R^6. origin: as above."""
+    """Crouch & Grossman (1993), order 3, with any laws: classical.cg3 is the paper's, on SE(3) x R^6. origin: as above.
+
+    docs/theory/runge_kutta.md, (K12).
+    """
     x = at(remembered_half(x, body, h, second=False), origin)
     stages: list[Array] = []
     for row in (*CG3_A, CG3_B):

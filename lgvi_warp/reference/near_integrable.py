@@ -53,6 +53,8 @@ ORDERS = {"strang": 2, "rkn4_6": 4, "rkn6_11": 6, "rkn6_14": 6}
 def modified_inertia(pi: Array, J: Array, h: float, order: int = 10) -> Array:
     """J~ (3, 3) of the preprocessed discrete Moser-Veselov rotation, order 2 to 10.
 
+    docs/theory/splitting.md, (S11).
+
     J~^-1 = (1 + s) J^-1 + d I, where s and d are polynomials in h^2 |pi|^2 / 2 and h^2 pi.J^-1 pi / 2, which the rotation
     conserves.
 
@@ -73,7 +75,10 @@ def modified_inertia(pi: Array, J: Array, h: float, order: int = 10) -> Array:
 
 
 def coefficients(moments: Array) -> list[tuple[list[float], list[float]]]:
-    """Hairer & Vilmart (2006): the coefficients of N^(k-j) H^j, j = 0 .. k, in s and in d, for k = 1 to 4."""
+    """Hairer & Vilmart (2006): the coefficients of N^(k-j) H^j, j = 0 .. k, in s and in d, for k = 1 to 4.
+
+    docs/theory/splitting.md, (S11).
+    """
     I1, I2, I3 = moments.tolist()
     pairs = ((I1, I2, I3), (I2, I3, I1), (I3, I1, I2))
     e = I1 * I2 * I3
@@ -131,20 +136,23 @@ def D(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) 
 
 
 def A(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) -> State:
-    """The flow of pi.J^-1 pi / 2 + U_b(b): the free rotation and p <- p + h f, in either order."""
+    """The flow of pi.J^-1 pi / 2 + U_b(b): the free rotation and p <- p + h f, in either order.
+
+    docs/theory/splitting.md, (S10).
+    """
     x = D(x, body, h, order, solve)
     force, _ = body.wrench(x.b, x.R, potential=True)
     return kicked(x, h, (force, np.zeros(3)))
 
 
 def B(x: State, body: Body, h: float) -> State:
-    """The flow of p.M^-1 p / 2 + U_R(R): T and pi <- pi + h m, in either order."""
+    """The flow of p.M^-1 p / 2 + U_R(R): T and pi <- pi + h m, in either order. docs/theory/splitting.md, (S10)."""
     _, torque = body.wrench(x.b, x.R, potential=True)
     return kicked(T(x, body, h), h, (np.zeros(3), torque))
 
 
 def step(x: State, body: Body, program: Program, h: float, order: int = 10, solve: Solver = quartic) -> State:
-    """One step of h [s]."""
+    """One step of h [s]. docs/theory/splitting.md, (S10)."""
     for part, coefficient in program:
         x = A(x, body, coefficient * h, order, solve) if part == "A" else B(x, body, coefficient * h)
     return x

@@ -19,28 +19,31 @@ Motion = tuple[Array, Array, Array, Array]
 
 
 def equation_10(Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Array:
-    """Eq. (10): F_k with h hat(J Om_k) = F_k Jd - Jd F_k^T."""
+    """Eq. (10): F_k with h hat(J Om_k) = F_k Jd - Jd F_k^T. docs/theory/integrator.md, (10)."""
     return solve(h * body.J @ Om_k, body.J)
 
 
 def equation_11(R_k: Array, F_k: Array) -> Array:
-    """Eq. (11): R_{k+1} = R_k F_k."""
+    """Eq. (11): R_{k+1} = R_k F_k. docs/theory/integrator.md, (11)."""
     return R_k @ F_k
 
 
 def equation_12(b_k: Array, R_k: Array, nu_k: Array, h: float) -> Array:
-    """Eq. (12): b_{k+1} = h R_k nu_k + b_k, with the old R and the old nu."""
+    """Eq. (12): b_{k+1} = h R_k nu_k + b_k, with the old R and the old nu. docs/theory/integrator.md, (12)."""
     return b_k + h * R_k @ nu_k
 
 
 def equation_13(nu_k: Array, F_k: Array, b_k1: Array, R_k1: Array, body: Body, h: float) -> Array:
-    """Eq. (13): M nu_{k+1} = F_k^T M nu_k + h U_{k+1}. Returns nu_{k+1}."""
+    """Eq. (13): M nu_{k+1} = F_k^T M nu_k + h U_{k+1}. Returns nu_{k+1}. docs/theory/integrator.md, (13)."""
     force, _ = body.wrench(b_k1, R_k1)
     return np.linalg.solve(body.M, F_k.T @ body.M @ nu_k + h * force)
 
 
 def equation_14(Om_k: Array, F_k: Array, nu_k1: Array, b_k1: Array, R_k1: Array, body: Body, h: float) -> Array:
-    """Eq. (14): J Om_{k+1} = F_k^T J Om_k + h M nu_{k+1} x nu_{k+1} + h M_{k+1}, with the new nu. Returns Om_{k+1}."""
+    """Eq. (14): J Om_{k+1} = F_k^T J Om_k + h M nu_{k+1} x nu_{k+1} + h M_{k+1}, with the new nu. Returns Om_{k+1}.
+
+    docs/theory/integrator.md, (14).
+    """
     _, torque = body.wrench(b_k1, R_k1)
     munk = cross(body.M @ nu_k1, nu_k1)
     return np.linalg.solve(body.J, F_k.T @ body.J @ Om_k + h * munk + h * torque)
@@ -57,34 +60,43 @@ def phi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, 
 
 
 def kicked_momentum(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float) -> Array:
-    """The bracket of eq. (19) and (21): J Om_k + h M nu_k x nu_k + h M_k, with the old nu."""
+    """The bracket of eq. (19) and (21): J Om_k + h M nu_k x nu_k + h M_k, with the old nu.
+
+    docs/theory/integrator.md, (19).
+    """
     _, torque = body.wrench(b_k, R_k)
     return body.J @ Om_k + h * cross(body.M @ nu_k, nu_k) + h * torque
 
 
 def equation_19(q: Array, body: Body, h: float, solve: Solver = newton) -> Array:
-    """Eq. (19): F_{k+1} with F_{k+1}^T Jd - Jd F_{k+1} = h hat(q), q the kicked momentum."""
+    """Eq. (19): F_{k+1} with F_{k+1}^T Jd - Jd F_{k+1} = h hat(q), q the kicked momentum.
+
+    docs/theory/integrator.md, (19).
+    """
     return solve(h * q, body.J).T
 
 
 def equation_20(nu_k: Array, F_k1: Array, b_k: Array, R_k: Array, body: Body, h: float) -> Array:
-    """Eq. (20): M nu_{k+1} = F_{k+1} (M nu_k + h U_k). Returns nu_{k+1}."""
+    """Eq. (20): M nu_{k+1} = F_{k+1} (M nu_k + h U_k). Returns nu_{k+1}. docs/theory/integrator.md, (20)."""
     force, _ = body.wrench(b_k, R_k)
     return np.linalg.solve(body.M, F_k1 @ (body.M @ nu_k + h * force))
 
 
 def equation_21(q: Array, F_k1: Array, body: Body) -> Array:
-    """Eq. (21): J Om_{k+1} = F_{k+1} q, q the kicked momentum. Returns Om_{k+1}."""
+    """Eq. (21): J Om_{k+1} = F_{k+1} q, q the kicked momentum. Returns Om_{k+1}.
+
+    docs/theory/integrator.md, (18), (21).
+    """
     return np.linalg.solve(body.J, F_k1 @ q)
 
 
 def equation_22(R_k: Array, F_k1: Array) -> Array:
-    """Eq. (22): R_{k+1} = R_k F_{k+1}^T."""
+    """Eq. (22): R_{k+1} = R_k F_{k+1}^T. docs/theory/integrator.md, (22)."""
     return R_k @ F_k1.T
 
 
 def equation_23(b_k: Array, R_k1: Array, nu_k1: Array, h: float) -> Array:
-    """Eq. (23): b_{k+1} = h R_{k+1} nu_{k+1} + b_k, with the new R and the new nu."""
+    """Eq. (23): b_{k+1} = h R_{k+1} nu_{k+1} + b_k, with the new R and the new nu. docs/theory/integrator.md, (23)."""
     return b_k + h * R_k1 @ nu_k1
 
 
@@ -102,7 +114,10 @@ def phi_adjoint(
 
 
 def psi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Motion:
-    """Psi_h = Phi*_{h/2} o Phi_{h/2}, section III-F: Phi first, each over half the step."""
+    """Psi_h = Phi*_{h/2} o Phi_{h/2}, section III-F: Phi first, each over half the step.
+
+    docs/theory/integrator.md, (I9).
+    """
     return phi_adjoint(*phi(b_k, R_k, nu_k, Om_k, body, 0.5 * h, solve), body, 0.5 * h, solve)
 
 
@@ -121,12 +136,18 @@ def forces(x: State, body: Body, h: float, nu: Array, Om: Array) -> Wrench:
 
 
 def equation_15(old: Wrench, new: Wrench, alpha: float) -> Array:
-    """Eq. (15): phi_k = alpha phi(b_k, nu_k, R_k, Om_k) + (1 - alpha) phi(b_{k+1}, nu_k, R_{k+1}, Om_k)."""
+    """Eq. (15): phi_k = alpha phi(b_k, nu_k, R_k, Om_k) + (1 - alpha) phi(b_{k+1}, nu_k, R_{k+1}, Om_k).
+
+    docs/theory/integrator.md, (15).
+    """
     return alpha * old[0] + (1.0 - alpha) * new[0]
 
 
 def equation_16(old: Wrench, new: Wrench, beta: float) -> Array:
-    """Eq. (16): tau_k = beta tau(b_k, nu_k, R_k, Om_k) + (1 - beta) tau(b_{k+1}, nu_k, R_{k+1}, Om_k)."""
+    """Eq. (16): tau_k = beta tau(b_k, nu_k, R_k, Om_k) + (1 - beta) tau(b_{k+1}, nu_k, R_{k+1}, Om_k).
+
+    docs/theory/integrator.md, (16).
+    """
     return beta * old[1] + (1.0 - beta) * new[1]
 
 
@@ -156,6 +177,8 @@ def Phi(x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0
 
 def Phi_adjoint(x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0.5, beta: float = 0.5) -> State:
     """Phi*_h: (19)-(23) with phi*_k, tau*_k, which are (15), (16) with k and k + 1 interchanged; by iteration.
+
+    docs/theory/integrator.md, (I8).
 
     Raises NoSolution where it does not settle.
     """

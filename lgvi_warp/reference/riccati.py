@@ -14,7 +14,10 @@ MOST_ITERATIONS = 60
 
 
 def hamiltonian(a: Array, J: Array) -> Array:
-    """H (6, 6) with H (I; S) = (I; S) (A + S), similar to a Hamiltonian matrix: its eigenvalues are pairs +-lambda."""
+    """H (6, 6) with H (I; S) = (I; S) (A + S), similar to a Hamiltonian matrix: its eigenvalues are pairs +-lambda.
+
+    docs/theory/rotation.md, (R15).
+    """
     A, Jd = 0.5 * hat(a), modified_inertia(J)
     return np.block([[A, np.eye(3)], [A @ A + Jd @ Jd, A]])
 
@@ -34,6 +37,8 @@ def matrix_sign(H: Array) -> Array:
 
 def sign(a: Array, J: Array, iterations: int | None = None) -> Array:
     """F = (A + S) Jd^-1, where I + sign(H) spans the invariant subspace (I; S) of the eigenvalues with positive real part.
+
+    docs/theory/rotation.md, (R15).
 
     a (3,), J (3, 3) [kg m2]. iterations means nothing here. Raises NoSolution where the step is too large or Jd singular.
     """

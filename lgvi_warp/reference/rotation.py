@@ -61,6 +61,8 @@ def sinc(x: float) -> float:
 def exp(f: Array) -> Array:
     """Rodrigues' formula, section III-G: exp(hat(f)) = I + sin|f|/|f| hat(f) + (1 - cos|f|)/|f|^2 hat(f)^2.
 
+    docs/theory/integrator.md, (4); docs/theory/rotation.md, (R1).
+
     The half angle in (1 - cos|f|)/|f|^2 = sinc(|f|/2)^2 / 2 keeps it exact near 0.
     """
     angle, H = norm(f), hat(f)
@@ -68,18 +70,24 @@ def exp(f: Array) -> Array:
 
 
 def cay(c: Array) -> Array:
-    """The rotation with tan(angle / 2) = |c| about c: I + 2/(1 + c.c) (hat(c) + hat(c)^2)."""
+    """The rotation with tan(angle / 2) = |c| about c: I + 2/(1 + c.c) (hat(c) + hat(c)^2).
+
+    docs/theory/rotation.md, (R4).
+    """
     H = hat(c)
     return np.eye(3) + 2.0 / (1.0 + c @ c) * (H + H @ H)
 
 
 def modified_inertia(J: Array) -> Array:
-    """Jd = tr(J)/2 I - J, defined before equation (5)."""
+    """Jd = tr(J)/2 I - J, defined before equation (5). docs/theory/integrator.md, (I4)."""
     return 0.5 * np.trace(J) * np.eye(3) - J
 
 
 def residual(F: Array, a: Array, J: Array) -> float:
-    """|F Jd - Jd F^T - hat(a)| / |a|, equation (24) as a number; not divided where a = 0."""
+    """|F Jd - Jd F^T - hat(a)| / |a|, equation (24) as a number; not divided where a = 0.
+
+    docs/theory/rotation.md, (24).
+    """
     Jd = modified_inertia(J)
     return norm(vee(F @ Jd - Jd @ F.T) - a) / (norm(a) or 1.0)
 
@@ -127,6 +135,8 @@ def iterate(value: Function, differential: Function, x: Array, a: Array, iterati
 def newton(a: Array, J: Array, iterations: int | None = None) -> Array:
     """Section III-G: Newton-Raphson on a = sin|f|/|f| J f + (1 - cos|f|)/|f|^2 f x J f, F = exp(hat(f)).
 
+    docs/theory/rotation.md, (24), (R2).
+
     iterations: that many steps from J^-1 a, or None for round-off. Raises NoSolution.
     """
     if not np.any(a):
@@ -143,7 +153,10 @@ def newton(a: Array, J: Array, iterations: int | None = None) -> Array:
 
 
 def newton_differential(f: Array, J: Array) -> Array:
-    """The differential as printed in section III-G, with the series of its two quotients for small |f|."""
+    """The differential as printed in section III-G, with the series of its two quotients for small |f|.
+
+    docs/theory/rotation.md, (R3).
+    """
     n = norm(f)
     if n > 1e-2:
         first = math.cos(n) / n**2 - math.sin(n) / n**3
@@ -161,12 +174,14 @@ def newton_differential(f: Array, J: Array) -> Array:
 
 
 def cayley_value(c: Array, a: Array, J: Array) -> Array:
-    """G(c) = a + a x c + c (a.c) - 2 J c, equation (24) for F = cay(c)."""
+    """G(c) = a + a x c + c (a.c) - 2 J c, equation (24) for F = cay(c). docs/theory/rotation.md, (R5)."""
     return a + cross(a, c) + c * (a @ c) - 2.0 * J @ c
 
 
 def cayley(a: Array, J: Array, iterations: int | None = None) -> Array:
     """Newton on G(c) = a + a x c + c (a.c) - 2 J c = 0, F = cay(c); dG = hat(a) + (a.c) I + c a^T - 2 J.
+
+    docs/theory/rotation.md, (R6).
 
     iterations: that many steps from (2 J)^-1 a, or None for round-off. Raises NoSolution.
     """
@@ -183,7 +198,10 @@ def cayley(a: Array, J: Array, iterations: int | None = None) -> Array:
 
 
 def quartic_coefficients(a: Array, J: Array) -> tuple[float, float, float, float]:
-    """(q0, q1, q2, d1) of q(s) = s^4 - d1 s^3 + q2 s^2 - q1 s + q0, whose smallest root is s = a.c. J: (3,)."""
+    """(q0, q1, q2, d1) of q(s) = s^4 - d1 s^3 + q2 s^2 - q1 s + q0, whose smallest root is s = a.c. J: (3,).
+
+    docs/theory/rotation.md, (R8).
+    """
     D1, D2, D3 = (2.0 * J).tolist()
     a1, a2, a3 = (a * a).tolist()
     A = a1 + a2 + a3
@@ -194,6 +212,8 @@ def quartic_coefficients(a: Array, J: Array) -> tuple[float, float, float, float
 
 def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
     """The smallest root by Newton steps from q0 / q1, the root of q's linear part; None: until they no longer climb.
+
+    docs/theory/rotation.md, (R9).
 
     q is convex and falls up to that root, so every step from its near side stays there, until round-off.
     """
@@ -209,7 +229,10 @@ def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
 
 
 def quartic_parameter(a: Array, J: Array, s: float) -> Array:
-    """c = n / det for the diagonal J (3,) and the root s; for any s, G(c) = (a.c - s) c: the residual for free."""
+    """c = n / det for the diagonal J (3,) and the root s; for any s, G(c) = (a.c - s) c: the residual for free.
+
+    docs/theory/rotation.md, (R7).
+    """
     b = 2.0 * J - s
     b1, b2, b3 = b.tolist()
     n = (np.array([b2 * b3, b3 * b1, b1 * b2]) + a @ a) * a + cross(b * a, a)
@@ -219,6 +242,8 @@ def quartic_parameter(a: Array, J: Array, s: float) -> Array:
 @in_principal_axes
 def quartic(a: Array, J: Array, iterations: int | None = None) -> Array:
     """The scalar reduction: s = a.c is the smallest root of a quartic, then c is rational in s and F = cay(c).
+
+    docs/theory/rotation.md, (24), (R11).
 
     iterations: Newton steps on the quartic, or None for round-off. F is a rotation whatever s is. Raises NoSolution.
     """
@@ -239,6 +264,8 @@ def rotation_or_raise(F: Array, name: str) -> Array:
 def moser_veselov_roots(a: Array, w: Array) -> Array:
     """The roots lambda_i with positive real part of det(I - lambda hat(a) - lambda^2 diag(w)), w = Jd^2 (3,); complex.
 
+    docs/theory/rotation.md, (R13).
+
     With beta = lambda^2 the determinant is prod(1 - beta w_i) + beta sum a_i^2 (1 - beta w_i). Raises NoSolution.
     """
     e1, e2, e3 = w.sum(), w[0] * w[1] + w[1] * w[2] + w[2] * w[0], w.prod()
@@ -253,6 +280,8 @@ def moser_veselov_roots(a: Array, w: Array) -> Array:
 @in_principal_axes
 def moser_veselov(a: Array, J: Array, iterations: int | None = None) -> Array:
     """Section III-G, after Moser & Veselov: P(lambda) = det(I - lambda hat(a) - lambda^2 Jd^2), a cubic in lambda^2.
+
+    docs/theory/rotation.md, (R14).
 
     v_i spans the kernel of I - lambda_i hat(a) - lambda_i^2 Jd^2, and F = (Jd psi Lambda psi^-1)^T (every J of the
     printed text is Jd). Explicit: iterations means nothing here. Raises NoSolution where roots coincide (near a sphere,
@@ -271,6 +300,8 @@ def moser_veselov(a: Array, J: Array, iterations: int | None = None) -> Array:
 
 def riccati(a: Array, J: Array, iterations: int | None = None) -> Array:
     """F = (A + S) Jd^-1 with A = hat(a)/2 and S^2 + S A - A S = A^2 + Jd^2, S symmetric (Cardoso & Leite 2003).
+
+    docs/theory/rotation.md, (R15).
 
     The columns of (I, S) span an invariant subspace of H, on which H acts as A + S = F Jd: the one of the three
     eigenvalues with positive real part. Explicit: iterations means nothing here. Raises NoSolution where that subspace

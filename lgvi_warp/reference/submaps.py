@@ -54,7 +54,7 @@ class Body:
 
     @property
     def I6(self) -> Array:
-        """The inertia (6, 6), with M and J as its blocks."""
+        """The inertia (6, 6), with M and J as its blocks. docs/theory/coupled.md, (X1)."""
         return np.block([[self.M, self.C], [self.C.T, self.J]])
 
     def wrench(
@@ -97,33 +97,39 @@ def look(x: State, body: Body, h: float) -> tuple[View, ...]:
 
 
 def Ab(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu."""
+    """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu. docs/theory/splitting.md, (S3)."""
     return replace(x, b=x.b + h * x.R @ velocity(body, x.p), t=x.t + h)
 
 
 def Ap(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu."""
+    """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu. docs/theory/splitting.md, (S3)."""
     return replace(x, pi=x.pi + h * cross(x.p, velocity(body, x.p)))
 
 
 def T(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2."""
+    """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2. docs/theory/splitting.md, (S2)."""
     return Ap(Ab(x, body, h), body, h)
 
 
 def D(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """Eq. (10), (11): F = S(h pi), R <- R F; of (13), (14): p <- F^T p, pi <- F^T pi. Adjoint: (19)-(22)."""
+    """Eq. (10), (11): F = S(h pi), R <- R F; of (13), (14): p <- F^T p, pi <- F^T pi. Adjoint: (19)-(22).
+
+    docs/theory/splitting.md, (S4).
+    """
     F = solve(h * x.pi, body.J)
     return replace(x, R=x.R @ F, p=F.T @ x.p, pi=F.T @ x.pi)
 
 
 def water(views: tuple[View, ...], body: Body) -> Flow:
-    """The sum of all currents."""
+    """The sum of all currents. docs/theory/water.md, (W4)."""
     return sum((term.flow(view) for term, view in zip(body.terms, views, strict=True)), STILL)
 
 
 def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]:
-    """(rho V - m) R^T Du/Dt at the centres of buoyancy and gravity: the push of water that accelerates."""
+    """(rho V - m) R^T Du/Dt at the centres of buoyancy and gravity: the push of water that accelerates.
+
+    docs/theory/water.md, (W2).
+    """
     a = R.T @ (flow.rate + flow.gradient @ flow.velocity)
     return body.excess * a, cross(body.excess_lever, a)
 
@@ -166,6 +172,8 @@ def load(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, A
 def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) -> Array:
     """D (6, 6) at nu, Om: the sum of the damping laws, and what water that varies in space does.
 
+    docs/theory/water.md, (W3).
+
     With X = R^T G R: force -m X nu - X^T (A11 nu + A12 Om), torque -m r_g x X nu (Lamb 1932, art. 137; Galper & Miloh 1994).
     """
     views = tuple(replace(view, nu=nu, Om=Om) for view in look(x, body, h))
@@ -178,7 +186,10 @@ def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) ->
 
 
 def V(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Velocity-dependent laws, w - D(nu) nu, by the linearly implicit step of order 2, D and w of the predicted middle."""
+    """Velocity-dependent laws, w - D(nu) nu, by the linearly implicit step of order 2, D and w of the predicted middle.
+
+    docs/theory/splitting.md, (S14).
+    """
     I6, P = body.I6, np.concatenate([x.p, x.pi])
     nu, Om = np.split(np.linalg.solve(I6, P), 2)
     w = load(x, body, h, nu, Om)[1]
@@ -191,7 +202,10 @@ def V(x: State, body: Body, h: float, flow: Flow) -> State:
 
 
 def E(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Drag by its exact flow; where the inertia is not diagonal, by that of one axis after the other."""
+    """Drag by its exact flow; where the inertia is not diagonal, by that of one axis after the other.
+
+    docs/theory/splitting.md, (S13).
+    """
     (drag,) = (term for term in body.terms if isinstance(term, Drag))
     P = np.concatenate([x.p, x.pi])
     if np.array_equal(body.I6, np.diag(np.diag(body.I6))):
@@ -212,12 +226,14 @@ def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
 
 
 def kicked(x: State, h: float, wrench: tuple[Array, Array]) -> State:
-    """p <- p + h f, pi <- pi + h m, of a wrench (f, m) [N, N m]."""
+    """p <- p + h f, pi <- pi + h m, of a wrench (f, m) [N, N m]. docs/theory/splitting.md, (S5)."""
     return replace(x, p=x.p + h * wrench[0], pi=x.pi + h * wrench[1])
 
 
 def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     """The potential's part of eq. (13), (14), (19), (20), p <- p + h f(b, R), pi <- pi + h mU(b, R), and the other laws.
+
+    docs/theory/splitting.md, (S5), (S15).
 
     Half of what the laws remember and of the water's drift, half the kick, drag, and the other halves: order 2.
     """

@@ -72,6 +72,7 @@ class CircularMean(Statistic):
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # Atan2 of the mean sine and cosine; its error follows from their covariance about that direction.
+        # docs/theory/estimators.md, (E18).
         n = part["count"][:, None]
         scale = np.maximum(n - 1, 1) * np.maximum(n, 1)
         variances = tuple(part[key] / scale for key in ("cc", "cs", "ss"))

@@ -235,6 +235,7 @@ class Exceedance(Condition, Counted):
         return {"count": values.count, "hits": values.summed(self.holds(values))}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
+        # docs/theory/estimators.md, (E5).
         count = part["count"]
         n = count[:, None]
         fraction = part["hits"] / np.maximum(n, 1)

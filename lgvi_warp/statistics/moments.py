@@ -27,7 +27,10 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def joined_means(first: Part, second: Part) -> tuple[Part, np.ndarray, np.ndarray]:
-    """Return count (k,) and mean (k, d) of two sets of members, and how far the mean of each lies above it, (k, d) each."""
+    """Return count (k,) and mean (k, d) of two sets of members, and how far the mean of each lies above it, (k, d) each.
+
+    docs/theory/estimators.md, (E2).
+    """
     n = first["count"] + second["count"]
     share = (second["count"] / np.where(n > 0, n, 1))[:, None]
     delta = second["mean"] - first["mean"]
@@ -114,12 +117,14 @@ class Mean(Statistic):
 
     def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join as Chan, Golub & LeVeque (1979).
+        # docs/theory/estimators.md, (E2).
         both, a, b = joined_means(first, second)
         n, m = first["count"][:, None], second["count"][:, None]
         return both | {"m2": first["m2"] + n * a**2 + (second["m2"] + m * b**2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # The mean with the interval mean -+ t s / sqrt(n).
+        # docs/theory/estimators.md, (E1).
         count = part["count"]
         n = count[:, None]
         mean = empty_as_nan(part["mean"], count)
@@ -129,6 +134,7 @@ class Mean(Statistic):
 
     def weighted_read(self, weighted: Weighted, time: np.ndarray) -> Estimate:
         # The deviation and the error of the linearised ratio.
+        # docs/theory/estimators.md, (E16).
         own, squares, W, few = weighted.own, weighted.squares, weighted.weight[:, None], weighted.members
         mean = own["mean"]
         spread = squares["m2"] + squares["count"][:, None] * weighted.off(mean) ** 2
@@ -186,6 +192,8 @@ class Covariance(Statistic):
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Return the covariance matrix with its interval.
+
+        docs/theory/estimators.md, (E3).
 
         The interval is s_ij -+ t n / (n - 1)
         sqrt((E[x_i^2 x_j^2] - E[x_i x_j]^2 + (E[x_i^2] E[x_j^2] + 2 E[x_i x_j]^2) / n) / (n - 1)).

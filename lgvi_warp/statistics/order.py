@@ -74,6 +74,7 @@ class Extremes(Statistic):
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # The extremes; `beyond` = b follows from P(a fraction above the maximum > b) = (1 - b)^n.
+        # docs/theory/estimators.md, (E7).
         count = part["count"]
         arrays = {name: empty_as_nan(part[name], count) for name in ("minimum", "maximum")}
         arrays |= {name: part[name] for name in ("minimum_member", "maximum_member")}
@@ -216,6 +217,7 @@ class Quantiles(Statistic):
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # Quantiles, linear between sorted values as np.quantile, with intervals by ranks.
+        # docs/theory/estimators.md, (E8).
         n, level = part["count"][:, None], np.array(self.levels)[None, :]
         low, high = intervals.ranks(n, level, self.confidence)
         # The variance of the sketch's error adds to that of the ranks.

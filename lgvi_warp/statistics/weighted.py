@@ -55,13 +55,16 @@ class Weighted:
 
     @property
     def effective(self) -> np.ndarray:
-        """Effective number (k,) of members; 0 where none counts."""
+        """Effective number (k,) of members; 0 where none counts. docs/theory/estimators.md, (E15)."""
         square = self.squares["count"]
         return np.where(square > 0.0, self.own["count"] ** 2 / np.where(square > 0.0, square, 1.0), 0.0)
 
     @property
     def unbiased(self) -> np.ndarray:
-        """The factor n / (n - 1) (k,) by which a variance of few members is too small; infinite for one member."""
+        """The factor n / (n - 1) (k,) by which a variance of few members is too small; infinite for one member.
+
+        docs/theory/estimators.md, (E16).
+        """
         n = np.where(self.members > 1, self.effective, 1.0)
         # Rounding must not make a single member two.
         more = np.maximum(n - 1.0, 0.0)
@@ -73,6 +76,8 @@ class Weighted:
 
     def number_of(self, probability: np.ndarray, squares: np.ndarray) -> np.ndarray:
         """Number of independent members whose fraction has the variance of a weighted fraction, (k, ...).
+
+        docs/theory/estimators.md, (E17).
 
         squares: sum (k, ...) of the squared weights of the members that the fraction counts.
         """

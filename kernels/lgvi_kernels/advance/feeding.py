@@ -37,6 +37,8 @@ CONTROL_NON_FINITE = 8
 def make_feed(spec, types, method, at_step, opened):
     """(feed, respond, recall): a tick at the state after k steps, which gets its alarm.
 
+    docs/theory/control_loop.md, (C1).
+
     Where the host is asked, feed only measures and guides; respond, at the start of the next launch, does the rest with what
     the host has written into the memory. recall gathers the tick at which a run goes on, and which was made before.
     method: see Step; at_step, opened: see Stepping.
@@ -170,7 +172,10 @@ def make_keep_motion(spec, types, method, truth, at_step, opened):
 
 
 def make_seen(spec, types, method, truth, at_step, opened, notes):
-    """(x, c, monitor, k, h, opening) -> what is measured and what is wanted after k steps; notes: both are noted."""
+    """(x, c, monitor, k, h, opening) -> what is measured and what is wanted after k steps; notes: both are noted.
+
+    docs/theory/control_loop.md, (C2).
+    """
     State, Constants, Monitor, real = types.State, types.Constants, types.Monitor, spec.real
     Reference, momentum = reference_struct(spec.lanes, real), method.momentum
     measure, guide = (in_turn(spec.control.parts, role) for role in ("measure", "guide"))
@@ -207,7 +212,10 @@ def make_seen(spec, types, method, truth, at_step, opened, notes):
 
 
 def make_acted(spec, types):
-    """(x, y, r, c, monitor): control, allocate and send; x gets the alarm of lanes whose commands are no numbers."""
+    """(x, y, r, c, monitor): control, allocate and send; x gets the alarm of lanes whose commands are no numbers.
+
+    docs/theory/control_loop.md, (C2).
+    """
     State, Constants, Monitor, real, checked = types.State, types.Constants, types.Monitor, spec.real, spec.checked
     Wrench, Reference = wrench_struct(spec.lanes, real), reference_struct(spec.lanes, real)
     Measurement = measurement_struct(spec.lanes, real, spec.shared_rows)

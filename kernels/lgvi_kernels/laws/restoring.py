@@ -26,7 +26,7 @@ def params(width, real):
 
 @wp.func
 def law(w: Any, view: Any, p: Any):
-    """mU(b, R) = -B r x R^T e3."""
+    """mU(b, R) = -B r x R^T e3. docs/theory/integrator.md, (I3)."""
     w.torque = w.torque - cross(p.moment, view.down)
     return w
 

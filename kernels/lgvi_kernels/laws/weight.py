@@ -26,7 +26,7 @@ def params(width, real):
 
 @wp.func
 def law(w: Any, view: Any, p: Any):
-    """f(b, R) = net R^T e3."""
+    """f(b, R) = net R^T e3. docs/theory/integrator.md, (I2)."""
     w.force = w.force + p.net * view.down
     return w
 

@@ -35,7 +35,7 @@ STAGNATION = 100.0
 
 @wp.func
 def turning(c: Any, S: Any):
-    """r = 2 c.S c / (1 + c.c)."""
+    """r = 2 c.S c / (1 + c.c). docs/theory/coupled.md, (X15)."""
     q = dot(c, S * c)
     return (q + q) / (ones(q) + dot(c, c))
 
@@ -49,7 +49,7 @@ def trace_less(S: Any, v: Any):
 
 @wp.func
 def w_guess(a: Any, P: Any, J: Any, S: Any, sg: Any):
-    """r from c = a / D, then s from the linear part of its quartic, then c."""
+    """r from c = a / D, then s from the linear part of its quartic, then c. docs/theory/coupled.md, (X16)."""
     D = J + J
     DD = vec3(D.y * D.z, D.z * D.x, D.x * D.y)
     al = a + turning(a / D, S) * P
@@ -66,7 +66,7 @@ def w_guess(a: Any, P: Any, J: Any, S: Any, sg: Any):
 
 @wp.func
 def w_value(c: Any, a: Any, P: Any, J: Any, S: Any, sg: Any):
-    """rho = al - (D - s) c + k x c."""
+    """rho = al - (D - s) c + k x c. docs/theory/coupled.md, (X15)."""
     al = a + turning(c, S) * P
     return al - (J + J) * c + dot(al, c) * c + cross(al - sg - sg, c)
 
@@ -92,7 +92,10 @@ def w_newton(c: Any, value: Any, a: Any, P: Any, J: Any, S: Any, sg: Any):
 
 
 def make_W(Rotation, rotate, iterations, adaptive, checked):
-    """W with a fixed number of Newton steps, or iterated to the tolerance in the lanes that need it (see solve.py)."""
+    """W with a fixed number of Newton steps, or iterated to the tolerance in the lanes that need it (see solve.py).
+
+    docs/theory/coupled.md, (X13), (X14).
+    """
 
     @wp.func
     def parameter(alarm: Any, a: Any, P: Any, J: Any, S: Any, tolerance: Any):

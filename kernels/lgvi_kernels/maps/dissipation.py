@@ -50,7 +50,10 @@ def make_implicit(Damping, Factor, coupled):
 
 
 def make_V(damping, velocities, Damping, Factor, coupled):
-    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces."""
+    """The step with the sum of these damping laws; `velocities`: (inertia, p, pi) -> (nu, Om) at the origin of the forces.
+
+    docs/theory/splitting.md, (S14).
+    """
     implicit = make_implicit(Damping, Factor, coupled)
 
     @wp.func

@@ -83,7 +83,7 @@ def along_known(x: Any, k: Any, s: Any):
 
 @wp.func
 def completed(x: Any):
-    """The middle row of R from the others."""
+    """The middle row of R from the others. docs/theory/runge_kutta.md, (K4)."""
     x.R1 = cross(x.R2, x.R0)
     return x
 
@@ -95,6 +95,8 @@ MOST_STAGES = 13
 
 def make_moves(move, weights, complete):
     """One function (y, slopes, h): the moves by h w_1 k_1, then h w_2 k_2, ... of all weights that are not zero.
+
+    docs/theory/runge_kutta.md, (K12).
 
     complete: the function that completes a moved state, or None (see `completed`).
     """
@@ -136,7 +138,7 @@ def make_moves(move, weights, complete):
 
 
 def make_push(Wrench, View, laws):
-    """(x, constants, h): P <- P + h F, where F never changes in inertial axes."""
+    """(x, constants, h): P <- P + h F, where F never changes in inertial axes. docs/theory/runge_kutta.md, (K6)."""
     force = superpose(laws, "steady_force")
 
     @wp.func
@@ -200,6 +202,8 @@ def make_stage(moves, push, node, timed, recall):
 def make_stages(Rates, rates, ys, kept):
     """One function (x, constants, h) -> the slopes of all stages.
 
+    docs/theory/runge_kutta.md, (K2).
+
     ys: their states (see make_stage); kept: whether what laws remember at the step's start is kept.
     """
     count = len(ys)
@@ -242,7 +246,10 @@ def make_stages(Rates, rates, ys, kept):
 
 
 def make_fixed(stages, finish, push, timed, recall, used=None):
-    """One step of length h. push, recall: as in make_stage; used: (energy, slopes, h) -> energy plus that of the step."""
+    """One step of length h. push, recall: as in make_stage; used: (energy, slopes, h) -> energy plus that of the step.
+
+    docs/theory/runge_kutta.md, (K3).
+    """
 
     @wp.func
     def step(x: Any, c: Any, h: Any):

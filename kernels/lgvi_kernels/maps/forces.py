@@ -16,6 +16,8 @@ def make_forces(
 ):
     """(everything, forces, current, slope) of these laws; an argument is None where a scene has no such law (see make_K).
 
+    docs/theory/integrator.md, (15), (16), (I8).
+
     push: the wrench of damping laws that give it; matrix: the damping of the others; damping: that of all laws, and of water
     that varies in space, which is in `water_wrench` as well; loads: of laws that look at the water (see seeing.py), those that
     are not in `push`.

@@ -26,7 +26,7 @@ def gathered(s: Any, k: Any, weight: Any):
 
 
 def make_damped(Rates, make_moves, row, coupled):
-    """The rates of one stage from those without A; row: g_i1 to g_ii."""
+    """The rates of one stage from those without A; row: g_i1 to g_ii. docs/theory/runge_kutta.md, (K15)."""
     before = make_moves(gathered, tuple(weight / row[-1] for weight in row[:-1]), None)
 
     @wp.func

@@ -45,7 +45,7 @@ def half_trace_less(J: Any):
 
 @wp.func
 def mv_coefficients(a: Any, J: Any):
-    """(s1, s2, det Jd), s3 = (det Jd)^2."""
+    """(s1, s2, det Jd), s3 = (det Jd)^2. docs/theory/rotation.md, (R13)."""
     d = half_trace_less(J)
     w = d * d
     a2 = a * a

@@ -15,7 +15,7 @@ TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
 
 
 def make_turned(Rotation, real):
-    """R exp(hat(v)) of a rotation vector v."""
+    """R exp(hat(v)) of a rotation vector v. docs/theory/rotation.md, (R1)."""
 
     @wp.func
     def turned(x: Any, v: Any):
@@ -35,7 +35,7 @@ def make_turned(Rotation, real):
 
 
 def make_act(turned):
-    """How the group moves a state."""
+    """How the group moves a state. docs/theory/runge_kutta.md, (K11)."""
 
     @wp.func
     def act(x: Any, k: Any, s: Any):
@@ -50,6 +50,8 @@ def make_act(turned):
 
 def make_munthe_kaas(rates, act, turned, timed, recall, accounted=False):
     """Munthe-Kaas & Owren (1999): order 4 with two commutators. recall: of half a step, see make_recall.
+
+    docs/theory/runge_kutta.md, (K10).
 
     accounted: the energy used is summed (see accounting.py).
     """

@@ -25,7 +25,9 @@ def rates_struct(width, real, kind, accounted=False):
 
 
 def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drifts, scaled, drag, power_at=None):
-    """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
+    """The right-hand side, eq. (1) and the dynamics of Nordkvist & Sanyal 2010 with all laws of a scene.
+
+    docs/theory/integrator.md, (1), (I1); docs/theory/runge_kutta.md, (K1); docs/theory/water.md, (W1).
 
     scaled: momenta are divided by max J; drag: the function that adds drag along the axes, where it is not among
     `everything`, or None; power_at: of a scene that sums the energy used (see accounting.py), or None.

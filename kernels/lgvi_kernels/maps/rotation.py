@@ -19,7 +19,10 @@ from lgvi_kernels.lanes.rotations import rodrigues, solve3
 
 @wp.func
 def reach(a: Any, J: Any):
-    """|J^-1 a|^2: where it is below 1, a rotation F exists; for a on a principal axis it exists only there."""
+    """|J^-1 a|^2: where it is below 1, a rotation F exists; for a on a principal axis it exists only there.
+
+    docs/theory/rotation.md, (R12).
+    """
     return dot(a * a, inverse_square(J))
 
 
@@ -35,7 +38,10 @@ def inverse_square(J: Any):
 
 @wp.func
 def quartic_coefficients(a: Any, J: Any):
-    """(e + A^2, d3 + d1 A, d2 + 2A, d1), the coefficients of q from the constant one up."""
+    """(e + A^2, d3 + d1 A, d2 + 2A, d1), the coefficients of q from the constant one up.
+
+    docs/theory/rotation.md, (R8).
+    """
     # Each function below asks for them anew: once inlined, the compiler computes them once.
     D = J + J
     DD = vec3(D.y * D.z, D.z * D.x, D.x * D.y)
@@ -47,7 +53,10 @@ def quartic_coefficients(a: Any, J: Any):
 
 @wp.func
 def quartic_linear(a: Any, J: Any):
-    """The root of q's linear part: from here every Newton step stays on the near side of the root."""
+    """The root of q's linear part: from here every Newton step stays on the near side of the root.
+
+    docs/theory/rotation.md, (R9).
+    """
     q0, q1, q2, d1 = quartic_coefficients(a, J)
     return q0 / q1
 
@@ -55,6 +64,8 @@ def quartic_linear(a: Any, J: Any):
 @wp.func
 def quartic_series(a: Any, J: Any):
     """The root's series in x = q0 / q1 to third order, x (1 + q2 x / q1 + ...), as one rational function.
+
+    docs/theory/rotation.md, (R10).
 
     x ((1 - e - f) / (1 - 2 e)) with e = q2 x / q1 < 0.4 for |J^-1 a| < 1 and f = d1 x^2 / q1. One division, like the
     linear part alone, and at |J^-1 a| = 0.01 already exact to round-off.
@@ -67,14 +78,17 @@ def quartic_series(a: Any, J: Any):
 
 @wp.func
 def quartic_value(s: Any, a: Any, J: Any):
-    """q(s). By (a.c - s) c = G(c) it is also the residual of equation (24): |G| = |q| |c| / det."""
+    """q(s). By (a.c - s) c = G(c) it is also the residual of equation (24): |G| = |q| |c| / det.
+
+    docs/theory/rotation.md, (R8).
+    """
     q0, q1, q2, d1 = quartic_coefficients(a, J)
     return (((s - d1) * s + q2) * s - q1) * s + q0
 
 
 @wp.func
 def quartic_newton(s: Any, value: Any, a: Any, J: Any):
-    """s - q(s) / q'(s)."""
+    """s - q(s) / q'(s). docs/theory/rotation.md, (R9)."""
     q0, q1, q2, d1 = quartic_coefficients(a, J)
     return s - value / (((s.dtype(4.0) * s - s.dtype(3.0) * d1) * s + q2 + q2) * s - q1)
 
@@ -101,7 +115,10 @@ def quartic_residual2(value: Any, a: Any, J: Any):
 
 @wp.func
 def quartic_rotation(F: Any, s: Any, a: Any, J: Any):
-    """c = n / det, F = I + 2/(det^2 + n.n) (det hat(n) + hat(n)^2): orthogonal whatever s is."""
+    """c = n / det, F = I + 2/(det^2 + n.n) (det hat(n) + hat(n)^2): orthogonal whatever s is.
+
+    docs/theory/rotation.md, (R7), (R11).
+    """
     a2 = a * a
     A = a2.x + a2.y + a2.z
     b = J + J - vec3(s, s, s)
@@ -123,13 +140,13 @@ def cayley_start(a: Any, J: Any):
 
 @wp.func
 def cayley_value(c: Any, a: Any, J: Any):
-    """G(c)."""
+    """G(c). docs/theory/rotation.md, (R5)."""
     return a + cross(a, c) + dot(a, c) * c - (J + J) * c
 
 
 @wp.func
 def cayley_newton(c: Any, value: Any, a: Any, J: Any):
-    """c - dG^-1 G, dG = hat(a) + (a.c) I + c a^T - 2 J."""
+    """c - dG^-1 G, dG = hat(a) + (a.c) I + c a^T - 2 J. docs/theory/rotation.md, (R6)."""
     s = dot(a, c)
     d = vec3(s, s, s) - J - J
     m0 = c.x * a
@@ -143,7 +160,7 @@ def cayley_newton(c: Any, value: Any, a: Any, J: Any):
 
 @wp.func
 def cayley_rotation(F: Any, c: Any, a: Any, J: Any):
-    """F = cay(c)."""
+    """F = cay(c). docs/theory/rotation.md, (R4)."""
     beta = (ones(c.x) + ones(c.x)) / (ones(c.x) + dot(c, c))
     return rodrigues(F, c, beta, beta)
 
@@ -182,7 +199,7 @@ def newton_start(a: Any, J: Any):
 
 @wp.func
 def newton_value(f: Any, a: Any, J: Any):
-    """Section III-G: sin|f|/|f| J f + (1 - cos|f|)/|f|^2 f x J f - a."""
+    """Section III-G: sin|f|/|f| J f + (1 - cos|f|)/|f|^2 f x J f - a. docs/theory/rotation.md, (R2)."""
     alpha, beta, dalpha, dbeta = sinc_series(dot(f, f))
     Jf = J * f
     return alpha * Jf + beta * cross(f, Jf) - a
@@ -190,7 +207,7 @@ def newton_value(f: Any, a: Any, J: Any):
 
 @wp.func
 def newton_newton(f: Any, value: Any, a: Any, J: Any):
-    """f - (differential)^-1 value; the differential as printed in III-G."""
+    """f - (differential)^-1 value; the differential as printed in III-G. docs/theory/rotation.md, (R3)."""
     alpha, beta, dalpha, dbeta = sinc_series(dot(f, f))
     Jf = J * f
     k = (dalpha + dalpha) * Jf + (dbeta + dbeta) * cross(f, Jf)
@@ -204,7 +221,7 @@ def newton_newton(f: Any, value: Any, a: Any, J: Any):
 
 @wp.func
 def newton_rotation(F: Any, f: Any, a: Any, J: Any):
-    """Rodrigues' formula, section III-G."""
+    """Rodrigues' formula, section III-G. docs/theory/rotation.md, (R1)."""
     alpha, beta, dalpha, dbeta = sinc_series(dot(f, f))
     return rodrigues(F, f, alpha, beta)
 

@@ -48,6 +48,8 @@ def square(a: Any, b: Any):
 def make_errors(Rates, moves):
     """(y, new, slopes, h, rtol, atol) -> mean square of the estimates over the tolerance, HNW (4.11), one for each of moves.
 
+    docs/theory/runge_kutta.md, (K7).
+
     moves: the functions (rates, slopes, h) -> rates that estimate an error.
     """
     first, last, double = moves[0], moves[-1], len(moves) > 1
@@ -113,6 +115,8 @@ def make_verdicts(width, real):
 
 def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_memory, used=None):
     """From one step of the grid to the next, by steps that the packet's worst lane decides.
+
+    docs/theory/runge_kutta.md, (K8).
 
     copy_memory: (constants, source, target), where a law remembers (see maps/explicit.py); else None. used: as of
         make_fixed there.

@@ -46,7 +46,7 @@ def make_clock(timed):
 
 
 def make_Ab(velocity, timed):
-    """The drift of the position."""
+    """The drift of the position. docs/theory/integrator.md, (12), (23); docs/theory/splitting.md, (S3)."""
     passed = make_clock(timed)
 
     @wp.func
@@ -59,12 +59,15 @@ def make_Ab(velocity, timed):
 
 @wp.func
 def Ap(x: Any, c: Any, h: Any):
-    """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu. Absent for M = m I, where it is zero."""
+    """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu. Absent for M = m I, where it is zero.
+
+    docs/theory/integrator.md, (14), (21); docs/theory/splitting.md, (S3).
+    """
     return twisted(x, h * cross(x.p, c.inertia.anisotropy * x.p))
 
 
 def make_T(timed, compensated):
-    """Drift and Munk moment."""
+    """Drift and Munk moment. docs/theory/splitting.md, (S2)."""
     passed = make_clock(timed)
 
     @wp.func
@@ -84,7 +87,10 @@ def make_T(timed, compensated):
 
 
 def make_D(Rotation, solve, compensated):
-    """The free rotation with this solver of equation (24)."""
+    """The free rotation with this solver of equation (24).
+
+    docs/theory/integrator.md, (10), (11), (13), (14), (19), (20), (21), (22); docs/theory/splitting.md, (S4).
+    """
 
     @wp.func
     def D(x: Any, c: Any, h: Any):
@@ -145,6 +151,8 @@ def make_at_user_origin(shifted):
 
 def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V, account=None):
     """The kick by these laws, each of them None where a scene has none.
+
+    docs/theory/integrator.md, (13), (14), (20), (21); docs/theory/splitting.md, (S5).
 
     law: forces from position and time; evolve: laws that remember, half before and half after; flow: the water carries
     the vehicle, half before and half after, and where it varies in space or time also pushes it; shifted: the origin of

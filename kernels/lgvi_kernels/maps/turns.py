@@ -31,6 +31,8 @@ from lgvi_kernels.lanes.sums import carried, moved, twisted, with_turned
 def shear_pair(a: Any, b: Any, t: Any, s: Any):
     """(a, b) turned by the angle with tan(half) = t and sine s, as three shears.
 
+    docs/theory/coupled.md, (X10).
+
     Their determinant is 1 however t and s are rounded, so that this rounding neither stretches nor shrinks what is turned.
     """
     u = a + t * b
@@ -163,6 +165,8 @@ def tangent(y: Any, third: Any):
 def make_turn(axis, pitched, following, compensated, watched=False):
     """R_i: turn about one axis, for `pitched` with a slide along it (a screw); following: the axis of the next turn.
 
+    docs/theory/coupled.md, (X9).
+
     watched: the last turn of a step, about the axis of the least J, leaves in alarm.size the largest Y.Y, Y half the angles
     about all axes (see packet.turned_too_far). Turns keep |pi|, so Y is not below half the angle of the turn about the axis of
     the largest J, nor, as J3 <= 2 J2 for a rigid body, below a half of that about the middle one.
@@ -209,7 +213,10 @@ def make_turn(axis, pitched, following, compensated, watched=False):
 
 
 def make_hop(axis_from, axis_to, U12, U13, U23, compensated):
-    """The origin moves from that of axis `axis_from` to that of axis `axis_to` (0, 1, 2), by the elements of U but 0."""
+    """The origin moves from that of axis `axis_from` to that of axis `axis_to` (0, 1, 2), by the elements of U but 0.
+
+    docs/theory/coupled.md, (X8), (X11).
+    """
     sign = 1.0 if axis_to > axis_from else -1.0
     first_two = (axis_from, axis_to) in ((0, 1), (1, 0))
     along_x, along_y, along_z = (make_shift(axis, compensated) for axis in range(3))

@@ -24,7 +24,7 @@ from lgvi_kernels.lanes.view import slope_against, slope_along, to_body, to_iner
 
 @wp.func
 def acceleration_wrench(w: Any, view: Any, inertia: Any, water: Any):
-    """(rho V - m) R^T Du/Dt at the centres of buoyancy and of gravity."""
+    """(rho V - m) R^T Du/Dt at the centres of buoyancy and of gravity. docs/theory/water.md, (W2)."""
     a = to_body(view, water.rate + slope_along(water, water.velocity))
     w.force = w.force + inertia.excess * a
     w.torque = w.torque + cross(inertia.excess_lever, a)
@@ -65,7 +65,10 @@ def levered(r: Any, m: Any):
 
 
 def make_water_wrench(lever, shifted):
-    """The force and torque of water that accelerates and varies in space, at these velocities (see make_shear)."""
+    """The force and torque of water that accelerates and varies in space, at these velocities (see make_shear).
+
+    docs/theory/water.md, (W3).
+    """
 
     @wp.func
     def water_wrench(w: Any, view: Any, inertia: Any, water: Any):
@@ -91,6 +94,8 @@ def make_water_wrench(lever, shifted):
 
 def make_shear(Matrix3, lever, shifted):
     """The same of the variation in space, as a damping matrix.
+
+    docs/theory/water.md, (W3).
 
     lever: the rigid body's centre is not at the user's origin, or added mass couples there (else no torque follows);
     shifted: the user's origin, where the water is taken, is not that of the forces.

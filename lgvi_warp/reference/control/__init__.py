@@ -160,6 +160,8 @@ class Integral:
     def at_tick(self, period: float, limit: float, unmet: float, conditional: bool) -> float:
         """I + T e within +-limit, unless more of the demand would go where some of it was not delivered.
 
+        docs/theory/control_loop.md, (C8).
+
         period, limit: Time between ticks T [s]; largest size of I.
         """
         if not (conditional and unmet * self.error > 0.0):

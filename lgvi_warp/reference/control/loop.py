@@ -52,7 +52,7 @@ class Loop:
         self.sent, self.unmet = [], np.zeros(6)
 
     def tick(self, x: State, body: Body, h: float) -> None:
-        """Measure, guide, control and allocate at the start of step x.step."""
+        """Measure, guide, control and allocate at the start of step x.step. docs/theory/control_loop.md, (C2)."""
         view = look(x, body, h)
         nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
         u = x.R.T @ water(view, body).velocity
@@ -74,7 +74,10 @@ class Loop:
         self.sent.append((x.step + self.delay, {name: law.command.copy() for name, law in self.actuators.items()}))
 
     def act(self, step: int, h: float) -> None:
-        """Let the actuators hold what acts in a step: the last commands that have come, with the faults that have begun."""
+        """Let the actuators hold what acts in a step: the last commands that have come, with the faults that have begun.
+
+        docs/theory/control_loop.md, (C4), (C5).
+        """
         arrived = [commands for since, commands in self.sent if since <= step]
         tick_time = step // self.every * self.every * h
         for name, law in self.actuators.items():
@@ -89,6 +92,8 @@ def closed_loop(
     x: State, body: Body, loop: Loop, step: Callable[[State, Body, float], State], h: float, steps: int
 ) -> list[State]:
     """The states after 0, 1, ..., steps steps, with a tick before every `every`-th.
+
+    docs/theory/control_loop.md, (C1).
 
     step, h, steps: (x, body, h) -> the state h later; step [s]; number of steps.
     """

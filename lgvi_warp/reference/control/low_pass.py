@@ -12,7 +12,10 @@ from lgvi_warp.reference.rotation import exp
 
 
 def share(period: float, time_constant: float) -> float:
-    """1 - exp(-T / time constant): how far a filter goes towards its input over a period T [s]; 1 where the constant is 0."""
+    """1 - exp(-T / time constant): how far a filter goes towards its input over a period T [s]; 1 where the constant is 0.
+
+    docs/theory/control_loop.md, (C7).
+    """
     return -math.expm1(-period / time_constant) if time_constant > 0.0 else 1.0
 
 
@@ -24,7 +27,10 @@ class LowPass(Part):
         self.last: Measurement | None = None
 
     def measure(self, y: Measurement) -> Measurement:
-        """x <- x + (1 - exp(-T / time constant)) (measured - x), from the first reading on."""
+        """x <- x + (1 - exp(-T / time constant)) (measured - x), from the first reading on.
+
+        docs/theory/control_loop.md, (C7).
+        """
         if self.last is not None:
             a, z = share(y.period, self.time_constant), self.last
             if self.of == "attitude":

@@ -18,7 +18,7 @@ class CurrentProfile(Law):
     """Numbers as those of `lw.terms.CurrentProfile`."""
 
     def flow(self, view: View) -> Flow:
-        """u(b3), and its slope within the segment."""
+        """u(b3), and its slope within the segment. docs/theory/water.md, (W5)."""
         depth = view.b[2]
         u = np.array([np.interp(depth, self.depths, column) for column in np.transpose(self.velocities)])
         gradient = np.zeros((3, 3))

@@ -11,7 +11,10 @@ class CurrentField(Law):
     """Numbers as those of `lw.terms.CurrentField`, velocities (s, t, x, y, z, 3) and times given."""
 
     def flow(self, view: View) -> Flow:
-        """The sum over the corners of the cell, each weighted by how near it is along every axis."""
+        """The sum over the corners of the cell, each weighted by how near it is along every axis.
+
+        docs/theory/water.md, (W6).
+        """
         field: Array = self.velocities[int(self.scenario)]
         origin, spacing = np.array([self.times[0], *self.origin]), np.array([self.times[1], *self.spacing])
         u = (np.array([view.t, *view.b]) - origin) / spacing

@@ -10,7 +10,7 @@ class CurrentHarmonics(Law):
     """Numbers as those of `lw.terms.CurrentHarmonics`."""
 
     def flow(self, view: View) -> Flow:
-        """u = sum a cos(omega t + phase) and its derivative."""
+        """u = sum a cos(omega t + phase) and its derivative. docs/theory/water.md, (W8)."""
         omega = 2.0 * np.pi / self.periods
         angle = omega * view.t + self.phases
         return Flow(np.cos(angle) @ self.amplitudes, -(omega * np.sin(angle)) @ self.amplitudes, np.zeros((3, 3)))

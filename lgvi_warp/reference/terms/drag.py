@@ -15,13 +15,19 @@ class Drag(Law):
         return np.diag(self.linear + self.quadratic * np.abs(np.concatenate([view.nu, view.Om])))
 
     def exact(self, p: Array, inertia: Array, h: float) -> Array:
-        """The momenta (6,) after h of drag alone: v e^-x / (1 + (h q|v|/I) (1 - e^-x)/x), x = h l / I, inertia I (6,)."""
+        """The momenta (6,) after h of drag alone: v e^-x / (1 + (h q|v|/I) (1 - e^-x)/x), x = h l / I, inertia I (6,).
+
+        docs/theory/splitting.md, (S13).
+        """
         v, x = p / inertia, h * self.linear / inertia
         mean = np.where(x == 0.0, 1.0, -np.expm1(-x) / np.where(x == 0.0, 1.0, x))
         return np.asarray(inertia * v * np.exp(-x) / (1.0 + h * self.quadratic * np.abs(v) / inertia * mean))
 
     def by_directions(self, nu: Array, inverse: Array, h: float) -> Array:
-        """The velocities (6,) after h / 2 of drag along each axis alone, and again in reversed order; inverse: I6^-1."""
+        """The velocities (6,) after h / 2 of drag along each axis alone, and again in reversed order; inverse: I6^-1.
+
+        docs/theory/coupled.md, (X18).
+        """
         for j in (*range(6), *reversed(range(6))):
             L = inverse[j, j]
             x = 0.5 * h * L * self.linear[j]

@@ -47,7 +47,10 @@ class Following(Law):
         return self._moved(view.memory, 0.5 * view.h, u, u)
 
     def follow(self, view: View) -> Array:
-        """Along each straight piece of the command within the view.h before view.t."""
+        """Along each straight piece of the command within the view.h before view.t.
+
+        docs/theory/control_loop.md, (C6).
+        """
         n = view.memory
         if self.driven:
             return self._moved(n, view.h, self.commanded(view.t), self.commanded(view.t))
@@ -63,7 +66,10 @@ class Following(Law):
 
 
 def chased(n: float, first: float, last: float, lag: float, rate: float, s: float) -> float:
-    """n after s [s] in which the command u goes straight from first to last: n' = (u - n) / lag, no faster than rate."""
+    """n after s [s] in which the command u goes straight from first to last: n' = (u - n) / lag, no faster than rate.
+
+    docs/theory/control_loop.md, (C6).
+    """
     if s <= 0.0:
         return n
     slope, gap, remaining = (last - first) / s, first - n, s

@@ -24,7 +24,10 @@ class GaussMarkovCurrent(Law):
         return np.concatenate([self.initial, self.initial, np.zeros(3)])
 
     def evolve(self, view: View, second: bool) -> Array:
-        """Exact over each draw (Gillespie 1996); during it, the mean of the old and the new."""
+        """Exact over each draw (Gillespie 1996); during it, the mean of the old and the new.
+
+        docs/theory/water.md, (W9).
+        """
         _, old, rate = np.split(view.memory, 3)
         if second:
             return np.concatenate([old, old, rate])

@@ -14,7 +14,7 @@ class Restoring(Law):
     in_order = ("moment",)
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """No force and the torque mU(b, R) = -B r x z, z = R^T e3."""
+        """No force and the torque mU(b, R) = -B r x z, z = R^T e3. docs/theory/integrator.md, (I3)."""
         return np.zeros(3), -cross(self.moment, view.down)
 
     def potential(self, view: View) -> float:

@@ -17,7 +17,10 @@ class Waves(Law):
         return sum((self.component(view, *numbers) for numbers in components), STILL)
 
     def component(self, view: View, a: float, period: float, heading_deg: float, phase: float) -> Flow:
-        """One wave: u = Re (heading, -i down)^T a omega e^(-k depth) e^(-i theta), and its derivatives."""
+        """One wave: u = Re (heading, -i down)^T a omega e^(-k depth) e^(-i theta), and its derivatives.
+
+        docs/theory/water.md, (W7).
+        """
         omega, heading = 2.0 * math.pi / period, math.radians(heading_deg)
         k = omega**2 / self.gravity
         along = np.array([math.cos(heading), math.sin(heading), 0.0])

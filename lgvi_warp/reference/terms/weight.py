@@ -14,7 +14,7 @@ class Weight(Law):
     in_order = ("net",)
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """Force f(b, R) = net z and no torque, z = R^T e3."""
+        """Force f(b, R) = net z and no torque, z = R^T e3. docs/theory/integrator.md, (I2)."""
         return self.net * view.down, np.zeros(3)
 
     def potential(self, view: View) -> float:

@@ -16,7 +16,10 @@ def normal(confidence: float) -> float:
 
 
 def student(count: np.ndarray, confidence: float) -> np.ndarray:
-    """Return half the width of a mean's interval in standard errors: Student's t of count - 1 degrees of freedom."""
+    """Return half the width of a mean's interval in standard errors: Student's t of count - 1 degrees of freedom.
+
+    docs/theory/estimators.md, (E1).
+    """
     from scipy.special import stdtrit
 
     wide = np.where(count > 1, stdtrit(np.maximum(count - 1, 1), 0.5 + 0.5 * confidence), np.inf)
@@ -24,13 +27,16 @@ def student(count: np.ndarray, confidence: float) -> np.ndarray:
 
 
 def about(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the interval value -+ factor standard errors."""
+    """Return the interval value -+ factor standard errors. docs/theory/estimators.md, (E1)."""
     half = np.where(np.isinf(factor), np.inf, np.where(np.isinf(factor), 0.0, factor) * standard_error)
     return value - half, value + half
 
 
 def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the interval of a positive number from that of its logarithm: value exp(-+ factor standard_error / value)."""
+    """Return the interval of a positive number from that of its logarithm: value exp(-+ factor standard_error / value).
+
+    docs/theory/estimators.md, (E4).
+    """
     open_ = (np.isinf(factor) | np.isinf(standard_error)) & ~np.isnan(value)
     some = (value > 0.0) & ~open_
     with np.errstate(over="ignore", invalid="ignore"):
@@ -41,7 +47,10 @@ def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarr
 def wilson(
     probability: np.ndarray, count: np.ndarray, confidence: float, factor: float | np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where |p - p0| <= z sqrt(p0 (1 - p0) / n), the interval of p0 that n trials estimated as p (Wilson 1927)."""
+    """Return where |p - p0| <= z sqrt(p0 (1 - p0) / n), the interval of p0 that n trials estimated as p (Wilson 1927).
+
+    docs/theory/estimators.md, (E5).
+    """
     z2 = np.square(normal(confidence) if factor is None else factor)
     n = np.where(count > 0, count, 1.0)
     centre = (probability + 0.5 * z2 / n) / (1.0 + z2 / n)
@@ -55,7 +64,10 @@ def wilson(
 
 
 def clopper_pearson(hits: np.ndarray, count: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a probability's interval with tails below half of 1 - confidence (Clopper & Pearson 1934): never too narrow."""
+    """Return a probability's interval with tails below half of 1 - confidence (Clopper & Pearson 1934): never too narrow.
+
+    docs/theory/estimators.md, (E6).
+    """
     from scipy.special import betaincinv
 
     k, n = np.broadcast_arrays(np.asarray(hits, np.float64), np.asarray(count, np.float64))
@@ -66,12 +78,17 @@ def clopper_pearson(hits: np.ndarray, count: np.ndarray, confidence: float) -> t
 
 
 def none_of(count: int, confidence: float) -> float:
-    """Return the one-sided upper limit of a probability of which no hit was seen: 1 - (1 - confidence)^(1 / n)."""
+    """Return the one-sided upper limit of a probability of which no hit was seen: 1 - (1 - confidence)^(1 / n).
+
+    docs/theory/estimators.md, (E7).
+    """
     return float(-np.expm1(np.log1p(-confidence) / count)) if count else 1.0
 
 
 def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
     """Return standard error and half width (...) of the mean of R independent estimates (R, ...), by Student's t with R - 1.
+
+    docs/theory/estimators.md, (E13).
 
     Infinite where an estimate is missing. L'Ecuyer, Nakayama, Owen & Tuffin (2023): none is more reliable among those that
     they compare for randomized quasi-Monte Carlo.
@@ -88,6 +105,8 @@ def probability_of_replicates(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return Wilson's interval with the variance of the fractions (R, ...) of R replicates, and Student's t factor.
 
+    docs/theory/estimators.md, (E14).
+
     The standard error of `least` members among `count` is added in squares: counts are whole numbers, and replicates may
     agree by chance. Where none or all members were counted there is no spread: it is that of `count` independent members.
     """
@@ -101,7 +120,10 @@ def probability_of_replicates(
 
 
 def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return a quantile of the binomial distribution as float64: the least k with P(B <= k) >= p."""
+    """Return a quantile of the binomial distribution as float64: the least k with P(B <= k) >= p.
+
+    docs/theory/estimators.md, (E8).
+    """
     from scipy.special import bdtr, bdtrik
 
     n = np.asarray(n, dtype=np.float64)
@@ -113,6 +135,9 @@ def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np
 
 
 def ranks(count: np.ndarray, level: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return ranks l < u with P(l <= B < u) >= confidence, B the binomial number of values below the quantile."""
+    """Return ranks l < u with P(l <= B < u) >= confidence, B the binomial number of values below the quantile.
+
+    docs/theory/estimators.md, (E8).
+    """
     tail = 0.5 * (1.0 - confidence)
     return binomial_quantile(tail, count, level), binomial_quantile(1.0 - tail, count, level) + 1.0

@@ -61,7 +61,10 @@ def merged(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def join(first_part: Part, second_part: Part, size: int, place: tuple[int, int]) -> Part:
-    """Return the sketch of two of equal weight and length; place: (level, index) of the result in the tree of blocks."""
+    """Return the sketch of two of equal weight and length; place: (level, index) of the result in the tree of blocks.
+
+    docs/theory/estimators.md, (E9).
+    """
     a, b = first_part["values"].shape[2], second_part["values"].shape[2]
     error, variance, shift = (float(first_part[key][0] + second_part[key][0]) for key in ("error", "variance", "shift"))
     weight = int(first_part["weights"][0])

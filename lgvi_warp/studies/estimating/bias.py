@@ -77,6 +77,8 @@ def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_r
 def beyond(halvings: Sequence[StepChange], order: int = 1) -> float:
     """What is left beyond the finest step: the last halving bounds it for order one; a third where halvings fall faster.
 
+    docs/theory/estimators.md, (E24).
+
     A difference that happens to be near 0 says little: the one before, divided by four, is taken where that is larger; by
     sixteen for a method of order 8, whose halvings fall by 256.
     """
@@ -88,6 +90,8 @@ def beyond(halvings: Sequence[StepChange], order: int = 1) -> float:
 
 def biases(halvings: Sequence[StepChange], order: int = 1) -> list[Bias]:
     """The bias of every step of a ladder, the coarsest first, from the difference of each to the next.
+
+    docs/theory/estimators.md, (E24).
 
     The differences of one ladder are of the same members and are added as they come, halves too, which bounds their sum.
 

@@ -53,6 +53,8 @@ def plain(y: np.ndarray, least: float = 0.0) -> MeanEstimate:
 def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) -> MeanEstimate:
     """The mean of members (n,) of independent replicates of a design, member i of replicate i mod R: Student's t of R - 1.
 
+    docs/theory/estimators.md, (E13).
+
     least: as of `plain`.
     """
     means = y.reshape(-1, replicates).mean(axis=0)
@@ -62,6 +64,8 @@ def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) 
 
 def regressed(y: np.ndarray, normals: np.ndarray, least: float = 0.0) -> MeanEstimate:
     """The mean of independent members (n,) by least squares on standard normals (n, d), whose means are known to be 0.
+
+    docs/theory/estimators.md, (E19).
 
     least: as of `plain`.
     """
@@ -75,7 +79,10 @@ def regressed(y: np.ndarray, normals: np.ndarray, least: float = 0.0) -> MeanEst
 
 
 def together(parts: Sequence[MeanEstimate]) -> MeanEstimate:
-    """The sum of independent estimates; degrees of freedom by Welch (1947) and Satterthwaite (1946)."""
+    """The sum of independent estimates; degrees of freedom by Welch (1947) and Satterthwaite (1946).
+
+    docs/theory/estimators.md, (E23).
+    """
     variance = sum(part.variance for part in parts)
     below = sum(part.variance**2 / part.freedom for part in parts)
     freedom = variance**2 / below if below > 0.0 else math.inf
@@ -84,6 +91,8 @@ def together(parts: Sequence[MeanEstimate]) -> MeanEstimate:
 
 def slope(fine: np.ndarray, coarse: np.ndarray) -> tuple[float, float]:
     """The factor of the coarse numbers that leaves the least of the fine ones' variance, and what part of it is left.
+
+    docs/theory/estimators.md, (E21).
 
     The part left is 1 - rho^2; 1 where either does not vary, or overflows.
     """
@@ -134,6 +143,8 @@ def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replica
 
 def best_numbers(spreads: Sequence[VarianceModel], variance: float) -> np.ndarray:
     """Numbers of members (levels,) that reach a variance of the sum for the least cost.
+
+    docs/theory/estimators.md, (E22).
 
     The least of sum C n subject to sum V n^-a = v is where n = (m a V / C)^(1 / (1 + a)), with one m for all; where all a are
     1, n = sqrt(V / C) sum sqrt(V C) / v.

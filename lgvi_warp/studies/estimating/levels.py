@@ -229,7 +229,7 @@ class Level:
         return [*samples, (-self.weight * self.slope, np.concatenate(self.below))] if self.below else samples
 
     def part(self, target: Sought, at: Solved) -> MeanEstimate:
-        """The estimate of the level, times its weight."""
+        """The estimate of the level, times its weight. docs/theory/estimators.md, (E20)."""
         z, least = target.contributions(np.concatenate(self.y), at), target.least(at)
         if self.below:
             z = z - self.slope * target.contributions(np.concatenate(self.below), at)
@@ -248,7 +248,7 @@ def normals(points: np.ndarray) -> np.ndarray:
 
 
 def estimated(levels: Sequence[Level], target: Sought) -> tuple[Solved, MeanEstimate]:
-    """The target from all levels, and the estimate of its error."""
+    """The target from all levels, and the estimate of its error. docs/theory/estimators.md, (E20)."""
     samples = [sample for level in levels for sample in level.weighted()]
     at = target.solved(samples)
     parts = together([level.part(target, at) for level in levels])

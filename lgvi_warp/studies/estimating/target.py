@@ -43,7 +43,7 @@ class Sought:
     below: float | None = None
 
     def solved(self, samples: Sequence[Weighted]) -> Solved:
-        """The value from weighted samples, whose weights have the sum 1."""
+        """The value from weighted samples, whose weights have the sum 1. docs/theory/estimators.md, (E11)."""
         if self.kind in ("mean", "probability"):
             return Solved(mean_of(samples, self.counted))
         level = self.level if self.kind == "quantile" else 1.0 - self.level
@@ -54,7 +54,10 @@ class Sought:
         return Solved(threshold + beyond / self.level, threshold)
 
     def contributions(self, y: np.ndarray, at: Solved) -> np.ndarray:
-        """What each member contributes (n,): their mean is the value, to first order."""
+        """What each member contributes (n,): their mean is the value, to first order.
+
+        docs/theory/estimators.md, (E12).
+        """
         if self.kind == "quantile":
             return at.threshold + (self.level - (y <= at.threshold)) / at.density
         if self.kind == "cvar":
@@ -118,7 +121,10 @@ def quantile_of(samples: Sequence[Weighted], level: float) -> float:
 
 
 def density_of(samples: Sequence[Weighted], level: float) -> float:
-    """The density at the quantile of a level, from the quantiles a part of the nearer tail on both sides."""
+    """The density at the quantile of a level, from the quantiles a part of the nearer tail on both sides.
+
+    docs/theory/estimators.md, (E12).
+    """
     members = sum(len(y) for _, y in samples)
     parts = min(max(LEAST_PARTS * (members / FEW) ** 0.2, LEAST_PARTS), MOST_PARTS)
     apart = min(level, 1.0 - level, 0.15) / parts

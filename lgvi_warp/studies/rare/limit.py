@@ -106,7 +106,7 @@ class VehicleLimit(Varying):
         return len(self.names) + self.draws
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
-        """The limits (n,) of members whose normals are u (n, d)."""
+        """The limits (n,) of members whose normals are u (n, d). docs/theory/rare_events.md, (B1)."""
         at_once = max(1, MOST_NUMBERS // self.d)
         parts = [self._limits(u[first : first + at_once]) for first in range(0, len(u), at_once)]
         return np.concatenate(parts)

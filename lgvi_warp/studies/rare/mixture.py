@@ -50,7 +50,7 @@ class Mixture:
         return np.stack(logs, axis=1)
 
     def log_density(self, u: np.ndarray) -> np.ndarray:
-        """Logarithm of the density at points (n, d): (n,)."""
+        """Logarithm of the density at points (n, d): (n,). docs/theory/rare_events.md, (B9)."""
         from scipy.special import logsumexp
 
         return np.asarray(logsumexp(self.log_parts(u), axis=1))
@@ -74,7 +74,10 @@ def _as_where_free(mean: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def fitted(points: np.ndarray, rng: np.random.Generator) -> Mixture:
-    """The mixture of 1 to 4 parts that describes points (n, d) best, by BIC (Schwarz 1978)."""
+    """The mixture of 1 to 4 parts that describes points (n, d) best, by BIC (Schwarz 1978).
+
+    docs/theory/rare_events.md, (B9).
+    """
     if len(points) > FITTED:
         points = points[rng.permutation(len(points))[:FITTED]]
     # Chains repeat members: they count once as evidence.
@@ -158,7 +161,7 @@ class WeightedMembers:
 
     @classmethod
     def of(cls, u: np.ndarray, limits: np.ndarray, mixture: Mixture) -> WeightedMembers:
-        """From points (n, d) drawn from a mixture, and their limits (n,)."""
+        """From points (n, d) drawn from a mixture, and their limits (n,). docs/theory/rare_events.md, (B8), (B10)."""
         happens = limits > 0.0
         failing, theirs = u[happens], limits[happens]
         n, weights = len(u), np.exp(log_weights(mixture, failing))
@@ -172,7 +175,10 @@ class WeightedMembers:
 
 
 def log_weights(mixture: Mixture, u: np.ndarray) -> np.ndarray:
-    """Logarithm of the standard normal density over that of the mixture, at points (n, d): (n,)."""
+    """Logarithm of the standard normal density over that of the mixture, at points (n, d): (n,).
+
+    docs/theory/rare_events.md, (B8).
+    """
     d = u.shape[1]
     return np.asarray(-0.5 * (u**2).sum(axis=1) - 0.5 * d * math.log(2.0 * math.pi) - mixture.log_density(u))
 

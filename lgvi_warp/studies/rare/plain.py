@@ -70,6 +70,7 @@ class _Failing:
 
 
 def _at_random(limit: Limit, d: int, count: int, seed: int, report: Callable[[int], None]) -> PlainAnswer:
+    # docs/theory/rare_events.md, (B2).
     rng, failing, hits = generator(seed, "rare plain"), _Failing(d), 0
     for first in range(0, count, AT_ONCE):
         u = rng.standard_normal((min(AT_ONCE, count - first), d))

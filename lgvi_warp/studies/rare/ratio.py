@@ -108,7 +108,10 @@ def carried(u: np.ndarray, own: VehicleLimit, other: VehicleLimit, seed: int) ->
 
 
 def shared(failing: FailingMembers, own: VehicleLimit, other: VehicleLimit, seed: int = 0) -> Share:
-    """The part of an event's members for which that of another limit happens, with the same numbers and the same noise."""
+    """The part of an event's members for which that of another limit happens, with the same numbers and the same noise.
+
+    docs/theory/rare_events.md, (B12).
+    """
     happens = other(carried(failing.u, own, other, seed)) > 0.0
     return Share.of(happens.astype(float), failing.weights, failing.chains, failing.related)
 
@@ -117,6 +120,8 @@ def ratio_of(
     first: RareEvent, second: RareEvent, of_first: Share, of_second: Share, confidence: float = 0.95
 ) -> RareRatio:
     """The ratio of two probabilities; of_first: the part of the first's members for which the second happens; and back.
+
+    docs/theory/rare_events.md, (B12).
 
     P(B) / P(A) = P(B | A) / P(A | B), the best bridge between the two laws of failing members (Meng & Wong 1996), where the
     events have members in common; the ratio of two independent answers where that is better known.

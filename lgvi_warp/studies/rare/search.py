@@ -59,7 +59,7 @@ class RareAnswer:
     notes: tuple[str, ...] = ()
 
     def interval(self, confidence: float = 0.95) -> tuple[float, float]:
-        """The interval of the probability, by Student's t of its logarithm."""
+        """The interval of the probability, by Student's t of its logarithm. docs/theory/rare_events.md, (B7)."""
         from scipy.stats import t
 
         away = float(t.ppf(0.5 + 0.5 * confidence, self.degrees)) * self.spread
@@ -68,6 +68,8 @@ class RareAnswer:
 
 def joined(runs: Sequence[SubsetRun]) -> tuple[float, float, float]:
     """(probability, spread of its relative error, degrees of freedom) of independent runs, weighed by their sizes.
+
+    docs/theory/rare_events.md, (B6).
 
     The spread is that of the runs about each other, beside what their own chains say; where the runs differ more than chains
     explain, that of the runs alone.
@@ -143,7 +145,10 @@ class RareSearch:
         return climb(limit, levels, generators, self._told)
 
     def plain(self, probability: float, runs: Sequence[SubsetRun]) -> RareAnswer:
-        """Plain sampling, of what is not rare; chains go on from those of these runs where it meets none."""
+        """Plain sampling, of what is not rare; chains go on from those of these runs where it meets none.
+
+        docs/theory/rare_events.md, (B2).
+        """
         count = max((1.0 - probability) / (probability * (AIM * self.relative_error) ** 2), FEWEST_PLAIN)
         if count > self.most - self.members:
             self.notes.append(TAKES_MORE.format(self.most))

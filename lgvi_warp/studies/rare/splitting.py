@@ -131,6 +131,8 @@ def split_runs(
     report: Callable[[float], None] = lambda fraction: None) -> SplitRuns:  # fmt: skip
     """Independent runs of so many members a level, with the levels and the score of a pilot, all of them in one batch.
 
+    docs/theory/rare_events.md, (B11).
+
     report: called with the part of the levels that are done.
     """
     count = len(generators)
@@ -154,7 +156,7 @@ def split_runs(
 
 
 def _run_of(run: int, levels: Sequence[Stage], bounds: Sequence[float], size: int) -> SubsetRun:
-    """One of several runs: its shares, and the scores of each level's members."""
+    """One of several runs: its shares, and the scores of each level's members. docs/theory/rare_events.md, (B11)."""
     reaches = [stage.reach[stage.run == run] for stage in levels]
     shares = [float((reach >= bound).mean()) for reach, bound in zip(reaches, bounds, strict=False) if len(reach)]
     probability = float(np.prod(shares)) if len(shares) == len(bounds) else 0.0

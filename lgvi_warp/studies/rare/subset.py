@@ -134,7 +134,10 @@ class _Climber:
         self._accepted, self._steps = 0.0, 0
 
     def proposals(self) -> np.ndarray:
-        """The next places of all chains: each keeps the standard normal law (Papaioannou et al. 2015)."""
+        """The next places of all chains: each keeps the standard normal law (Papaioannou et al. 2015).
+
+        docs/theory/rare_events.md, (B4).
+        """
         u, step = self._u[-1], np.minimum(1.0, self.scale * self._widths)
         return np.sqrt(1.0 - step**2) * u + step * self.rng.standard_normal(u.shape)
 
@@ -174,7 +177,10 @@ class _Climber:
 
 
 def share_variance(happens: np.ndarray, chains: int) -> float:
-    """Variance of the relative error of a share, of members (n,) chain by chain: from the spread of the chains' own shares."""
+    """Variance of the relative error of a share, of members (n,) chain by chain: from the spread of the chains' own shares.
+
+    docs/theory/rare_events.md, (B5).
+    """
     share = float(happens.mean())
     if chains == len(happens):
         return (1.0 - share) / (share * chains)
@@ -193,6 +199,8 @@ def climb(
     limit: Limit, levels: Sequence[ChainLevel], generators: Sequence[np.random.Generator],
     report: Callable[[int], None] = lambda members: None) -> list[SubsetRun]:  # fmt: skip
     """Go from levels that there are to the event, every run by itself, all chains in one batch.
+
+    docs/theory/rare_events.md, (B3).
 
     report: called with the number of members that each step runs.
     Raises: NoProgress.

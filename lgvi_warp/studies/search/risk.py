@@ -41,7 +41,10 @@ class CVaR:
         faults.raise_if_any()
 
     def __call__(self, costs: np.ndarray) -> np.ndarray:
-        """The risk (k,) of costs (k, members); infinite where a member of the worst part has an infinite cost."""
+        """The risk (k,) of costs (k, members); infinite where a member of the worst part has an infinite cost.
+
+        docs/theory/estimators.md, (E10).
+        """
         n = costs.shape[1]
         worst = -np.sort(-costs, axis=1)
         weights = np.clip(self.share * n - np.arange(n), 0.0, 1.0)

@@ -22,7 +22,10 @@ def params(width, real):
 
 @wp.func
 def send(y: Any, p: Any):
-    """Put the new commands before the others; those of `periods` ticks ago act from `steps` on, those before until then."""
+    """Put the new commands before the others; those of `periods` ticks ago act from `steps` on, those before until then.
+
+    docs/theory/control_loop.md, (C3), (C4).
+    """
     unity = ones(p.periods)
     half = y.h.dtype(0.5) * unity
     for i in range(p.count):

@@ -23,7 +23,10 @@ def params(width, real):
 
 @wp.func
 def send(y: Any, p: Any):
-    """From the first tick at or after its time on: command <- gain * command + offset."""
+    """From the first tick at or after its time on: command <- gain * command + offset.
+
+    docs/theory/control_loop.md, (C5).
+    """
     begun = since(y, p.begin)
     u = remembered(y, p.fresh)
     remember(y, p.fresh, positive(begun, p.gain * u + p.offset, u))

@@ -12,6 +12,8 @@ from lgvi_kernels.law import *
 def integral(y: Any, row: int, limit: Any, unmet: Any, conditional: int):
     """I at this tick, from I and the error of the last one, in two rows of the memory: I + T e within +-limit.
 
+    docs/theory/control_loop.md, (C8).
+
     Where conditional, I stays as it was if more of the demand, of which `unmet` was not delivered, would go the same way.
     """
     old = remembered(y, row)

@@ -21,7 +21,10 @@ def params(width, real):
 
 @wp.func
 def share(y: Any, time_constant: Any):
-    """1 - exp(-T / time constant): how far a filter goes towards its input over a period; 1 where the constant is 0."""
+    """1 - exp(-T / time constant): how far a filter goes towards its input over a period; 1 where the constant is 0.
+
+    docs/theory/control_loop.md, (C7).
+    """
     unity = ones(time_constant)
     x = least(y.period * unity / time_constant, y.h.dtype(50.0) * unity)
     return x * decay(x)

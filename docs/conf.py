@@ -26,7 +26,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_desi
 exclude_patterns = ["index.md"]
 html_theme = "furo"
 html_static_path = ["site_parts/static"]
-html_css_files = ["site.css"]
+html_css_files = ["site.css", "equations.css"]
 html_search_scorer = str(DOCS / "site_parts/static/scorer.js")
 templates_path = ["site_parts/templates"]
 SOURCE = tomllib.loads((DOCS.parent / "pyproject.toml").read_text())["project"]["urls"]["Source"]
@@ -49,8 +49,6 @@ myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
 myst_fence_as_directive = ["math"]
 html_math_renderer = "mathml"
-html_static_path = ["site_parts/static"]
-html_css_files = ["equations.css"]
 # Notebooks run anew in each build, and an error in one is an error of the build.
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True

@@ -253,8 +253,8 @@ def drives(forms: Iterable[Product]) -> dict[str, list[int]]:
         elif i == j == k:
             along = "u|u|" if i == 0 else f"{own}|{own}|" if kind == "d" else ""
         else:
-            beside = i == k and j == 0 or kind == "c" and i == j and k == 0
-            along = f"u {own}" if beside and i else ""
+            beside = (i == k and j == 0) or (kind == "c" and i == j and k == 0)
+            along = f"u {own}" if beside else ""
         if along:
             places.setdefault(f"{FORCES[i]} of {along}", []).append(place)
     return places

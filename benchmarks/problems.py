@@ -202,11 +202,10 @@ def quadratic_form():
     return terms.QuadraticForm(products=products, values=[-20.0, -80.0, -80.0, -3.0, -5.0, -5.0, 4.0, 3.0])
 
 
-def moving_mass():
-    """By its weight, along a path."""
-    return terms.MovingMass(
-        mass=1.0, places=[[0.0, 0.0, 0.05], [0.05, 0.0, 0.05], [0.0, 0.0, 0.05]], times=[0.0, 1.0, 2.0]
-    )
+def moving_mass(inertia="auto"):
+    """Along a path, by its weight; or with its inertia."""
+    places = [[0.0, 0.0, 0.05], [0.05, 0.0, 0.05], [0.0, 0.0, 0.05]]
+    return terms.MovingMass(mass=1.0, places=places, times=[0.0, 1.0, 2.0], inertia=inertia)
 
 
 def polar():
@@ -260,6 +259,9 @@ def each_term():
     glider = {make.__name__: scene(make()) for make in own}
     powered = replace(thrusters(), power_commands=[-1.0, 0.0, 1.0], power=[200.0, 0.0, 250.0])
     glider["thrusters, energy_use"] = scene(powered, terms.EnergyUse(hotel=20.0))
+    pumped = replace(buoyancy_engine(), efficiency=0.5)
+    glider["buoyancy_engine, energy_use"] = scene(pumped, terms.EnergyUse(hotel=20.0))
+    glider["stratification, compressibility"] = scene(replace(stratification(), compressibility=0.003))
     x = np.linspace(-50.0, 50.0, 101)
     hills = 60.0 + np.sin(x / 5.0)[:, None] * np.cos(x / 7.0)
     floor = lw.events.Floor(depth=hills, origin=[-50.0, -50.0], spacing=[1.0, 1.0])

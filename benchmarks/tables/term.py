@@ -16,8 +16,8 @@ of tables 4 knots.
 
 {terms}
 
-`rk4` refuses `gauss_markov_current`, and its "all terms" are without noise. Driven vehicles of the package, with their terms
-and commands as shipped:
+`rk4` refuses `gauss_markov_current`, and its "all terms" are without noise; `psi_s` takes a moving mass by its weight
+alone. Driven vehicles of the package, with their terms and commands as shipped:
 
 {driven}
 

@@ -83,8 +83,11 @@ MADE = {
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),
     "guide/beside_others.png": Made(("benchmarks/rows/bars.json", "benchmarks/bars_picture.py"), BARS),
     "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
+    "guide/glider_by_its_battery.png": of_script("examples/laws/glider_by_its_battery.py"),
     "guide/glider_in_an_eddy.png": of_script("examples/studies/glider_in_an_eddy.py"),
     "guide/where_to_search.png": of_example("examples/where_to_search.py", "where_to_search.png"),
+    "guide/glider_survey.png": of_script("examples/studies/glider_survey.py"),
+    "guide/rescue_vehicle.png": of_script("examples/laws/rescue_vehicle.py"),
     "guide/tune_worst_5_percent.png": of_script("examples/sweeps/tune_worst_5_percent.py"),
     **{
         f"guide/stability_{name}.png": Made(("examples/paper.toml", *room("plots")), STABILITY, f"stability_{name}.png")

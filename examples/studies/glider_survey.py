@@ -3,10 +3,12 @@
 
     python examples/studies/glider_survey.py
 
-In its nose the engine drives the glider, and pitches it as well. A picture shows depth and speed over time.
+In its nose the engine drives the glider, and pitches it as well. A picture shows depth, speed and the energy used over time.
 """
 
-import matplotlib.pyplot as plt
+import sys
+from pathlib import Path
+
 import numpy as np
 
 import lgvi_warp as lw
@@ -20,31 +22,56 @@ ENGINE = lw.terms.BuoyancyEngine(
     depth_top=10.0,
     depth_bottom=100.0,
     position=[0.73, 0.0, 0.0],
+    efficiency=0.4,
     **DENSITY,
 )
+COMPUTERS = lw.terms.EnergyUse(hotel=0.5)  # W
 
 
-def main():
-    """Survey for an hour, print how far it came, and draw depth and speed."""
-    scene = lw.Scene.named("seawing", terms=[ENGINE, WATER], start={"position": [0.0, 0.0, 12.0]})
-    result = lw.solve(scene, h=0.1, t1=3600.0, save=lw.SaveAt(every=5.0))
+def plot(result, turns, path):
+    """Depth, speed and energy."""
+    from matplotlib.figure import Figure
+
     minutes, depth = result.time / 60.0, result.position[:, 0, 2]
-    speed = np.linalg.norm(result.velocity[:, 0], axis=1)
+    figure = Figure(figsize=(8.0, 6.5), layout="constrained")
+    above, middle, below = figure.subplots(3, 1, sharex=True)
+    above.plot(minutes, depth, color="#0072B2")
+    above.plot(minutes[turns], depth[turns], "k.")
+    for at in (ENGINE.depth_top, ENGINE.depth_bottom):
+        above.axhline(float(at), color="0.5", linestyle=":")
+    above.invert_yaxis()
+    above.set(
+        ylabel="depth; dotted: where\nthe engine turns [m]",
+        xlim=(0.0, minutes[-1]),
+        title="A glider goes on beyond a turning depth while its pump works",
+    )
+    middle.plot(minutes, np.linalg.norm(result.velocity[:, 0], axis=1), color="#D55E00")
+    middle.set(ylabel="speed [m/s]", ylim=(0.0, None))
+    used = result.energy_used[:, 0] / 1e3
+    below.plot(minutes, used, color="0.2", label="all")
+    below.plot(minutes, result.time * float(COMPUTERS.hotel) / 1e3, "--", color="0.5", label="computers and sensors")
+    below.set(xlabel="time [min]", ylabel="energy used [kJ]", ylim=(0.0, None))
+    below.legend()
+    figure.savefig(path, dpi=100)
+    return path
+
+
+def main(path):
+    """Survey for an hour, print how far it came, and draw depth, speed and energy."""
+    scene = lw.Scene.named("seawing", terms=[ENGINE, WATER, COMPUTERS], start={"position": [0.0, 0.0, 12.0]})
+    save = lw.SaveAt(every=5.0, fields=("position", "velocity", "energy_used"))
+    result = lw.solve(scene, h=0.1, t1=3600.0, save=save)
+    depth, speed = result.position[:, 0, 2], np.linalg.norm(result.velocity[:, 0], axis=1)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(depth)))) + 1
     print(f"{result.position[-1, 0, 0]:.0f} m north in an hour, {len(turns)} turns, from {depth[turns].min():.1f} m to "
           f"{depth[turns].max():.1f} m, {np.median(speed):.2f} m/s")  # fmt: skip
-    figure, (above, below) = plt.subplots(2, 1, figsize=(8.0, 5.0), sharex=True, layout="constrained")
-    above.plot(minutes, depth)
-    above.plot(minutes[turns], depth[turns], "k.")
-    above.axhline(10.0, color="0.7", linestyle=":")
-    above.axhline(100.0, color="0.7", linestyle=":")
-    above.invert_yaxis()
-    above.set(ylabel="depth [m]")
-    below.plot(minutes, speed, "C1")
-    below.set(xlabel="time [min]", ylabel="speed [m/s]")
-    figure.savefig("glider_survey.png", dpi=100)
-    print("glider_survey.png")
+    used = result.energy_used[-1, 0]
+    pumped = used - 3600.0 * float(COMPUTERS.hotel)
+    print(f"{used:.0f} J used, {100.0 * pumped / used:.0f} % of them by the pump")
+    print(plot(result, turns, path))
 
 
 if __name__ == "__main__":
-    main()
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/glider_survey.png")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    main(target)

@@ -409,19 +409,23 @@ def _check(
         faults.add("method", method.name, f"cannot advance an inertia that couples velocities and rates ({k})", remedy)
     composed = len(method.stages) > 1
     noisy = any(getattr(module, "NOISE", False) for _, module in acting)
-    if composed and not method.two_part and (dense or flow in ("uniform", "varying") or memory or noisy):
+    undone = not (dense or flow in ("uniform", "varying") or memory or noisy)
+    # One that takes what this method does not.
+    plain = "psi_x" if facts.residual_coupling > UNCOUPLED else "psi_s"
+    if composed and not method.two_part and not undone:
         causes = {"a damping matrix": dense, "water that varies": flow in ("uniform", "varying"), "noise": noisy}
         cause = next((cause for cause, present in causes.items() if present), "a term that remembers")
         faults.add("method", method.name, f"keeps its order only if a step of -h undoes one of h, and {cause} prevents that",
                    f"use {method.base}")  # fmt: skip
     for term, module in acting:
         if method.two_part and not getattr(module, "SEPARABLE", False):
-            faults.add("method", method.name, f"needs potentials of position plus those of attitude; {term.key} has none such",
-                       "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
+            remedy = "use ss6_13(psi_x), or bm6(psi_x)" if undone else f"use {plain}"
+            problem = f"needs potentials of position plus those of attitude; {term.key} has none such"
+            faults.add("method", method.name, problem, remedy)
         if method.gauss and ([role for role in ROLES if hasattr(module, role) and role != "power"] != ["law"]
                              or term.exact_flow or getattr(module, "NOISE", False) or hasattr(module, "seeing")):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
-            faults.add("method", method.name, problem, "use psi_s")
+            faults.add("method", method.name, problem, f"use {plain}")
     moving = [term.key for term, module in acting if hasattr(module, "carried_inertia")]
     if moving and method.tableau is None:
         problem = f"takes one inertia for all times, which {' and '.join(moving)} changes"

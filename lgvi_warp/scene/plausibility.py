@@ -19,6 +19,7 @@ from lgvi_warp.ocean.places import FAR_FROM_ORIGIN, too_long
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins
+from lgvi_warp.physics.terms.quadratic_form import QuadraticForm, drives
 from lgvi_warp.physics.terms.strips import StripTerm
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
@@ -69,6 +70,7 @@ FAR_AWAY = ("a place is {:.0f} km from environment.origin: lengths across the wa
 LARGE = ("an inertia of {:.4g} kg m2 is beyond the {:.4g} kg m2 that the mass allows within the {:.4g} m of the hull's "
          "stations: a unit?")  # fmt: skip
 
+DRIVES = "{} is {{:.4g}}, and pushes the vehicle on as it moves: drag and damping are below 0, a sign?"
 TWICE = "brakes the hull across the flow where {} does: its drag counts twice"
 
 
@@ -190,6 +192,15 @@ def hulls(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
         yield f"{second.key}.drag_coefficient", both & (common > 0.0), _text(TWICE.format(first.key))
 
 
+def driving(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
+    """Look for products of velocities that push a vehicle along its own motion: printed drag and damping are below 0."""
+    for term in scene.terms:
+        if isinstance(term, QuadraticForm):
+            for along, places in drives(term.forms).items():
+                sums = p[f"{term.key}.values"][:, places].sum(axis=1)
+                yield f"{term.key}.values", sums > 0.0, _text(DRIVES.format(along), sums)
+
+
 def remarks(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Pass on what terms say of their own numbers."""
     for term in scene.terms:
@@ -211,7 +222,7 @@ def _far_away(key: str, distance: np.ndarray) -> OddityCheck:
 
 
 # Checks of every member before a run.
-OF_NUMBERS = (waypoints, net_weight, density, currents, fin_angles, depths, inertia, hulls, actuators, remarks)
+OF_NUMBERS = (waypoints, net_weight, density, currents, fin_angles, depths, inertia, hulls, actuators, driving, remarks)
 
 
 def of_numbers(

@@ -46,7 +46,7 @@ def vehicle_names() -> list[str]:
     Examples:
         >>> import lgvi_warp as lw
         >>> lw.vehicles.names()
-        ['bluerov2_heavy', 'nordkvist_sanyal', 'remus_100', 'seawing', 'sphere', 'torpedo']
+        ['bluerov2_heavy', 'nordkvist_sanyal', 'remus_100', 'seawing', 'slocum', 'sphere', 'torpedo']
     """
     folder = resources.files("lgvi_warp.vehicles")
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))

@@ -260,13 +260,22 @@ def test_members_have_engines_of_their_own():
 
 
 @pytest.mark.kernel
+@pytest.mark.slow_for("*float32")
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
-def test_a_run_that_goes_on_in_the_midst_of_pumping_keeps_its_bits(method):
+def test_a_run_that_goes_on_in_the_midst_of_pumping_keeps_its_bits(method, dtype):
     fleet = fleet_of(OWN)
     # At 14 s the members turn at their bottoms, or have turned.
-    first = lw.solve(fleet, method, h=0.1, t1=14.0)
-    second = lw.solve(fleet, method, h=0.1, t1=40.0, start=first.final)
-    np.testing.assert_array_equal(depths(second)[-1], depths(lw.solve(fleet, method, h=0.1, t1=40.0))[-1])
+    first = lw.solve(fleet, method, h=0.1, t1=14.0, dtype=dtype)
+    second = lw.solve(fleet, method, h=0.1, t1=40.0, start=first.final, dtype=dtype)
+    np.testing.assert_array_equal(depths(second)[-1], depths(lw.solve(fleet, method, h=0.1, t1=40.0, dtype=dtype))[-1])
+
+
+def test_a_schedule_that_is_no_number_is_told_once():
+    for wrong in (np.nan, np.inf, "a"):
+        text = refused(lw.terms.Ballast, times=[0.0, 1.0], command_schedule=[[wrong], [0.0]])
+        assert text.startswith("ballast.command_schedule = ")
+        assert "\n" not in text
 
 
 def test_volumes_and_depths_in_the_wrong_order_are_refused():

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import lgvi_warp as lw
 from tests.laws.test_device_code import assert_close, bench_of, measured
@@ -170,6 +171,54 @@ def test_orders_of_a_published_vehicle(method, order):
     truth = last(lw.solve(fleet, "rk4", h=0.00625, t1=4.0))
     errors = [difference(last(lw.solve(fleet, method, h=h, t1=4.0)), truth) for h in steps]
     assert slope(steps, errors) == pytest.approx(order, abs=0.3)
+
+
+# The DSRV of 5 m, dimensionless as printed: Healey (1992), lecture notes, Naval Postgraduate School; read in MSS, DSRV.m.
+RESCUE, SPEED = 5.0, 4.11
+DSRV = {"Zq": -0.017455, "Zw": -0.043938, "Mq": -0.01131, "Mw": 0.011175}
+DSRV_MASS, DSRV_INERTIA, RIGHTING = 0.036391, 0.001925, -0.156276
+DSRV_ADDED = {(2, 2): 0.031545, (2, 4): 0.000130, (4, 2): 0.000146, (4, 4): 0.001573}
+
+
+def dsrv():
+    """The vehicle, and its matrix of w', q' [kg, kg m, kg m2]."""
+    unit = 0.5 * RHO * RESCUE**3
+    added = np.zeros((6, 6))
+    for (i, j), value in DSRV_ADDED.items():
+        added[i, j] = unit * value * RESCUE ** ((i > 2) + (j > 2))
+    # Printed Z_qdot and M_wdot differ by a tenth; no added mass does.
+    added[2, 4] = added[4, 2] = 0.5 * (added[2, 4] + added[4, 2])
+    mass, inertia = unit * DSRV_MASS, unit * RESCUE**2 * DSRV_INERTIA
+    weight, below = mass * GRAVITY, -RIGHTING * unit / (mass * GRAVITY)
+    # About the centre of gravity, which lies below that of buoyancy: M'theta is printed times U^2 [m2/s2].
+    body = lw.Vehicle(rigid_body_mass_matrix=np.diag([mass] * 3 + [inertia] * 3), added_mass_matrix=added, weight=weight,
+                      buoyancy=weight, center_of_buoyancy=(0.0, 0.0, -below))  # fmt: skip
+    form = lw.terms.QuadraticForm.gertler_hagen(DSRV, rho=RHO, length=RESCUE, added_mass=added)
+    return lw.Scene(body, lw.Environment(GRAVITY, water_density=RHO), terms=[form]), added[[2, 4]][:, [2, 4]], unit
+
+
+def test_a_rescue_vehicle_swings_as_its_linear_equations_say():
+    # m (w' - U q) = Z, I q' = M + M'theta theta, theta' = q: small motions about U ahead, by the exponential of the matrix.
+    scene, added, unit = dsrv()
+    A = np.zeros((3, 3))
+    A[0, :2] = unit / RESCUE * SPEED * np.array([DSRV["Zw"], RESCUE * DSRV["Zq"] + RESCUE * DSRV_MASS])
+    A[1, :2] = unit * SPEED * np.array([DSRV["Mw"], RESCUE * DSRV["Mq"]])
+    A[1, 2], A[2, 1] = unit * RIGHTING, 1.0
+    M = np.eye(3)
+    M[:2, :2] = added + unit * np.diag([DSRV_MASS, RESCUE**2 * DSRV_INERTIA])
+    t1, begun = 2.0, 1e-5 * np.array([SPEED, 1.0, 0.0])
+    expected = expm(np.linalg.solve(M, A) * t1) @ begun
+    result = lw.solve(one(scene, nu=(SPEED, 0.0, begun[0]), Om=(0.0, begun[1], 0.0)), "rk8", h=0.05, t1=t1)
+    R = result.attitude[-1, 0]
+    got = np.array([result.velocity[-1, 0, 2], result.angular_velocity[-1, 0, 1], np.arctan2(-R[2, 0], R[2, 2])])
+    # What is left out is of second order: some 1e-5 of them.
+    assert np.abs(got - expected).max() < 1e-4 * np.abs(expected).max()
+    assert np.abs(expected).max() > 0.1 * np.abs(begun).max()
+
+
+def test_no_published_vehicle_is_told_to_drive_itself():
+    for scene in (nps_scene(), dsrv()[0]):
+        assert not [text for text in lw.solve(scene, "rk4", h=0.1, t1=0.1).messages if "quadratic_form" in text]
 
 
 def test_members_with_entries_of_their_own():

@@ -39,6 +39,8 @@ NO_POTENTIAL = "needs potentials of position plus those of attitude; {} has none
 @pytest.mark.parametrize(("method", "given", "said"), [
     ("rkn6_14", [TETHER], NO_POTENTIAL.format("tether")),
     ("rkn6_11", [DRAG], NO_POTENTIAL.format("drag")),
+    # Nor do compositions take what these laws remember.
+    ("rkn4_6", ROUGH, "thrusters has none such; use psi_s"),
     ("rkn4_6", [WRENCH], NO_POTENTIAL.format("wrench")),
     ("bm4(psi_x)", [MATRIX], "keeps its order only if a step of -h undoes one of h"),
     *(("gauss6", [term], "takes forces of position and time only")

@@ -81,6 +81,26 @@ def test_of_two_events_in_one_step_the_earlier_one_stops(method):
             assert result.energy_used[-1, 0] == pytest.approx(HOTEL * min(at, 0.4), rel=1e-12)
 
 
+@pytest.mark.slow_but("psi_s-True")
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize("method", ["psi_s", "rk4"])
+def test_a_battery_that_ends_beside_the_floor_or_the_surface(method, first):
+    # One step of 1 s, at 1 m/s down or up: the end of the way lies 0.3 m, 0.5 m or 2 m off, that of the battery at 0.4 s.
+    off = np.array([0.3, 0.5, 2.0])
+    down, depth = np.repeat([1.0, -1.0], 3), np.concatenate([20.0 - off, off])
+    ways = {1.0: "floor", -1.0: "surface"}
+    stops = [lw.events.Floor(depth=20.0), lw.events.Surface()]
+    battery = [lw.events.Battery(capacity=2.0)]
+    body = lw.Vehicle(30.0, inertia=(0.3, 4.0, 4.0), buoyancy=30.0 * 9.80665)
+    scene = lw.Scene(body, terms=[account()], events=battery + stops if first else stops + battery)
+    fleet = one(scene, b=np.stack([0.0 * depth, 0.0 * depth, depth], 1), nu=np.stack([0.0 * down, 0.0 * down, down], 1))
+    result = lw.solve(fleet, method, h=1.0, t1=1.0, save=SAVE_ALL, threads=1)
+    told = [lw.Status(status).name.lower() for status in result.status]
+    assert told == [ways[way] if far < 0.4 else "battery" for way, far in zip(down, np.tile(off, 2), strict=True)]
+    np.testing.assert_allclose(result.failure_time, np.minimum(np.tile(off, 2), 0.4), rtol=1e-12)
+    np.testing.assert_allclose(result.energy_used[-1], HOTEL * np.minimum(np.tile(off, 2), 0.4), rtol=1e-12)
+
+
 SAVE_ALL = lw.SaveAt(fields=FIELDS)
 
 

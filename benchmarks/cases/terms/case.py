@@ -32,6 +32,8 @@ def entries(quick=False):
     vehicles = {"none": alone["none"]} | problems.coupled()
     found += [("all terms", "psi_s", problems.all_terms())]
     found += [(name, "rk4", scene) for name, scene in alone.items() if name != "gauss_markov_current"]
+    # A splitting advances one inertia.
+    found += [("moving_mass with its inertia", "rk4", problems.scene(problems.moving_mass(inertia=True)))]
     found += [("all terms", "rk4", problems.all_terms(noise=False))]
     found += [(name, method, driven_scene(name)) for name in DRIVEN for method in DRIVEN_METHODS]
     return found + [(name, method, scene) for name, scene in vehicles.items() for method in ("psi_x", "psi_x8")]

@@ -22,6 +22,14 @@ FOREVER = 1e30
 SCHEDULE = ("times", "command_schedule")
 
 
+def are_finite(values: Any) -> bool:
+    """Return whether these are finite numbers."""
+    try:
+        return bool(np.all(np.isfinite(np.asarray(values, float))))
+    except (TypeError, ValueError):
+        return False
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Commanded(Term):
     """A term of n units whose `command` (n,) is held, or follows `command_schedule` (k, n) at `times` (k,). Abstract."""
@@ -35,7 +43,8 @@ class Commanded(Term):
         both = self.command is not None and self.command_schedule is not None
         object.__setattr__(self, "commanded_twice", both and not np.array_equal(first, self.command))
         if self.command is None:
-            object.__setattr__(self, "command", first)
+            # What is wrong with a schedule is told of it alone.
+            object.__setattr__(self, "command", first if are_finite(first) else [0.0] * count)
         self.repeat(count, "command")
         if self.command_schedule is None:
             object.__setattr__(self, "following", SCHEDULE if self.times is None else ())

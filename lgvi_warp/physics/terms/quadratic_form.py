@@ -240,6 +240,26 @@ class QuadraticForm(Term):
         return matrix
 
 
+def drives(forms: Iterable[Product]) -> dict[str, list[int]]:
+    """Places of the products that push along the motion itself where their sum is above 0, by what their sum multiplies.
+
+    Of u ahead, u^2; of another velocity, by itself v|v|, and beside u, u v. A sign of these is that of a drag or of damping.
+    """
+    places: dict[str, list[int]] = {}
+    for place, (kind, i, j, k) in enumerate(forms):
+        own = VELOCITIES[i]
+        if kind == "h":
+            along = f"{own}|{own}|" if i == k and i in (1, 2) else ""
+        elif i == j == k:
+            along = "u|u|" if i == 0 else f"{own}|{own}|" if kind == "d" else ""
+        else:
+            beside = (i == k and j == 0) or (kind == "c" and i == j and k == 0)
+            along = f"u {own}" if beside else ""
+        if along:
+            places.setdefault(f"{FORCES[i]} of {along}", []).append(place)
+    return places
+
+
 # The standard equations of submarines -------------------------------------------------------------------------------
 
 _FIN = re.compile(r"(delta|\u03b4|d[sbreapn])", re.IGNORECASE)

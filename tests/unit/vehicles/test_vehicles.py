@@ -26,7 +26,7 @@ def term(name, kind):
 
 
 def test_the_list():
-    assert NAMES == ["bluerov2_heavy", "nordkvist_sanyal", "remus_100", "seawing", "sphere", "torpedo"]
+    assert NAMES == ["bluerov2_heavy", "nordkvist_sanyal", "remus_100", "seawing", "slocum", "sphere", "torpedo"]
     with pytest.raises(lw.SceneError, match="did you mean 'remus_100'"):
         co.vehicle_file("remus100")
 

@@ -97,7 +97,9 @@ entry_of = overloads.family(
 set_element = overloads.family("set_element", "rows[entry, row + offset] = value.")
 gathered = overloads.family("gathered", "The row + offset + index of each lane.")
 gathered3 = overloads.family("gathered3", "`gathered` of three rows from row + index on, as a vector.")
-thirds = overloads.family("thirds", "`gathered3` as three lanes side by side, of rows that the caller knows to be there.")
+thirds = overloads.family(
+    "thirds", "`gathered3` as three lanes side by side, of rows that the caller knows to be there."
+)
 third = overloads.family("third", "The k-th of three lanes side by side.")
 pieces_of = overloads.family(
     "pieces_of",

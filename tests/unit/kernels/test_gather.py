@@ -77,8 +77,9 @@ def test_three_rows_from_each_lanes_own_index_on(width, real):
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_whole_number_is_at_or_below_and_one_that_int32_holds(width, real):
     ends = {
-        0.0: 0, -0.0: 0, 0.75: 0, -0.25: -1, -1.0: -1, 5.0: 5, -7.5: -8, 2147483520.0: 2147483520, -2147483648.0: -(2**31),
-        2147483648.0: 2**31 - 1, -2147483904.0: -(2**31), 1e30: 2**31 - 1, -1e30: -(2**31), np.inf: 2**31 - 1, -np.inf: -(2**31),
+        0.0: 0, 0.75: 0, -0.25: -1, -1.0: -1, 5.0: 5, -7.5: -8, 2147483520.0: 2147483520, -2147483648.0: -(2**31),
+        2147483648.0: 2**31 - 1, -2147483904.0: -(2**31), 1e30: 2**31 - 1, -1e30: -(2**31), np.inf: 2**31 - 1,
+        -np.inf: -(2**31),
     }  # fmt: skip
     x = np.array([*ends, np.nan])
     if real == wp.float64:

@@ -50,7 +50,7 @@ def current_profile():
 
 
 def current_field(times=1):
-    """A swirl of 2 MB where vehicles are in cells of their own: 44 x 44 x 44 nodes, or fewer at several times."""
+    """A swirl of 2 MB, for vehicles in cells of their own: 44 x 44 x 44 nodes, or fewer at several times."""
     n = round((44**3 / times) ** (1.0 / 3.0))
     x = np.linspace(-40.0, 40.0, n)
     north, east, depth = np.meshgrid(x, x, np.linspace(0.0, 40.0, n), indexing="ij")
@@ -65,7 +65,7 @@ def current_field(times=1):
 
 
 def one_cell():
-    """The same where all vehicles are in one cell."""
+    """A field of one cell, in which all vehicles are."""
     x = np.array([-1e4, 1e4])
     north, east, depth = np.meshgrid(x, x, [0.0, 1e3], indexing="ij")
     field = 1e-5 * np.stack([-east, north, 0.1 * depth], axis=-1)
@@ -253,6 +253,7 @@ def each_term():
     fields = {
         "current_field": scene(current_field()),
         "current_field, 4 times": scene(current_field(4)),
+        "current_field, all in one cell of it": scene(current_field()),
         "current_field, one cell": scene(one_cell()),
     }
     own = (ballast, buoyancy_engine, polar, moving_mass, surface_buoyancy, quadratic_form)

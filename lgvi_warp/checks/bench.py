@@ -26,8 +26,9 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment
 
-# Length [s] and step number of the kick at which laws are evaluated.
+# Length [s] and step number of the kick at which laws are evaluated, and those of another.
 KICK, STEP = 0.01, 3
+OTHER_KICK, OTHER_STEP = 0.37, 11
 # Other body axes and another origin [m], as a method might choose them: a law must not depend on them.
 TURN = notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 1.2]))
 ORIGIN = np.array([0.1, -0.2, 0.15])
@@ -168,9 +169,9 @@ class Bench(TermBench):
         """The context that packed() receives; parameters: of the scene by name, each (1, ...) or (n, ...)."""
         return packing_context(parameters, self.count, self.seed, KICK, elsewhere)
 
-    def at(self, views: Views) -> dict[str, np.ndarray]:
-        """Evaluate every role of the law: by role, (count, numbers of the role)."""
-        return self.packets.evaluate(views)
+    def at(self, views: Views, h: float = KICK, step: int = STEP) -> dict[str, np.ndarray]:
+        """Evaluate every role of the law: by role, (count, numbers of the role); h [s], step: of the kick."""
+        return self.packets.evaluate(views, h, step)
 
 
 class Bank(Device):
@@ -187,20 +188,20 @@ class Bank(Device):
         """What the law remembers, a Warp array (packets, rows) of lanes; the second half is a backup."""
         return self.laws.memory.array
 
-    def evaluate(self, views: Views) -> dict[str, np.ndarray]:
+    def evaluate(self, views: Views, h: float = KICK, step: int = STEP) -> dict[str, np.ndarray]:
         """Evaluate every role of the law, and its energy where it has one: by role, (count, numbers of the role)."""
-        out = self.run_device(views, -1)
+        out = self.run_device(views, -1, h, step)
         roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
         return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
 
-    def run_device(self, views: Views, second: int, h: float = KICK) -> np.ndarray:
+    def run_device(self, views: Views, second: int, h: float = KICK, step: int = STEP) -> np.ndarray:
         """Evaluate the law once at each view: (k, OUT_FIELDS); h: length of the kick, or of the time before the views [s]."""
         flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
         rows = np.concatenate(flat, axis=1)
         lanes = Lanes(self.packets, rows.shape[1], self.kernel.Lane)
         put_rows(lanes.view, rows)
         times = wp.array(views.time[:: self.bench.width], dtype=wp.float64, device="cpu")
-        self.launch(lanes.array, times, wp.float64(h), STEP, second)
+        self.launch(lanes.array, times, wp.float64(h), step, second)
         return self.written()
 
 

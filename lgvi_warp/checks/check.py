@@ -10,7 +10,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgvi_kernels import built_in
-from lgvi_warp.checks.bench import MOST_SAMPLES, ORIGIN, TURN, Bank, Bench, Views, of_scene, short, sizes
+from lgvi_warp.checks.bench import (
+    MOST_SAMPLES,
+    ORIGIN,
+    OTHER_KICK,
+    OTHER_STEP,
+    TURN,
+    Bank,
+    Bench,
+    Views,
+    of_scene,
+    short,
+    sizes,
+)
 from lgvi_warp.checks.report import (
     LANES_APART,
     ROUND_OFF,
@@ -35,6 +47,8 @@ from lgvi_warp.scene.scene import Scene
 # Length of the time over which a law follows [s].
 FOLLOWED = 0.4
 FLOWS = ("steady", "uniform", "varying")
+# Roles that say what the water or a force is at a moment, whatever the method's step.
+MOMENTARY = ("law", "damping", "push", "load", "flow", "steady_force", "distance")
 # Roles that may look at the velocities.
 MOVING = ("damping", "push", "load")
 SEES_VELOCITIES = (*MOVING, "power")
@@ -47,9 +61,10 @@ def check_law(
 
     Each new law costs the compilation of one small kernel. The checks, each made where the law has the role:
 
-    * All roles: numbers are finite, also at rest and along single axes. Lanes do not mix. Numbers that vary by member
-      give the same as shared ones. `packed` fills the fields that `params` names, and the law is the same in all body
-      axes and about all origins that a method may choose.
+    * All roles: numbers are finite, also at rest and along single axes. Lanes do not mix, and the place of a member among
+      others does not matter. Without noise and memory, forces do not depend on the length of the step. Numbers that vary
+      by member give the same as shared ones. `packed` fills the fields that `params` names, and the law is the same in
+      all body axes and about all origins that a method may choose.
     * `law`: independent of velocities, and of the time unless `timed`. With POTENTIAL, force and torque are the
       derivatives of `potential`, and `energy` adds the same potential.
     * `damping`: nu . D nu >= 0. With `dissipative = False` the least power is reported and is no fault.
@@ -142,13 +157,29 @@ def _of_every_law(bench: Bench, step: float) -> Iterator[Check]:
             remedy = f"write timed = True in {kind}, or it gets no time"
             yield judged(f"{role}: blind to time", later[role] - value, 0.0, views, remedy)
     if not bench.noisy:
+        yield from _steps(bench, here)
         yield from _packing(bench, here)
+
+
+def _steps(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
+    """A force is the same whatever step the method takes; what a law remembers may follow from its steps."""
+    if bench.term.memory:
+        return
+    longer = bench.at(bench.views, h=OTHER_KICK)
+    later = bench.at(bench.views, step=OTHER_STEP)
+    for role in filter(here.__contains__, MOMENTARY):
+        remedy = "only noise, and what a law remembers, may depend on view.h, the length of the step"
+        yield judged(f"{role}: blind to the step", longer[role] - here[role], 0.0, bench.views, remedy)
+        if not bench.term.timed:
+            remedy = f"write timed = True in {type(bench.term).__name__}, or view.step stays 0"
+            yield judged(f"{role}: blind to the step's number", later[role] - here[role], 0.0, bench.views, remedy)
 
 
 def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     """The same law whatever lane it is in, however its numbers are given, in whatever axes."""
     views = bench.views
-    back = np.arange(bench.count).reshape(-1, bench.width)[:, ::-1].reshape(-1)
+    # Last first: every member is in another lane, and in another packet.
+    back = np.arange(bench.count)[::-1]
     mixed_views = Views(**{name: value[back] for name, value in vars(views).items()})
     # What a law remembers may depend on where it is: it remembers anew.
     mixed = Bank(bench, bench.context(bench.parameters), mixed_views).evaluate(mixed_views)

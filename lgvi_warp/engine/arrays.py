@@ -231,7 +231,9 @@ class LawArrays:
         parts_of_laws = [row_parts(law) for law in laws]
         count = self._packets if any(len(part) > 1 for parts in parts_of_laws for part in parts) else 1
         if moved or len(self.table.view) != count:
-            self.table, self._written = Lanes(count, self._rows, self._Number), {}
+            # A vector of rows that members share is one load of four: one row more than there are.
+            rows = self._rows + (self._Number is not self._Lane)
+            self.table, self._written = Lanes(count, rows, self._Number), {}
         first = 1
         for parts, known in zip(parts_of_laws, shared, strict=True):
             for part in parts:

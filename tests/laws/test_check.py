@@ -216,6 +216,27 @@ def mixing_law(w: Any, view: Any, p: Any):
 
 
 @wp.func
+def step_law(w: Any, view: Any, p: Any):
+    """A torque that grows with the step."""
+    w.torque = w.torque + (view.h * p.strength) * view.down
+    return w
+
+
+@wp.func
+def counting_law(w: Any, view: Any, p: Any):
+    """A torque that grows from step to step."""
+    w.torque = w.torque + (view.h.dtype(view.step) * p.strength) * view.down
+    return w
+
+
+@wp.func
+def placed_law(w: Any, view: Any, p: Any):
+    """A torque that depends on which members stand beside a member's own packet."""
+    w.torque = w.torque + (view.h.dtype(view.packet) * p.strength) * view.down
+    return w
+
+
+@wp.func
 def resisting_damping(D: Any, view: Any, p: Any):
     """Along x alone, of one number."""
     zero = p.strength - p.strength
@@ -324,6 +345,9 @@ WRONG = {
     "looks at the velocity": (with_role("law", hasty_law), ["law: blind to velocity", ...]),
     "divides by zero": (with_role("law", dividing_law), ["finite", ...]),
     "looks at another lane": (with_role("law", mixing_law), ["law: lanes apart", "law: any axes", ...]),
+    "looks at the step": (with_role("law", step_law), ["law: blind to the step"], "view.h, the length of the step"),
+    "counts steps": (with_role("law", counting_law), ["law: blind to the step's number"], "timed = True in Bad"),
+    "looks at its packet": (with_role("law", placed_law), ["law: lanes apart"], "must not look at others"),
     "no number at rest": (with_role("damping", constant_damping), [AT_REST, ...], STILL),
     "no number along an axis": (with_role("damping", slender_damping), [AT_REST, ...], STILL),
     "no number at the origin": (with_role("law", heading_law), [AT_REST, ...], "at position [0.0, 0.0, 0.0] m"),

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Currents on a grid: exact where they are linear, a closed circle in an eddy, scenarios, times, the ends, and bad input."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import lgvi_warp as lw
+from lgvi_warp.engine.arrays import Lanes
 from tests.support.tools import GRAVITY, last, one
 
 # Neutral, and as heavy as the water that it displaces: it goes with the water if it begins so.
@@ -129,3 +132,83 @@ def test_a_large_grid_gives_what_its_part_gives(dtype, levels):
     assert np.ptp(ends[0].velocity[-1], axis=0).min() > 0.01
     np.testing.assert_allclose(ends[1].velocity[-1], ends[0].velocity[-1], rtol=0.0, atol=tolerance)
     np.testing.assert_allclose(ends[1].position[-1], ends[0].position[-1], rtol=0.0, atol=30.0 * tolerance)
+
+
+def test_the_nodes_of_a_field_are_written_once_for_all_calls(monkeypatch):
+    rng = np.random.default_rng(5)
+    field = lw.terms.CurrentField(velocities=0.1 * rng.normal(size=(60, 60, 20, 3)), spacing=[1.0, 1.0, 1.0])
+    made = []
+    begin = Lanes.__init__
+    monkeypatch.setattr(Lanes, "__init__", lambda self, *given: made.append(given[:2]) or begin(self, *given))
+    vary = {"start.velocity": lw.distributions.Normal(std=0.1)}
+    run = lw.prepare(scene(field), vary, of="speed", method="rk4", h=0.1, t1=0.1)
+    first, second = rng.normal(size=(2, 64, 3))
+    run(first)
+    tables = [(packets, rows) for packets, rows in made if packets * rows >= field.velocities.size]
+    # One for all packets; a vector of the last node is one load of four rows.
+    assert tables == [(1, 1 + field.velocities.size + 1)]
+    tracemalloc.start()
+    answer = run(second)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len([size for size in made if size == tables[0]]) == 1
+    assert peak < field.velocities.nbytes / 4
+    np.testing.assert_array_equal(answer, run(second))
+
+
+def hills(depth):
+    """A floor that lies at this depth in the south and rises to the north by 1 m in 4 m."""
+    return lw.events.Floor(
+        depth=[[depth, depth], [depth - 30.0, depth - 30.0]], origin=[-60.0, -60.0], spacing=[120.0, 120.0]
+    )
+
+
+@pytest.mark.parametrize("method", ["psi_s", "rk4", "psi_x"])
+@pytest.mark.parametrize("h", [0.5, 30.0])
+def test_a_member_that_leaves_a_field_and_meets_the_floor_stops_at_what_comes_first(method, h):
+    # Water of 0.5 m/s to the north and of 0.25 m/s downwards carries all: to the edge at 60 m, and to the floor.
+    water = np.array([0.5, 0.0, 0.25])
+    wide = lw.terms.CurrentField(velocities=np.broadcast_to(0.4 * water, (3, 3, 3, 3)), origin=[-600.0, -600.0, 0.0],
+                                 spacing=[600.0, 600.0, 40.0], name="wide")  # fmt: skip
+    near = field_of(lambda x, y, z: [0.6 * v + 0.0 * x for v in water], outside="stop", name="near")
+    floor = hills(45.0)
+    start = np.array([[49.9, 0.0, 6.0], [49.9, 0.0, 9.9], [49.9, 0.0, 10.0], [49.9, 0.0, 12.0]])
+    until_edge = (60.0 - start[:, 0]) / water[0]
+    # z + 0.25 t = 45 - (x + 60 + 0.5 t) / 4.
+    until_floor = (45.0 - (start[:, 0] + 60.0) / 4.0 - start[:, 2]) / (water[2] + water[0] / 4.0)
+    first = np.minimum(until_edge, until_floor)
+    # The two in the middle meet both within one step.
+    assert np.all(np.floor(np.stack([until_edge, until_floor])[:, 1:3] / 0.5) == 40.0)
+    still, upright = np.zeros((4, 3)), np.tile(np.eye(3), (4, 1, 1))
+    sea = lw.Scene(DRIFTER, lw.Environment(GRAVITY), terms=[wide, near], events=[floor])
+    fleet = lw.Ensemble.from_states(sea, start, upright, still + water, still)
+    result = lw.solve(fleet, method, h=h, t1=60.0)
+    outside, met = lw.Status.OUTSIDE, lw.Status.FLOOR
+    assert [lw.Status(status) for status in result.status] == [outside, outside, met, met]
+    np.testing.assert_allclose(result.end_time, first, rtol=1e-9)
+    np.testing.assert_allclose(result.position[-1], start + first[:, None] * water, rtol=1e-9)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_a_run_goes_on_in_a_field_with_a_single_scenario(dtype):
+    # One member, one scenario, one fleet of many: each goes on as if it had not been cut.
+    rng = np.random.default_rng(7)
+    field = lw.terms.CurrentField(
+        velocities=0.3 * rng.normal(size=(1, 3, *(len(x) for x in NODES), 3)),
+        origin=ORIGIN,
+        spacing=SPACING,
+        times=[0.0, 1.0],
+    )
+    assert field.velocities.shape[0] == 1
+    for members in (1, 19):
+        place = rng.uniform(-40.0, 40.0, (members, 3)) * [1.0, 1.0, 0.2] + [0.0, 0.0, 20.0]
+        still, upright = np.zeros((members, 3)), np.tile(np.eye(3), (members, 1, 1))
+        fleet = lw.Ensemble.from_states(
+            scene(field), place, upright, still, still, {"current_field.scenario": np.zeros(members)}
+        )
+        run = {"method": "rk4", "h": 0.1, "dtype": dtype}
+        result, half = lw.solve(fleet, t1=2.0, **run), lw.solve(fleet, t1=1.0, **run)
+        on = lw.solve(fleet, t1=2.0, **run, start=half.final)
+        np.testing.assert_array_equal(on.position[-1], result.position[-1])
+        alone = lw.solve(fleet.subset([members - 1]), t1=2.0, **run)
+        np.testing.assert_array_equal(alone.position[-1, 0], result.position[-1, members - 1])

@@ -171,6 +171,51 @@ def test_a_long_wave_is_a_growing_strain():
     assert apart[0] / apart[1] == pytest.approx(16.0, rel=0.1)
 
 
+def test_the_moment_is_newmans_in_a_wave_as_long_as_the_hull():
+    """Newman (1977), 7.4: a slender body at rest in a stream feels rho S Dw/Dt + (d/dt + u d/dx)(a w) per length.
+
+    The hull is pointed, so that the last part is -u times the sum of a w in the moment's lever, and no force.
+    """
+    stream, period, depth, phase = -1.5, 1.1, 0.8, 0.4
+    stations = np.linspace(-0.7, 0.9, 41)
+    carried = 40.0 * (1.0 - ((stations - 0.1) / 0.8) ** 2)
+    breadth = 0.05
+    x, weight, a = gauss(stations, carried)
+    displaced = DENSITY * np.pi * breadth**2 / 4.0
+    added = sum(w * one * A.T @ A for w, one, A in zip(
+        weight, a, [np.hstack([ACROSS, -ACROSS @ hat(arm_of(at))]) for at in x], strict=True))  # fmt: skip
+    middle = np.array([(x @ weight) / weight.sum(), 0.0, 0.0])
+    mass = displaced * weight.sum()
+    rigid = np.block([[mass * np.eye(3), -mass * hat(middle)], [mass * hat(middle), np.diag([J, J, J])]])
+    found = []
+    for height in (1e-3, -1e-3):
+        body = lw.Vehicle(rigid_body_mass_matrix=rigid, added_mass_matrix=added, buoyancy=mass * GRAVITY,
+                          center_of_buoyancy=middle)  # fmt: skip
+        hull = lw.terms.HullLoads(stations=stations, diameters=np.full(len(stations), breadth), added_mass=carried)
+        wave = lw.terms.Waves(amplitudes=[abs(height)], periods=[period], headings_deg=[0.0],
+                              phases=[phase if height > 0.0 else phase + np.pi])  # fmt: skip
+        water = [hull, wave, lw.terms.Current(velocity=[stream, 0.0, 0.0])]
+        fleet = one(lw.Scene(body, lw.Environment(GRAVITY, water_density=DENSITY), terms=water), b=(0.0, 0.0, depth))
+        got = accelerations(fleet, "rk8", 2e-3)
+        found.append((rigid + added) @ np.concatenate([got[0][0], got[1][0]]))
+    # Waves of half the height one way and the other: what is of second order falls out.
+    load = 0.5 * (found[0] - found[1])
+    omega = 2.0 * np.pi / period
+    k = omega**2 / GRAVITY
+    assert 0.5 < k * np.ptp(stations) / (2.0 * np.pi) < 2.0
+    size = 1e-3 * omega * np.exp(-k * depth)
+    w, rate, slope = (
+        -size * f for f in (np.sin(k * x + phase), -omega * np.cos(k * x + phase), k * np.cos(k * x + phase))
+    )
+    rise = rate + stream * slope
+    force = weight @ (displaced * rise + a * rate)
+    moment = weight @ (-x * (displaced * rise + a * rate) + stream * a * w)
+    # The third order of the steepness, 2e-5 here, and the differences by which accelerations are found.
+    np.testing.assert_allclose(load[[2, 4]], [force, moment], rtol=1e-4)
+    # A hull that feels the water at its origin alone has another moment.
+    assert abs(weight @ (-x * (displaced + a)) * rise[len(x) // 4] / moment - 1.0) > 0.1
+
+
 def test_drag_is_that_of_the_flow_at_each_strip():
     # Water that rises with x across a bar at rest: its moment is rho / 2 Cd D g^2 times the integral of |x|^3.
     length, slope, Cd = 1.6, 0.7, 1.1

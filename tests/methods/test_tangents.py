@@ -242,6 +242,19 @@ def test_all_terms_against_differences(method, noise):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("tangents", [1, 3])
+def test_a_current_on_a_grid_against_differences(tangents):
+    # Within one cell: slopes of the water jump from cell to cell. Lanes with one slope, and of an odd length.
+    rng = np.random.default_rng(2)
+    field = lw.terms.CurrentField(velocities=0.3 * rng.normal(size=(2, 3, 4, 4, 2, 3)), origin=[-40.0, -40.0, 0.0],
+                                  spacing=[20.0, 30.0, 50.0], times=[-1.0, 10.0], scenario=1.0)  # fmt: skip
+    start = {"position": [3.0, 4.0, 11.0], "velocity": [0.5, 0.1, 0.0], "euler_deg": [2.0, 3.0, 4.0]}
+    scene = lw.Scene.named("remus_100", terms=[field], start=start)
+    sizes = {"start.position[0]": 10.0, "start.position[2]": 10.0, "current_field.velocities[1,0,2,1,0,1]": 1.0}
+    assert_agree(scene, dict(list(sizes.items())[-tangents:]), "rk4", 1e-7, h=0.05, t1=2.0, threads=1)
+
+
+@pytest.mark.slow
 def test_float32_has_its_own_digits():
     settings = {"h": 0.02, "t1": TIME, "tangents": list(FALL), "threads": 1}
     single, double = (lw.solve(falling(), "rk4", dtype=dtype, **settings) for dtype in ("float32", "float64"))

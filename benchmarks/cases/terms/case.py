@@ -10,12 +10,15 @@ from benchmarks import problems
 from benchmarks.peers.plot import DRIVEN
 from benchmarks.peers.problem import driven_scene
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.sampling.distributions.basic import Normal
+from lgvi_warp.sampling.distributions.basic import Normal, Uniform
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies import speed
 
 STEP = 0.01
 SPREAD = {"start.angular_velocity": Normal(relative=0.1)}
+# Of scenes with a grid: places within it, so that the members of a packet are in cells of their own.
+PLACES = {"start.position": Uniform(low=[-35.0, -35.0, 2.0], high=[35.0, 35.0, 38.0])}
+GRIDS = ("current_field", "current_field, 4 times", "events: floor on a grid")
 # Of driven vehicles: explicit methods, and a splitting.
 DRIVEN_METHODS = ("rk4", "rk8", "psi_x")
 # What is measured quickly.
@@ -39,13 +42,18 @@ def entries(quick=False):
     return found + [(name, method, scene) for name, scene in vehicles.items() for method in ("psi_x", "psi_x8")]
 
 
+def spread(name):
+    """What varies in the scene of this name."""
+    return SPREAD | (PLACES if name in GRIDS else {})
+
+
 def run(quick):
     members, steps, rounds = (512, 50, 3) if quick else (4096, 200, 7)
     chosen = entries(quick)
     for dtype in ("float64", "float32"):
         plans = [
-            make_plan(Ensemble(scene, members, 1, SPREAD), method, h=STEP, t1=STEP * steps, dtype=dtype)
-            for _, method, scene in chosen
+            make_plan(Ensemble(scene, members, 1, spread(name)), method, h=STEP, t1=STEP * steps, dtype=dtype)
+            for name, method, scene in chosen
         ]
         seconds = speed.interleaved([speed.stepper(plan) for plan in plans], rounds)
         times = [1e9 * one / (members * steps) for one in seconds]

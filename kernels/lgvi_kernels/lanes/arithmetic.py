@@ -96,6 +96,11 @@ entry_of = overloads.family(
 )
 set_element = overloads.family("set_element", "rows[entry, row + offset] = value.")
 gathered = overloads.family("gathered", "The row + offset + index of each lane.")
+gathered3 = overloads.family("gathered3", "`gathered` of three rows from row + index on, as a vector.")
+thirds = overloads.family(
+    "thirds", "`gathered3` as three lanes side by side, of rows that the caller knows to be there."
+)
+third = overloads.family("third", "The k-th of three lanes side by side.")
 pieces_of = overloads.family(
     "pieces_of",
     "How many pieces of a table, each of `each` rows, to read behind `first` and the `head` rows of the first value: as many "
@@ -188,6 +193,7 @@ def _declare_rows(width, real):
     L, I = lane(width, real), int_lane(width)  # noqa: E741
     Rows, Numbers = wp.array2d(dtype=L), wp.array2d(dtype=real)
     OwnLanes, OwnNumbers = own_rows(L), own_rows(real)
+    Three = wp.types.vector(3 * width, real)
     read = "memcpy(&r, place, sizeof(r)); return r;"
     write = "memcpy(place, &value, sizeof(r));"
     read_own = native.own(width, real, "memcpy(&r, place, sizeof(r));") + " return r;"
@@ -221,6 +227,15 @@ def _declare_rows(width, real):
 
     @overloads.func_native(native.gather_any(width, real, True))
     def gathered(like: L, rows: Numbers, entry: int, row: int, offset: int, index: I) -> L: ...
+
+    @overloads.func_native(native.gather3(width, real, False))
+    def thirds(rows: Rows, entry: int, row: int, index: I) -> Three: ...
+
+    @overloads.func_native(native.gather3(width, real, True))
+    def thirds(rows: Numbers, entry: int, row: int, index: I) -> Three: ...
+
+    @overloads.func_native(native.third(width, real))
+    def third(a: Three, k: int) -> L: ...
 
     @overloads.func_native(native.gather(width, real, False))
     def gathered(like: L, rows: OwnLanes, entry: int, row: int, offset: int, index: I) -> L: ...
@@ -282,6 +297,35 @@ def _declare_vectors(width, real):
     @overloads.func
     def positive(a: L, b: L3, c: L3):
         return vec3(positive(a, b.x, c.x), positive(a, b.y, c.y), positive(a, b.z, c.z))
+
+
+@overloads.for_each_type
+def _declare_nodes(width, real):
+    L, I = lane(width, real), int_lane(width)  # noqa: E741
+    Rows, Numbers = wp.array2d(dtype=L), wp.array2d(dtype=real)
+
+    @overloads.func
+    def gathered3(like: L, rows: Rows, entry: int, row: int, index: I):
+        a = thirds(rows, entry, row, index)
+        return vec3(third(a, 0), third(a, 1), third(a, 2))
+
+    @overloads.func
+    def gathered3(like: L, rows: Numbers, entry: int, row: int, index: I):
+        a = thirds(rows, entry, row, index)
+        return vec3(third(a, 0), third(a, 1), third(a, 2))
+
+    for kind in (L, real):
+        _declare_own_nodes(width, real, kind)
+
+
+def _declare_own_nodes(width, real, kind):
+    L, I, Own = lane(width, real), int_lane(width), own_rows(kind)  # noqa: E741
+
+    @overloads.func
+    def gathered3(like: L, rows: Own, entry: int, row: int, index: I):
+        x = gathered(like, rows, entry, row, 0, index)
+        y = gathered(like, rows, entry, row, 1, index)
+        return vec3(x, y, gathered(like, rows, entry, row, 2, index))
 
 
 @wp.func

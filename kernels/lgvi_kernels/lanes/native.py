@@ -77,12 +77,89 @@ def gather_any(width, real, shared):
     return f"{kind} r; const auto* from = {place}; for (int j = 0; j < {width}; ++j) r[j] = {value}; return r;"
 
 
-def whole(width, real):
-    """C++ of the whole numbers at or below those of a lane; what is no number, or beyond int32, becomes an end of int32."""
+def gather3(width, real, shared):
+    """C++ that reads, for each lane, three rows from that of its own index on, side by side in a vector of three lanes."""
+    whole = f"wp::vec_t<{3 * width}, wp::{real.__name__}>"
+    kind = f"wp::{real.__name__}" if shared else f"wp::vec_t<{width}, wp::{real.__name__}>"
+    begin = f"{whole} r; const auto* from = (({kind}*)rows.data) + ((wp::int64)entry * rows.shape[1] + row);"
+    value = "from[index[j] + i]" if shared else "from[index[j] + i][j]"
+    if width == 1 or width & (width - 1):
+        loops = f"for (int i = 0; i < 3; ++i) for (int j = 0; j < {width}; ++j)"
+        return f"{begin} {loops} r[i * {width} + j] = {value}; return r;"
+    if shared and width % 4 == 0:
+        apart = _nodes(width)
+    else:
+        lanes = f"V X; for (int j = 0; j < {width}; ++j) X[j] = {value};"
+        apart = f"for (int i = 0; i < 3; ++i) {{ {lanes} memcpy(&r.c[i * {width}], &X, sizeof(V)); }}"
+    # Vehicles near each other ask for one row: a number for them all, or a lane as it stands.
+    copy = "V X = V() + from[index[0] + i];" if shared else "V X; memcpy(&X, &from[index[0] + i], sizeof(V));"
+    together = f"for (int i = 0; i < 3; ++i) {{ {copy} memcpy(&r.c[i * {width}], &X, sizeof(V)); }}"
+    indices = f"typedef int J __attribute__((vector_size({4 * width}))); J K; memcpy(&K, &index, sizeof(J));"
+    choice = f"if (__builtin_reduce_or(K != K[0]) == 0) {{ {together} }} else {{ {apart} }}"
+    return f"{head(width, real, '')} {begin} {indices} {choice} return r;"
+
+
+def _nodes(width):
+    """C++ of three rows of each lane by one load of four: the last one, which may lie behind the table, is not used.
+
+    Four lanes at a time are a matrix of 4 x 4, whose first three columns are wanted.
+    """
+    quads = range(0, width, 4)
+    text = "typedef S Q __attribute__((vector_size(4 * sizeof(S))));"
+    text += "".join(f" Q q{j}; memcpy(&q{j}, from + index[{j}], sizeof(Q));" for j in range(width))
+    for t in range(4):
+        text += f" const V T{t} = {_side_by_side([f'q{at + t}' for at in quads], 4)};"
+    for name, a, b, first in (("E", 0, 1, 0), ("F", 2, 3, 0), ("G", 0, 1, 1), ("H", 2, 3, 1)):
+        order = [i for at in quads for i in (at + first, width + at + first, at + 2 + first, width + at + 2 + first)]
+        text += f" const V {name} = {_shuffled(f'T{a}', f'T{b}', order)};"
+    for i, (a, b, first) in enumerate((("E", "F", 0), ("G", "H", 0), ("E", "F", 2))):
+        order = [i for at in quads for i in (at + first, at + first + 1, width + at + first, width + at + first + 1)]
+        text += f" const V R{i} = {_shuffled(a, b, order)}; memcpy(&r.c[{i * width}], &R{i}, sizeof(V));"
+    return text
+
+
+def _shuffled(a, b, order):
+    return f"__builtin_shufflevector({a}, {b}, {', '.join(map(str, order))})"
+
+
+def _side_by_side(names, size):
+    """C++ of one vector of the vectors with these names, a power of two of them, each of so many numbers."""
+    if len(names) == 1:
+        return names[0]
+    pairs = [_shuffled(a, b, range(2 * size)) for a, b in zip(names[::2], names[1::2], strict=True)]
+    return _side_by_side(pairs, 2 * size)
+
+
+def third(width, real):
+    """C++ of one of three lanes that stand side by side."""
+    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
+    return f"{kind} r; memcpy(&r, &a.c[k * {width}], sizeof(r)); return r;"
+
+
+def whole(width, real, repeats=1):
+    """C++ of the whole numbers at or below those of a lane; what is no number, or beyond int32, becomes an end of int32.
+
+    repeats: how often they stand one after the other; the lane has `width` numbers, and then others.
+    """
     floor = "__builtin_floorf" if real == wp.float32 else "__builtin_floor"
-    value = f"v >= (S)-2147483648.0 ? (v < (S)2147483648.0 ? (int){floor}(v) : 2147483647) : -2147483647 - 1"
-    each = f"for (int j = 0; j < {width}; ++j) {{ const S v = a[j]; r[j] = {value}; }}"
-    return f"typedef wp::{real.__name__} S; wp::vec_t<{width}, wp::int32> r; {each} return r;"
+    least, beyond = "(S)-2147483648.0", "(S)2147483648.0"
+    result = f"wp::vec_t<{width * repeats}, wp::int32> r;"
+    copies = f"for (int i = 0; i < {repeats}; ++i) memcpy(&r.c[i * {width}], &K, sizeof(K)); return r;"
+    if width == 1:
+        value = f"v >= {least} ? (v < {beyond} ? (int){floor}(v) : 2147483647) : -2147483647 - 1"
+        return f"typedef wp::{real.__name__} S; const S v = a[0]; const int K = {value}; {result} {copies}"
+    # Numbers that int32 holds are converted; the first beyond them is its last by choice, since float32 does not hold that.
+    bounds = f"V F = A >= {least} ? __builtin_elementwise_floor(A) : V() + {least};"
+    if real == wp.float32:
+        bounds += f" auto M = A >= {beyond}; F = M ? V() : F;"
+        convert = "J K = __builtin_convertvector(F, J); K = M ? J() + 2147483647 : K;"
+    else:
+        bounds += " F = F < (S)2147483647.0 ? F : V() + (S)2147483647.0;"
+        convert = "J K = __builtin_convertvector(F, J);"
+    return (
+        f"{head(width, real, 'A')} typedef int J __attribute__((vector_size({4 * width}))); {bounds} {convert}"
+        f" {result} {copies}"
+    )
 
 
 def below(width, real):

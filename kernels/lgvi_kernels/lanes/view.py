@@ -15,6 +15,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     element,
     entry_of,
     gathered,
+    gathered3,
     mul,
     neg,
     ones,
@@ -89,12 +90,7 @@ def gather1(view: Any, row: int, index: Any):
 @wp.func
 def gather3(view: Any, row: int, index: Any):
     """Three rows from `row + index` on, as a vector, each lane at an index of its own."""
-    like = view.b.x
-    t = view.table
-    i = view.entry
-    return vec3(
-        gathered(like, t, i, row, 0, index), gathered(like, t, i, row, 1, index), gathered(like, t, i, row, 2, index)
-    )
+    return gathered3(view.b.x, view.table, view.entry, row, index)
 
 
 @wp.func

@@ -129,13 +129,7 @@ def whole(shape):
 
     So a row that a vehicle gathers by its own index is gathered with its slopes.
     """
-    of_values = native.whole(shape.width, shape.real)
-    plain = f"wp::vec_t<{shape.width}, wp::int32> r;"
-    assert plain in of_values
-    repeat = f"for (int j = {shape.width}; j < {shape.width * (1 + shape.tangents)}; ++j) r[j] = r[j - {shape.width}];"
-    return of_values.replace(plain, f"wp::vec_t<{shape.length}, wp::int32> r;").replace(
-        "return r;", f"{repeat} return r;"
-    )
+    return native.whole(shape.width, shape.real, 1 + shape.tangents)
 
 
 def normals(shape):

@@ -7,7 +7,7 @@ import copy
 import dataclasses
 import functools
 import keyword
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
@@ -602,10 +602,14 @@ class Term:
         Returns:
             `type`, `name` where it has one, and every field that is not None, arrays as lists.
         """
+        return self.table_without(())
+
+    def table_without(self, names: Collection[str]) -> dict[str, Any]:
+        """The table of `to_dict` without these fields, whose numbers no list is made of."""
         content: dict[str, Any] = {"type": self.type} | ({"name": self.name} if self.name else {})
         for item in dataclasses.fields(self):
             value = getattr(self, item.name)
-            if item.name != "name" and value is not None:
+            if item.name not in ("name", *names) and value is not None:
                 content[word_of(item)] = value.tolist() if isinstance(value, np.ndarray) else value
         return content
 

@@ -198,11 +198,9 @@ class CurrentField(Term):
         return _with_data(changed, self.data) if fields.keys().isdisjoint(OF_DATA) else changed
 
     def to_dict(self) -> dict[str, Any]:
-        content = super().to_dict()
-        content.pop("data", None)
         if self.data is None or self.data.file is None:
-            return content
-        return {key: value for key, value in content.items() if key not in OF_DATA} | self.data.table()
+            return self.table_without(("data",))
+        return self.table_without(("data", *OF_DATA)) | self.data.table()
 
     @property
     def remarks(self) -> tuple[str, ...]:

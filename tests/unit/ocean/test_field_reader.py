@@ -3,6 +3,7 @@
 
 import datetime
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -296,6 +297,13 @@ def test_a_file_is_read_again_with_the_same_bits(tmp_path):
     again = lw.Scene.named("sphere", terms=[table]).terms[0]
     np.testing.assert_array_equal(again.velocities, field.velocities)
     assert again.to_dict() == table
+    # No list is made of numbers that the file has: one would take many times the memory of the field.
+    fine = read(path, region=None, speed=1.0, duration=5000.0, spacing=[500.0, 500.0, 5.0])
+    tracemalloc.start()
+    fine.to_dict()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < fine.velocities.nbytes / 4
     # Other numbers are those of no file.
     assert "velocities" in field.with_fields({"spacing": [9.0, 9.0, 9.0]}).to_dict()
     data.cmems(NORTH, EAST).to_netcdf(path)
@@ -340,8 +348,6 @@ speed = 1.0
 
 def test_of_a_gigabyte_only_what_a_run_can_reach_is_read(tmp_path):
     """Two variables of 1.1 GB each, of which few fields were ever written: the others take no disk space."""
-    import tracemalloc
-
     netcdf = pytest.importorskip("netCDF4")
     sizes = {"time": 60, "depth": 20, "latitude": 500, "longitude": 450}
     with netcdf.Dataset(tmp_path / "large.nc", "w") as file:

@@ -10,7 +10,10 @@ import pytest
 from scipy.stats import chi2
 
 import lgvi_warp as lw
+from lgvi_warp.physics.terms.noisy import channel
 from lgvi_warp.reference.control import Measurement, imu
+from lgvi_warp.reference.control import dvl as twin_dvl
+from lgvi_warp.reference.control.altimeter import Ground
 from tests.conftest import ROOT
 from tests.control.bench import measured, scene
 from tests.support.navigating import (
@@ -23,6 +26,7 @@ from tests.support.navigating import (
     parts,
     remus,
     run_twins,
+    through,
     twins,
     voyage,
 )
@@ -37,6 +41,10 @@ TAILS = (5e-5, 1.0 - 5e-5)
 
 def fleet(listed, members, seed=0):
     return lw.Ensemble(scene(listed, period=PERIOD), members, seed)
+
+
+def over(floor, listed, members):
+    return lw.Ensemble(scene(listed, period=PERIOD, events=[floor]), members, 0)
 
 
 def still(ticks, depth=10.0):
@@ -104,13 +112,7 @@ def test_without_a_log_the_position_drifts_as_the_integral_of_the_accelerometers
 def run_twin_filter(listed, truth):
     """The twin of a filter after the last tick."""
     each = twins(listed, 0)
-    for part in each:
-        part.begin()
-    for k, row in enumerate(truth[:, 0]):
-        y = Measurement(row[:3], row[3:12].reshape(3, 3), row[12:15], row[15:18], row[18:21], t=k * PERIOD, period=PERIOD,
-                        h=H, step=5 * k, tick=k)  # fmt: skip
-        for part in each:
-            y = part.measure(y)
+    through(each, truth)
     return each[-1]
 
 
@@ -167,13 +169,39 @@ def test_a_beam_whose_way_to_the_floor_is_beyond_its_range_has_no_echo():
     truth = np.repeat(still(2), 400, axis=1)
     truth[:, rolled, 3:12] = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]).reshape(-1)
     log = lw.control.DVL(noise=0.01, floor="ground", greatest_range=11.3)
-    base = scene([lw.control.IMU(), log, lw.control.ErrorStateFilter(dvl="dvl")], period=PERIOD)
-    ground = lw.events.Floor(name="ground", depth=20.0)
-    above = lw.Scene(base.vehicle, base.environment, base.terms, controller=base.controller, events=[ground])
-    seen = measured(lw.Ensemble(above, 400, 0), truth, H)[0, :, 12:15]
+    listed = [lw.control.IMU(), log, lw.control.ErrorStateFilter(dvl="dvl")]
+    seen = measured(over(lw.events.Floor(name="ground", depth=20.0), listed, 400), truth, H)[0, :, 12:15]
     # The first estimate has errors of 0.1 m/s. Two beams leave them in one direction.
     known = [(np.linalg.eigvalsh(np.cov(seen[which].T)) < 0.03**2).sum() for which in (level, rolled)]
     assert known == [0, 2]
+
+
+@pytest.mark.parametrize("reach", [9.0, np.inf])
+def test_beams_over_a_grid_are_those_of_the_twin(reach):
+    # A slope of 0.2 to the east below a vehicle that rolls: some beams meet it within 6 m to 9 m and others do not.
+    depth = np.tile(20.0 + np.arange(-10.0, 11.0), (21, 1))
+    floor = dict(depth=depth, origin=[-50.0, -50.0], spacing=[5.0, 5.0])
+    log = LOG | {"greatest_range": reach, "least_range": 6.0}
+    truth = voyage(300)
+    truth[..., 2] += 3.0
+    ground = lw.events.Floor(name="ground", **floor)
+    seen = measured(over(ground, [lw.control.DVL(**log, floor="ground")], 2), truth, H)
+    each = [twin_dvl.DVL(**log, ground=Ground(depth, *list(floor.values())[1:]), channel=channel("dvl"))]
+    wanted = through(each, truth)
+    assert np.abs(seen[:, 0] - wanted).max() < 1e-12
+    # Not all ticks have three beams.
+    held = np.all(wanted[1:, 12:15] == wanted[:-1, 12:15], axis=1)
+    assert 0.1 < held[1::2].mean() < 0.9
+
+
+def test_a_flat_floor_on_a_grid_is_a_flat_floor():
+    truth, log = voyage(100), lw.control.DVL(noise=0.01, floor="ground", least_range=1.0, greatest_range=11.0)
+    flat = lw.events.Floor(name="ground", depth=20.0)
+    grid = lw.events.Floor(name="ground", depth=np.full((3, 3), 20.0), spacing=[10.0, 10.0])
+    seen = [measured(over(floor, [log], 2), truth, H) for floor in (flat, grid)]
+    assert np.array_equal(*seen)
+    free = measured(fleet([lw.control.DVL(noise=0.01)], 2), truth, H)
+    assert 0.05 < np.any(seen[0] != free, axis=2).mean() < 0.95
 
 
 def test_a_fix_below_the_surface_does_not_count():
@@ -209,6 +237,7 @@ FAULTS = {
         "usbl.latency",
     ),
     "after": ([lw.control.ErrorStateFilter(), lw.control.IMU()], "stands before the filter"),
+    "no floor": ([lw.control.DVL(floor="ground")], "dvl.floor = 'ground'"),
 }  # fmt: skip
 
 

@@ -33,8 +33,8 @@ class DVL(MeasuringPart):
         u_i = (+-sin(angle) / sqrt(2), +-sin(angle) / sqrt(2), cos(angle))
 
     A beam has no echo where it is lost by chance, where it looks upward, and where the way along it to the floor, flat or on a
-    grid, is not within its range. An `error_state_filter` takes each beam by itself, so one is of use too; without a filter the measured
-    velocity becomes that of the log's place by least squares of three beams or four, else it stays the last one.
+    grid, is not within its range. An `error_state_filter` takes each beam by itself, so one is of use too; without a filter
+    the measured velocity becomes that of the log's place by least squares of three beams or four, else it stays the last one.
 
     Args:
         place: Place of the log (3,) [m], body axes; 0 by default.

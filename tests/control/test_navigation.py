@@ -223,7 +223,7 @@ def test_readings_of_members_that_vary():
 
 FAULTS = {
     "imu": ([lw.control.ErrorStateFilter()], "error_state_filter.imu = 'imu'"),
-    "kind": ([lw.control.Sensor(name="imu", of="depth"), lw.control.ErrorStateFilter()], "is not of type imu"),
+    "kind": ([lw.control.Sensor(name="imu", of="depth"), lw.control.ErrorStateFilter()], "is not a part of type imu"),
     "noise": ([lw.control.IMU(), lw.control.DVL(), lw.control.ErrorStateFilter(dvl="dvl")], "dvl.noise"),
     "before": ([lw.control.IMU(), lw.control.Sensor(of="depth"), lw.control.ErrorStateFilter()], "sensors = 'sensor'"),
     "late": (
@@ -304,6 +304,22 @@ def test_what_a_filter_believes_is_a_quantity_of_statistics(voyages):
                    statistics=[lw.statistics.Mean("nees"), lw.statistics.Mean("estimate_sigma")])  # fmt: skip
     assert np.array_equal(run.nees, voyages.nees[:5])
     assert abs(run.statistics["mean nees"].value[-1, 0] - voyages.nees[4].mean()) < 1e-9
+
+
+def test_nees_and_nis_are_metrics_of_members(voyages):
+    asked = [lw.metrics.NEES(then=[lw.statistics.MemberValues()]), lw.metrics.NIS(then=[lw.statistics.MemberValues()])]
+    ensemble = lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1)
+    saved = lw.SaveAt(every=PERIOD, fields=("nees", "nis", "nis_count"))
+    run = lw.solve(ensemble, t1=2.0, save=saved, statistics=asked, **SETTINGS)
+    assert np.array_equal(run.nees[::5], voyages.nees[:5])
+    nees, nis = (run.statistics[f"each {name}"].value[0, 0] for name in ("nees", "nis"))
+    assert nees == pytest.approx(run.nees.mean(axis=0), rel=1e-12)
+    assert nis == pytest.approx(run.nis.sum(axis=0) / run.nis_count.sum(axis=0), rel=1e-12)
+    # A right filter: 21 ticks of one member are like one look at the errors, so the mean over members is as free as theirs.
+    low, high = chi2.ppf(TAILS, 15 * 200) / 200
+    assert low < nees.mean() < high
+    with pytest.raises(lw.SceneError, match=r"nis\.of = 'depth'"):
+        lw.metrics.NIS("depth")
 
 
 def test_a_filter_goes_on_where_a_run_ended(voyages):

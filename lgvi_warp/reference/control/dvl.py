@@ -23,7 +23,7 @@ def beams(angle: float) -> Array:
 
 
 class DVL(Part):
-    """Numbers as those of `lw.control.DVL`; floor [m], the depth of a flat sea floor, inf for none; keys of its random numbers.
+    """Numbers as those of `lw.control.DVL`; floor [m], the depth of a flat floor, inf for none; keys of its random numbers.
 
     ground: None, or a `Ground`, a floor on a grid, at which a beam looks for 20 km at most.
 

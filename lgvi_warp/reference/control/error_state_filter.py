@@ -14,6 +14,8 @@ from lgvi_warp.reference.rotation import Array, exp, hat, norm
 # Blocks of the error: position, velocity (inertial), attitude (body axes), biases of accelerometer and gyroscope; and the
 # position at the tick of a fix that is on its way.
 P, V, THETA, A, W, THEN = (slice(3 * i, 3 * i + 3) for i in range(6))
+# The square of the bow's level part, up to which it has no heading: 6 degrees from the vertical.
+LEVEL = 0.01
 # Variance of the rate at a tick, from the means of two periods, over that of a mean.
 OF_RATE = 2.5
 INNOVATIONS = {"dvl": 0, "fix": 4, "delayed_fix": 7, "depth": 10, "heading": 11}
@@ -150,7 +152,8 @@ class ErrorStateFilter(Part):
         if self.depth and self.handed[self.depth]["fresh"]:
             difference = self.handed[self.depth]["values"][0] - origin[2]
             self.update(INNOVATIONS["depth"], self.by_position(P, 2), difference, self.believed["depth"])
-        if self.heading and self.handed[self.heading]["fresh"]:
+        # Where the bow is nearly vertical it has no heading.
+        if self.heading and self.handed[self.heading]["fresh"] and np.sum(self.R[:2, 0] ** 2) > LEVEL:
             difference = self.handed[self.heading]["values"][0] - heading(self.R)
             difference -= 2.0 * np.pi * np.rint(difference / (2.0 * np.pi))
             self.update(INNOVATIONS["heading"], self.by_heading(), difference, self.believed["heading"])

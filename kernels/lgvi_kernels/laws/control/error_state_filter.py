@@ -42,6 +42,8 @@ BELIEF_BIAS, BELIEF_NEES, BELIEF_NIS, BELIEF_COUNT, BELIEF_INNOVATION, BELIEF_SI
 # Places of the innovations.
 FIX, DELAYED_FIX, DEPTH, HEADING = 4, 7, 10, 11
 TURN = 6.283185307179586
+# The square of the bow's level part, up to which it has no heading: 6 degrees from the vertical.
+LEVEL = 0.01
 # Variance of the rate at a tick, from the means of two periods, over that of a mean.
 OF_RATE = 2.5
 
@@ -329,12 +331,14 @@ def make_by_heading(take):
         none = p.arm - p.arm
         n = z.north
         e = z.east
-        level = n.x * n.x + e.x * e.x
+        least = y.h.dtype(wp.static(LEVEL)) * ones(n.x)
+        level = greatest(n.x * n.x + e.x * e.x, least)
         turn = vec3(level - level, (e.x * n.z - n.x * e.z) / level, (n.x * e.y - e.x * n.y) / level)
         round_turn = y.h.dtype(wp.static(TURN)) * ones(level)
         difference = remembered(y, p.heading) - heading(z)
         difference = difference - round_turn * rounded(difference / round_turn)
-        new = remembered(y, p.heading + 1)
+        # Where the bow is nearly vertical it has no heading.
+        new = positive(level - least, remembered(y, p.heading + 1), least - least)
         take(y, p, wp.static(HEADING), 0, none, none, turn, none, difference, p.heading_r, new)
 
     return by_heading

@@ -11,14 +11,13 @@ from scipy.stats import chi2
 
 import lgvi_warp as lw
 from lgvi_warp.physics.terms.noisy import channel
-from lgvi_warp.reference.control import Measurement, imu
 from lgvi_warp.reference.control import dvl as twin_dvl
 from lgvi_warp.reference.control.altimeter import Ground
+from lgvi_warp.reference.control.readings import attitude
 from tests.conftest import ROOT
 from tests.control.bench import measured, scene
 from tests.support.navigating import (
     BELIEFS,
-    GRAVITY,
     LOG,
     ON_BOARD,
     PERIOD,
@@ -35,6 +34,7 @@ from tests.support.refusals import refused
 from tests.support.tools import one
 
 H = 0.02
+SIGMAS = ("position_sigma", "velocity_sigma", "attitude_sigma", "accelerometer_sigma", "gyroscope_sigma")
 # A right code misses such a band with a chance of 1e-4.
 TAILS = (5e-5, 1.0 - 5e-5)
 
@@ -93,12 +93,9 @@ def errors_of(listed, truth, members):
 def test_without_a_log_the_position_drifts_as_the_integral_of_the_accelerometers_noise():
     # At rest, all else known: a walk of the velocity of N^2 T a tick, and the position by the mean of two velocities, so its
     # variance after k ticks is N^2 T^3 k (4 k^2 - 1) / 12, which goes to N^2 t^3 / 3. The log is silent from 0 s on.
-    density, members, ticks, tiny = 0.01, 1000, 200, 1e-9
+    density, members, ticks = 0.01, 1000, 200
     unit = dict(place=(0.0, 0.0, 0.0), accelerometer_noise=density)
-    start = dict(position_sigma=tiny, velocity_sigma=tiny, attitude_sigma=tiny)
-    listed = parts(
-        (), unit=unit, log_numbers=LOG | {"silent_from": 0.0}, accelerometer_sigma=tiny, gyroscope_sigma=tiny, **start
-    )
+    listed = parts((), unit=unit, log_numbers=LOG | {"silent_from": 0.0}, **dict.fromkeys(SIGMAS, 1e-9))
     error = errors_of(listed, still(ticks + 1), members)
     for k in (10, 100, ticks):
         variance = density**2 * PERIOD**3 * k * (4 * k**2 - 1) / 12
@@ -107,6 +104,84 @@ def test_without_a_log_the_position_drifts_as_the_integral_of_the_accelerometers
         assert abs(variance / (density**2 * (k * PERIOD) ** 3 / 3) - 1.0) < 1 / k**2
     each = run_twin_filter(listed, still(ticks + 1))
     assert abs(each.sigma[0] ** 2 / variance - 1.0) < 1e-6
+
+
+def test_delayed_fixes_are_those_of_a_straight_line():
+    # At rest with a unit that does not err, place and velocity of a line are all that is unknown: its posterior is that of a
+    # regression on the fixes, each at the time at which it was taken, as soon as they are there.
+    place, velocity, noise, members, late, every = 3.0, 0.2, 0.5, 1000, 20, 50
+    sigmas = dict.fromkeys(SIGMAS, 1e-9) | {"position_sigma": place, "velocity_sigma": velocity}
+    usbl = lw.control.Sensor(name="usbl", of="position", noise=noise, every=every, latency=late)
+    listed = [lw.control.IMU(), usbl, lw.control.ErrorStateFilter(delayed_fix="usbl", **sigmas)]
+    ticks = 3 * every
+    error = errors_of(listed, still(ticks), members)
+    low, high = chi2.ppf(TAILS, 3 * members)
+    information = np.diag([place**-2, velocity**-2])
+    for k in range(ticks):
+        if k >= late and (k - late) % every == 0:
+            row = np.array([1.0, (k - late) * PERIOD])
+            information = information + np.outer(row, row) / noise**2
+        if k in (0, 19, 20, 69, 70, 149):
+            row = np.array([1.0, k * PERIOD])
+            variance = row @ np.linalg.solve(information, row)
+            assert low < (error[k] ** 2).sum() / variance < high
+            assert run_twin_filter(listed, still(k + 1)).sigma[0] == pytest.approx(np.sqrt(variance), rel=1e-6)
+
+
+def test_a_fix_that_comes_after_the_run_changes_nothing():
+    truth, plain = voyage(100), parts(("depth",))
+    usbl = lw.control.Sensor(name="usbl", of="position", noise=0.5, every=1000, latency=900)
+    filtered = dataclasses.replace(plain[-1], delayed_fix="usbl")
+    seen = [measured(fleet(listed, 2), truth, H) for listed in (plain, [*plain[:-1], usbl, filtered])]
+    assert np.abs(seen[0] - seen[1]).max() < 1e-12
+
+
+@pytest.mark.slow
+def test_lost_beams_are_no_log():
+    truth = voyage(300)
+    without = parts(("depth",), log=False)
+    seen = measured(fleet(without, 2), truth, H)
+    wanted, belief = run_twins(without, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    assert belief[:, 2].max() == 1.0
+    lost = measured(fleet(parts(("depth",), log_numbers=LOG | {"dropout": 1.0}), 2), truth, H)
+    assert np.abs(lost - seen).max() < 1e-12
+
+
+@pytest.mark.slow
+def test_a_bow_that_points_at_the_surface_has_no_heading():
+    # In 10 s upright, and 5 s there: a compass tells nothing, and divides by nothing.
+    angles, rate = np.minimum(np.linspace(0.0, 0.75 * np.pi, 151), 0.5 * np.pi), 0.005 * np.pi / PERIOD
+    truth = still(len(angles))
+    truth[:, 0, 3:12] = [attitude(0.0, pitch, 0.3).reshape(-1) for pitch in angles]
+    truth[:, 0, 19] = np.where(np.arange(len(angles)) < 100, rate, 0.0)
+    listed = parts(("depth", "heading", "fix"))
+    seen = measured(fleet(listed, 2), truth, H)
+    wanted, _ = run_twins(listed, truth, 1)
+    assert np.isfinite(seen).all()
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    # The third row of the attitude is known to some of its sigma, 0.02 rad.
+    assert np.abs(seen[:, :, 9:12] - truth[:, :, 9:12]).max() < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", [0.04, 0.2])
+def test_estimates_are_the_twins_at_other_periods(period):
+    truth, listed = voyage(150, period), parts()
+    seen = measured(lw.Ensemble(scene(listed, period=period), 2, 0), truth, H)
+    wanted, _ = run_twins(listed, truth, 1, period=period)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_a_unit_without_noise_is_taken_at_its_word():
+    truth, unit = voyage(1200), dict(place=UNIT["place"])
+    listed = parts(("depth",), unit=unit, **dict.fromkeys(SIGMAS[2:], 1e-6))
+    seen = measured(fleet(listed, 2), truth, H)
+    wanted, _ = run_twins(listed, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    # By what the log says the velocity is known ever better.
+    assert np.abs(seen[-1] - truth[-1])[:, 12:15].max() < 0.01
 
 
 def run_twin_filter(listed, truth):
@@ -131,22 +206,16 @@ def allan_of(noise, walk, m):
 @pytest.mark.parametrize("which", ["gyroscope", "accelerometer"])
 def test_the_allan_deviation_is_as_set(which):
     noise, walk, ticks, members = 1e-3, 2e-3, 1200, 60
+    truth = still(ticks + 1)
     if which == "gyroscope":
         listed = [lw.control.IMU(gyroscope_noise=noise, gyroscope_walk=walk, gyroscope_bias=0.1)]
-        rates = measured(fleet(listed, members), still(ticks + 1), H)[1:, :, 18:21].reshape(ticks, -1)
+        rates = measured(fleet(listed, members), truth, H)[1:, :, 18:21]
     else:
-        rates = np.zeros((ticks, 3 * members))
-        numbers = dict(accelerometer_noise=np.full(3, noise), accelerometer_walk=np.full(3, walk), gravity=GRAVITY)
-        for member in range(members):
-            unit = imu.IMU(**numbers, handed={})
-            unit.begin()
-            for k in range(ticks + 1):
-                unit.measure(
-                    Measurement(np.zeros(3), np.eye(3), *np.zeros((3, 3)), period=PERIOD, tick=k, member=member)
-                )
-                if k:
-                    force = unit.handed["imu"]["gained"] / PERIOD + np.array([0.0, 0.0, GRAVITY])
-                    rates[k - 1, 3 * member : 3 * member + 3] = force
+        # A filter that knows all else and reads nothing adds up what the accelerometers say.
+        unit = dict(place=(0.0, 0.0, 0.0), accelerometer_noise=noise, accelerometer_walk=walk)
+        listed = parts((), log=False, unit=unit, **dict.fromkeys(SIGMAS, 1e-9))
+        rates = np.diff(measured(fleet(listed, members), truth, H)[:, :, 12:15], axis=0) / PERIOD
+    rates = rates.reshape(ticks, -1)
     for m in (1, 3, 10, 30, 60):
         # Windows of 2 m ticks that do not overlap are the least that count: so many squares of 3 axes.
         windows = rates.shape[1] * (ticks // (2 * m))
@@ -222,7 +291,7 @@ def test_readings_of_members_that_vary():
 
 
 FAULTS = {
-    "imu": ([lw.control.ErrorStateFilter()], "error_state_filter.imu = 'imu'"),
+    "imu": ([lw.control.ErrorStateFilter()], "give the scene a part of type imu"),
     "kind": ([lw.control.Sensor(name="imu", of="depth"), lw.control.ErrorStateFilter()], "is not a part of type imu"),
     "noise": ([lw.control.IMU(), lw.control.DVL(), lw.control.ErrorStateFilter(dvl="dvl")], "dvl.noise"),
     "before": ([lw.control.IMU(), lw.control.Sensor(of="depth"), lw.control.ErrorStateFilter()], "sensors = 'sensor'"),
@@ -237,8 +306,26 @@ FAULTS = {
         "usbl.latency",
     ),
     "after": ([lw.control.ErrorStateFilter(), lw.control.IMU()], "stands before the filter"),
+    "range": ([lw.control.DVL(least_range=1.0, greatest_range=20.0, floor="ground")], "give the scene one"),
     "no floor": ([lw.control.DVL(floor="ground")], "dvl.floor = 'ground'"),
 }  # fmt: skip
+
+
+BAD_NUMBERS = {
+    "density": (lambda: lw.control.IMU(gyroscope_noise=-1e-4), "imu.gyroscope_noise"),
+    "arm": (lambda: lw.control.DVL(place=(1.0, 2.0)), "(3,) [m]"),
+    "range": (lambda: lw.control.DVL(least_range=50.0, greatest_range=10.0), "is not above least_range = 50"),
+    "silence": (lambda: lw.control.DVL(silent_from=5.0, silent_to=2.0), "is not above silent_from = 5"),
+    "sigma": (lambda: lw.control.ErrorStateFilter(attitude_sigma=0.0), "give numbers above 0 [rad]"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_NUMBERS)
+def test_bad_numbers_are_told_in_one_line(name):
+    make, text = BAD_NUMBERS[name]
+    with pytest.raises(lw.SceneError, match=re.escape(text)) as found:
+        make()
+    assert "\n" not in str(found.value)
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -328,6 +415,45 @@ def test_a_filter_goes_on_where_a_run_ended(voyages):
                   save=lw.SaveAt(every=0.5, fields=("position", "nees")), **SETTINGS)  # fmt: skip
     assert np.array_equal(on.nees[-1], voyages.nees[-1])
     assert np.array_equal(on.position[-1], voyages.position[-1])
+
+
+@pytest.mark.slow
+def test_a_filter_goes_on_with_a_fix_on_its_way():
+    listed = parts(**ON_BOARD)
+    ensemble = lw.Ensemble(remus(listed), 8, seed=1)
+    save = lw.SaveAt(every=0.5, fields=("position", "nees", "measured_position"), final=True)
+    # The fix of 5 s comes at 7 s.
+    whole, first = (lw.solve(ensemble, t1=t1, save=save, **SETTINGS) for t1 in (9.0, 6.0))
+    on = lw.solve(ensemble, start=first.final, t1=9.0, save=save, **SETTINGS)
+    for name in ("position", "nees", "measured_position"):
+        assert np.array_equal(on.samples[name][-1], whole.samples[name][-1])
+
+
+@pytest.mark.slow
+def test_without_a_log_a_good_gyroscope_keeps_filters_consistent_and_a_poor_one_does_not():
+    # An error theta of the vertical looks like a bias g theta^2 / 2, which no linear filter knows.
+    sigmas = {name: value for name, value in ON_BOARD.items() if name.endswith("sigma")}
+    judged = {}
+    for drift in (5e-5, 1e-3):
+        unit = ON_BOARD["unit"] | {"gyroscope_turn_on": drift}
+        listed = parts(("depth",), log=False, unit=unit, **sigmas, gyroscope_sigma=drift)
+        save = lw.SaveAt(every=1.0, fields=("nees", "nis", "nis_count"))
+        run = lw.solve(lw.Ensemble(remus(listed), 400, seed=1), t1=40.0, save=save, **SETTINGS)
+        judged[drift] = lw.metrics.consistency(run, level=0.999)
+    assert judged[5e-5].nees_share == 1.0
+    assert judged[1e-3].nees[-1] > 2.0 * 15.0
+
+
+def test_consistency_of_filters_that_read_nothing_or_have_lost_their_covariance(voyages):
+    quiet = {"nis": 0.0 * voyages.nis, "nis_count": 0.0 * voyages.nis_count}
+    judged = lw.metrics.consistency(dataclasses.replace(voyages, samples=dict(voyages.samples) | quiet))
+    assert np.isnan(judged.nis).all()
+    assert np.isnan(judged.nis_share)
+    assert "no innovation" in repr(judged)
+    lost = voyages.nees.copy()
+    lost[20:, 3] = np.nan
+    judged = lw.metrics.consistency(dataclasses.replace(voyages, samples=dict(voyages.samples) | {"nees": lost}))
+    assert judged.nees_share <= 20 / 41
 
 
 @pytest.mark.slow

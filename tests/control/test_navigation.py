@@ -85,6 +85,21 @@ def test_a_log_and_a_gyroscope_without_a_filter_are_the_twins():
     assert np.array_equal(seen[200:249, :, 12:15], seen[201:250, :, 12:15])
 
 
+def test_sensors_without_errors_measure_the_truth():
+    truth = voyage(100)
+    plain = [lw.control.DVL(), lw.control.IMU()]
+    seen = measured(fleet(plain, 2), truth, H)
+    assert np.abs(seen[:, :, 12:15] - truth[:, :, 12:15]).max() < 1e-12
+    wanted, _ = run_twins(plain, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-12
+    # A filter of a unit alone, which notes nothing, has the least code of all; it starts at the truth.
+    listed = [lw.control.IMU(), lw.control.ErrorStateFilter(report=False, start_error=0.0)]
+    seen = measured(fleet(listed, 2), truth, H)
+    # Places go on by the mean of two velocities: T^3 / 12 of the jerk a tick, which here is up to 0.03 m/s^3.
+    assert np.abs(seen - truth)[..., :3].max() < 100 * 0.1**3 / 12 * 0.03
+    assert np.abs(seen - truth)[..., 3:15].max() < 1e-12
+
+
 def errors_of(listed, truth, members):
     """Errors of the position of filters (ticks, members, 3)."""
     return measured(fleet(listed, members), truth, H)[..., :3] - truth[..., :3]

@@ -439,6 +439,9 @@ def made(features):
         if wp.static(has["heading"]):
             by_heading(y, z, p)
         injected(y, p)
+        # What a lane remembers must not tell whether another one had a reading.
+        for j in range(18):
+            remember(y, p.memory + wp.static(ERROR + 18) + j, zero)
 
     @wp.func
     def measure(y: Any, p: Any):

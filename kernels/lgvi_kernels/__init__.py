@@ -32,7 +32,7 @@ from types import ModuleType
 def built_in(folder, name):
     """The device code of a name in a folder ("laws", "stops"), imported when it is asked for first; None for no such name.
 
-    Of "thrusters_with:driven,table" it is what that module's `made` returns for the features ("driven", "table"), and of "imu:"
+    Of "thrusters_with:driven,table" it is what that module's `made` returns for the features ("driven", "table"), of "imu:"
     for none.
     """
     name, chooses, features = name.partition(":")

@@ -202,6 +202,9 @@ class ErrorStateFilter(MeasuringPart):
         unit, log = used["imu"], used.get("dvl", DVL())
         late = context.parameters[f"{self.delayed_fix}.latency"] if self.delayed_fix else np.zeros(1)
         places = {"lever": unit.place[None], "arm": (log.place - unit.place)[None], "latency": np.rint(late)}
+        for role in ("fix", "delayed_fix", "depth"):
+            place = getattr(used.get(role), "place", None)
+            places[f"{role}_lever"] = (unit.place - (0.0 if place is None else place))[None]
         beams = {"ahead": DIAGONAL * np.sin(log.angle)[None], "down": np.cos(log.angle)[None]}
         return values | places | beams | {"gravity": context.parameters["environment.gravity"]}
 

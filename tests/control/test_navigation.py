@@ -143,6 +143,36 @@ def test_delayed_fixes_are_those_of_a_straight_line():
             assert run_twin_filter(listed, still(k + 1)).sigma[0] == pytest.approx(np.sqrt(variance), rel=1e-6)
 
 
+def with_places(listed):
+    """The same sensors, those of depth and position at places of their own."""
+    at = {"cell": (0.8, 0.1, 0.0), "gps": (-0.5, 0.0, -0.3), "usbl": (0.2, -0.1, 0.4)}
+    return [dataclasses.replace(part, place=at[part.key]) if part.key in at else part for part in listed]
+
+
+def test_sensors_with_places_of_their_own_are_the_twins():
+    truth, listed = voyage(150), with_places(parts())
+    seen = measured(fleet(listed, 2), truth, H)
+    wanted, belief = run_twins(listed, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    assert belief[:, 2].max() == 4 + 3 + 1 + 1
+    # Without noise, and a filter that knows nothing, a fix of a place is one of the origin: by geometry alone.
+    sharp = {"fix": dataclasses.replace(listed[4], noise=1e-6), "attitude_sigma": 1e-9, "position_sigma": 50.0}
+    gps = [lw.control.IMU(), sharp.pop("fix"), lw.control.ErrorStateFilter(fix="gps", **sharp)]
+    far = still(2, 8.0)
+    far[:, 0, 3:12] = attitude(0.2, -0.4, 1.0).reshape(-1)
+    error = measured(fleet(gps, 2), far, H)[0, :, :3] - far[0, :, :3]
+    assert np.abs(error).max() < 1e-5
+    # Without a filter what they read is taken for the body's; an antenna above 9 m has a fix, though the origin has none.
+    plain = [part for part in listed if part.key in ("cell", "gps")]
+    seen = measured(fleet(plain, 2), truth, H)
+    wanted, _ = run_twins(plain, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-12
+    deep = [dataclasses.replace(listed[4], noise=0.0, every=1.0, place=(0.0, 0.0, -1.0), deepest=9.5)]
+    sinking = still(3)
+    sinking[:, 0, 2] = [10.0, 10.2, 10.8]
+    assert measured(fleet(deep, 2), sinking, H)[:, 0, 2] == pytest.approx([9.0, 9.2, 9.2])
+
+
 def test_a_fix_that_comes_after_the_run_changes_nothing():
     truth, plain = voyage(100), parts(("depth",))
     usbl = lw.control.Sensor(name="usbl", of="position", noise=0.5, every=1000, latency=900)
@@ -331,6 +361,11 @@ BAD_NUMBERS = {
     "arm": (lambda: lw.control.DVL(place=(1.0, 2.0)), "(3,) [m]"),
     "range": (lambda: lw.control.DVL(least_range=50.0, greatest_range=10.0), "is not above least_range = 50"),
     "silence": (lambda: lw.control.DVL(silent_from=5.0, silent_to=2.0), "is not above silent_from = 5"),
+    "place": (
+        lambda: lw.control.Sensor(of="velocity", place=(1.0, 0.0, 0.0)),
+        "has no meaning for a sensor of velocity",
+    ),
+    "point": (lambda: lw.control.Altimeter(place=(1.0, 0.0, 0.0)), "give point"),
     "sigma": (lambda: lw.control.ErrorStateFilter(attitude_sigma=0.0), "give numbers above 0 [rad]"),
 }
 

@@ -94,9 +94,14 @@ def twin_of_filter(listed, handed, member, seed, gravity):
     ]
     log = by_key.get(design.dvl, lw.control.DVL())
     latency = int(by_key[design.delayed_fix].latency) if design.delayed_fix else 0
+    places = {
+        f"{role}_place": by_key[key].place
+        for role, key in design.uses.items()
+        if getattr(by_key[key], "place", None) is not None and role in ("fix", "delayed_fix", "depth")
+    }
     return twin_filter.ErrorStateFilter(
         **numbers, **dict(design.uses), handed=handed, believed=believed, place=unit.place, dvl_place=log.place,
-        dvl_angle=float(log.angle), gravity=gravity, latency=latency, errors=np.concatenate(errors),
+        dvl_angle=float(log.angle), gravity=gravity, latency=latency, errors=np.concatenate(errors), **places,
     )  # fmt: skip
 
 

@@ -80,7 +80,7 @@ def peaks(opened: Opened, places: Sequence[int], names: Sequence[str], period: f
         angles = grid_of(response)
         each.append([highest(of, angles) for of in gains_of(response, np.eye(len(A))[list(places)])])
     found = np.array(each).reshape(len(each), -1, 2)
-    columns = {}
+    columns: dict[str, np.ndarray] = {}
     for i, name in enumerate((*OF_THE_DEMAND, *names)):
         columns |= {f"{name}_peak": found[:, i, 0], f"{name}_frequency": found[:, i, 1] / period}
     return columns

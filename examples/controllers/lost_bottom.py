@@ -89,13 +89,16 @@ def plot(runs, path):
         for panel, places in zip(panels, (run.measured_position, run.position), strict=False):
             low, high = np.quantile(places[..., 1], (0.05, 0.95), axis=1)
             panel.fill_between(run.time, low, high, color=color, alpha=0.35, label=name)
+            panel.plot(run.time, np.stack([low, high], axis=1), color=color, linewidth=0.8)
         sigma = run.estimate_sigma[:, 0, 1]
         panels[1].plot(run.time, 1.645 * sigma, ":", color=color)
         panels[1].plot(run.time, -1.645 * sigma, ":", color=color)
         judged = lw.metrics.consistency(run)
         panels[2].semilogy(run.time, judged.nees, color=color, label=name)
     panels[2].fill_between(run.time, *judged.nees_band.T, color="black", alpha=0.3)
-    panels[0].set(title="Off the line, as the loop believes", xlabel="time [s]", ylabel="[m]")
+    panels[2].set_yticks([15, 50, 100, 500], ["15", "50", "100", "500"])
+    panels[2].minorticks_off()
+    panels[0].set(title="Off the line, as the loop believes", xlabel="time [s]", ylabel="to starboard of the line [m]")
     panels[1].set(title="Off the true line; dotted: 90 % by the filter", xlabel="time [s]")
     panels[2].set(title="NEES (grey: 95 % band of a right filter)", xlabel="time [s]")
     for panel in panels[:2]:

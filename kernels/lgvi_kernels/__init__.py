@@ -32,12 +32,13 @@ from types import ModuleType
 def built_in(folder, name):
     """The device code of a name in a folder ("laws", "stops"), imported when it is asked for first; None for no such name.
 
-    Of "thrusters_with:driven,table" it is what that module's `made` returns for the features ("driven", "table").
+    Of "thrusters_with:driven,table" it is what that module's `made` returns for the features ("driven", "table"), of "imu:"
+    for none.
     """
-    name, _, features = name.partition(":")
+    name, chooses, features = name.partition(":")
     path = f"{__name__}.{folder}.{name}"
     module = import_module(path) if name.isidentifier() and find_spec(path) else None
-    return module.made(tuple(features.split(","))) if module and features else module
+    return module.made(tuple(filter(None, features.split(",")))) if module and chooses else module
 
 
 def device(path, features, **functions):

@@ -26,11 +26,13 @@ def margins_arguments(verb: Any) -> None:
     add = verb.add_argument
     add_shared(verb, "scene", scene="scene file (TOML) with [controller]; its members are those of [ensemble]")
     add("--loop", metavar="KEY", help="key of the law, such as heading_pid (default: all laws together)")
-    add("--of", action="append", choices=("gain", "delay", "disk"), help="what the loop is to bear (default: gain and "
+    add("--of", action="append", choices=("gain", "delay", "disk", "peak"), help="what the loop is to bear (default: gain and "
         "delay); may be given several times")  # fmt: skip
     add("--by", action="append", choices=("eigenvalues", "runs"), help="how it is found (default: eigenvalues); may be "
         "given several times")  # fmt: skip
     add("--skew", metavar="S", type=float, default=0.0, help="skew of the disk, from -1 to 1 (default 0)")
+    add("--to", metavar="NAME", action="append", help="number of the motion to which peaks are wanted, as position[2]; may be "
+        "given several times")  # fmt: skip
     add("--about", metavar="S", type=float, default=60.0, help="time after which loops are looked at [s] (default 60)")
     add(
         "--settle",
@@ -69,7 +71,7 @@ def margins(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None
     with progress_bar(chosen.quiet, "running"):
         found = (study or bearable)(
             scene, chosen.loop, tuple(dict.fromkeys(chosen.of or ("gain", "delay"))),
-            by=tuple(dict.fromkeys(chosen.by or ("eigenvalues",))), **numbers,
+            by=tuple(dict.fromkeys(chosen.by or ("eigenvalues",))), to=tuple(chosen.to or ()), **numbers,
         )  # fmt: skip
     with progress_bar(chosen.quiet, "writing"):
         written = Written(found.save(out))

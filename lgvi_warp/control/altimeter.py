@@ -62,7 +62,7 @@ class Altimeter(Sensor):
 
     def shape_of(self, item: Any) -> tuple[Any, ...]:
         # The errors are scalars.
-        return item.metadata["shape"] if item.name in ("direction", "point") else ()
+        return item.metadata["shape"] if item.name in ("direction", "point", "place") else ()
 
     def check(self, faults: Faults) -> None:
         super().check(faults)

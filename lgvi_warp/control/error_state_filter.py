@@ -137,9 +137,10 @@ class ErrorStateFilter(MeasuringPart):
         """Add a fault where a sensor does not fit its role."""
         kind, reading = ROLES[role]
         word, sensor = f"{self.key}.{role}", before.get(key)
-        what = f"a sensor of {reading}" if reading else f"of type {kind.type}"
+        what = f"a sensor of {reading}" if reading else f"a part of type {kind.type}"
         if sensor is None:
-            faults.add(word, key, "is no sensor that stands before the filter", closest(key, before))
+            remedy = closest(key, before) if before else f"give the scene {what}, above the filter"
+            faults.add(word, key, "is no sensor that stands before the filter", remedy)
         elif not isinstance(sensor, kind) or (isinstance(sensor, Sensor) and sensor.of != reading):
             faults.add(word, key, f"is not {what}", f"name one that is {what}")
         elif list(self.uses.values()).count(key) > 1:
@@ -201,6 +202,9 @@ class ErrorStateFilter(MeasuringPart):
         unit, log = used["imu"], used.get("dvl", DVL())
         late = context.parameters[f"{self.delayed_fix}.latency"] if self.delayed_fix else np.zeros(1)
         places = {"lever": unit.place[None], "arm": (log.place - unit.place)[None], "latency": np.rint(late)}
+        for role in ("fix", "delayed_fix", "depth"):
+            place = getattr(used.get(role), "place", None)
+            places[f"{role}_lever"] = (unit.place - (0.0 if place is None else place))[None]
         beams = {"ahead": DIAGONAL * np.sin(log.angle)[None], "down": np.cos(log.angle)[None]}
         return values | places | beams | {"gravity": context.parameters["environment.gravity"]}
 

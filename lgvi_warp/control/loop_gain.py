@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A factor on the demand of some laws, by which margins are measured: no part of a scene that a user writes."""
+"""A factor on the demand of some laws, and what is added to it, by which margins are measured: no part that a user writes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.base import number
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 
 BEGIN, END = "loop_begin", "loop_gain"
-FACTOR = f"{END}.factor"
+FACTOR, ADDED = f"{END}.factor", f"{END}.added"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,15 +38,17 @@ class LoopBegin(ControlLaw):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopGain(LoopBegin):
-    """Multiplies each component of the demand of the laws since `LoopBegin`."""
+    """Multiplies each component of the demand of the laws since `LoopBegin`, and adds to it."""
 
     device: ClassVar[str] = "loop_gain:end"
 
     factor: Any = number((6,), "1", (1.0,) * 6)
+    added: Any = number((6,), "N, N m", (0.0,) * 6)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        factor = numbers["factor"]
-        return Packed({"of_force": factor[:, :3], "of_torque": factor[:, 3:], "demand": self.bus.answer})
+        factor, added = numbers["factor"], numbers["added"]
+        factors = {"of_force": factor[:, :3], "of_torque": factor[:, 3:]}
+        return Packed(factors | {"force": added[:, :3], "torque": added[:, 3:], "demand": self.bus.answer})
 
 
 def of_all(factor: np.ndarray) -> np.ndarray:

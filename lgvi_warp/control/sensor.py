@@ -20,6 +20,10 @@ VECTORS = ("bias", "noise", "drift", "quantum")
 IDLE = dict.fromkeys(VECTORS, 0.0) | {"every": 1.0, "latency": 0.0, "dropout": 0.0, "deepest": np.inf}
 DRAWING = frozenset({"noise", "drift", "dropout"})
 KEEPING = frozenset({"every", "latency", "dropout", "deepest"})
+# What a sensor may read of a place of its own.
+OF_A_PLACE = ("position", "depth")
+# What its device code has where it is not at the body's origin.
+PLACED = "place"
 # What its device code has where the call gives its normals.
 GIVEN = "given"
 # What it has where an estimator takes its readings.
@@ -50,13 +54,16 @@ class Sensor(MeasuringPart):
         every: Ticks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
         latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first one is there.
         dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default. The first is never lost.
-        deepest: Depth of the body's origin below which readings are lost, as those of GPS are [m]; inf by default.
+        deepest: Depth of its place below which readings are lost, as those of GPS are [m]; inf by default.
+        place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
+            reads the position or the depth of this place.
 
     An estimator that names the sensor (see lw.control.ErrorStateFilter) takes the readings itself: then what is measured stays
     as it was, no reading is kept, the first may be lost, and the estimator waits for the latency.
 
     Raises:
-        SceneError: Where `of` is not known, or `every` or `latency` is no whole number; and as `Term`.
+        SceneError: Where `of` is not known, `every` or `latency` is no whole number, or a place is given for another
+            reading; and as `Term`.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -65,7 +72,7 @@ class Sensor(MeasuringPart):
     """
 
     type: ClassVar[str] = "sensor"
-    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, GIVEN, HANDED)
+    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, PLACED, GIVEN, HANDED)
 
     of: str = ""
     noise: Any = number((3,), "unit", 0.0, least=0.0)
@@ -76,6 +83,8 @@ class Sensor(MeasuringPart):
     latency: Any = number((), "ticks", IDLE["latency"], least=0.0, most=MOST_TICKS)
     dropout: Any = number((), "1", IDLE["dropout"], least=0.0, most=1.0)
     deepest: Any = number((), "m", IDLE["deepest"], infinite=True)
+    # Absent where it is not given, so that a sensor without it has no such parameter.
+    place: Any = number((3,), "m", None, optional=True)
 
     def __post_init__(self) -> None:
         if self.of != RANGE:
@@ -93,7 +102,7 @@ class Sensor(MeasuringPart):
 
     def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
         # One number for each that it reads; a sensor of a scalar has scalars.
-        return () if self.count == 1 else super().shape_of(item)
+        return () if self.count == 1 and item.name != PLACED else super().shape_of(item)
 
     def check(self, faults: Faults) -> None:
         for name in ("every", "latency"):
@@ -101,6 +110,9 @@ class Sensor(MeasuringPart):
             if value != round(value):
                 near = f"{np.floor(value):g} or {np.ceil(value):g}"
                 faults.add(name, value, "is no whole number of ticks", f"give {near}")
+        if self.place is not None and self.of not in OF_A_PLACE:
+            remedy = "leave it out" if self.of != RANGE else "give point"
+            faults.add("place", self.place, f"has no meaning for a sensor of {self.of}", remedy)
 
     @property
     def ticks_before(self) -> int:
@@ -111,7 +123,10 @@ class Sensor(MeasuringPart):
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # The names of the numbers that matter for some member.
         acting = tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
-        return (*(name for name in acting if name != "latency"), HANDED) if self.is_handed else acting
+        placed = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
+        return (
+            (*(name for name in acting if name != "latency"), *placed, HANDED) if self.is_handed else (*acting, *placed)
+        )
 
     @property
     def handed_rows(self) -> int:
@@ -143,6 +158,8 @@ class Sensor(MeasuringPart):
         handed = HANDED in chosen
         values: dict[str, Any] = {name: _vector(numbers[name]) for name in VECTORS if name in chosen}
         values |= {name: _whole(name, numbers[name]) for name in ("every", "latency") if name in chosen}
+        if PLACED in chosen:
+            values[PLACED] = numbers[PLACED]
         if "deepest" in chosen:
             values["deepest"] = np.minimum(numbers["deepest"], BOTTOMLESS)
         if handed:

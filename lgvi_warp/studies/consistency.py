@@ -23,7 +23,7 @@ class Consistency(Summarized):
     Attributes:
         time: Times of the samples (k,) [s].
         members: Members that were still under way (k,).
-        nees: Mean over the members of e^T P^-1 e, 15 for a right filter (k,).
+        nees: Mean over the members of e^T P^-1 e, 15 for a right filter (k,); NaN where a filter's covariance lost its digits.
         nees_band: Lower and upper end of its band (k, 2).
         nis: Sum of squared innovations over their variances, by their number, 1 for a right filter (k,); NaN where none was.
         nis_band: Lower and upper end of its band (k, 2); NaN where none was.
@@ -114,7 +114,7 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
 
 
 def _share(values: np.ndarray, band: np.ndarray) -> float:
-    """The share of those that are numbers in their bands; NaN for none."""
-    known = np.isfinite(values)
+    """The share of those that have a band and are in it, which NaN is not; NaN for none."""
+    known = np.isfinite(band).all(axis=1)
     inside = (values >= band[:, 0]) & (values <= band[:, 1])
     return float(inside[known].mean()) if known.any() else np.nan

@@ -8,6 +8,7 @@ import warp as wp
 
 import lgvi_warp as lw
 from lgvi_kernels.lanes.arithmetic import lane, vec3
+from lgvi_kernels.lanes.state import table_number
 from lgvi_kernels.lanes.tick import measurement_struct
 from lgvi_kernels.maps.in_turn import in_turn
 from lgvi_warp.engine.packets import Packets
@@ -18,13 +19,12 @@ from tests.support.loops import torpedo
 FIELDS = 21
 
 
-def scene(sensors, faults=(), period=0.1, **law):
+def scene(sensors, faults=(), period=0.1, events=(), **law):
     """A vehicle with these sensors and a law that needs nothing of them."""
     laws, guidance = [lw.control.HeadingPID(**{"kp": 1.0} | law)], [lw.control.SetPoint(heading=0.0)]
     controller = lw.Controller(period=period, sensors=sensors, guidance=guidance, laws=laws, faults=faults)
-    return lw.Scene(
-        torpedo(196.0, (0.0, 0.0, -0.02)), lw.Environment(9.8), [lw.terms.ControlWrench()], controller=controller
-    )
+    vehicle, water = torpedo(196.0, (0.0, 0.0, -0.02)), lw.Environment(9.8)
+    return lw.Scene(vehicle, water, [lw.terms.ControlWrench()], controller=controller, events=events)
 
 
 def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
@@ -33,7 +33,8 @@ def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
     plan = make_plan(ensemble, "psi_s", h, 1.0, dtype=dtype, width=width)
     n, ticks = ensemble.members, len(truth)
     packets = Packets(plan, ensemble.select(0, n))
-    kernel = _kernel(plan.spec.control.parts, plan.kernel.advance.types.Loop, width, plan.spec.real)
+    spec = plan.spec
+    kernel = _kernel(spec.control.parts, plan.kernel.advance.types.Loop, width, spec.real, spec.shared_rows)
     every, kind = controller.every(h), np.float64 if dtype == "float64" else np.float32
     lanes = np.zeros((packets.count * width, ticks, FIELDS))
     lanes[:n] = np.broadcast_to(truth, (ticks, n, FIELDS)).transpose(1, 0, 2)
@@ -41,7 +42,7 @@ def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
     rows = rows.reshape(packets.count, ticks * FIELDS, width)
     given = wp.array(rows, dtype=lane(width, plan.spec.real), device="cpu")
     out = wp.zeros((packets.count, ticks * FIELDS), dtype=lane(width, plan.spec.real), device="cpu")
-    inputs = [given, packets.laws.structs[1].array, packets.memory, every, h, ticks, out]
+    inputs = [given, packets.laws.structs[1].array, packets.laws.table.array, packets.memory, every, h, ticks, out]
     wp.launch(kernel, dim=packets.count, inputs=inputs, device="cpu")
     seen = out.numpy().reshape(packets.count, ticks, FIELDS, width).transpose(1, 0, 3, 2)
     return seen.reshape(ticks, -1, FIELDS)[:, :n]
@@ -50,16 +51,17 @@ def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
 _kernels = {}
 
 
-def _kernel(parts, Loop, width, real):
+def _kernel(parts, Loop, width, real, shared):
     """Kept: a Warp kernel for each set of parts."""
-    key = parts, Loop, width, real
+    key = parts, Loop, width, real, shared
     if key not in _kernels:
-        _kernels[key] = _make(in_turn(parts, "measure"), Loop, width, real)
+        _kernels[key] = _make(in_turn(parts, "measure"), Loop, width, real, shared)
     return _kernels[key]
 
 
-def _make(measure, Loop, width, real):
-    Lane, Measurement = lane(width, real), measurement_struct(width, real)
+def _make(measure, Loop, width, real, shared):
+    Lane, Measurement = lane(width, real), measurement_struct(width, real, shared)
+    Number = table_number(width, real, shared)
 
     @wp.func
     def three(rows: wp.array2d(dtype=Lane), i: int, at: int):
@@ -72,8 +74,8 @@ def _make(measure, Loop, width, real):
         rows[i, at + 2] = v.z
 
     @wp.kernel(module="unique", enable_backward=False)
-    def run(given: wp.array2d(dtype=Lane), loop: wp.array(dtype=Loop), memory: wp.array2d(dtype=Lane), every: int,
-            h: wp.float64, ticks: int, out: wp.array2d(dtype=Lane)):  # fmt: skip
+    def run(given: wp.array2d(dtype=Lane), loop: wp.array(dtype=Loop), table: wp.array2d(dtype=Number),
+            memory: wp.array2d(dtype=Lane), every: int, h: wp.float64, ticks: int, out: wp.array2d(dtype=Lane)):  # fmt: skip
         i = wp.tid()
         p = loop[i % loop.shape[0]]
         for k in range(ticks):
@@ -91,6 +93,8 @@ def _make(measure, Loop, width, real):
             y.tick = k
             y.t = real(wp.float64(y.step) * h)
             y.period = real(wp.float64(every) * h)
+            y.table = table
+            y.entry = i % table.shape[0]
             y.memory = memory
             y.packet = i
             y = measure(y, y, y, p)

@@ -10,12 +10,14 @@ import pytest
 from scipy.stats import chi2
 
 import lgvi_warp as lw
-from lgvi_warp.reference.control import Measurement, imu
+from lgvi_warp.physics.terms.noisy import channel
+from lgvi_warp.reference.control import dvl as twin_dvl
+from lgvi_warp.reference.control.altimeter import Ground
+from lgvi_warp.reference.control.readings import attitude
 from tests.conftest import ROOT
 from tests.control.bench import measured, scene
 from tests.support.navigating import (
     BELIEFS,
-    GRAVITY,
     LOG,
     ON_BOARD,
     PERIOD,
@@ -23,6 +25,7 @@ from tests.support.navigating import (
     parts,
     remus,
     run_twins,
+    through,
     twins,
     voyage,
 )
@@ -31,12 +34,17 @@ from tests.support.refusals import refused
 from tests.support.tools import one
 
 H = 0.02
+SIGMAS = ("position_sigma", "velocity_sigma", "attitude_sigma", "accelerometer_sigma", "gyroscope_sigma")
 # A right code misses such a band with a chance of 1e-4.
 TAILS = (5e-5, 1.0 - 5e-5)
 
 
 def fleet(listed, members, seed=0):
     return lw.Ensemble(scene(listed, period=PERIOD), members, seed)
+
+
+def over(floor, listed, members):
+    return lw.Ensemble(scene(listed, period=PERIOD, events=[floor]), members, 0)
 
 
 def still(ticks, depth=10.0):
@@ -77,6 +85,21 @@ def test_a_log_and_a_gyroscope_without_a_filter_are_the_twins():
     assert np.array_equal(seen[200:249, :, 12:15], seen[201:250, :, 12:15])
 
 
+def test_sensors_without_errors_measure_the_truth():
+    truth = voyage(100)
+    plain = [lw.control.DVL(), lw.control.IMU()]
+    seen = measured(fleet(plain, 2), truth, H)
+    assert np.abs(seen[:, :, 12:15] - truth[:, :, 12:15]).max() < 1e-12
+    wanted, _ = run_twins(plain, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-12
+    # A filter of a unit alone, which notes nothing, has the least code of all; it starts at the truth.
+    listed = [lw.control.IMU(), lw.control.ErrorStateFilter(report=False, start_error=0.0)]
+    seen = measured(fleet(listed, 2), truth, H)
+    # Places go on by the mean of two velocities: T^3 / 12 of the jerk a tick, which here is up to 0.03 m/s^3.
+    assert np.abs(seen - truth)[..., :3].max() < 100 * 0.1**3 / 12 * 0.03
+    assert np.abs(seen - truth)[..., 3:15].max() < 1e-12
+
+
 def errors_of(listed, truth, members):
     """Errors of the position of filters (ticks, members, 3)."""
     return measured(fleet(listed, members), truth, H)[..., :3] - truth[..., :3]
@@ -85,12 +108,9 @@ def errors_of(listed, truth, members):
 def test_without_a_log_the_position_drifts_as_the_integral_of_the_accelerometers_noise():
     # At rest, all else known: a walk of the velocity of N^2 T a tick, and the position by the mean of two velocities, so its
     # variance after k ticks is N^2 T^3 k (4 k^2 - 1) / 12, which goes to N^2 t^3 / 3. The log is silent from 0 s on.
-    density, members, ticks, tiny = 0.01, 1000, 200, 1e-9
+    density, members, ticks = 0.01, 1000, 200
     unit = dict(place=(0.0, 0.0, 0.0), accelerometer_noise=density)
-    start = dict(position_sigma=tiny, velocity_sigma=tiny, attitude_sigma=tiny)
-    listed = parts(
-        (), unit=unit, log_numbers=LOG | {"silent_from": 0.0}, accelerometer_sigma=tiny, gyroscope_sigma=tiny, **start
-    )
+    listed = parts((), unit=unit, log_numbers=LOG | {"silent_from": 0.0}, **dict.fromkeys(SIGMAS, 1e-9))
     error = errors_of(listed, still(ticks + 1), members)
     for k in (10, 100, ticks):
         variance = density**2 * PERIOD**3 * k * (4 * k**2 - 1) / 12
@@ -101,16 +121,118 @@ def test_without_a_log_the_position_drifts_as_the_integral_of_the_accelerometers
     assert abs(each.sigma[0] ** 2 / variance - 1.0) < 1e-6
 
 
+def test_delayed_fixes_are_those_of_a_straight_line():
+    # At rest with a unit that does not err, place and velocity of a line are all that is unknown: its posterior is that of a
+    # regression on the fixes, each at the time at which it was taken, as soon as they are there.
+    place, velocity, noise, members, late, every = 3.0, 0.2, 0.5, 1000, 20, 50
+    sigmas = dict.fromkeys(SIGMAS, 1e-9) | {"position_sigma": place, "velocity_sigma": velocity}
+    usbl = lw.control.Sensor(name="usbl", of="position", noise=noise, every=every, latency=late)
+    listed = [lw.control.IMU(), usbl, lw.control.ErrorStateFilter(delayed_fix="usbl", **sigmas)]
+    ticks = 3 * every
+    error = errors_of(listed, still(ticks), members)
+    low, high = chi2.ppf(TAILS, 3 * members)
+    information = np.diag([place**-2, velocity**-2])
+    for k in range(ticks):
+        if k >= late and (k - late) % every == 0:
+            row = np.array([1.0, (k - late) * PERIOD])
+            information = information + np.outer(row, row) / noise**2
+        if k in (0, 19, 20, 69, 70, 149):
+            row = np.array([1.0, k * PERIOD])
+            variance = row @ np.linalg.solve(information, row)
+            assert low < (error[k] ** 2).sum() / variance < high
+            assert run_twin_filter(listed, still(k + 1)).sigma[0] == pytest.approx(np.sqrt(variance), rel=1e-6)
+
+
+def with_places(listed):
+    """The same sensors, those of depth and position at places of their own."""
+    at = {"cell": (0.8, 0.1, 0.0), "gps": (-0.5, 0.0, -0.3), "usbl": (0.2, -0.1, 0.4)}
+    return [dataclasses.replace(part, place=at[part.key]) if part.key in at else part for part in listed]
+
+
+def test_sensors_with_places_of_their_own_are_the_twins():
+    truth, listed = voyage(150), with_places(parts())
+    seen = measured(fleet(listed, 2), truth, H)
+    wanted, belief = run_twins(listed, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    assert belief[:, 2].max() == 4 + 3 + 1 + 1
+    # Without noise, and a filter that knows nothing, a fix of a place is one of the origin: by geometry alone.
+    sharp = {"fix": dataclasses.replace(listed[4], noise=1e-6), "attitude_sigma": 1e-9, "position_sigma": 50.0}
+    gps = [lw.control.IMU(), sharp.pop("fix"), lw.control.ErrorStateFilter(fix="gps", **sharp)]
+    far = still(2, 8.0)
+    far[:, 0, 3:12] = attitude(0.2, -0.4, 1.0).reshape(-1)
+    error = measured(fleet(gps, 2), far, H)[0, :, :3] - far[0, :, :3]
+    assert np.abs(error).max() < 1e-5
+    # Without a filter what they read is taken for the body's; an antenna above 9 m has a fix, though the origin has none.
+    plain = [part for part in listed if part.key in ("cell", "gps")]
+    seen = measured(fleet(plain, 2), truth, H)
+    wanted, _ = run_twins(plain, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-12
+    deep = [dataclasses.replace(listed[4], noise=0.0, every=1.0, place=(0.0, 0.0, -1.0), deepest=9.5)]
+    sinking = still(3)
+    sinking[:, 0, 2] = [10.0, 10.2, 10.8]
+    assert measured(fleet(deep, 2), sinking, H)[:, 0, 2] == pytest.approx([9.0, 9.2, 9.2])
+
+
+def test_a_fix_that_comes_after_the_run_changes_nothing():
+    truth, plain = voyage(100), parts(("depth",))
+    usbl = lw.control.Sensor(name="usbl", of="position", noise=0.5, every=1000, latency=900)
+    filtered = dataclasses.replace(plain[-1], delayed_fix="usbl")
+    seen = [measured(fleet(listed, 2), truth, H) for listed in (plain, [*plain[:-1], usbl, filtered])]
+    assert np.abs(seen[0] - seen[1]).max() < 1e-12
+
+
+@pytest.mark.slow
+def test_lost_beams_are_no_log():
+    truth = voyage(300)
+    without = parts(("depth",), log=False)
+    seen = measured(fleet(without, 2), truth, H)
+    wanted, belief = run_twins(without, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    assert belief[:, 2].max() == 1.0
+    lost = measured(fleet(parts(("depth",), log_numbers=LOG | {"dropout": 1.0}), 2), truth, H)
+    assert np.abs(lost - seen).max() < 1e-12
+
+
+@pytest.mark.slow
+def test_a_bow_that_points_at_the_surface_has_no_heading():
+    # In 10 s upright, and 5 s there: a compass tells nothing, and divides by nothing.
+    angles, rate = np.minimum(np.linspace(0.0, 0.75 * np.pi, 151), 0.5 * np.pi), 0.005 * np.pi / PERIOD
+    truth = still(len(angles))
+    truth[:, 0, 3:12] = [attitude(0.0, pitch, 0.3).reshape(-1) for pitch in angles]
+    truth[:, 0, 19] = np.where(np.arange(len(angles)) < 100, rate, 0.0)
+    listed = parts(("depth", "heading", "fix"))
+    seen = measured(fleet(listed, 2), truth, H)
+    wanted, _ = run_twins(listed, truth, 1)
+    assert np.isfinite(seen).all()
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    # The third row of the attitude is known to some of its sigma, 0.02 rad.
+    assert np.abs(seen[:, :, 9:12] - truth[:, :, 9:12]).max() < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", [0.04, 0.2])
+def test_estimates_are_the_twins_at_other_periods(period):
+    truth, listed = voyage(150, period), parts()
+    seen = measured(lw.Ensemble(scene(listed, period=period), 2, 0), truth, H)
+    wanted, _ = run_twins(listed, truth, 1, period=period)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_a_unit_without_noise_is_taken_at_its_word():
+    truth, unit = voyage(1200), dict(place=UNIT["place"])
+    listed = parts(("depth",), unit=unit, **dict.fromkeys(SIGMAS[2:], 1e-6))
+    seen = measured(fleet(listed, 2), truth, H)
+    wanted, _ = run_twins(listed, truth, 1)
+    assert np.abs(seen[:, 1] - wanted).max() < 1e-9
+    # By what the log says the velocity is known ever better.
+    assert np.abs(seen[-1] - truth[-1])[:, 12:15].max() < 0.01
+
+
 def run_twin_filter(listed, truth):
     """The twin of a filter after the last tick."""
     each = twins(listed, 0)
-    for part in each:
-        part.begin()
-    for k, row in enumerate(truth[:, 0]):
-        y = Measurement(row[:3], row[3:12].reshape(3, 3), row[12:15], row[15:18], row[18:21], t=k * PERIOD, period=PERIOD,
-                        h=H, step=5 * k, tick=k)  # fmt: skip
-        for part in each:
-            y = part.measure(y)
+    through(each, truth)
     return each[-1]
 
 
@@ -129,22 +251,16 @@ def allan_of(noise, walk, m):
 @pytest.mark.parametrize("which", ["gyroscope", "accelerometer"])
 def test_the_allan_deviation_is_as_set(which):
     noise, walk, ticks, members = 1e-3, 2e-3, 1200, 60
+    truth = still(ticks + 1)
     if which == "gyroscope":
         listed = [lw.control.IMU(gyroscope_noise=noise, gyroscope_walk=walk, gyroscope_bias=0.1)]
-        rates = measured(fleet(listed, members), still(ticks + 1), H)[1:, :, 18:21].reshape(ticks, -1)
+        rates = measured(fleet(listed, members), truth, H)[1:, :, 18:21]
     else:
-        rates = np.zeros((ticks, 3 * members))
-        numbers = dict(accelerometer_noise=np.full(3, noise), accelerometer_walk=np.full(3, walk), gravity=GRAVITY)
-        for member in range(members):
-            unit = imu.IMU(**numbers, handed={})
-            unit.begin()
-            for k in range(ticks + 1):
-                unit.measure(
-                    Measurement(np.zeros(3), np.eye(3), *np.zeros((3, 3)), period=PERIOD, tick=k, member=member)
-                )
-                if k:
-                    force = unit.handed["imu"]["gained"] / PERIOD + np.array([0.0, 0.0, GRAVITY])
-                    rates[k - 1, 3 * member : 3 * member + 3] = force
+        # A filter that knows all else and reads nothing adds up what the accelerometers say.
+        unit = dict(place=(0.0, 0.0, 0.0), accelerometer_noise=noise, accelerometer_walk=walk)
+        listed = parts((), log=False, unit=unit, **dict.fromkeys(SIGMAS, 1e-9))
+        rates = np.diff(measured(fleet(listed, members), truth, H)[:, :, 12:15], axis=0) / PERIOD
+    rates = rates.reshape(ticks, -1)
     for m in (1, 3, 10, 30, 60):
         # Windows of 2 m ticks that do not overlap are the least that count: so many squares of 3 axes.
         windows = rates.shape[1] * (ticks // (2 * m))
@@ -167,13 +283,39 @@ def test_a_beam_whose_way_to_the_floor_is_beyond_its_range_has_no_echo():
     truth = np.repeat(still(2), 400, axis=1)
     truth[:, rolled, 3:12] = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]).reshape(-1)
     log = lw.control.DVL(noise=0.01, floor="ground", greatest_range=11.3)
-    base = scene([lw.control.IMU(), log, lw.control.ErrorStateFilter(dvl="dvl")], period=PERIOD)
-    ground = lw.events.Floor(name="ground", depth=20.0)
-    above = lw.Scene(base.vehicle, base.environment, base.terms, controller=base.controller, events=[ground])
-    seen = measured(lw.Ensemble(above, 400, 0), truth, H)[0, :, 12:15]
+    listed = [lw.control.IMU(), log, lw.control.ErrorStateFilter(dvl="dvl")]
+    seen = measured(over(lw.events.Floor(name="ground", depth=20.0), listed, 400), truth, H)[0, :, 12:15]
     # The first estimate has errors of 0.1 m/s. Two beams leave them in one direction.
     known = [(np.linalg.eigvalsh(np.cov(seen[which].T)) < 0.03**2).sum() for which in (level, rolled)]
     assert known == [0, 2]
+
+
+@pytest.mark.parametrize("reach", [9.0, np.inf])
+def test_beams_over_a_grid_are_those_of_the_twin(reach):
+    # A slope of 0.2 to the east below a vehicle that rolls: some beams meet it within 6 m to 9 m and others do not.
+    depth = np.tile(20.0 + np.arange(-10.0, 11.0), (21, 1))
+    floor = dict(depth=depth, origin=[-50.0, -50.0], spacing=[5.0, 5.0])
+    log = LOG | {"greatest_range": reach, "least_range": 6.0}
+    truth = voyage(300)
+    truth[..., 2] += 3.0
+    ground = lw.events.Floor(name="ground", **floor)
+    seen = measured(over(ground, [lw.control.DVL(**log, floor="ground")], 2), truth, H)
+    each = [twin_dvl.DVL(**log, ground=Ground(depth, *list(floor.values())[1:]), channel=channel("dvl"))]
+    wanted = through(each, truth)
+    assert np.abs(seen[:, 0] - wanted).max() < 1e-12
+    # Not all ticks have three beams.
+    held = np.all(wanted[1:, 12:15] == wanted[:-1, 12:15], axis=1)
+    assert 0.1 < held[1::2].mean() < 0.9
+
+
+def test_a_flat_floor_on_a_grid_is_a_flat_floor():
+    truth, log = voyage(100), lw.control.DVL(noise=0.01, floor="ground", least_range=1.0, greatest_range=11.0)
+    flat = lw.events.Floor(name="ground", depth=20.0)
+    grid = lw.events.Floor(name="ground", depth=np.full((3, 3), 20.0), spacing=[10.0, 10.0])
+    seen = [measured(over(floor, [log], 2), truth, H) for floor in (flat, grid)]
+    assert np.array_equal(*seen)
+    free = measured(fleet([lw.control.DVL(noise=0.01)], 2), truth, H)
+    assert 0.05 < np.any(seen[0] != free, axis=2).mean() < 0.95
 
 
 def test_a_fix_below_the_surface_does_not_count():
@@ -194,8 +336,8 @@ def test_readings_of_members_that_vary():
 
 
 FAULTS = {
-    "imu": ([lw.control.ErrorStateFilter()], "error_state_filter.imu = 'imu'"),
-    "kind": ([lw.control.Sensor(name="imu", of="depth"), lw.control.ErrorStateFilter()], "is not of type imu"),
+    "imu": ([lw.control.ErrorStateFilter()], "give the scene a part of type imu"),
+    "kind": ([lw.control.Sensor(name="imu", of="depth"), lw.control.ErrorStateFilter()], "is not a part of type imu"),
     "noise": ([lw.control.IMU(), lw.control.DVL(), lw.control.ErrorStateFilter(dvl="dvl")], "dvl.noise"),
     "before": ([lw.control.IMU(), lw.control.Sensor(of="depth"), lw.control.ErrorStateFilter()], "sensors = 'sensor'"),
     "late": (
@@ -209,7 +351,31 @@ FAULTS = {
         "usbl.latency",
     ),
     "after": ([lw.control.ErrorStateFilter(), lw.control.IMU()], "stands before the filter"),
+    "range": ([lw.control.DVL(least_range=1.0, greatest_range=20.0, floor="ground")], "give the scene one"),
+    "no floor": ([lw.control.DVL(floor="ground")], "dvl.floor = 'ground'"),
 }  # fmt: skip
+
+
+BAD_NUMBERS = {
+    "density": (lambda: lw.control.IMU(gyroscope_noise=-1e-4), "imu.gyroscope_noise"),
+    "arm": (lambda: lw.control.DVL(place=(1.0, 2.0)), "(3,) [m]"),
+    "range": (lambda: lw.control.DVL(least_range=50.0, greatest_range=10.0), "is not above least_range = 50"),
+    "silence": (lambda: lw.control.DVL(silent_from=5.0, silent_to=2.0), "is not above silent_from = 5"),
+    "place": (
+        lambda: lw.control.Sensor(of="velocity", place=(1.0, 0.0, 0.0)),
+        "has no meaning for a sensor of velocity",
+    ),
+    "point": (lambda: lw.control.Altimeter(place=(1.0, 0.0, 0.0)), "give point"),
+    "sigma": (lambda: lw.control.ErrorStateFilter(attitude_sigma=0.0), "give numbers above 0 [rad]"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_NUMBERS)
+def test_bad_numbers_are_told_in_one_line(name):
+    make, text = BAD_NUMBERS[name]
+    with pytest.raises(lw.SceneError, match=re.escape(text)) as found:
+        make()
+    assert "\n" not in str(found.value)
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -277,12 +443,67 @@ def test_what_a_filter_believes_is_a_quantity_of_statistics(voyages):
     assert abs(run.statistics["mean nees"].value[-1, 0] - voyages.nees[4].mean()) < 1e-9
 
 
+def test_nees_and_nis_are_metrics_of_members(voyages):
+    asked = [lw.metrics.NEES(then=[lw.statistics.MemberValues()]), lw.metrics.NIS(then=[lw.statistics.MemberValues()])]
+    ensemble = lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1)
+    saved = lw.SaveAt(every=PERIOD, fields=("nees", "nis", "nis_count"))
+    run = lw.solve(ensemble, t1=2.0, save=saved, statistics=asked, **SETTINGS)
+    assert np.array_equal(run.nees[::5], voyages.nees[:5])
+    nees, nis = (run.statistics[f"each {name}"].value[0, 0] for name in ("nees", "nis"))
+    assert nees == pytest.approx(run.nees.mean(axis=0), rel=1e-12)
+    assert nis == pytest.approx(run.nis.sum(axis=0) / run.nis_count.sum(axis=0), rel=1e-12)
+    # A right filter: 21 ticks of one member are like one look at the errors, so the mean over members is as free as theirs.
+    low, high = chi2.ppf(TAILS, 15 * 200) / 200
+    assert low < nees.mean() < high
+    with pytest.raises(lw.SceneError, match=r"nis\.of = 'depth'"):
+        lw.metrics.NIS("depth")
+
+
 def test_a_filter_goes_on_where_a_run_ended(voyages):
     first = sailed(200, 10.0, 0.5)
     on = lw.solve(lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1), start=first.final, t1=20.0,
                   save=lw.SaveAt(every=0.5, fields=("position", "nees")), **SETTINGS)  # fmt: skip
     assert np.array_equal(on.nees[-1], voyages.nees[-1])
     assert np.array_equal(on.position[-1], voyages.position[-1])
+
+
+@pytest.mark.slow
+def test_a_filter_goes_on_with_a_fix_on_its_way():
+    listed = parts(**ON_BOARD)
+    ensemble = lw.Ensemble(remus(listed), 8, seed=1)
+    save = lw.SaveAt(every=0.5, fields=("position", "nees", "measured_position"), final=True)
+    # The fix of 5 s comes at 7 s.
+    whole, first = (lw.solve(ensemble, t1=t1, save=save, **SETTINGS) for t1 in (9.0, 6.0))
+    on = lw.solve(ensemble, start=first.final, t1=9.0, save=save, **SETTINGS)
+    for name in ("position", "nees", "measured_position"):
+        assert np.array_equal(on.samples[name][-1], whole.samples[name][-1])
+
+
+@pytest.mark.slow
+def test_without_a_log_a_good_gyroscope_keeps_filters_consistent_and_a_poor_one_does_not():
+    # An error theta of the vertical looks like a bias g theta^2 / 2, which no linear filter knows.
+    sigmas = {name: value for name, value in ON_BOARD.items() if name.endswith("sigma")}
+    judged = {}
+    for drift in (5e-5, 1e-3):
+        unit = ON_BOARD["unit"] | {"gyroscope_turn_on": drift}
+        listed = parts(("depth",), log=False, unit=unit, **sigmas, gyroscope_sigma=drift)
+        save = lw.SaveAt(every=1.0, fields=("nees", "nis", "nis_count"))
+        run = lw.solve(lw.Ensemble(remus(listed), 400, seed=1), t1=40.0, save=save, **SETTINGS)
+        judged[drift] = lw.metrics.consistency(run, level=0.999)
+    assert judged[5e-5].nees_share == 1.0
+    assert judged[1e-3].nees[-1] > 2.0 * 15.0
+
+
+def test_consistency_of_filters_that_read_nothing_or_have_lost_their_covariance(voyages):
+    quiet = {"nis": 0.0 * voyages.nis, "nis_count": 0.0 * voyages.nis_count}
+    judged = lw.metrics.consistency(dataclasses.replace(voyages, samples=dict(voyages.samples) | quiet))
+    assert np.isnan(judged.nis).all()
+    assert np.isnan(judged.nis_share)
+    assert "no innovation" in repr(judged)
+    lost = voyages.nees.copy()
+    lost[20:, 3] = np.nan
+    judged = lw.metrics.consistency(dataclasses.replace(voyages, samples=dict(voyages.samples) | {"nees": lost}))
+    assert judged.nees_share <= 20 / 41
 
 
 @pytest.mark.slow

@@ -6,51 +6,21 @@ import pytest
 from scipy.optimize import minimize
 
 import lgvi_warp as lw
-from lgvi_warp.control import AllocationMatrix, HeadingPID, PosePID, SetPoint
-from lgvi_warp.distributions import Choice, Uniform
-from lgvi_warp.terms import ControlWrench
+from lgvi_warp.control import HeadingPID
 from tests.support.refusals import refused, says
-
-J, PERIOD, H, EVERY = 11.0, 0.1, 0.02, 5
-LATE = [0.0, 0.06, 0.12]
-
-
-def scene(law, inertia, delay=0.06, guidance=()):
-    controller = lw.Controller(
-        period=PERIOD, delay=delay, guidance=guidance or [SetPoint(heading=0.0)], laws=[law],
-        allocation=[AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
-    vehicle = lw.Vehicle(
-        20.0, inertia=inertia, added_mass=(0.0, 0.0, 0.0), buoyancy=200.0, center_of_buoyancy=(0.0, 0.0, 0.0)
-    )
-    return lw.Scene(vehicle, lw.Environment(10.0), [ControlWrench()], controller=controller)
-
-
-def opened(kp, ki, kd, inertia, steps):
-    """x' = A x + B w, w = C x: angles, rates, integrals of the errors, and the torques that are on their way."""
-    inverse, unity = np.linalg.inv(np.atleast_2d(inertia)), np.eye(len(np.atleast_2d(inertia)))
-    r, (q, s) = len(unity), divmod(steps, EVERY)
-    late = s * H
-
-    def push(t):
-        return np.concatenate([0.5 * t**2 * inverse, t * inverse])
-
-    n = 3 * r + (q + 2) * r
-    A = np.zeros((n, n))
-    A[: 2 * r, : 2 * r] = np.block([[unity, PERIOD * unity], [0.0 * unity, unity]])
-    acting = slice(3 * r + q * r, 4 * r + q * r)
-    older = slice(acting.stop, acting.stop + r)
-    A[: 2 * r, acting] = push(PERIOD - late)
-    A[: 2 * r, older] = push(PERIOD) - push(PERIOD - late)
-    A[2 * r : 3 * r, :r], A[2 * r : 3 * r, 2 * r : 3 * r] = -PERIOD * unity, unity
-    A[4 * r :, 3 * r : -r] = np.eye((q + 1) * r)
-    B = np.zeros((n, r))
-    B[3 * r : 4 * r] = unity
-    C = -np.diag(kp) @ A[:r] - np.diag(kd) @ A[r : 2 * r] + np.diag(ki) @ A[2 * r : 3 * r]
-    return A, B, C
-
-
-def numbers(fleet, n):
-    return {name: np.broadcast_to(v, (n, *v.shape[1:])) for name, v in fleet.parameters(0, n).items()}
+from tests.support.turning_loops import (
+    GAINS,
+    INERTIAS,
+    LATE,
+    PERIOD,
+    H,
+    J,
+    heading_loops,
+    loop_of,
+    opened,
+    scene,
+    turning,
+)
 
 
 @pytest.mark.parametrize(
@@ -58,17 +28,12 @@ def numbers(fleet, n):
 )
 def test_ten_loops_beside_python_control(skew):
     control = pytest.importorskip("control")
-    vary = {"heading_pid.kp": Uniform(4.0, 8.0), "heading_pid.kd": Uniform(7.0, 12.0), "heading_pid.ki": Uniform(0.4, 1.2),
-            "controller.delay": Choice(LATE)}  # fmt: skip
-    law = HeadingPID(kp=6.0, ki=0.8, kd=9.0)
-    fleet = lw.Ensemble(scene(law, (5.0, 8.0, J)), 10, 7, vary)
+    fleet = heading_loops(10)
     found = lw.linear.margins(fleet, "heading_pid", of=("disk",), skew=skew, about=80.0, method="psi_s", h=H)
     assert found.steady.all()
-    p = numbers(fleet, 10)
     frequencies = np.geomspace(1e-3, np.pi / PERIOD, 20_000)
     for i in range(10):
-        gains = [p[f"heading_pid.{k}"][i : i + 1] for k in ("kp", "ki", "kd")]
-        A, B, C = opened(*gains, J, round(p["controller.delay"][i] / H))
+        A, B, C = loop_of(fleet, i)
         margin, gain, phase = control.disk_margins(control.ss(A, B, -C, 0.0, PERIOD), frequencies, skew=skew)
         # python-control looks at a grid of ten thousandths: next to a peak that errs by their square.
         assert found.values["disk"][i] == pytest.approx(margin, rel=1e-5)
@@ -96,23 +61,13 @@ def swept(A, B, C, frequencies):
     return 1.0 / largest
 
 
-INERTIAS = [
-    [[5.0, 2.0, 0.0], [2.0, 8.0, 0.0], [0.0, 0.0, 11.0]],
-    [[5.0, 2.5, 1.0], [2.5, 8.0, 3.0], [1.0, 3.0, 11.0]],
-    [[5.0, -3.0, 2.0], [-3.0, 9.0, 1.0], [2.0, 1.0, 7.0]],
-]
-
-
 @pytest.mark.parametrize(("inertia", "delay"), [
     (INERTIAS[0], 0.0), *(pytest.param(*each, marks=pytest.mark.slow) for each in zip(INERTIAS[1:], LATE[1:], strict=True)),
 ])  # fmt: skip
 def test_coupled_axes_beside_a_sweep(inertia, delay):
-    kr, ki_r, kw = np.array([4.0, 7.0, 9.0]), np.array([0.3, 0.5, 0.4]), np.array([8.0, 11.0, 13.0])
-    law = PosePID(kp=[0.0] * 3, kd=[0.0] * 3, kr=kr, ki_r=ki_r, kw=kw)
-    place = SetPoint(position=[0.0, 0.0, 0.0], heading=0.0)
-    found = lw.linear.margins(scene(law, inertia, delay, [place]), of=("disk",), about=80.0, method="psi_s", h=H)
+    found = lw.linear.margins(turning(inertia, delay), of=("disk",), about=80.0, method="psi_s", h=H)
     assert found.steady.all(), found.why
-    A, B, C = opened(kr, ki_r, kw, inertia, round(delay / H))
+    A, B, C = opened(*GAINS, inertia, round(delay / H))
     at = found.values["disk_frequency"][0]
     grid = np.concatenate([np.geomspace(0.01, np.pi / PERIOD, 60), at * np.linspace(0.98, 1.02, 21)])
     # The grid is a thousandth fine at the peak.

@@ -94,29 +94,42 @@ def twin_of_filter(listed, handed, member, seed, gravity):
     ]
     log = by_key.get(design.dvl, lw.control.DVL())
     latency = int(by_key[design.delayed_fix].latency) if design.delayed_fix else 0
+    places = {
+        f"{role}_place": by_key[key].place
+        for role, key in design.uses.items()
+        if getattr(by_key[key], "place", None) is not None and role in ("fix", "delayed_fix", "depth")
+    }
     return twin_filter.ErrorStateFilter(
         **numbers, **dict(design.uses), handed=handed, believed=believed, place=unit.place, dvl_place=log.place,
-        dvl_angle=float(log.angle), gravity=gravity, latency=latency, errors=np.concatenate(errors),
+        dvl_angle=float(log.angle), gravity=gravity, latency=latency, errors=np.concatenate(errors), **places,
     )  # fmt: skip
 
 
-def run_twins(listed, truth, member, seed=0, h=0.02, period=PERIOD):
-    """(what is measured (ticks, 21), of a filter (ticks, 3): NEES, NIS and how many) of one member."""
-    each = twins(listed, member, seed)
+def through(each, truth, member=0, h=0.02, period=PERIOD, then=lambda k: None):
+    """What twins of one member leave of a motion (ticks, 1 or n, 21): (ticks, 21); then: called after each tick."""
     for part in each:
         part.begin()
-    seen, belief = np.zeros((len(truth), 21)), np.zeros((len(truth), 3))
+    seen, every = np.zeros((len(truth), 21)), round(period / h)
     for k, row in enumerate(truth):
         row = row[min(member, len(row) - 1)]
         vectors = row[:3], row[3:12].reshape(3, 3), row[12:15], row[15:18], row[18:21]
-        every = round(period / h)
         y = Measurement(*vectors, t=k * period, period=period, h=h, step=every * k, tick=k, member=member)
         for part in each:
             y = part.measure(y)
         seen[k] = np.concatenate([y.position, y.R.reshape(-1), y.velocity, y.water_velocity, y.angular_velocity])
+        then(k)
+    return seen
+
+
+def run_twins(listed, truth, member, seed=0, **how):
+    """(what is measured (ticks, 21), of a filter (ticks, 3): NEES, NIS and how many) of one member."""
+    each, belief = twins(listed, member, seed), np.zeros((len(truth), 3))
+
+    def note(k):
         if isinstance(listed[-1], lw.control.ErrorStateFilter):
             belief[k] = each[-1].nees, each[-1].nis, each[-1].nis_count
-    return seen, belief
+
+    return through(each, truth, member, then=note, **how), belief
 
 
 # Sensors of a REMUS 100 that are near to one another; the first estimates are good enough for a linear filter.

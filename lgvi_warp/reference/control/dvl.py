@@ -11,7 +11,8 @@ from lgvi_warp.reference.control import Measurement, Part
 from lgvi_warp.reference.random import normals
 from lgvi_warp.reference.rotation import Array
 
-# Azimuth of the beams from the bow, to starboard.
+# How far a beam looks for a floor on a grid [m]; azimuths of the beams from the bow, to starboard.
+FARTHEST = 2e4
 AZIMUTHS = np.radians([45.0, 135.0, 225.0, 315.0])
 
 
@@ -22,12 +23,14 @@ def beams(angle: float) -> Array:
 
 
 class DVL(Part):
-    """Numbers as those of `lw.control.DVL`; floor [m], the depth of the sea floor, inf for none; keys of its random numbers.
+    """Numbers as those of `lw.control.DVL`; floor [m], the depth of a flat floor, inf for none; keys of its random numbers.
+
+    ground: None, or a `Ground`, a floor on a grid, at which a beam looks for 20 km at most.
 
     handed: None, or {name: what is handed on}, shared by sensors and filter.
     """
 
-    key, handed = "dvl", None
+    key, handed, ground = "dvl", None, None
     place = np.zeros(3)
     angle, noise, dropout, every = math.radians(30.0), 0.0, 0.0, 1
     floor, least_range, greatest_range, silent_from, silent_to = math.inf, 0.0, math.inf, math.inf, math.inf
@@ -46,6 +49,10 @@ class DVL(Part):
             altitude = self.floor - (y.position + y.R @ self.place)[2]
             down = directions @ y.R[2]
             kept &= (down > 0.0) & (self.least_range * down <= altitude) & (altitude <= self.greatest_range * down)
+        if self.ground is not None:
+            start, most = y.position + y.R @ self.place, min(self.greatest_range, FARTHEST)
+            ways = np.array([self.ground.along(start, y.R @ u, most) for u in directions])
+            kept &= (self.least_range < ways) & (ways < most)
         return kept & (y.tick % self.every == 0)
 
     def measure(self, y: Measurement) -> Measurement:

@@ -14,6 +14,8 @@ from lgvi_warp.reference.rotation import Array, exp, hat, norm
 # Blocks of the error: position, velocity (inertial), attitude (body axes), biases of accelerometer and gyroscope; and the
 # position at the tick of a fix that is on its way.
 P, V, THETA, A, W, THEN = (slice(3 * i, 3 * i + 3) for i in range(6))
+# The square of the bow's level part, up to which it has no heading: 6 degrees from the vertical.
+LEVEL = 0.01
 # Variance of the rate at a tick, from the means of two periods, over that of a mean.
 OF_RATE = 2.5
 INNOVATIONS = {"dvl": 0, "fix": 4, "delayed_fix": 7, "depth": 10, "heading": 11}
@@ -32,13 +34,14 @@ class ErrorStateFilter(Part):
 
     imu, dvl, depth, heading, fix, delayed_fix: keys of the sensors in `handed`; "" for none.
     believed: deviations: of accelerometer_noise, accelerometer_walk, gyroscope_noise, gyroscope_walk, fix, delayed_fix
-    (3,), of dvl, depth, heading one number. place, dvl_place (3,): of IMU and DVL; dvl_angle [rad].
+    (3,), of dvl, depth, heading one number. place, dvl_place, fix_place, delayed_fix_place, depth_place (3,): of the IMU and
+    of these; dvl_angle [rad].
     latency: ticks of the delayed fix. errors: (9,) standard normals, the error of the first estimate.
     """
 
     imu = dvl = depth = heading = fix = delayed_fix = ""
     process_scale = measurement_scale = start_error = 1.0
-    place = dvl_place = np.zeros(3)
+    place = dvl_place = fix_place = delayed_fix_place = depth_place = np.zeros(3)
     dvl_angle, gravity, latency = np.radians(30.0), 9.81, 0
     errors = np.zeros(9)
 
@@ -107,13 +110,17 @@ class ErrorStateFilter(Part):
         self.nis += innovation**2 / s
         self.nis_count += 1
 
-    def by_position(self, place: slice, i: int) -> Array:
-        """How the position of the body's origin, by number i, follows from the error; `place`: now, or as a fix was sent."""
+    def by_position(self, now: slice, i: int, place: Array) -> Array:
+        """How number i of the position of a sensor's `place` follows from the error; `now`: P, or THEN, as a fix was sent."""
         h = np.zeros(18)
-        h[place.start + i] = 1.0
-        if place == P:
-            h[THETA] = (self.R @ hat(self.place))[i]
+        h[now.start + i] = 1.0
+        if now == P:
+            h[THETA] = (self.R @ hat(self.place - place))[i]
         return h
+
+    def at(self, place: Array) -> Array:
+        """The position (3,) of a sensor's place."""
+        return self.p + self.R @ (place - self.place)
 
     def by_beam(self, u: Array) -> tuple[float, Array]:
         """The velocity along a beam, and how it follows from the error."""
@@ -131,7 +138,6 @@ class ErrorStateFilter(Part):
     def correct(self, y: Measurement) -> None:
         """All that has been measured at this tick, one number after another."""
         self.begin_tick()
-        origin = self.p - self.R @ self.place
         if self.dvl:
             read = self.handed[self.dvl]
             for i, u in enumerate(beams(self.dvl_angle)):
@@ -143,35 +149,40 @@ class ErrorStateFilter(Part):
                     self.update(i, h, read["along"][i] - expected, sigma)
         if self.fix and self.handed[self.fix]["fresh"]:
             for i in range(3):
-                difference = self.handed[self.fix]["values"][i] - origin[i]
-                self.update(INNOVATIONS["fix"] + i, self.by_position(P, i), difference, self.believed["fix"][i])
+                difference = self.handed[self.fix]["values"][i] - self.at(self.fix_place)[i]
+                h = self.by_position(P, i, self.fix_place)
+                self.update(INNOVATIONS["fix"] + i, h, difference, self.believed["fix"][i])
         if self.delayed_fix:
-            self.correct_by_delayed(origin)
+            self.correct_by_delayed()
         if self.depth and self.handed[self.depth]["fresh"]:
-            difference = self.handed[self.depth]["values"][0] - origin[2]
-            self.update(INNOVATIONS["depth"], self.by_position(P, 2), difference, self.believed["depth"])
-        if self.heading and self.handed[self.heading]["fresh"]:
+            difference = self.handed[self.depth]["values"][0] - self.at(self.depth_place)[2]
+            h = self.by_position(P, 2, self.depth_place)
+            self.update(INNOVATIONS["depth"], h, difference, self.believed["depth"])
+        # Where the bow is nearly vertical it has no heading.
+        if self.heading and self.handed[self.heading]["fresh"] and np.sum(self.R[:2, 0] ** 2) > LEVEL:
             difference = self.handed[self.heading]["values"][0] - heading(self.R)
             difference -= 2.0 * np.pi * np.rint(difference / (2.0 * np.pi))
             self.update(INNOVATIONS["heading"], self.by_heading(), difference, self.believed["heading"])
         self.inject()
 
-    def correct_by_delayed(self, origin: Array) -> None:
+    def correct_by_delayed(self) -> None:
         """As a fix is sent, the position is copied with its covariances; as it arrives, it corrects the copy.
 
         Stochastic cloning: Roumeliotis & Burdick 2002. One fix is on its way at a time.
         """
         read = self.handed[self.delayed_fix]
         if read["fresh"] and self.waiting < 0:
-            # The copy is that of the body's origin, where the fix is taken, before the other numbers of this tick.
+            # The copy is that of the place where the fix is taken, before the other numbers of this tick.
             copy = np.eye(18)
-            copy[THEN] = np.stack([self.by_position(P, i) for i in range(3)])
+            copy[THEN] = np.stack([self.by_position(P, i, self.delayed_fix_place) for i in range(3)])
             self.P, self.x = copy @ self.P @ copy.T, copy @ self.x
-            self.then, self.sent, self.waiting = origin.copy(), read["values"].copy(), self.latency
+            self.then, self.sent, self.waiting = self.at(self.delayed_fix_place), read["values"].copy(), self.latency
         if self.waiting == 0:
             for i in range(3):
                 slot, difference = INNOVATIONS["delayed_fix"] + i, self.sent[i] - self.then[i]
-                self.update(slot, self.by_position(THEN, i), difference, self.believed["delayed_fix"][i])
+                self.update(
+                    slot, self.by_position(THEN, i, self.delayed_fix_place), difference, self.believed["delayed_fix"][i]
+                )
         if self.waiting >= 0:
             self.waiting -= 1
 

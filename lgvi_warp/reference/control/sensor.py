@@ -21,7 +21,7 @@ class Sensor(Part):
 
     key, handed = "sensor", None
     noise = bias = drift = quantum = dropout = 0.0
-    deepest = math.inf
+    deepest, place = math.inf, None
     every, latency = 1, 0
     seed0 = seed1 = channel = 0
 
@@ -36,7 +36,10 @@ class Sensor(Part):
 
     def measure(self, y: Measurement) -> Measurement:
         """The reading that has arrived by now."""
-        count = len(values(y, self.of))
+        count, truth = len(values(y, self.of)), y
+        if self.place is not None:
+            arm = y.R @ self.place
+            y = replace(y, position=y.position + (arm if count == 3 else arm * [0.0, 0.0, 1.0]))
         first, second = (self.drawn(y, stream) for stream in (0, 1))
         z = shifted(y, self.of, self.bias + self.walk + self.noise * first[:count])
         steps = first[1:2] if count == 1 else second[:3]
@@ -50,9 +53,9 @@ class Sensor(Part):
         old = y.tick % self.every != 0
         if self.handed is not None:
             self.handed[self.key] = {"values": values(z, self.of), "fresh": not (old or lost)}
-            return y
+            return truth
         self.arrived.append(self.arrived[-1] if self.arrived and (old or lost) else z)
-        delayed = self.arrived[max(y.tick - self.latency, 0)]
+        delayed = self.arrived[max(y.tick - int(self.latency), 0)]
         if self.of == "attitude":
             return replace(y, R=delayed.R)
         return with_values(y, self.of, values(delayed, self.of))

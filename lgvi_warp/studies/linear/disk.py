@@ -22,18 +22,37 @@ class Response:
     def __init__(self, A: np.ndarray, B: np.ndarray, C: np.ndarray):
         from scipy.linalg import schur
 
-        self._T, Z = schur(A, output="complex")
-        self._B, self._C = Z.conj().T @ B, C @ Z
+        self._T, self._Z = schur(A, output="complex")
+        self._B, self._C = self._Z.conj().T @ B, C @ self._Z
         closed = np.linalg.eigvals(A + B @ C)
         self.poles = np.concatenate([np.diagonal(self._T), closed])
 
     def __call__(self, angles: np.ndarray) -> np.ndarray:
+        return self.demands(self.states(angles))
+
+    def states(self, angles: np.ndarray) -> np.ndarray:
+        """(z - A)^-1 B in Schur's axes, (k, n, r)."""
         T, B = self._T, self._B
         x = np.zeros((len(angles), *B.shape), complex)
         z = np.exp(1j * angles)[:, None]
         for i in range(len(T) - 1, -1, -1):
             x[:, i] = (B[i] + np.einsum("j,kjr->kr", T[i, i + 1 :], x[:, i + 1 :])) / (z - T[i, i])
+        return x
+
+    def demands(self, x: np.ndarray) -> np.ndarray:
+        """L (k, r, r) of states in Schur's axes."""
         return np.asarray(-self._C @ x)
+
+    def rows(self, outputs: np.ndarray) -> np.ndarray:
+        """Rows (p, n) of the states in Schur's axes."""
+        return np.asarray(outputs @ self._Z)
+
+
+def grid_of(response: Response) -> np.ndarray:
+    """Angles [rad a period] at which a loop is looked at: a grid, and those of its poles."""
+    turning = np.abs(np.angle(response.poles))
+    turning = turning[(turning > LOWEST * np.pi) & (turning < np.pi)]
+    return np.unique(np.concatenate([np.pi * np.geomspace(LOWEST, 1.0, GRID), turning]))
 
 
 def scaled_norms(M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -89,9 +108,7 @@ def peak(response: Response, skew: float) -> tuple[float, float]:
             M = np.linalg.inv(unity + L) + 0.5 * (skew - 1.0) * unity
         return np.where(np.isfinite(M), M, 0.0)
 
-    turning = np.abs(np.angle(response.poles))
-    turning = turning[(turning > LOWEST * np.pi) & (turning < np.pi)]
-    angles = np.unique(np.concatenate([np.pi * np.geomspace(LOWEST, 1.0, GRID), turning]))
+    angles = grid_of(response)
     M = matrices(angles)
     bounds, scales = scaled_norms(M)
     best, at = -np.inf, 0

@@ -81,8 +81,8 @@ class LinearModel:
             SceneError: If a name is unknown.
         """
         faults = Faults()
-        keep = _chosen(faults, "states", states, self.states)
-        push = _chosen(faults, "inputs", self.inputs if inputs is None else inputs, self.inputs)
+        keep = chosen_places(faults, "states", states, self.states)
+        push = chosen_places(faults, "inputs", self.inputs if inputs is None else inputs, self.inputs)
         faults.raise_if_any()
         return replace(
             self, A=self.A[np.ix_(keep, keep)], B=self.B[np.ix_(keep, push)], C=self.C[:, keep], D=self.D[:, push],
@@ -107,7 +107,7 @@ class LinearModel:
         return control.StateSpace(self.A, self.B, self.C, self.D, self.dt, **names)
 
 
-def _chosen(faults: Faults, key: str, wanted: Sequence[str], known: tuple[str, ...]) -> list[int]:
+def chosen_places(faults: Faults, key: str, wanted: Sequence[str], known: tuple[str, ...]) -> list[int]:
     """Places of names, those of whole vectors too."""
     places: list[int] = []
     for name in wanted:

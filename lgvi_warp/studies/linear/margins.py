@@ -18,24 +18,32 @@ from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.files import Saved
-from lgvi_warp.studies.linear.bench import calm
+from lgvi_warp.studies.linear.bench import COORDINATES, calm
 from lgvi_warp.studies.linear.disk import disks
 from lgvi_warp.studies.linear.edges import edges
-from lgvi_warp.studies.linear.linearize import RANDOM, check_parts
+from lgvi_warp.studies.linear.linearize import RANDOM, check_parts, chosen_places
 from lgvi_warp.studies.linear.loops import IDLE, LEAST_TICKS, UNSETTLED, Loops, Study
+from lgvi_warp.studies.linear.peaks import OF_THE_DEMAND, peaks
 from lgvi_warp.studies.linear.sampled_loop import SampledLoop
 from lgvi_warp.studies.linear.trim import step_of
 
-OF, WAYS = ("gain", "delay", "disk"), ("eigenvalues", "runs")
+OF, WAYS = ("gain", "delay", "disk", "peak"), ("eigenvalues", "runs")
+# Those of a linear model alone.
+LINEAR = ("disk", "peak")
 # Members whose margins are sought together.
 GROUP = 2048
 # Width of the last brackets, in the logarithm of the factor: of eigenvalues, and of runs, which judge to some 0.4 %.
 NARROW = {"eigenvalues": 1e-6, "runs": 2e-3}
 PERCENTILES = (0.0, 5.0, 25.0, 50.0, 75.0, 95.0, 100.0)
-UNITS = {"delay": "s", "disk_phase": "rad", "disk_frequency": "rad/s"}
+UNITS = {"delay": "s", "disk_phase": "rad", "frequency": "rad/s"}
 GAINS = ("gain_lower", "gain_upper")
 DISKS = ("disk", "disk_gain_lower", "disk_gain_upper", "disk_phase", "disk_frequency")
-NAMES = {"gain": GAINS, "delay": ("delay",), "disk": DISKS}
+NAMES = {"gain": GAINS, "delay": ("delay",), "disk": DISKS, "peak": ()}
+
+
+def unit_of(name: str) -> str:
+    """The unit of a margin; "" for a number."""
+    return UNITS.get(name, UNITS.get(name.rsplit("_", 1)[-1], ""))
 
 
 @dataclass(frozen=True)
@@ -49,7 +57,9 @@ class Margins(Saved):
         values: by name, (n,): "gain_lower" and "gain_upper", between which the factors on the demand lie that the loop bears
             (0 and infinite where it bears all that were asked); "delay", the largest delay [s] beside the loop's own, in whole
             steps; "disk", the disk margin of all components of the demand at once, what it says of factors
-            ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where ("disk_frequency" [rad/s]).
+            ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where ("disk_frequency" [rad/s]);
+            peak gains, "sensitivity_peak", "complementary_peak" and "position[2]_peak" of what was asked `to`, and where
+            ("..._frequency" [rad/s]).
         by_runs: the same, as runs show them; without those that were not asked.
         why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
             nothing" where its commands have no effect, "failed"; "" where it has.
@@ -151,14 +161,15 @@ class Margins(Saved):
 
         Args:
             count: how many (default 10).
-            name: by which margin; None, the default, for the first of "gain_upper", "delay" and "disk" that was asked.
+            name: by which margin; None, the default, for the first of "gain_upper", "delay", "disk" and "sensitivity_peak"
+                that was asked. Of a peak the largest is the worst.
 
         Returns:
             Indices (count,), the least first; members that do not settle as they are before all others.
         """
         columns = self._columns()
-        chosen = name or next(word for word in ("gain_upper", "delay", "disk") if word in columns)
-        values = columns[chosen] * (-1.0 if chosen.endswith("lower") else 1.0)
+        chosen = name or next(word for word in ("gain_upper", "delay", "disk", "sensitivity_peak") if word in columns)
+        values = columns[chosen] * (-1.0 if chosen.endswith(("lower", "peak")) else 1.0)
         return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[:count]
 
     @property
@@ -173,11 +184,10 @@ class Margins(Saved):
         lines = [f"{self.loop}: margins of {self.members} members"]
         if self.reasons:
             lines.append(f"{sum(self.reasons.values())} of them have none ({self.reasons_text}); the others:")
-        lines.append(f"{'':22}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
+        width = max(22, *(len(f"{name} {unit_of(name)}") + 1 for name in self._columns()))
+        lines.append(f"{'':{width}}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
         for name, row in self.percentiles().items():
-            lines.append(
-                f"{f'{name} {UNITS.get(name, str())}'.strip():22}" + "".join(f"{value:10.4g}" for value in row)
-            )
+            lines.append(f"{f'{name} {unit_of(name)}'.strip():{width}}" + "".join(f"{value:10.4g}" for value in row))
         return "\n".join([*lines, *self.messages])
 
 
@@ -194,6 +204,7 @@ def margins(
     most: float = 100.0,
     longest: float = 10.0,
     skew: float = 0.0,
+    to: Sequence[str] = (),
     method: str | Method | None = None,
     h: float | None = None,
 ) -> Margins:
@@ -219,11 +230,16 @@ def margins(
     a complex factor of its own in the disk (1 + (1 - skew) d / 2) / (1 - (1 + skew) d / 2), |d| < margin (Seiler, Packard,
     Gahinet 2020, IEEE Control Systems 40(5)). It is 1 / the largest structured singular value of S + (skew - 1) / 2.
 
+    A peak gain is how much of a disturbance that is added to the law's demand comes through, at the frequency where most does:
+    to the demand that acts (S, the sensitivity), to the law's answer (T), and to each number of the motion in `to`, per unit
+    of the demand; with several components the largest singular value, so it is the H-infinity norm. It is infinite where the
+    gain grows towards frequency 0. The largest of the members is the worst-case gain of the ensemble.
+
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is meant; without waves and noise.
         loop: Key of the law, such as "heading_pid"; None, the default, for all laws together.
-        of: Some of "gain", "delay" and "disk"; the first two by default. A delay is that of all commands; "disk" is by
-            eigenvalues only.
+        of: Some of "gain", "delay", "disk" and "peak"; the first two by default. A delay is that of all commands; "disk" and
+            "peak" are by eigenvalues only.
         by: "eigenvalues", the default, "runs", or both.
         about: Time after which the loop is looked at [s]; 60 by default.
         settle: Longest time that a member is given to be steady [s]; 1200 by default.
@@ -232,6 +248,8 @@ def margins(
         most: Largest factor, and one over the least; 100 by default.
         longest: Longest delay that is added [s]; 10 by default.
         skew: Skew of the disk, from -1 to 1: 0, the default, for factors and their inverses alike; 1 for the sensitivity S.
+        to: Numbers of the motion whose peak gains are wanted too, as "position[2]" [m], "rotation[1]" [rad, body axes],
+            "velocity" [m/s], "angular_velocity" [rad/s], as of `linearize`; none by default.
         method: As of `lw.solve`; default that of the scene.
         h: Step [s]; default that of the scene.
 
@@ -265,8 +283,9 @@ def margins(
     faults.number("most", most, "", 1.0)
     if not -1.0 <= float(skew) <= 1.0:
         faults.add("skew", skew, "is out of bounds", "give a number from -1 to 1")
-    if "disk" in of and "eigenvalues" not in by:
-        faults.add("by", by, "has no disk margins, which are of a linear model", 'add "eigenvalues"')
+    if set(LINEAR) & set(of) and "eigenvalues" not in by:
+        faults.add("by", by, "has no disk margins and no peaks, which are of a linear model", 'add "eigenvalues"')
+    outputs = _outputs(faults, to, of)
     _check_loop(faults, scene.controller, loop, seconds)
     faults.raise_if_any()
     calm(scene, "margins")
@@ -275,7 +294,10 @@ def margins(
     else:
         check_parts(scene.controller, "margins", RANDOM)
     study = Study(ensemble, loop, about, settle, seconds, tilt, method, step_of(scene, h))
-    names = {way: [name for word in of if word != "disk" or way != "runs" for name in NAMES[word]] for way in by}
+    of_way = {"eigenvalues": of, "runs": [word for word in of if word not in LINEAR]}
+    peak_names = [f"{name}_{of_peak}" for name in (*OF_THE_DEMAND, *outputs) for of_peak in ("peak", "frequency")]
+    each_names = NAMES | {"peak": tuple(peak_names)}
+    names = {way: [name for word in of_way[way] for name in each_names[word]] for way in by}
     n = ensemble.members
     answers: Answers = {way: {name: np.full(n, np.nan) for name in names.get(way, ())} for way in WAYS}
     why: np.ndarray = np.full(n, "", dtype=object)
@@ -283,10 +305,10 @@ def margins(
         places = np.arange(first, min(first + GROUP, n))
         groups, why[places] = study.loops(places)
         for loops in groups:
-            why[loops.places], of_loops = _group(loops, of, by, most, longest, skew)
+            why[loops.places], of_loops = _group(loops, of, by, most, longest, skew, outputs)
             for way in by:
-                for name in names[way]:
-                    answers[way][name][loops.places] = of_loops[way][name]
+                for name, column in of_loops[way].items():
+                    answers[way][name][loops.places] = column
     grid = study.bench.plan.grid
     return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, grid.h, grid.messages)
 
@@ -304,12 +326,26 @@ def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: floa
         )
 
 
+def _outputs(faults: Faults, to: Any, of: Sequence[str]) -> dict[str, int]:
+    """Places in the motion of the numbers that peaks are asked to, by name."""
+    places = chosen_places(faults, "to", listed("to", to, "names"), COORDINATES)
+    if places and "peak" not in of:
+        faults.add("to", to, "is asked without peaks", 'add "peak" to `of`')
+    return {COORDINATES[i]: i for i in places}
+
+
 # Margins (n,) by name, by way.
 Answers = dict[str, dict[str, np.ndarray]]
 
 
 def _group(
-    loops: Loops, of: Sequence[str], by: Sequence[str], most: float, longest: float, skew: float
+    loops: Loops,
+    of: Sequence[str],
+    by: Sequence[str],
+    most: float,
+    longest: float,
+    skew: float,
+    outputs: Mapping[str, int],
 ) -> tuple[np.ndarray, Answers]:
     """Why loops have no margins (n,), and margins by way and by name."""
     bench, n, delays_now = loops.study.bench, len(loops.places), loops.delay
@@ -319,13 +355,15 @@ def _group(
     why: np.ndarray = np.where(loops.return_to_it(), "", UNSETTLED).astype(object)
     ways: dict[str, Any] = {"runs": loops.settle} if "runs" in by else {}
     if "eigenvalues" in by:
-        apart = loops.study.components if "disk" in of else ()
+        apart = loops.study.components if set(LINEAR) & set(of) else ()
         sampled = SampledLoop(bench, loops.places, loops.motion, loops.begin, apart)
         ways = {"eigenvalues": sampled.stable} | ways
         why[(why == "") & ~sampled.moves] = IDLE
         why[(why == "") & ~sampled.stable(unity, delays_now, every)] = UNSETTLED
-        if "disk" in of:
-            answers["eigenvalues"] = _disks(sampled, delays_now, why == "", skew, loops.study.period)
+        if apart:
+            answers["eigenvalues"] = _of_frequencies(
+                sampled, delays_now, why == "", of, skew, loops.study.period, outputs
+            )
     start = np.where(why == "", 1.0, np.nan)
     for way, holds in ways.items():
         known = answers["eigenvalues"]
@@ -352,12 +390,15 @@ def _group(
     return why, answers
 
 
-def _disks(
-    sampled: SampledLoop, delays: np.ndarray, settled: np.ndarray, skew: float, period: float
-) -> dict[str, np.ndarray]:
-    """Disk margins by name (n,) of loops with delays in steps; NaN where they do not settle."""
-    values = {name: np.full(len(delays), np.nan) for name in DISKS}
+def _of_frequencies(
+    sampled: SampledLoop, delays: np.ndarray, settled: np.ndarray, of: Sequence[str], skew: float, period: float,
+    outputs: Mapping[str, int],
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Disk margins and peak gains by name (n,) of loops with delays in steps; NaN where they do not settle."""
+    values: dict[str, np.ndarray] = {}
     for opened in sampled.opened(delays, np.flatnonzero(settled)):
-        for name, column in disks(opened, skew, period).items():
-            values[name][opened.some] = column
+        found = disks(opened, skew, period) if "disk" in of else {}
+        found |= peaks(opened, list(outputs.values()), list(outputs), period) if "peak" in of else {}
+        for name, column in found.items():
+            values.setdefault(name, np.full(len(delays), np.nan))[opened.some] = column
     return values

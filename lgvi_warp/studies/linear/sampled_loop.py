@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgvi_warp.control.loop_gain import FACTOR, of_all
+from lgvi_warp.control.loop_gain import ADDED, FACTOR, of_all
 from lgvi_warp.studies.linear.bench import Motion, MotionBench
-from lgvi_warp.studies.linear.differences import Differences, Row
+from lgvi_warp.studies.linear.differences import STEP, Differences, Row
 from lgvi_warp.studies.linear.linearize import remembered
 
 DELAY = "controller.delay"
@@ -85,6 +85,17 @@ class SampledLoop:
         # [u, parts] by [x, parts]: of the laws outside of the loop, and what the loop adds.
         self._tick, self._more = without, with_loop - without
         self._each = [with_loop - tick(1.0 - np.eye(6)[i])[1] for i in apart]
+
+        def written(i: int) -> np.ndarray:
+            """What a unit of component i of the demand writes to commands and parts at a tick (n, C + m)."""
+            ends = []
+            for sign in (1.0, -1.0):
+                numbers = {FACTOR: of_all(zero + 1.0), ADDED: np.tile(sign * STEP * np.eye(6)[i], (n, 1)), DELAY: zero}
+                after = bench.run(places, still, k, k + bench.every, numbers).memory
+                ends.append(np.stack([after[row.key][:, row.row] for row in (*commands, *parts)], axis=1))
+            return np.nan_to_num((ends[0] - ends[1]) / (2.0 * STEP))
+
+        self._written = [written(i) for i in apart]
         self._late = [total]
         of_late = Differences(bench, k, bench.every, acting, terms, motion=False)
         for steps in range(1, bench.every):
@@ -159,11 +170,11 @@ class SampledLoop:
                 np.zeros((len(some), A.shape[1], len(self._each))),
                 np.zeros((len(some), len(self._each), A.shape[1])),
             )
-            for r, each in enumerate(self._each):
-                # What one component does is of rank 1: what it writes, times what the laws see.
-                left, sizes, right = np.linalg.svd(each[some], full_matrices=False)
-                written, seen = left[:, :, 0] * sizes[:, :1], right[:, 0]
-                written[sizes[:, 0] < SEES] = 0.0
+            for r, (each, units) in enumerate(zip(self._each, self._written, strict=True)):
+                # What one component does is of rank 1: what a unit of it writes, times what the laws see.
+                written = np.where(np.abs(units[some]) < SEES, 0.0, units[some])
+                size = np.sum(written**2, axis=1, keepdims=True)
+                seen = np.einsum("ki,kij->kj", written, each[some]) / np.where(size > 0.0, size, 1.0)
                 B[:, s + m : s + m + C, r], B[:, s : s + m, r] = written[:, :C], written[:, C:]
                 rows[:, r] = np.einsum("ki,kij->kj", seen[:, :12], A[:, :12])
                 rows[:, r, s : s + m] += seen[:, 12:]

@@ -22,7 +22,13 @@ LABELS = {
     "disk": "disk margin",
     "disk_gain_upper": "disk margin as a factor",
     "disk_phase": "disk margin as a phase [rad]",
+    "sensitivity_peak": "peak gain of S",
+    "complementary_peak": "peak gain of T",
 }
+# Of these a member is the worse, the more it has.
+MORE_IS_WORSE = ("lower", "peak")
+# Panels side by side at most.
+COLUMNS = 3
 # The share of members whose margin is marked: one in twenty bears less, or, of a lower margin, more.
 MARKED = 0.05
 
@@ -49,21 +55,26 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
         fault = f"none of the {found.members} members has margins ({found.reasons_text})"
         raise NothingToDraw(f"{fault}: there is nothing to draw")
     ways = {way: values for way, values in (("eigenvalues", found.values), ("runs", found.by_runs)) if values}
-    names = [name for name in next(iter(ways.values())) if name in LABELS]
-    with panels(figure, path, (1, len(names)), (1.0 + 4.5 * len(names), 4.5), sharey=True) as grid:
-        for axes, name in zip(grid[0], names, strict=True):
+    names = [name for name in next(iter(ways.values())) if name in LABELS or name.endswith("_peak")]
+    columns = min(len(names), COLUMNS)
+    rows = -(-len(names) // columns)
+    with panels(figure, path, (rows, columns), (1.0 + 4.5 * columns, 4.5 * rows), sharey=True) as grid:
+        for axes in grid.flat[len(names) :]:
+            axes.remove()
+        for axes, name in zip(grid.flat, names, strict=False):
             for i, way in enumerate(way for way in ways if name in ways[way]):
                 _curve(axes, *found.curve(name, way), label=f"by {way}", **style(i))
             _mark(axes, found.curve(name)[0], name)
-            axes.set(xlabel=LABELS[name], ylim=(0.0, 102.0))
+            axes.set(xlabel=LABELS.get(name, f"peak gain to {name.removesuffix('_peak')}"), ylim=(0.0, 102.0))
             axes.grid(alpha=0.3)
             axes.legend()
-        grid[0, 0].set_ylabel("members with at most that [%]")
+        for axes in grid[:, 0]:
+            axes.set_ylabel("members with at most that [%]")
         lost = found.members - int(steady.sum())
         remark = f"; {lost:,} have none ({found.reasons_text})" if lost else ""
         title = f"{found.loop}: margins of {found.members - lost:,} members{remark}"
         grid[0, 0].figure.suptitle(wrapped(title, grid[0, 0].figure))
-    return grid.ravel()
+    return grid.ravel()[: len(names)]
 
 
 def _curve(axes: Any, values: np.ndarray, shares: np.ndarray, **line: Any) -> None:
@@ -75,9 +86,10 @@ def _curve(axes: Any, values: np.ndarray, shares: np.ndarray, **line: Any) -> No
 
 
 def _mark(axes: Any, values: np.ndarray, name: str) -> None:
-    """Mark what all but one in twenty members bear."""
-    level = 1.0 - MARKED if name == "gain_lower" else MARKED
+    """Mark what all but one in twenty members bear, or have at most."""
+    level = 1.0 - MARKED if name.endswith(MORE_IS_WORSE) else MARKED
     edge = float(np.quantile(values, level, method="inverted_cdf"))
     if np.isfinite(edge):
-        label = f"{100.0 * (1.0 - MARKED):g} % of the members bear {edge:.3g}"
+        verb = "have at most" if name.endswith("peak") else "of the members bear"
+        label = f"{100.0 * (1.0 - MARKED):g} % {verb} {edge:.3g}"
         axes.axvline(edge, color="0.3", linestyle=":", label=label)

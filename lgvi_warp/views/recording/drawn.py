@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
 
 NEEDED = ("position", "attitude", "velocity")
+# What is drawn of a filter; the name of the curve of its error.
+BELIEFS = ("measured_position", "estimate_sigma", "nees")
+OFF = "position_error"
 # Levels of a fan: smallest, largest, and quantiles between.
 LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 # Levels of the spread along each axis of the covariance, as those of two standard deviations of a normal distribution.
@@ -36,12 +39,14 @@ class Fan:
 
     name: Name of its entity, as "height"; title: name and unit in words.
     levels: Values at LEVELS, shape (7, f); NaN at times when no member is under way.
+    believed: What filters believe of that number, shape (f,), where they do.
     """
 
     name: str
     title: str
     unit: str
     levels: np.ndarray
+    believed: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +143,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     if members is not None:
         kept = np.arange(result.members) if source is result else result.kept_members
         choice = dataclasses.replace(choice, members=places_of(members, result.members, kept))
-    few = choices.few(source, choice.members, (*FIELDS, *CHANNELS, ENERGY_USED), choice.frames)
+    few = choices.few(source, choice.members, (*FIELDS, *CHANNELS, ENERGY_USED, *BELIEFS), choice.frames)
     counted = under_way(few)
     fans, ranked, above = _survey(source, choice, _directions(few, counted))
     fans = tuple(streamed(result, fan, choice.frames) for fan in fans)
@@ -151,6 +156,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     if ENERGY_USED in few.samples:
         title = f"Energy used [J] of {of_members(len(choice.members), result.members)}"
         fans = (*fans, Fan(ENERGY_USED, title, "J", at_levels(few.energy_used, counted, LEVELS)))
+    fans = (*fans, *_navigation(few, counted, of_members(len(choice.members), result.members)))
     depth = np.where(count, position[..., 2], np.nan)
     finite = depth[np.isfinite(depth)]
     bins = np.linspace(*_range(finite), 41)
@@ -158,6 +164,22 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     shares = _shares(result, choice.frames)
     spread = _spread(position, count)
     return Drawn(result, source, choice, few, label, rgb, counted, shares, fans, spread, bins, heights, above)
+
+
+def _navigation(few: Result, counted: np.ndarray, text: str) -> Iterator[Fan]:
+    """Fans of how far members are from where their filters believe, and of NEES, as far as it was saved."""
+    if {"measured_position", "estimate_sigma"} <= set(few.samples):
+        off = np.linalg.norm(few.measured_position - few.position, axis=-1)
+        title = f"Off the estimated place [m] of {text}"
+        yield Fan(OFF, title, "m", at_levels(off, counted, LEVELS), believed_sigma(few, counted))
+    if "nees" in few.samples:
+        yield Fan("nees", f"NEES, 15 for a right filter, of {text}", "1", at_levels(few.nees, counted, LEVELS))
+
+
+def believed_sigma(few: Result, counted: np.ndarray) -> np.ndarray:
+    """What the filters believe of the distance to the estimated place, a root mean square (f,) [m], by the median member."""
+    sigma = np.linalg.norm(few.estimate_sigma[..., :3], axis=-1)
+    return np.asarray(at_levels(sigma, counted, [0.5])[0])
 
 
 def places_of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:

@@ -21,6 +21,7 @@ BANDS = (("all", 0, 6, 60), ("90 %", 1, 5, 110), ("50 %", 2, 4, 170))
 # Bands are paler than bodies under way: they are seen through.
 PALE = (120, 180, 255)
 MEDIAN, WHITE, GREY, FAULT = LEVELS.index(0.5), (255, 255, 255), (130, 130, 130), (255, 200, 60)
+BELIEVED = (255, 160, 60)
 # Fewer samples than this are drawn with a marker each.
 MARKED = 3
 # Most histograms: each takes a message of its own.
@@ -54,6 +55,9 @@ def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
     name = run.label or ("the member" if single else "median")
     color = run.color(Status.OK) if single or run.label else WHITE
     _series(recording, run.path(f"curves/{fan.name}", "median"), run.time, fan.levels[MEDIAN], name, color)
+    if fan.believed is not None:
+        label = f"{run.label}: as the filter believes" if run.label else "as the filter believes, rms"
+        _series(recording, run.path(f"curves/{fan.name}", "believed"), run.time, fan.believed, label, BELIEVED)
 
 
 def _series(

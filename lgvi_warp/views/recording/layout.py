@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.control.signals import CHANNELS, ENERGY_USED
-from lgvi_warp.views.recording.drawn import Drawn, Fan
+from lgvi_warp.views.recording.drawn import OFF, Drawn, Fan
 from lgvi_warp.views.recording.eye import ASPECT, SIGHT, distance
 from lgvi_warp.views.recording.world import TIMELINE, WorldBox
 
@@ -74,11 +74,13 @@ def _right(runs: list[Drawn]) -> Any:
         limits = _limits(np.concatenate([fan.levels for fan in group], axis=1))
         # All have the same legend; it would cover their curves.
         below = _high(group[0], limits)
-        views[name] = _curve(f"curves/{name}", group[0].title, all_times, limits, name == "height", below)
+        views[name] = _curve(f"curves/{name}", group[0].title, all_times, limits, name in ("height", OFF), below)
     height = views.pop("height")
     energies = [views[name] for name in ("energy", ENERGY_USED) if name in views]
     motion = rrb.Tabs(views["speed"], *energies, active_tab=0)
     angles = rrb.Tabs(*(views[name] for name in ("pitch", "roll", "heading")), active_tab=0)
+    beliefs = [views[name] for name in (OFF, "nees") if name in views]
+    navigation = [rrb.Tabs(*beliefs, active_tab=0)] if beliefs else []
     commands = [_curve_of_channels(all_times)] if any(name in runs[0].few.samples for name in CHANNELS) else []
     facts = rrb.Tabs(
         *(rrb.TextDocumentView(origin=run.path("run/summary"), name=run.label or "Run") for run in runs),
@@ -89,8 +91,8 @@ def _right(runs: list[Drawn]) -> Any:
         ),
         active_tab=0,
     )
-    shares = [2.6, 2.0, 2.0, *[2.0 for _ in commands], 4.0]
-    return rrb.Vertical(height, angles, motion, *commands, facts, row_shares=shares)
+    shares = [2.6, 2.0, 2.0, *[2.0 for _ in (*navigation, *commands)], 4.0]
+    return rrb.Vertical(height, angles, motion, *navigation, *commands, facts, row_shares=shares)
 
 
 def _high(fan: Fan, limits: tuple[float, float] | None) -> bool:

@@ -45,16 +45,18 @@ def test_arguments_of_margins(tmp_path, capsys):
     study = Study(loops("", "", "does not settle", ""))
     plain = ["margins", SCENE, "--out", str(tmp_path)]
     assert main([*plain, "-q"], study=study) == 0
-    more = ["--loop", "depth_pid", "--of", "disk", "--of", "gain", "--of", "disk", "--by", "eigenvalues", "--by", "runs",
-            "--skew", "-0.5", "--about", "5", "--settle", "50", "--seconds", "30", "--tilt", "1e-4", "--most", "20",
+    more = ["--loop", "depth_pid", "--of", "disk", "--of", "gain", "--of", "disk", "--of", "peak", "--to", "position[2]",
+            "--by", "eigenvalues", "--by", "runs", "--skew", "-0.5",
+            "--about", "5", "--settle", "50", "--seconds", "30", "--tilt", "1e-4", "--most", "20",
             "--longest", "2", "--members", "7", "--seed", "3", "--method", "rk4", "--step", "0.05"]  # fmt: skip
     assert main([*plain, *more], study=study) == 0
     ((scene, *asked), settings), ((other, *others), numbers) = study.calls
     assert (scene.ensemble_settings.members, asked) == (10000, [None, ("gain", "delay")])
-    assert settings == {"by": ("eigenvalues",), "skew": 0.0, "about": 60.0, "settle": 1200.0, "seconds": 240.0,
+    assert settings == {"by": ("eigenvalues",), "to": (), "skew": 0.0, "about": 60.0, "settle": 1200.0, "seconds": 240.0,
                         "tilt": 1e-3, "most": 100.0, "longest": 10.0}  # fmt: skip
-    assert others == ["depth_pid", ("disk", "gain")]
-    assert numbers == {"by": ("eigenvalues", "runs"), "skew": -0.5, "about": 5.0, "settle": 50.0, "seconds": 30.0,
+    assert others == ["depth_pid", ("disk", "gain", "peak")]
+    assert numbers == {"by": ("eigenvalues", "runs"), "to": ("position[2]",), "skew": -0.5,
+                       "about": 5.0, "settle": 50.0, "seconds": 30.0,
                        "tilt": 1e-4, "most": 20.0, "longest": 2.0}  # fmt: skip
     assert (other.ensemble_settings.members, other.ensemble_settings.seed) == (7, 3)
     assert (str(other.run.method), other.run.step) == ("rk4", 0.05)

@@ -138,6 +138,30 @@ def test_curves_are_quantiles_of_those_under_way(mixed, path):
         assert share == pytest.approx([100.0 * counted[frame].mean()])
 
 
+def test_what_filters_believe_is_drawn_beside_their_errors(tmp_path):
+    run = fleet()
+    rng, shape = np.random.default_rng(3), run.position.shape[:2]
+    off = rng.normal(size=(*shape, 3)) * [0.3, 0.4, 0.1]
+    samples = dict(run.samples) | {"measured_position": run.position + off, "nees": rng.chisquare(15, shape)}
+    samples["estimate_sigma"] = rng.uniform(0.1, 0.5, (*shape, 15))
+    path = tmp_path / "believed.rrd"
+    lw.record(dataclasses.replace(run, samples=samples), path)
+    alive = under_way(run)
+    for frame in (0, 20):
+        t, counted = float(run.time[frame]), alive[frame]
+        wanted = {
+            "/curves/position_error/median": np.linalg.norm(off, axis=-1),
+            "/curves/position_error/believed": np.linalg.norm(samples["estimate_sigma"][..., :3], axis=-1),
+            "/curves/nees/median": samples["nees"],
+        }
+        for entity, values in wanted.items():
+            median = np.median(values[frame, counted])
+            assert rows(path, entity, "scalars")[t] == pytest.approx([median], rel=1e-5)
+    plain = tmp_path / "plain.rrd"
+    lw.record(run, plain)
+    assert not rows(plain, "/curves/position_error/median", "scalars")
+
+
 def test_two_recordings_together_are_each_as_alone(mixed, path, tmp_path):
     import rerun_cli
 

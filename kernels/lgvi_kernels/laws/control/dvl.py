@@ -7,8 +7,10 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
+from lgvi_kernels.cells import grid_fields
 from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.law import *
+from lgvi_kernels.laws.control.altimeter import range_to_floor
 from lgvi_kernels.laws.control.readings import remember3, remembered3
 from lgvi_kernels.laws.control.sensor import drawn, is_due
 
@@ -35,18 +37,24 @@ def either(a: Any, b: Any, c: Any, d: Any):
 def made(features):
     """The device code of a log.
 
-    features: "noise", "dropout", "floor", "silent" where some member has them, and "handed" where a filter takes the beams.
+    features: "noise", "dropout", "silent" where some member has them, "floor" or "grid" where there is one, flat or on a grid,
+    and "handed" where a filter takes the beams.
     """
-    noisy, lossy, floored, silent, handed = (
-        name in features for name in ("noise", "dropout", "floor", "silent", "handed")
+    noisy, lossy, floored, gridded, silent, handed = (
+        name in features for name in ("noise", "dropout", "floor", "grid", "silent", "handed")
     )
 
     def params(width, real):
-        """Params: the numbers by member; key of the random numbers; first of its rows of memory, and of what it hands on."""
-        names = ("noise", "ahead", "down", "every", "dropout", "floor", "least_range", "greatest_range")
-        lanes = dict.fromkeys((*names, "silent_from", "silent_to"), lane(width, real))
+        """Params: the numbers by member; key of the random numbers; first of its rows of memory, and of what it hands on.
+
+        floor: its depth; or most, how far the beams look, and the grid.
+        """
+        names = ("noise", "ahead", "down", "every", "dropout", "least_range", "greatest_range")
+        ground = ("most",) if gridded else ("floor",)
+        lanes = dict.fromkeys((*names, *ground, "silent_from", "silent_to"), lane(width, real))
         words = dict.fromkeys(("memory", "handed"), wp.int32)
-        return struct("DVL", place=lane3(width, real), **lanes, key=noise_key(width), **words)
+        grid = grid_fields(width, real) if gridded else {}
+        return struct("DVL", place=lane3(width, real), **lanes, **grid, key=noise_key(width), **words)
 
     @wp.func
     def quiet(y: Any, p: Any):
@@ -62,13 +70,21 @@ def made(features):
 
     @wp.func
     def echo(fresh: Any, altitude: Any, down: Any, p: Any):
-        """`fresh` where the beam meets the floor within its range, or the member has no floor; else 0."""
+        """`fresh` where the beam meets the flat floor within its range; else 0."""
         unity = ones(fresh)
         zero = unity - unity
         near = positive(p.least_range * down - altitude, zero, fresh)
         within = positive(altitude - p.greatest_range * down, zero, near)
-        upward = positive(down, within, zero)
-        return positive(p.floor - unity.dtype(1e29) * unity, fresh, upward)
+        return positive(down, within, zero)
+
+    @wp.func
+    def echo_of_grid(fresh: Any, y: Any, u: Any, p: Any):
+        """`fresh` where the beam meets the floor within its range; else 0."""
+        zero = ones(fresh) - ones(fresh)
+        start = y.position + to_inertial(y, p.place)
+        reading = range_to_floor(y, p, start, to_inertial(y, u))
+        near = positive(reading - p.least_range, fresh, zero)
+        return positive(p.most - reading, near, zero)
 
     @wp.func
     def solved(y: Any, p: Any, at: Any):
@@ -107,7 +123,9 @@ def made(features):
         if wp.static(lossy):
             chance = drawn(unity, p.key, y.tick, 1)
         new = quiet(y, p)
-        altitude = p.floor - y.position.z - dot(y.down, p.place)
+        altitude = zero
+        if wp.static(floored):
+            altitude = p.floor - y.position.z - dot(y.down, p.place)
         at = p.handed
         if wp.static(not handed):
             at = p.memory + 3
@@ -121,6 +139,8 @@ def made(features):
                 fresh = positive(p.dropout - quarter(chance, i), zero, fresh)
             if wp.static(floored):
                 fresh = echo(fresh, altitude, dot(u, y.down), p)
+            if wp.static(gridded):
+                fresh = echo_of_grid(fresh, y, u, p)
             remember(y, at + i, along)
             remember(y, at + 4 + i, fresh)
         if wp.static(not handed):

@@ -42,6 +42,8 @@ BELIEF_BIAS, BELIEF_NEES, BELIEF_NIS, BELIEF_COUNT, BELIEF_INNOVATION, BELIEF_SI
 # Places of the innovations.
 FIX, DELAYED_FIX, DEPTH, HEADING = 4, 7, 10, 11
 TURN = 6.283185307179586
+# The square of the bow's level part, up to which it has no heading: 6 degrees from the vertical.
+LEVEL = 0.01
 # Variance of the rate at a tick, from the means of two periods, over that of a mean.
 OF_RATE = 2.5
 
@@ -49,10 +51,12 @@ OF_RATE = 2.5
 def params(width, real):
     """Params: variances over a period and of readings, places of the sensors; rows of memory and of what sensors hand on.
 
-    lever: place of the unit; arm: that of the log less it. size: rows of the covariance, count: those of the estimate.
+    lever: place of the unit; arm: that of the log less it; fix_lever and so on: lever less the places of these.
+    size: rows of the covariance, count: those of the estimate.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
     names = ("lever", "arm", "gained_q", "turned_q", "bias_a_q", "bias_w_q", "fix_r", "delayed_fix_r")
+    names += ("fix_lever", "delayed_fix_lever", "depth_lever")
     lanes = ("gravity", "ahead", "down", "dvl_r", "depth_r", "heading_r", "latency")
     words = ("memory", "size", "count", "imu", "dvl", "fix", "delayed_fix", "depth", "heading", "belief")
     kinds = dict.fromkeys(names, Lane3) | dict.fromkeys(lanes, Lane) | dict.fromkeys(words, wp.int32)
@@ -255,35 +259,36 @@ def make_by_beams(take):
 
 
 def make_by_position(take):
-    """(y, z, p, origin, ...): numbers of the position of the body's origin."""
+    """(y, z, p, ...): numbers of the position of a sensor's place."""
 
     @wp.func
-    def by_number(y: Any, z: Any, p: Any, slot: int, i: int, difference: Any, r: Any, new: Any):
-        """e_i, and row i of R hat(lever)."""
+    def by_number(y: Any, z: Any, p: Any, slot: int, i: int, lever: Any, read: Any, r: Any, new: Any):
+        """e_i, and row i of R hat(lever); lever: from the sensor's place to the unit."""
         none = p.arm - p.arm
-        turn = cross(direction(z, i), p.lever)
-        take(y, p, slot, 0, axis(r, i), none, turn, none, difference, r, new)
+        place = remembered3(y, p.memory) - to_inertial(z, lever)
+        turn = cross(direction(z, i), lever)
+        take(y, p, slot, 0, axis(r, i), none, turn, none, read - number_of(place, i), r, new)
 
     return by_number
 
 
 def make_by_delayed(take):
-    """(y, z, p, origin): as a fix is sent the position is copied with its covariances; as it arrives it corrects the copy.
+    """(y, z, p): as a fix is sent the position is copied with its covariances; as it arrives it corrects the copy.
 
     Stochastic cloning: Roumeliotis & Burdick 2002.
     """
 
     @wp.func
-    def copied(y: Any, z: Any, p: Any, origin: Any, sent: Any):
+    def copied(y: Any, z: Any, p: Any, sent: Any):
         P = p.memory + wp.static(COVARIANCE)
         x = p.memory + wp.static(ERROR)
         like = p.latency
         copy_block(y.memory, y.packet, P, p.size, 5, 0, sent)
-        # The copy is that of the body's origin: less the lever's turn.
+        # The copy is that of the sensor's place: less the lever's turn.
         some = positive(sent, ones(like), ones(like) - ones(like))
-        a = some * cross(p.lever, unit_x(like))
-        b = some * cross(p.lever, unit_y(like))
-        c = some * cross(p.lever, unit_z(like))
+        a = some * cross(p.delayed_fix_lever, unit_x(like))
+        b = some * cross(p.delayed_fix_lever, unit_y(like))
+        c = some * cross(p.delayed_fix_lever, unit_z(like))
         a = to_inertial(z, a)
         b = to_inertial(z, b)
         c = to_inertial(z, c)
@@ -292,19 +297,20 @@ def make_by_delayed(take):
         copy = remembered3(y, x) + t.x * a + t.y * b + t.z * c
         remember3(y, x + 15, positive(sent, copy, remembered3(y, x + 15)))
         then = p.memory + wp.static(THEN)
-        remember3(y, then, positive(sent, origin, remembered3(y, then)))
+        place = remembered3(y, p.memory) - to_inertial(z, p.delayed_fix_lever)
+        remember3(y, then, positive(sent, place, remembered3(y, then)))
         fix = p.memory + wp.static(SENT)
         remember3(y, fix, positive(sent, remembered3(y, p.delayed_fix), remembered3(y, fix)))
 
     @wp.func
-    def by_delayed(y: Any, z: Any, p: Any, origin: Any):
+    def by_delayed(y: Any, z: Any, p: Any):
         unity = ones(p.latency)
         half = unity.dtype(0.5) * unity
         waiting = remembered(y, p.memory + wp.static(WAITING))
         free = positive(waiting + half, unity - unity, unity)
         sent = positive(remembered(y, p.delayed_fix + 3), free, unity - unity)
         if any_positive(sent):
-            copied(y, z, p, origin, sent)
+            copied(y, z, p, sent)
         waiting = positive(sent, p.latency, waiting)
         new = positive(half - absolute(waiting), unity, unity - unity)
         difference = remembered3(y, p.memory + wp.static(SENT)) - remembered3(y, p.memory + wp.static(THEN))
@@ -329,12 +335,14 @@ def make_by_heading(take):
         none = p.arm - p.arm
         n = z.north
         e = z.east
-        level = n.x * n.x + e.x * e.x
+        least = y.h.dtype(wp.static(LEVEL)) * ones(n.x)
+        level = greatest(n.x * n.x + e.x * e.x, least)
         turn = vec3(level - level, (e.x * n.z - n.x * e.z) / level, (n.x * e.y - e.x * n.y) / level)
         round_turn = y.h.dtype(wp.static(TURN)) * ones(level)
         difference = remembered(y, p.heading) - heading(z)
         difference = difference - round_turn * rounded(difference / round_turn)
-        new = remembered(y, p.heading + 1)
+        # Where the bow is nearly vertical it has no heading.
+        new = positive(level - least, remembered(y, p.heading + 1), least - least)
         take(y, p, wp.static(HEADING), 0, none, none, turn, none, difference, p.heading_r, new)
 
     return by_heading
@@ -419,22 +427,25 @@ def made(features):
         if wp.static(has["report"]):
             for j in range(wp.static(BELIEF_NIS), wp.static(BELIEF)):
                 remember(y, p.belief + j, zero)
-        origin = remembered3(y, p.memory) - to_inertial(z, p.lever)
         if wp.static(has["dvl"]):
             by_beams(y, z, p)
         if wp.static(has["fix"]):
-            difference = remembered3(y, p.fix) - origin
+            read = remembered3(y, p.fix)
             new = remembered(y, p.fix + 3)
             for i in range(3):
-                by_number(y, z, p, wp.static(FIX) + i, i, number_of(difference, i), number_of(p.fix_r, i), new)
+                r = number_of(p.fix_r, i)
+                by_number(y, z, p, wp.static(FIX) + i, i, p.fix_lever, number_of(read, i), r, new)
         if wp.static(has["delayed_fix"]):
-            by_delayed(y, z, p, origin)
+            by_delayed(y, z, p)
         if wp.static(has["depth"]):
-            lower = remembered(y, p.depth) - origin.z
-            by_number(y, z, p, wp.static(DEPTH), 2, lower, p.depth_r, remembered(y, p.depth + 1))
+            read_depth = remembered(y, p.depth)
+            by_number(y, z, p, wp.static(DEPTH), 2, p.depth_lever, read_depth, p.depth_r, remembered(y, p.depth + 1))
         if wp.static(has["heading"]):
             by_heading(y, z, p)
         injected(y, p)
+        # What a lane remembers must not tell whether another one had a reading.
+        for j in range(18):
+            remember(y, p.memory + wp.static(ERROR + 18) + j, zero)
 
     @wp.func
     def measure(y: Any, p: Any):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A factor on the demand of the laws between two places of a controller's list: how margins are measured."""
+"""A factor on the demand of the laws between two places of a controller's list, and what is added, for margins."""
 
 import functools
 from typing import Any
@@ -21,8 +21,8 @@ def made(features):
     ends = "end" in features
 
     def params(width, real):
-        """Params: factors on force and torque by component; first of six rows of the memory that both share."""
-        factors = dict.fromkeys(("of_force", "of_torque"), lane3(width, real)) if ends else {}
+        """Params: factors on force and torque by component, what is added to them; first of six rows that both share."""
+        factors = dict.fromkeys(("of_force", "of_torque", "force", "torque"), lane3(width, real)) if ends else {}
         return struct("LoopGain", **factors, demand=wp.int32)
 
     @wp.func
@@ -41,8 +41,8 @@ def made(features):
         at = p.demand
         force = vec3(remembered(y, at), remembered(y, at + 1), remembered(y, at + 2))
         torque = vec3(remembered(y, at + 3), remembered(y, at + 4), remembered(y, at + 5))
-        w.force = force + by_component(p.of_force, w.force - force)
-        w.torque = torque + by_component(p.of_torque, w.torque - torque)
+        w.force = force + by_component(p.of_force, w.force - force) + p.force
+        w.torque = torque + by_component(p.of_torque, w.torque - torque) + p.torque
         return w
 
     return device(__name__, features, params=params, control=end if ends else begin)

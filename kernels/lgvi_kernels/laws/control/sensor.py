@@ -128,7 +128,7 @@ def made(features):
     features: what it reads (see readings.py), its numbers that are not idle, and "given" where the call gives its normals.
     """
     of, *others = features
-    handed, deep = "handed" in others, "deepest" in others
+    handed, deep, placed = (name in others for name in ("handed", "deepest", "place"))
     reading = make_reading(of)
     count, values, with_values, shifted = reading.count, reading.values, reading.with_values, reading.shifted
     biased, noisy, drifting, quantised, rare, late, lossy = (
@@ -154,6 +154,7 @@ def made(features):
 
             key = {"key": given_ticks()}
         words = {"memory": wp.int32, "sets": wp.int32} | ({"handed": wp.int32} if handed else {})
+        vectors |= {"place": Lane3} if placed else {}
         return vectors | lanes | key | words
 
     def params(width, real):
@@ -180,6 +181,11 @@ def made(features):
         zero = unity - unity
         if wp.static(handed):
             before = y
+        if wp.static(placed):
+            arm = to_inertial(y, p.place)
+            if wp.static(count == 1):
+                arm = vec3(zero, zero, arm.z)
+            y.position = y.position + arm
         e = vec3(zero, zero, zero)
         lost = zero
         if wp.static(biased):

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Metrics of what a filter believes: whether its errors and innovations are as large as it says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import among, refusal
+from lgvi_warp.statistics.metrics.actuator_metrics import all_of
+from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
+from lgvi_warp.statistics.values.quantity import Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class OfFilter(Metric):
+    """A metric of what an `lw.control.ErrorStateFilter` believes. Abstract."""
+
+    def meant(self) -> Quantity:
+        if not among(self.of, (self.default,)):
+            raise refusal(f"{self.type}.of", self.of, f"is not the {self.default} of a filter", "leave it out")
+        return _BELIEFS[self.type]
+
+
+@dataclass(frozen=True, eq=False)
+class NEES(OfFilter):
+    """The mean over a member's ticks of e^T P^-1 e, its filter's squared error by the truth; then statistics of it.
+
+    It is 15 on average for a right filter, which has 15 states. Errors of one member at two ticks are not independent: use
+    `lw.metrics.consistency` for a test over members. It needs a filter that reports.
+
+    Args:
+        of: "nees", the default.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+    """
+
+    type: ClassVar[str] = "nees"
+    default: ClassVar[str | None] = "nees"
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"sum": x[0].copy(), "count": np.ones(x.shape[1])}
+
+    def follow(self, state: State, ticks: Ticks) -> State:
+        size = ticks.x[:, 0]
+        return {
+            "sum": accumulated(state["sum"], ticks, size),
+            "count": accumulated(state["count"], ticks, np.ones(size.shape)),
+        }
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["sum"] / state["count"]
+
+
+@dataclass(frozen=True, eq=False)
+class NIS(NEES):
+    """The mean over all readings that a member's filter took of innovation^2 over its variance; then statistics of it.
+
+    It is 1 on average for a right filter, and NaN for one that took none. Unlike `NEES` it needs no truth: a vehicle at sea
+    can tell it. It needs a filter that reports.
+
+    Args:
+        of: "nis", the default.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+    """
+
+    type: ClassVar[str] = "nis"
+    default: ClassVar[str | None] = "nis"
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"sum": x[0].copy(), "count": x[1].copy()}
+
+    def follow(self, state: State, ticks: Ticks) -> State:
+        names = ("sum", "count")
+        return {name: accumulated(state[name], ticks, ticks.x[:, i]) for i, name in enumerate(names)}
+
+
+_BELIEFS = {"nees": all_of("nees"), "nis": all_of("nis", "nis_count")}

@@ -56,6 +56,7 @@ MADE = {
     "controllers/depth_in_waves.png": of_script("examples/controllers/depth_in_waves.py"),
     "controllers/depth_keeping.png": of_script("examples/controllers/depth_keeping.py"),
     "controllers/learning.png": of_script("examples/controllers/train_a_policy.py", "1.5"),
+    "controllers/learn_depth_keeping.png": of_script("examples/controllers/learn_depth_keeping.py", "200000"),
     "controllers/lost_bottom.png": of_script("examples/controllers/lost_bottom.py"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),

@@ -23,7 +23,7 @@ import lgvi_warp as lw
 INPUTS = ["depth_error", "down[0]", "velocity[2]", "angular_velocity[1]"]
 SIZE = np.array([3.0, 0.2, 0.1, 0.1])  # m, 1, m/s, rad/s: what is usual of each
 MOST_PLANES = 0.35  # rad of the stern planes, by an action of 1
-WANTED, EPISODE, VEHICLES = 10.0, 40.0, 32  # m, s
+WANTED, EPISODE, PERIOD, VEHICLES = 10.0, 40.0, 0.1, 32  # m, s, s
 DISCOUNT = 0.98
 VARY = {
     "vehicle.buoyancy": lw.distributions.Uniform(low=297.0, high=302.0),
@@ -41,7 +41,7 @@ DEPTH = lw.control.DepthPID(
 def fleet(law, members, seed):
     """REMUS 100 with a heading law and a depth law."""
     wanted = lw.control.SetPoint(depth=WANTED, heading=0.5)
-    controller = lw.Controller(period=0.1, guidance=[wanted], laws=[law, HEADING], allocation=[PLANES])
+    controller = lw.Controller(period=PERIOD, guidance=[wanted], laws=[law, HEADING], allocation=[PLANES])
     scene = lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
     return lw.Ensemble(scene, members, seed, VARY)
 
@@ -63,19 +63,15 @@ def environment():
 
 
 class Rewards(BaseCallback):
-    """Mean reward of each rollout, before it is normalised."""
+    """Mean reward of each step, before it is normalised."""
 
     def __init__(self):
         super().__init__()
-        self.history, self.sum, self.count = [], 0.0, 0
+        self.history = []
 
     def _on_step(self):
-        self.sum, self.count = self.sum + self.training_env.get_original_reward().mean(), self.count + 1
+        self.history.append(self.training_env.get_original_reward().mean())
         return True
-
-    def _on_rollout_end(self):
-        self.history.append(self.sum / self.count)
-        self.sum, self.count = 0.0, 0
 
 
 def by_stable_baselines(steps, seed=1):
@@ -114,22 +110,23 @@ def errors(law, members=1000):
 
 
 def plot(histories, each, path):
-    """The learning curves, and depths of the members: median and the middle 90 %."""
+    """The mean rewards of episodes while learning, and how far off their depth the vehicles are under each law."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 4.2), layout="constrained")
     learning, depths = figure.subplots(1, 2)
+    length = round(EPISODE / PERIOD)
     for name, history in histories.items():
-        learning.plot(ppo.ROLLOUT * VEHICLES * np.arange(1, len(history) + 1) / 1000.0, history, label=name)
-    learning.set(title="Learning", xlabel="steps of environments [thousands]", ylabel="mean reward of a step")
+        episodes = np.reshape(history[: len(history) // length * length], (-1, length)).mean(axis=1)
+        made = length * VEHICLES * np.arange(1, len(episodes) + 1) / 1000.0
+        learning.plot(made, episodes, "o-", markersize=4, label=name)
+    learning.set(
+        title="Learning", xlabel="steps of environments [thousands]", ylabel="mean reward of an episode's steps"
+    )
     learning.legend()
     for i, (name, (error, t)) in enumerate(each.items()):
-        low, middle, high = np.quantile(error, [0.05, 0.5, 0.95], axis=1)
-        depths.plot(t, middle, color=f"C{i}", label=name)
-        depths.fill_between(t, low, high, color=f"C{i}", alpha=0.25)
-    depths.axvline(30.0, color="0.6", linewidth=0.8)
-    depths.set(title="1000 new vehicles: median, 5 % to 95 %", xlabel="time [s]", ylabel="depth less 10 m [m]")
-    depths.set_ylim(-1.5, 1.5)
+        depths.plot(t, np.sqrt(np.mean(error**2, axis=1)), color=f"C{i}" if name in histories else "0.5", label=name)
+    depths.set(title="1000 new vehicles", xlabel="time [s]", ylabel="root mean square depth error [m]", yscale="log")
     depths.legend()
     figure.savefig(path, dpi=100)
     return path

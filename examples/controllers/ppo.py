@@ -41,7 +41,7 @@ def train(env, steps, size, gain, seed=1):
     """Learn from so many steps of environments.
 
     size: what an observation of 1 is, (k,). gain: factor of rewards, so that values are of the order of 1.
-    Returns: weights and biases of the policy's layers, which take observations as they are; mean reward of each rollout.
+    Returns: weights and biases of the policy's layers, which take observations as they are; mean reward of each step.
     """
     torch.manual_seed(seed)
     torch.set_num_threads(1)
@@ -94,7 +94,7 @@ def train(env, steps, size, gain, seed=1):
                 (0.5 * wrong - gained).backward()
                 nn.utils.clip_grad_norm_(numbers, 0.5)
                 learner.step()
-        history.append(reward.mean() / gain)
+        history += (reward.mean(axis=1) / gain).tolist()
     layers = [(each.weight, each.bias) for each in policy if isinstance(each, nn.Linear)]
     (W, b), *others = [(W.detach().double().numpy(), b.detach().double().numpy()) for W, b in layers]
     return [(W / size, b), *others], history

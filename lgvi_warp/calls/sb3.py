@@ -36,11 +36,11 @@ def sb3(env: Vehicles) -> Any:
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> controller = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(depth=10.0)])
-        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
-        >>> env = lw.gym.VectorEnv(scene, observe=["depth_error", "down"], act="control_fins", num_envs=4, duration=20.0)
-        >>> learner_sees = lw.gym.sb3(env)  # stable_baselines3.PPO("MlpPolicy", learner_sees).learn(100_000)
-        >>> learner_sees.reset().shape
+        >>> parts = dict(guidance=[lw.control.SetPoint(depth=9.0)], laws=[lw.control.HeavePID(kp=40.0, kd=60.0)])
+        >>> scene = lw.Scene.named("bluerov2_heavy", controller=lw.Controller(period=0.1, **parts))
+        >>> env = lw.gym.VectorEnv(scene, observe=["depth_error", "down"], act="thrusters", num_envs=4, h=0.02, duration=8.0)
+        >>> for_learners = lw.gym.sb3(env)  # then stable_baselines3.PPO("MlpPolicy", for_learners).learn(100_000)
+        >>> for_learners.reset().shape
         (4, 4)
     """
     made = _vec_env(needed())

@@ -6,11 +6,11 @@ No ArduPilot sent them: they follow its description (libraries/SITL/examples/JSO
 frame vectored_6dof (libraries/AP_Motors/AP_Motors6DOF.cpp).
 """
 
-import importlib.util
 import json
 import struct
 
 from tests.conftest import ROOT
+from tests.support.bridges import example
 
 KEPT = ROOT / "tests" / "data" / "ardupilot_exchange.jsonl"
 # What each motor does by a longer pulse: roll, pitch, yaw, up, ahead, to starboard.
@@ -24,14 +24,6 @@ MIXING = (
     (1, 1, 0, -1, 0, 0),
     (-1, 1, 0, -1, 0, 0),
 )
-
-
-def example(name):
-    """An example as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / "bridges" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def pulses(which, size):

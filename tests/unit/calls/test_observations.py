@@ -14,7 +14,9 @@ INF = np.inf
 
 def limits(events, *names, vary=None, **parts):
     """The least and the largest of named numbers; None where nothing bounds any."""
-    controller = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(depth=5.0)], **parts)
+    controller = lw.Controller(
+        period=0.1, guidance=[lw.control.SetPoint(depth=5.0)], laws=[lw.control.HeavePID(kp=1.0)], **parts
+    )
     scene = lw.Scene.named("remus_100", controller=controller, events=events)
     found = bounds(names, lw.Ensemble(scene, 3, 1, vary or {}))
     return None if found is None else found.tolist()

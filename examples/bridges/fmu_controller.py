@@ -25,11 +25,20 @@ import lgvi_warp as lw
 
 PERIOD = 0.1  # s
 COMPONENTS = ("X", "Y", "Z", "K", "M", "N")
+
+
+def heading_error(y, r):
+    """The wanted heading less the measured one, the short way (m,) [rad]."""
+    return np.remainder(r.heading - y.heading + np.pi, 2.0 * np.pi) - np.pi
+
+
+def rate_error(y, r):
+    """The wanted yaw rate less the measured one (m,) [rad/s]."""
+    return r.angular_velocity[:, 2] - y.angular_velocity[:, 2]
+
+
 # What variables of the FMU are given, each a function of what is measured and wanted that returns (m,).
-INPUTS = {
-    "heading_error": lambda y, r: np.remainder(r.heading - y.heading + np.pi, 2.0 * np.pi) - np.pi,
-    "rate_error": lambda y, r: r.angular_velocity[:, 2] - y.angular_velocity[:, 2],
-}
+INPUTS = {"heading_error": heading_error, "rate_error": rate_error}
 OUTPUTS = {"N": "moment"}  # which variable each demand is
 
 

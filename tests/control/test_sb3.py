@@ -3,6 +3,8 @@
 
 import copy
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import gymnasium
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from tests.conftest import ROOT
 from tests.control.test_gym import LAW, PERIOD, N, One, environment, scene
 from tests.support.vec_env import stand_in
 
@@ -211,3 +214,19 @@ def test_both_checkers_pass():
     assert wrapped.reset().shape == (N, 4)
     infos = [wrapped.step(some(N, seed=k))[3] for k in range(3)][-1]
     assert all(info["episode"]["l"] == 3 for info in infos)
+
+
+@pytest.mark.slow
+def test_two_learners_keep_the_depth_better_than_the_law(tmp_path):
+    """200,000 steps each; then on 1,000 vehicles that they have not met, in the kernel."""
+    pytest.importorskip("stable_baselines3")
+    picture = tmp_path / "learnt.png"
+    script = ROOT / "examples" / "controllers" / "learn_depth_keeping.py"
+    command = [sys.executable, script, "200000", picture]
+    *lines, last = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path).stdout.splitlines()
+    errors = {line.partition(":")[0]: float(line.split()[-2]) for line in lines}
+    assert list(errors) == ["PPO of Stable-Baselines3", "ppo.py", "depth_pid"]
+    assert errors["PPO of Stable-Baselines3"] < errors["depth_pid"]
+    assert errors["ppo.py"] < errors["depth_pid"]
+    assert last == str(picture)
+    assert picture.stat().st_size > 10_000

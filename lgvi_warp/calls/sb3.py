@@ -79,7 +79,7 @@ class Baselines:
             raise ValueError(f"options = {self._options[0]}: there are none to set; vary the ensemble")
         self._asked = None
         observed, _ = self.env.reset(seed=self._seeds[0])
-        self._reset_seeds()  # type: ignore[attr-defined]
+        self._seeds = [None] * self.num_envs
         return observed
 
     def step_async(self, actions: np.ndarray) -> None:
@@ -193,8 +193,10 @@ class Baselines:
         """
         return [None] * self.num_envs
 
-    def _chosen(self, indices: Indices) -> Iterable[int]:
-        return list(self._get_indices(indices))  # type: ignore[attr-defined]
+    def _chosen(self, indices: Indices) -> list[int]:
+        if indices is None:
+            return list(range(self.num_envs))
+        return [indices] if isinstance(indices, int | np.integer) else list(indices)
 
     def _of_each(self, value: Any, indices: Indices) -> list[Any]:
         by_row = isinstance(value, np.ndarray) and value.shape[:1] == (self.num_envs,)

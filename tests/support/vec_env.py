@@ -13,17 +13,11 @@ class VecEnv:
     def __init__(self, num_envs, observation_space, action_space):
         self.num_envs, self.observation_space, self.action_space = num_envs, observation_space, action_space
         self._options = [{} for _ in range(num_envs)]
-        self._reset_seeds()
+        self._seeds = [None] * num_envs
         self.render_mode = self.get_attr("render_mode")[0]
-
-    def _reset_seeds(self):
-        self._seeds = [None] * self.num_envs
 
     def set_options(self, options):
         self._options = [options] * self.num_envs
-
-    def _get_indices(self, indices):
-        return range(self.num_envs) if indices is None else [indices] if isinstance(indices, int) else indices
 
     def has_attr(self, name):
         try:

@@ -3,6 +3,7 @@
 
 import copy
 import pickle
+import runpy
 import subprocess
 import sys
 from dataclasses import replace
@@ -201,8 +202,9 @@ def test_what_is_seen_lies_within_its_bounds(dtype):
     assert floors > N / 2
 
 
-def test_both_checkers_pass():
-    """Gymnasium's is in test_gym.py; Stable-Baselines3's, with its warnings as errors but for what it says of num_envs = 1."""
+@pytest.mark.filterwarnings("ignore:.*action space has dtype float64.*:UserWarning")
+def test_the_checker_and_the_wrappers_of_stable_baselines():
+    """Its checker takes single environments; its wrappers stand for learners. Gymnasium's checker: test_gym.py."""
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
     single = One()
     assert single.many.num_envs == 1
@@ -214,6 +216,22 @@ def test_both_checkers_pass():
     assert wrapped.reset().shape == (N, 4)
     infos = [wrapped.step(some(N, seed=k))[3] for k in range(3)][-1]
     assert all(info["episode"]["l"] == 3 for info in infos)
+
+
+def test_advantages_are_sums_of_what_surprises():
+    """Of ppo.py, beside the sums over all that follows in the same episode, term by term (Schulman et al. 2016, 16)."""
+    pytest.importorskip("torch")
+    ppo = runpy.run_path(str(ROOT / "examples" / "controllers" / "ppo.py"))
+    rng, steps, count = np.random.default_rng(2), 9, 4
+    rewards, values, following = rng.normal(size=(3, steps, count))
+    ended = rng.random((steps, count)) < 0.3
+    found = ppo["advantages"](rewards, values, ended, following)
+    decay = ppo["DISCOUNT"] * ppo["TRACE"]
+    for i in range(count):
+        for k in range(steps):
+            last = next((j for j in range(k, steps) if ended[j, i]), steps - 1)
+            surprises = [rewards[j, i] + ppo["DISCOUNT"] * following[j, i] - values[j, i] for j in range(k, last + 1)]
+            assert found[k, i] == pytest.approx(sum(s * decay**n for n, s in enumerate(surprises)), abs=1e-12)
 
 
 @pytest.mark.slow

@@ -50,6 +50,8 @@ class FmuLaw:
     """
 
     def __init__(self, file, period, inputs, outputs, parameters=None):
+        if not zipfile.is_zipfile(file):
+            raise ValueError(f"{file}: is no FMU, or not there; give the path of one")
         self.made_of = file, period, inputs, outputs, parameters
         self.version = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         self.period, self.inputs, self.parameters = period, inputs, parameters or {}
@@ -119,6 +121,8 @@ class FmuLaw:
 
 def build(folder, version):
     """Compile heading_law.c to an FMU of FMI 2 or 3 in a folder; returns its path."""
+    if shutil.which("cc") is None:
+        raise ValueError("cc: no C compiler is on the path; install one, or give an FMU that exists")
     base, variables = (FMU2Slave, "ScalarVariable") if version == 2 else (FMU3Slave, "Float64")
     source, folder = Path(__file__).with_name("heading_law.c"), Path(folder)
     functions = [
@@ -176,12 +180,21 @@ def ends(law, members=100):
     return result.attitude[-1]
 
 
-if __name__ == "__main__":
+def main(file=None):
+    """Run the fleet under an FMU, and under the law in the kernel where it is that of heading_law.c."""
     with tempfile.TemporaryDirectory() as made:
-        law = FmuLaw(sys.argv[1] if len(sys.argv) > 1 else build(made, 3), PERIOD, INPUTS, OUTPUTS)
+        law = FmuLaw(file or build(made, 3), PERIOD, INPUTS, OUTPUTS)
         last = ends(lw.control.Callback(law, version=law.version))
         law.close()
     off = np.degrees(np.abs(np.arctan2(last[:, 1, 0], last[:, 0, 0]) - 0.8).max())
     print(f"{len(last)} vehicles, each with an FMU of its own: at most {off:.2g} deg off the heading after 20 s")
-    same = ends(lw.control.HeadingPID(kp=3.0, ki=0.5, kd=2.0, anti_windup="none"))
-    print(f"beside heading_pid in the kernel: attitudes at most {np.abs(last - same).max():.1e} apart")
+    if file is None:
+        same = ends(lw.control.HeadingPID(kp=3.0, ki=0.5, kd=2.0, anti_windup="none"))
+        print(f"beside heading_pid in the kernel: attitudes at most {np.abs(last - same).max():.1e} apart")
+
+
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:2])
+    except ValueError as error:
+        sys.exit(str(error))

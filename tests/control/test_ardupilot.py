@@ -3,6 +3,8 @@
 
 import json
 import socket
+import subprocess
+import sys
 import threading
 from functools import partial
 
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from tests.conftest import ROOT
 from tests.support import servo_packets
 from tests.support.bridges import example
 from tests.support.servo_packets import KEPT, packet, packets, pulses
@@ -184,6 +187,24 @@ def test_it_is_the_run_of_the_same_commands(vehicle):
 
 def held(commands, t, y, r, members):
     return np.tile(commands, (len(members), 1))
+
+
+def test_a_vehicle_that_fails_is_put_back_to_its_start(vehicle, monkeypatch):
+    told(vehicle, packet(0, pulses(4, 200)))
+    monkeypatch.setattr(vehicle.env, "step", lambda commands: (np.zeros((1, 18)), 0.0, np.array([True]), None, {}))
+    answer = told(vehicle, packet(1, pulses(4, 200)))
+    assert answer["timestamp"] == 0.0
+    assert answer["position"] == list(BRIDGE.START)
+    assert answer["imu"]["accel_body"] == [0.0, 0.0, -vehicle.gravity[2]]
+    assert vehicle.starts == 2
+
+
+@pytest.mark.parametrize("port", ["here", "70000", "-1"])
+def test_a_wrong_port_is_told_in_a_line(port):
+    command = [sys.executable, ROOT / "examples" / "bridges" / "ardupilot_json.py", port]
+    told_of = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert told_of.returncode == 1
+    assert told_of.stderr == f"port = {port!r}: is no port; give a number from 1 to 65535, such as 9002\n"
 
 
 def test_the_mixing_is_complete():

@@ -62,6 +62,22 @@ def test_what_the_file_has_not_is_named(fmu):
         BRIDGE.FmuLaw(fmu, BRIDGE.PERIOD, BRIDGE.INPUTS, {"N": "torque"})
 
 
+def test_a_file_that_is_no_fmu_is_told(tmp_path):
+    other = tmp_path / "law.fmu"
+    for _ in range(2):
+        with pytest.raises(ValueError, match=r"law\.fmu: is no FMU, or not there; give the path of one"):
+            BRIDGE.FmuLaw(other, BRIDGE.PERIOD, BRIDGE.INPUTS, BRIDGE.OUTPUTS)
+        other.write_text("no archive")
+
+
+def test_the_script_compares_both_laws(capsys):
+    BRIDGE.main()
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.startswith("100 vehicles, each with an FMU of its own: at most ")
+    assert float(first.split()[11]) < 1.0  # deg
+    assert float(second.split()[-2]) < 1e-12
+
+
 def test_an_error_of_the_fmu_ends_the_run(law):
     """An input that the FMU does not know: its status is an exception, with the tick and the members."""
     law.places["heading_error"] = 99

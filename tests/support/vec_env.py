@@ -21,9 +21,10 @@ class VecEnv:
 
     def has_attr(self, name):
         try:
-            return bool(self.get_attr(name)) or True
+            self.get_attr(name)
         except AttributeError:
             return False
+        return True
 
     def step(self, actions):
         self.step_async(actions)

@@ -2,3 +2,4 @@
 # The public names of this door, one a line.
 
 from lgvi_warp.calls.gym import VectorEnv as VectorEnv
+from lgvi_warp.calls.sb3 import sb3 as sb3

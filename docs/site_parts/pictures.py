@@ -71,6 +71,7 @@ def of_comparison(name: str) -> Made:
 
 COMPARISONS = sorted(path.stem for path in (ROOT / "benchmarks/validation").glob("[a-z]*.py"))
 FRONTS = "benchmarks/fronts_picture.py"
+LEARNT = "examples/controllers/learn_depth_keeping.py"
 STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out", "{}")
 SWEEP = "examples/sweeps/depth_gain_map.toml"
 MADE = {
@@ -78,6 +79,9 @@ MADE = {
     "controllers/depth_in_waves.png": of_script("examples/controllers/depth_in_waves.py"),
     "controllers/depth_keeping.png": of_script("examples/controllers/depth_keeping.py"),
     "controllers/learning.png": of_script("examples/controllers/train_a_policy.py", "1.5"),
+    "controllers/learn_depth_keeping.png": Made(
+        (LEARNT, "examples/controllers/ppo.py"), (sys.executable, LEARNT, "200000", "{}/picture.png"), "picture.png"
+    ),
     "controllers/lost_bottom.png": of_script("examples/controllers/lost_bottom.py"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),

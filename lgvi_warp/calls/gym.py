@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.calls.observations import observer
+from lgvi_warp.calls.observations import bounds, observer
 from lgvi_warp.common.errors import Faults, MissingExtra, brief, closest, ragged, refusal
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import answered
@@ -94,6 +94,8 @@ class Vehicles:
         dtype: str | None = None,
         width: int | None = None,
     ):
+        # What `__reduce__` makes a copy by.
+        self._made_of = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         gymnasium = needed()
         ensemble = ensemble_of(fleet)
         faults, names = Faults(), (instead_of,) if isinstance(instead_of, str) else tuple(instead_of)
@@ -125,6 +127,7 @@ class Vehicles:
         if duration is not None:
             faults.positive("duration", duration)
         faults.raise_if_any()
+        self._limits = None if callable(observe) else bounds(observe, ensemble)
         self._fleet = _acted(ensemble, names, to)
         self._random = _endless(ensemble)
         self._noise_seed = ensemble.seed
@@ -181,9 +184,12 @@ class Vehicles:
         box, batched = gymnasium.spaces.Box, gymnasium.vector.utils.batch_space
         self._answer = np.zeros((self.num_envs, size if to else len(COMPONENTS)))
         self._kind = kind
+        if self._limits is not None:
+            self._limits = self._limits.astype(kind)
         observed = self._seen(*self._episodes.signals())
         self.single_action_space = box(-most.astype(kind), most.astype(kind), dtype=kind.type)
-        self.single_observation_space = box(-np.inf, np.inf, observed.shape[1:], kind.type)
+        low, high = (-np.inf, np.inf) if self._limits is None else self._limits
+        self.single_observation_space = box(low, high, observed.shape[1:], kind.type)
         self.action_space = batched(self.single_action_space, self.num_envs)
         self.observation_space = batched(self.single_observation_space, self.num_envs)
 
@@ -278,8 +284,14 @@ class Vehicles:
             ResetNeeded: Before the first `reset`; with autoreset "Disabled" where an episode has ended; and after
                 2^31 integration steps, when all environments must be reset.
         """
+        return self._stepped(actions, self._mode)
+
+    def _stepped(
+        self, actions: Any, mode: str
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """`step` by a way of autoreset."""
         last, episodes = self._done, self._episodes
-        if not self._begun or (self._mode == "Disabled" and last.any()):
+        if not self._begun or (mode == "Disabled" and last.any()):
             raise needed().error.ResetNeeded("an episode has ended, or none has begun: call reset first")
         if episodes.steps + episodes.every > self._plan.grid.steps:
             raise needed().error.ResetNeeded("steps are counted up to 2^31: reset all environments")
@@ -303,7 +315,7 @@ class Vehicles:
         terminations = ended if self._terminated is None else ended | self._truth(self._terminated(self.time, y, r))
         truncations = self._periods_made >= self._periods
         infos: dict[str, Any] = {"status": status, "_status": ended.copy()} if ended.any() else {}
-        if self._mode == "NextStep" and last.any():
+        if mode == "NextStep" and last.any():
             again = np.flatnonzero(last)
             self._begin_next(again)
             observed[again] = self._restarted(again)
@@ -311,7 +323,7 @@ class Vehicles:
             for mask in infos.values():
                 mask[again] = 0
         self._done = terminations | truncations
-        if self._mode == "SameStep" and self._done.any():
+        if mode == "SameStep" and self._done.any():
             again = np.flatnonzero(self._done)
             final = np.full(self.num_envs, None, dtype=object)
             final[again] = list(observed[again])
@@ -326,6 +338,10 @@ class Vehicles:
             self._done = np.zeros(self.num_envs, bool)
         self._observed = observed
         return observed.copy(), rewards, terminations, truncations, infos
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what it was made of: the copy is a new environment that has not begun."""
+        return _remade, (self._made_of,)
 
     def _begin_next(self, envs: np.ndarray) -> None:
         self._numbers[envs] += 1
@@ -356,7 +372,7 @@ class Vehicles:
         observed = answered("observe", self._observe(self.time, y, r)).astype(self._kind)
         if observed.ndim != 2 or len(observed) != len(y.heading):
             raise ValueError(f"observe: returned shape {observed.shape}; return ({len(y.heading)}, k), a row for each")
-        return observed
+        return observed if self._limits is None else np.clip(observed, *self._limits)
 
     def _rewarded(self, y: CallbackInput, r: CallbackInput, actions: Any) -> np.ndarray:
         if self._reward is None:
@@ -377,6 +393,11 @@ class Vehicles:
         return terminated
 
 
+def step_by(mode: str, env: Vehicles, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
+    """A step of an environment with a way of autoreset that another library wants, whatever its own."""
+    return env._stepped(actions, mode)
+
+
 def needed() -> Any:
     """Gymnasium."""
     try:
@@ -391,6 +412,10 @@ def _vector_env() -> type:
     """`Vehicles` as a class of Gymnasium's, made when it is used first: Gymnasium may be absent."""
     base = needed().vector.VectorEnv
     return type("VectorEnv", (Vehicles, base), {"__doc__": Vehicles.__doc__, "__module__": __name__})
+
+
+def _remade(made_of: dict[str, Any]) -> Any:
+    return _vector_env()(**made_of)
 
 
 def __getattr__(name: str) -> Any:

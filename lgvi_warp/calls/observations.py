@@ -10,6 +10,9 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.engine.host_callback import CallbackInput
+from lgvi_warp.physics.terms.events import Box, Surface
+from lgvi_warp.physics.terms.floor import Floor
+from lgvi_warp.scene.ensemble import Ensemble
 
 
 def heading_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
@@ -42,32 +45,34 @@ class ObservedNumber(NamedTuple):
 
     wish: What guidance must give for it; None for nothing.
     of: Function of the measured and the wanted motion of m members that returns (m,) or (m, length).
+    most: The largest that each number can be, by what it is; infinite by default.
     """
 
     length: int
     wish: str | None
     of: Callable[[CallbackInput, CallbackInput], Any]
+    most: float = np.inf
 
 
 OBSERVATIONS = {
     "depth_error": ObservedNumber(1, "depth", lambda y, r: r.depth - y.depth),
-    "heading_error": ObservedNumber(1, "heading", heading_error),
+    "heading_error": ObservedNumber(1, "heading", heading_error, np.pi),
     "speed_error": ObservedNumber(1, "speed", lambda y, r: r.speed - water_velocity(y)[:, 0]),
     "depth": ObservedNumber(1, None, lambda y, r: y.depth),
     "position_error": ObservedNumber(3, "position", position_error),
-    "attitude_error": ObservedNumber(3, "attitude", attitude_error),
+    "attitude_error": ObservedNumber(3, "attitude", attitude_error, 1.0),
     "velocity": ObservedNumber(3, None, lambda y, r: y.velocity),
     "water_velocity": ObservedNumber(3, None, lambda y, r: water_velocity(y)),
     "angular_velocity": ObservedNumber(3, None, lambda y, r: y.angular_velocity),
-    "down": ObservedNumber(3, None, lambda y, r: y.attitude[:, 2]),
+    "down": ObservedNumber(3, None, lambda y, r: y.attitude[:, 2], 1.0),
     "measured_position": ObservedNumber(3, None, lambda y, r: y.position),
-    "measured_attitude": ObservedNumber(9, None, lambda y, r: y.attitude),
-    "measured_heading": ObservedNumber(1, None, lambda y, r: y.heading),
+    "measured_attitude": ObservedNumber(9, None, lambda y, r: y.attitude, 1.0),
+    "measured_heading": ObservedNumber(1, None, lambda y, r: y.heading, np.pi),
     "reference_position": ObservedNumber(3, None, lambda y, r: r.position),
-    "reference_attitude": ObservedNumber(9, None, lambda y, r: r.attitude),
+    "reference_attitude": ObservedNumber(9, None, lambda y, r: r.attitude, 1.0),
     "reference_velocity": ObservedNumber(3, None, lambda y, r: r.velocity),
     "reference_angular_velocity": ObservedNumber(3, None, lambda y, r: r.angular_velocity),
-    "reference_heading": ObservedNumber(1, None, lambda y, r: r.heading),
+    "reference_heading": ObservedNumber(1, None, lambda y, r: r.heading, np.pi),
     "reference_depth": ObservedNumber(1, None, lambda y, r: r.depth),
     "reference_speed": ObservedNumber(1, None, lambda y, r: r.speed),
 }  # fmt: skip
@@ -75,6 +80,46 @@ OBSERVATIONS = {
 OBSERVATIONS |= {
     f"measured_{name}": OBSERVATIONS[name] for name in ("depth", "velocity", "water_velocity", "angular_velocity")
 }
+
+
+# Name of a number -> which number of the position it is.
+_PLACES = {"depth": (2,), "measured_depth": (2,), "measured_position": (0, 1, 2)}
+
+
+def bounds(names: Sequence[str], fleet: Ensemble) -> np.ndarray | None:
+    """The least and the largest that named numbers can be, (2, k); None where none of them has a bound.
+
+    Angles and numbers of rotations have one by what they are. Depth and position have those at which events of the scene stop
+    a vehicle, where it measures them as they are.
+    """
+    corners, columns = _sea(fleet), []
+    for entry in names:
+        name, _, index = entry.partition("[")
+        each = OBSERVATIONS[name]
+        ends = np.full((2, each.length), [[-each.most], [each.most]])
+        if name in _PLACES:
+            ends = corners[:, _PLACES[name]]
+        columns.append(ends[:, [int(index[:-1])]] if index else ends)
+    both = np.concatenate(columns, axis=1)
+    return both if np.isfinite(both).any() else None
+
+
+def _sea(fleet: Ensemble) -> np.ndarray:
+    """The corners (2, 3) [m] between which all members are measured; infinite where nothing says so."""
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    controller: Any = fleet.scene.controller
+    if controller.sensors or controller.faults:
+        return np.array([low, high])
+    for event in fleet.scene.events:
+        if any(name.startswith(f"{event.key}.") for name in fleet.varied_names):
+            continue
+        if isinstance(event, Surface):
+            low[2] = max(low[2], event.depth)
+        elif isinstance(event, Floor):
+            high[2] = min(high[2], np.max(event.depth) - (event.clearance or 0.0))
+        elif isinstance(event, Box):
+            low, high = np.maximum(low, event.lower), np.minimum(high, event.upper)
+    return np.array([low, high])
 
 
 def observer(

@@ -29,6 +29,7 @@ DOORS = {
     "stores: zarr": (needed, "zarr", "store"),
     "clusters": (lambda: executor_of("dask", 1, "tcp://127.0.0.1:1"), "distributed", "cluster"),
     "environments": (lambda: lw.gym.VectorEnv(None, observe=[]), "gymnasium", "gym"),
+    "learners": (lambda: lw.gym.sb3(None), "stable_baselines3.common.vec_env", "learn"),
     "state spaces": (lambda: MODEL.state_space(), "control", "control"),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (canvas.figure_class, "matplotlib.figure", "viz"),

@@ -24,6 +24,7 @@ OF_TESTS = {
         "docs/guide/sensitivity.md docs/guide/statistics.md docs/guide/vehicles.md",
     "control/test_bad_sensors.py": "docs/controllers/faults.md docs/controllers/sensors.md",
     "control/test_gym.py": "docs/controllers/gym.md",
+    "control/test_own_loop.py": "docs/controllers/bring_your_own_loop.md docs/controllers/learn_depth_keeping.md",
     "control/test_navigation.py": "docs/controllers/navigation.md",
     "studies/test_derivatives.py": "docs/guide/derivatives.md",
     "studies/test_estimating.py": "docs/guide/least_cost.md",

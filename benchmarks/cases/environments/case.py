@@ -55,20 +55,30 @@ def environments(members, steps, rounds):
         method="psi_x",
         h=STEP,
     )
-    actions = np.zeros((members, 1))
+    actions, acts = np.zeros((members, 1)), {}
 
-    def act():
+    def act(some):
         for _ in range(steps):
-            env.step(actions)
+            some.step(actions)
 
     whole = lw.Ensemble(scene(DEPTH, lw.control.HeadingPID(**GAINS)), members, 1, VARY)
     begun = dict(method="psi_x", h=STEP, t1=STEP * EVERY * steps, threads=1, save=lw.SaveAt(fields=("position",)))
     lw.solve(whole, **begun)
     env.reset(seed=1)
-    act()
-    taken, fused = least([act, lambda: lw.solve(whole, **begun)], rounds, clock=time.process_time)
-    return {"environments": members, "steps_a_period": EVERY, "environment_steps_per_s": round(members * steps / taken),
-            "to_a_run_of_the_same_loop": round(taken / fused, 2)}  # fmt: skip
+    acts["step"] = partial(act, env)
+    try:
+        acts["sb3"] = partial(act, lw.gym.sb3(env))
+    except ImportError as error:
+        missing = {"stable_baselines3_missing": error.name}
+    else:
+        missing = {}
+    for each in acts.values():
+        each()
+    *taken, fused = least([*acts.values(), lambda: lw.solve(whole, **begun)], rounds, clock=time.process_time)
+    told = {"environments": members, "steps_a_period": EVERY, "environment_steps_per_s": round(members * steps / taken[0]),
+            "to_a_run_of_the_same_loop": round(taken[0] / fused, 2)}  # fmt: skip
+    through = {} if missing else {"through_stable_baselines3_to_without": round(taken[1] / taken[0], 2)}
+    return told | through | missing
 
 
 def ticks(members, steps, rounds):

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
-from tests.support import foreign_remus as remus
+from benchmarks import foreign_remus as remus
 from tests.support.pages import blocks, snippets
 
 OWN_LOOP, LEARNING = "docs/controllers/bring_your_own_loop.md", "docs/controllers/learn_depth_keeping.md"

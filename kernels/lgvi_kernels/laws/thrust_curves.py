@@ -112,7 +112,7 @@ def make_estrin(sided):
 
 
 def make_side_row(sided):
-    """(view, row, astern, side) -> a number ahead where side > 0, else the one `astern` rows behind; sided: see make_horner."""
+    """(view, row, astern, side) -> the number ahead where side > 0, else that `astern` rows behind; sided: see make_horner."""
 
     @wp.func
     def side_row(view: Any, row: int, astern: int, side: Any):
@@ -125,7 +125,7 @@ def make_side_row(sided):
 
 
 def make_derived(terms, powers, side_row):
-    """(view, row, z, side) -> c1 + c2 z + ..., a coefficient every second row, its slope, and half of the slope of that."""
+    """(view, row, z, side) -> c1 + c2 z + ..., coefficients every second row, its slope, and half of that of its slope."""
 
     @wp.func
     def derived(view: Any, row: int, z: Any, side: Any):
@@ -143,10 +143,10 @@ def make_derived(terms, powers, side_row):
 
 @functools.cache
 def make_polynomial_inverses(powers, sided, odd):
-    """(view, first, polynomials, t, u, side, other) -> where a polynomial, which rises up to a largest value, has values t, u.
+    """(view, first, polynomials, t, u, side, other) -> the places where a rising polynomial has the values t and u.
 
-    Beyond the largest value it is where that is. It begins with a polynomial in s, t = (largest value) (1 - (1 - s^2)^2), in
-    which the inverse is smooth where t begins as a square and where it turns; a step of Halley's follows, with one division.
+    Beyond the largest value it is the place of that. It begins with a polynomial in s, t = (largest value) (1 - (1 - s^2)^2),
+    in which the inverse is smooth where t begins as a square and where it turns; a step of Halley's follows.
     Both values go through this side by side: what one waits for costs no time. first: rows of the inverse; polynomials: first
     row of the one ahead, with so many powers; side, other: of t and u; sided: whether it is another one astern; odd: whether
     it has odd powers alone, which changes no bit.
@@ -160,8 +160,8 @@ def make_polynomial_inverses(powers, sided, odd):
         astern = wp.static(INVERSE_ROWS)
         unity = ones(t)
         part = least(t * side_row(view, first, astern, side), unity)
-        # s^2 = part / (1 + v), v^2 = 1 - part, which loses no digits near 0. At the turn, v = 0, what v is off counts for little,
-        # and what s is off for much: a step of Newton's.
+        # s^2 = part / (1 + v), v^2 = 1 - part, which loses no digits near 0. At the turn, v = 0, it counts little how far v is
+        # off, and much how far s is: hence a step of Newton's.
         half = view.h.dtype(0.5) * unity
         rest = unity - part
         square = part * fused(rest, about_inverse_root(rest), unity)

@@ -41,7 +41,7 @@ def of(scene, **vary):
 def in_waves():
     """The autopilot in waves and a current, which sensors and laws do not look at."""
     fleet = autopilot()
-    waves = lw.terms.Waves(amplitudes=[0.2], periods=[4.0], directions=[0.3])
+    waves = lw.terms.Waves(amplitudes=[0.2], periods=[4.0], headings_deg=[20.0])
     water = [waves, lw.terms.Current(velocity=(0.2, 0.1, 0.0))]
     return lw.Ensemble(dataclasses.replace(fleet.scene, terms=[*fleet.scene.terms, *water]), 20, 1, fleet.vary)
 

@@ -33,9 +33,10 @@ def rov(laws, guidance=(HOLD,), allocation=(), faults=()):
     )
 
 
-def of(scene, **vary):
+def of(scene):
     """Twenty members of a scene."""
-    return lw.Ensemble(scene, 20, 1, {"start.angular_velocity": lw.distributions.Normal(std=0.05)} | vary)
+    spread = {f"start.{name}": lw.distributions.Normal(std=0.05) for name in ("velocity", "angular_velocity")}
+    return lw.Ensemble(scene, 20, 1, spread)
 
 
 def in_waves():
@@ -57,7 +58,7 @@ SCENES = {
     "line of sight, reference model, sensors": lambda: (autopilot(guidance=[SIGHT, MODEL]), "psi_x", "float64"),
     "float32": lambda: (autopilot(guidance=[SIGHT, MODEL]), "psi_x", "float32"),
     "rk4": lambda: (autopilot(sensors=SENSORS[:3]), "rk4", "float64"),
-    "in waves": lambda: (in_waves(), "psi_s", "float64"),
+    "in waves": lambda: (in_waves(), "psi_x", "float64"),
     "pose": lambda: (rov([lw.control.PosePID(**POSE)]), "psi_s", "float64"),
     "pose, float32, within limits": lambda: (
         rov([lw.control.PosePID(**POSE)], allocation=[lw.control.BoundedLeastSquares(to="thrusters")]), "psi_s", "float32"

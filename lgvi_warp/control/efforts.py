@@ -158,7 +158,9 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     acts = most > 0.0
     inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
     slope = np.where(acts, 1e-3 * most / np.where(acts, top, 1.0), 1.0)
-    return side_by_side(*(x[:, None] for x in (inverse, most, top, slope)), inverses @ TO_COEFFICIENTS.T)
+    # Summed row by row: a product of matrices rounds otherwise with other members beside.
+    coefficients = (inverses[:, None, :] * TO_COEFFICIENTS).sum(axis=-1)
+    return side_by_side(*(x[:, None] for x in (inverse, most, top, slope)), coefficients)
 
 
 def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:

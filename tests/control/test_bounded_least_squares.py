@@ -25,8 +25,8 @@ def thrust(command):
 MOST = thrust(np.linspace(0.0, 1.0, 100_001)).max()
 
 
-def asked(allocation, demands, dtype="float64", faults=()):
-    """Commands, thrusts and what is told back, of demands (n, 6)."""
+def asked(allocation, demands, dtype="float64", faults=(), varied=None):
+    """Commands, thrusts and what is told back, of demands (n, 6); varied: numbers by member."""
     controller = lw.Controller(
         period=0.1,
         guidance=[SetPoint(position=[0.0] * 3, heading=0.0)],
@@ -37,7 +37,7 @@ def asked(allocation, demands, dtype="float64", faults=()):
     scene = lw.Scene.named("bluerov2_heavy", controller=controller)
     n = len(demands)
     still = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
-    fleet = lw.Ensemble.from_states(scene, demands[:, :3], *still, demands[:, 3:])
+    fleet = lw.Ensemble.from_states(scene, demands[:, :3], *still, demands[:, 3:], varied or {})
     save = lw.SaveAt(every=0.1, fields=("command", "demand", "unmet"))
     result = lw.solve(fleet, "rk4", h=0.1, t1=0.1, dtype=dtype, save=save)
     command, demand, unmet = (np.float64(getattr(result, name)[0]) for name in save.fields)
@@ -146,6 +146,21 @@ def test_members_beside_others_keep_their_bits():
     together = asked(BoundedLeastSquares(to="thrusters"), demands)[0]
     for i in (0, 5):
         np.testing.assert_array_equal(asked(BoundedLeastSquares(to="thrusters"), demands[i : i + 1])[0][0], together[i])
+
+
+def test_curves_are_inverted_with_the_same_bits_beside_others():
+    # The named vehicle's curve has odd powers alone; beside it one whose curve ahead has others.
+    demands = drawn(40, 0.15)
+    for allocation in (PseudoInverse(to="thrusters"), BoundedLeastSquares(to="thrusters")):
+        alone = asked(allocation, demands)[0]
+        square = np.where(np.arange(40) % 2 == 0, 0.0, 5.0)
+        beside = asked(allocation, demands, varied={"thrusters.polynomial[1]": square})[0]
+        np.testing.assert_array_equal(beside[::2], alone[::2])
+        efforts = demands @ np.linalg.pinv(EFFECT).T
+        inside = np.abs(efforts).max(axis=1) < MOST
+        assert inside[::2].any() and inside[1::2].any()  # noqa: PT018
+        made = thrust(beside) + np.where(beside > 0.0, square[:, None] * beside**2, 0.0)
+        np.testing.assert_allclose(made[inside], efforts[inside], rtol=0.0, atol=1e-8 * MOST)
 
 
 def test_a_demand_that_is_no_number_ends_the_member():

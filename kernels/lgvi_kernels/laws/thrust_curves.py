@@ -166,8 +166,8 @@ def make_polynomial_inverses(powers, sided, odd):
         rest = unity - part
         square = part * fused(rest, about_inverse_root(rest), unity)
         inverse = about_inverse_root(square)
-        s = part * fused(inverse, half - (half * square) * (inverse * inverse), inverse)
-        w = sixteen(view, first + 4, astern, side, s + s - unity)
+        s = part * fused(inverse, fused(half * square, -(inverse * inverse), half), inverse)
+        w = sixteen(view, first + 4, astern, side, fused(s, unity + unity, -unity))
         return clamp(w, unity - unity, side_row(view, first + 2, astern, side))
 
     @wp.func
@@ -175,23 +175,24 @@ def make_polynomial_inverses(powers, sided, odd):
         """w after a step of Halley's towards t."""
         astern = wp.static(INVERSE_ROWS)
         half = view.h.dtype(0.5)
-        # The polynomial is w a(z) + z b(z), z = w^2: its value over w, its slope, and half of the slope of that.
+        # The polynomial is w a(z) + z b(z), z = w^2: its value over w, its slope, and half of the slope of that. Products
+        # are joined with sums here, and not by the compiler, which may choose otherwise where a curve is odd.
         z = w * w
         a, a_slope, a_bend = of_odd(view, polynomials, z, side)
-        two = z * (a_bend + a_bend)
+        twice = a_bend + a_bend
         over = a
         slope = fused(z + z, a_slope, a)
-        bend = w * (a_slope + a_slope + a_slope + (two + two))
+        bend = w * fused(z, twice + twice, a_slope + a_slope + a_slope)
         if wp.static(powers > 1 and not odd):
             # Of an odd curve this adds exactly 0.
             b, b_slope, b_bend = of_even(view, polynomials + 1, z, side)
-            once = z * b_slope
-            twice = z * (z * b_bend)
+            twice = b_bend + b_bend
+            more = fused(z, twice + twice, b_slope + b_slope + b_slope + b_slope + b_slope)
             over = fused(w, b, a)
-            slope = fused(w + w, b + once, slope)
-            bend = bend + (b + (once + once + once + once + once) + (twice + twice + twice + twice))
+            slope = fused(w + w, fused(z, b_slope, b), slope)
+            bend = fused(z, more, bend) + b
         slope = greatest(slope, side_row(view, first + 3, astern, side))
-        short = t - w * over
+        short = fused(w, -over, t)
         # slope^2 + short slope' / 2, which is positive near a solution.
         below = greatest(fused(short, bend, slope * slope), half * slope * slope)
         w = w + short * slope / below

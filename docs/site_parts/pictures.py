@@ -83,6 +83,7 @@ MADE = {
         (LEARNT, "examples/controllers/ppo.py"), (sys.executable, LEARNT, "200000", "{}/picture.png"), "picture.png"
     ),
     "controllers/lost_bottom.png": of_script("examples/controllers/lost_bottom.py"),
+    "controllers/saturated_thrusters.png": of_script("examples/controllers/saturated_thrusters.py"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),
     "guide/beside_others.png": Made(("benchmarks/rows/bars.json", "benchmarks/bars_picture.py"), BARS),

@@ -72,7 +72,7 @@ class BoundedLeastSquares(EffortAllocation):
             "count": count,
             "shared": sum(block.shape[1] for block in rows),
             "size": size,
-            "sided": self.sided(actuator_numbers),
+            **self.kind_of_curves(actuator_numbers),
             "rounds": self.rounds,
             "sweeps": self.sweeps,
         }

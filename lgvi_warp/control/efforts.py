@@ -101,9 +101,11 @@ class EffortAllocation(Allocation):
         sides = (inverse_rows(polynomial, reach) for polynomial in polynomials(numbers))
         return side_by_side(curves, *sides), size
 
-    def sided(self, numbers: Numbers) -> int:
-        """1 where the polynomials of some member differ ahead and astern, else 0."""
-        return int(self.shape == "polynomial" and not np.array_equal(*polynomials(numbers)))
+    def kind_of_curves(self, numbers: Numbers) -> dict[str, int]:
+        """Whether (1 or 0) polynomials of some member differ ahead and astern, and whether those of all are odd and do not."""
+        ahead, astern = polynomials(numbers) if self.shape == "polynomial" else (np.zeros((1, 0)),) * 2
+        same = np.array_equal(ahead, astern)
+        return {"sided": int(not same), "odd": int(same and not np.any(ahead[:, 1::2]))}
 
 
 # Singular values below this part of the largest count as zero.
@@ -156,7 +158,9 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     acts = most > 0.0
     inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
     slope = np.where(acts, 1e-3 * most / np.where(acts, top, 1.0), 1.0)
-    return side_by_side(*(x[:, None] for x in (inverse, most, top, slope)), inverses @ TO_COEFFICIENTS.T)
+    # Summed row by row: a product of matrices rounds otherwise with other members beside.
+    coefficients = (inverses[:, None, :] * TO_COEFFICIENTS).sum(axis=-1)
+    return side_by_side(*(x[:, None] for x in (inverse, most, top, slope)), coefficients)
 
 
 def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:

@@ -63,6 +63,6 @@ class PseudoInverse(EffortAllocation):
             "count": count,
             "sets": 1 << len(lost),
             "size": size,
-            "sided": self.sided(actuator_numbers),
+            **self.kind_of_curves(actuator_numbers),
         }
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))

@@ -350,7 +350,7 @@ def from_list(entries: Any, key: str = "statistics", *, unique_names: bool = Tru
     faults, statistics = Faults(), list[Statistic]()
     for i, entry in enumerate(entries):
         with faults.including():
-            statistics.append(_from_table(f"{key}[{i}]", entry))
+            statistics.append(from_table(f"{key}[{i}]", entry))
     if unique_names and not faults:
         names: list[str] = []
         for statistic in statistics:
@@ -363,7 +363,7 @@ def from_list(entries: Any, key: str = "statistics", *, unique_names: bool = Tru
     return tuple(statistics)
 
 
-def _from_table(where: str, entry: Any) -> Statistic:
+def from_table(where: str, entry: Any) -> Statistic:
     """Return the statistic of a table, or the statistic itself."""
     if isinstance(entry, Statistic):
         return entry

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.statistics.base import TYPES, Statistic, from_list
+from lgvi_warp.statistics.base import TYPES, Statistic, from_table
 from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.paths.member_values import MemberValues
@@ -33,7 +33,7 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
         else:
             remedy = 'give "overshoot depth", "iae heading" or "max(depth)"'
             raise refusal(key, entry, "is not one number of each member", remedy)
-    (statistic,) = from_list([entry], key, unique_names=False)
+    statistic = from_table(key, entry)
     if not isinstance(statistic, MemberStatistic):
         remedy = 'give a metric such as lw.metrics.Overshoot("depth"), or "max(depth)"'
         raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)

@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 import lgvi_warp as lw
-from lgvi_warp.control import BoundedLeastSquares, Fault, PosePID, PseudoInverse, SetPoint, StateFeedback
+from lgvi_warp.control import BoundedLeastSquares, Fault, HeadingPID, PosePID, PseudoInverse, SetPoint, StateFeedback
 from tests.support.refusals import refused, says
 
 NAMED = lw.Scene.named("bluerov2_heavy")
@@ -25,8 +25,8 @@ def thrust(command):
 MOST = thrust(np.linspace(0.0, 1.0, 100_001)).max()
 
 
-def asked(allocation, demands, dtype="float64", faults=()):
-    """Commands, thrusts and what is told back, of demands (n, 6)."""
+def asked(allocation, demands, dtype="float64", faults=(), varied=None):
+    """Commands, thrusts and what is told back, of demands (n, 6); varied: numbers by member."""
     controller = lw.Controller(
         period=0.1,
         guidance=[SetPoint(position=[0.0] * 3, heading=0.0)],
@@ -37,7 +37,7 @@ def asked(allocation, demands, dtype="float64", faults=()):
     scene = lw.Scene.named("bluerov2_heavy", controller=controller)
     n = len(demands)
     still = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
-    fleet = lw.Ensemble.from_states(scene, demands[:, :3], *still, demands[:, 3:])
+    fleet = lw.Ensemble.from_states(scene, demands[:, :3], *still, demands[:, 3:], varied or {})
     save = lw.SaveAt(every=0.1, fields=("command", "demand", "unmet"))
     result = lw.solve(fleet, "rk4", h=0.1, t1=0.1, dtype=dtype, save=save)
     command, demand, unmet = (np.float64(getattr(result, name)[0]) for name in save.fields)
@@ -148,6 +148,21 @@ def test_members_beside_others_keep_their_bits():
         np.testing.assert_array_equal(asked(BoundedLeastSquares(to="thrusters"), demands[i : i + 1])[0][0], together[i])
 
 
+def test_curves_are_inverted_with_the_same_bits_beside_others():
+    # The named vehicle's curve has odd powers alone; beside it one whose curve ahead has others.
+    demands = drawn(40, 0.15)
+    for allocation in (PseudoInverse(to="thrusters"), BoundedLeastSquares(to="thrusters")):
+        alone = asked(allocation, demands)[0]
+        square = np.where(np.arange(40) % 2 == 0, 0.0, 5.0)
+        beside = asked(allocation, demands, varied={"thrusters.polynomial[1]": square})[0]
+        np.testing.assert_array_equal(beside[::2], alone[::2])
+        efforts = demands @ np.linalg.pinv(EFFECT).T
+        inside = np.abs(efforts).max(axis=1) < MOST
+        assert inside[::2].any() and inside[1::2].any()  # noqa: PT018
+        made = thrust(beside) + np.where(beside > 0.0, square[:, None] * beside**2, 0.0)
+        np.testing.assert_allclose(made[inside], efforts[inside], rtol=0.0, atol=1e-8 * MOST)
+
+
 def test_a_demand_that_is_no_number_ends_the_member():
     law = PosePID(kp=[1e200] * 3, kd=[1e200] * 3, kr=[1e308] * 3, kw=[1e308] * 3)
     controller = lw.Controller(period=0.1, guidance=[SetPoint(position=[1e200, 0.0, 0.0], heading=0.0)], laws=[law],
@@ -160,3 +175,81 @@ def test_bad_numbers():
     says(refused(BoundedLeastSquares, to="thrusters", rounds=0), "rounds", "1 or more")
     says(refused(BoundedLeastSquares, to="thrusters", sweeps=-1), "sweeps", "0 or more")
     says(refused(BoundedLeastSquares, to="thrusters", priorities=[1.0, 0.0, 1.0, 1.0, 1.0, 1.0]), "priorities")
+
+
+# A pair of thrusters on either side, whose thrust is the square of the command, and one alone.
+SIDES = dict(position=((0.0, 0.2, 0.0), (0.0, -0.2, 0.0)), direction=((1.0, 0.0, 0.0),) * 2, coefficient=(10.0, 10.0),
+             limit=1.0)  # fmt: skip
+ALONE = dict(position=((0.0, 0.0, 0.0),), direction=((1.0, 0.0, 0.0),), coefficient=(10.0,), limit=1.0)
+DEAD = [Fault(name=f"dead_{i}", of="thrusters", channel=i, time=0.0, gain=0.0, known=True) for i in range(2)]
+# Thrusters, faults, and the largest efforts.
+EDGES = {
+    "two": (SIDES, [], (10.0, 10.0)),
+    "one": (ALONE, [], (10.0,)),
+    "no thrust": (SIDES | {"coefficient": (10.0, 0.0)}, [], (10.0, 0.0)),
+    "no limit left": (SIDES | {"limit": (0.0, 1.0)}, [], (0.0, 10.0)),
+    "a dead band beyond the limit": (SIDES | {"dead_band": (2.0, 0.0)}, [], (0.0, 10.0)),
+    "all dead": (SIDES, DEAD, (0.0, 0.0)),
+}
+# All at their limits, one, none, nothing asked for, what no thruster makes, and all astern.
+DEMANDS = np.array([[1e3, 0, 0, 0, 0, 1.0], [15.0, 0, 0, 0, 0, 1.0], [3.0, 0, 0, 0, 0, 0.2], [0.0] * 6,
+                    [0.0, 0, 5.0, 0, 2.0, 0], [-1e3, 0, 0, 0, 0, -1e3]])  # fmt: skip
+
+
+def allocated(numbers, faults, dtype="float64"):
+    """Commands, and what was not delivered, of DEMANDS."""
+    held = SetPoint(position=[0.0] * 3, heading=0.0)
+    within = [BoundedLeastSquares(to="thrusters")]
+    controller = lw.Controller(period=0.1, guidance=[held], laws=[LAW], allocation=within, faults=faults)
+    vehicle = lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0))
+    scene = lw.Scene(vehicle, terms=[lw.terms.Thrusters(**numbers)], controller=controller)
+    still = np.tile(np.eye(3), (len(DEMANDS), 1, 1)), np.zeros((len(DEMANDS), 3))
+    fleet = lw.Ensemble.from_states(scene, DEMANDS[:, :3], *still, DEMANDS[:, 3:])
+    save = lw.SaveAt(every=0.1, fields=("command", "unmet"))
+    result = lw.solve(fleet, "rk4", h=0.1, t1=0.1, dtype=dtype, save=save)
+    assert result.status.counts() == {"ok": len(DEMANDS)}
+    return np.float64(result.command[0]), np.float64(result.unmet[0])
+
+
+@pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("edge", EDGES)
+def test_edges(edge, dtype):
+    numbers, faults, most = EDGES[edge]
+    command, unmet = allocated(numbers, faults, dtype)
+    able = np.array(most) > 0.0
+    assert np.all(np.abs(command) <= np.array(numbers["limit"]))
+    assert np.all(command[:, ~able] == 0.0)
+    B = np.concatenate([np.array(numbers["direction"]), np.cross(numbers["position"], numbers["direction"])], axis=1).T
+    # The arm is 0.2 m, where there is one.
+    s = np.repeat([1.0, 5.0 if len(most) == 2 else 1.0], 3)
+    exact = 1e-12 if dtype == "float64" else 1e-6
+    made = 10.0 * command * np.abs(command) * able
+    for w, t, left in zip(DEMANDS, made, unmet, strict=True):
+        size, best = np.linalg.norm(s * w), np.zeros(len(most))
+        if able.any():
+            limits = np.array(most)[able]
+            best[able] = lsq_linear(s[:, None] * B[:, able], s * w, (-limits, limits), tol=1e-14, method="bvls").x
+        errors = [np.linalg.norm(s * (B @ efforts - w)) for efforts in (t, best)]
+        assert errors[0] <= errors[1] * 1.001 + exact * size
+        told = left != 0.0
+        np.testing.assert_allclose(left[told], (w - B @ t)[told], rtol=0.0, atol=10 * exact * np.linalg.norm(w))
+        assert (np.abs(s * (w - B @ t))[~told] <= 1.001e-3 * size).all()
+
+
+def test_a_thruster_that_the_loop_does_not_know_to_be_dead():
+    well, dead = allocated(SIDES, []), allocated(SIDES, [Fault(of="thrusters", channel=0, time=0.0, gain=0.0)])
+    np.testing.assert_array_equal(dead[0], well[0] * [0.0, 1.0])
+    np.testing.assert_array_equal(dead[1], well[1])
+
+
+def test_a_channel_that_makes_nothing_of_what_is_asked_for():
+    # Laws ask for N alone: the second thruster pushes through the origin, its column is 0.
+    term = lw.terms.Thrusters(position=((-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)), direction=((0.0, 1.0, 0.0),) * 2,
+                              coefficient=(10.0, 10.0), limit=1.0)  # fmt: skip
+    for allocation in (BoundedLeastSquares(to="thrusters"), BoundedLeastSquares(to="thrusters", sweeps=0)):
+        controller = lw.Controller(period=0.1, guidance=[SetPoint(heading=2.0)], laws=[HeadingPID(kp=100.0)],
+                                   allocation=[allocation])  # fmt: skip
+        scene = lw.Scene(lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0)), terms=[term], controller=controller)
+        result = lw.solve(scene, "rk4", h=0.1, t1=0.1, save=lw.SaveAt(every=0.1, fields=("command", "unmet")))
+        np.testing.assert_array_equal(np.abs(result.command[0, 0]), [1.0, 0.0])
+        np.testing.assert_allclose(result.unmet[0, 0], [0.0] * 5 + [190.0], rtol=1e-12)

@@ -49,6 +49,17 @@ def test_reallocation_keeps_the_place_when_a_thruster_dies(tmp_path):
 
 
 @pytest.mark.slow
+def test_moments_before_forces_keep_the_vehicle_upright(tmp_path):
+    picture = tmp_path / "saturated_thrusters.png"
+    command = [sys.executable, ROOT / "examples" / "controllers" / "saturated_thrusters.py", picture]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path).stdout.splitlines()
+    tilts, ends = ([number(line, f"{unit}") for line in lines[:3]] for unit in ("deg", "cm off"))
+    assert lines[3] == str(picture)
+    assert tilts[2] < 0.3 * min(tilts[:2])
+    assert max(ends) < 20.0
+
+
+@pytest.mark.slow
 def test_an_integral_takes_the_vehicle_back_to_the_legs(tmp_path):
     plain, integral = printed("controllers/waypoints", tmp_path)
     assert number(integral, "m off") < 0.5 * number(plain, "m off")

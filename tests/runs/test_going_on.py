@@ -175,6 +175,17 @@ def test_way_points():
     check(autopilot(guidance=guidance, sensors=[]), "psi_x", h=0.01, length=0.3)
 
 
+def test_allocation_within_limits():
+    # Far from its place: thrusters are at their limits, integrals wait, and one dies on the way.
+    gains = dict(kp=(40.0,) * 3, ki=(4.0,) * 3, kd=(60.0,) * 3, kr=(10.0,) * 3, kw=(4.0,) * 3)
+    dead = lw.control.Fault(name="dead", of="thrusters", channel=2, time=0.5, gain=0.0, known=True)
+    controller = lw.Controller(
+        period=0.1, guidance=[lw.control.SetPoint(position=(3.0, -2.0, 8.0), heading=1.0)], laws=[lw.control.PosePID(**gains)],
+        allocation=[lw.control.BoundedLeastSquares(to="thrusters")], faults=[dead],
+    )  # fmt: skip
+    check(fleet_of("bluerov2_heavy", controller=controller), "psi_s", saved={"fields": (*MOTION, "command", "unmet")})
+
+
 def law(t, y, r, members):
     """A damper of the yaw rate, with the time and the members in it."""
     demand = np.zeros((len(members), 6))

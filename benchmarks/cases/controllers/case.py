@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed loops beside the same scene without a controller, by processor time, in turn; callbacks and metrics beside none."""
 
+import dataclasses
 import time
 
 import numpy as np
@@ -31,16 +32,35 @@ def remus(every, **more):
     return lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
 
 
-def bluerov2(every):
+# Places to hold: below the start, at the start, and so far away that thrusters are always at their limits.
+BELOW, HERE, FAR = (0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (300.0, 200.0, 50.0)
+ALLOCATIONS = {
+    "pseudo_inverse": lw.control.PseudoInverse(to="thrusters"),
+    "redistributed pseudo_inverse": lw.control.BoundedLeastSquares(to="thrusters", sweeps=0, rounds=2),
+    "bounded_least_squares": lw.control.BoundedLeastSquares(to="thrusters"),
+}
+
+
+def bluerov2(every, allocation=ALLOCATIONS["pseudo_inverse"], place=BELOW):
     """BlueROV2 heavy that keeps its station with eight thrusters."""
     controller = None
     if every:
         controller = lw.Controller(
             period=every * H,
-            guidance=[lw.control.SetPoint(position=(0.0, 0.0, 5.0), heading=0.0)],
+            guidance=[lw.control.SetPoint(position=place, heading=0.0)],
             laws=[lw.control.PosePID(**POSE, feedforward="restoring")],
+            allocation=[allocation],
         )
     return lw.Scene.named("bluerov2_heavy", controller=controller)
+
+
+def at_work():
+    """BlueROV2 heavy without a controller, whose thrusters work all the time: commands along a schedule, with their lag."""
+    scene = bluerov2(0)
+    (thrusters,) = (term for term in scene.terms if term.type == "thrusters")
+    commands = [[0.1 * (-1) ** i for i in range(8)], [0.0] * 8]
+    moving = thrusters.with_fields({"times": [0.0, 20.0], "command_schedule": commands, "command": commands[0]})
+    return dataclasses.replace(scene, terms=[moving if term is thrusters else term for term in scene.terms])
 
 
 def packets_of(scene, method, dtype, members, steps):
@@ -61,8 +81,8 @@ def seconds(packets, k0, k1):
     return time.thread_time() - begun
 
 
-def ratios(name, scenes, method, dtype, quick):
-    """Loops beside the scene without one, the least of several rounds; and what one tick takes."""
+def least_times(scenes, method, dtype, quick):
+    """ns of a member's step of each scene, the least of several rounds; and of a tick, of "every 10" and "every 1"."""
     members, steps, rounds = (64, 300, 2) if quick else (512, 1000, 7)
     all_packets = [packets_of(scene, method, dtype, members, steps) for scene in scenes.values()]
     times = np.empty((rounds, len(scenes)))
@@ -70,13 +90,27 @@ def ratios(name, scenes, method, dtype, quick):
         for j, packets in enumerate(all_packets):
             packets.refill(packets.members)
             times[i, j] = seconds(packets, 0, steps)
-    least = times.min(axis=0) * 1e9 / (members * steps)
+    least = dict(zip(scenes, (times.min(axis=0) * 1e9 / (members * steps)).tolist(), strict=True))
+    return *least.values(), (least["every 1"] - least["every 10"]) / 0.9
+
+
+def ratios(name, scenes, method, dtype, quick):
+    """Loops beside the scene without one, and what one tick takes."""
+    *least, tick = least_times(scenes, method, dtype, quick)
     for label, ns in zip(scenes, least, strict=True):
         yield {"vehicle": name, "method": method, "dtype": dtype, "loop": label, "ns": round(ns, 1),
                "over_none": round(ns / least[0], 3)}  # fmt: skip
-    found = dict(zip(scenes, least, strict=True))
-    tick = (found["every step"] - found["every 10"]) / 0.9
     yield {"vehicle": name, "method": method, "dtype": dtype, "ns_a_tick": round(tick, 1)}
+
+
+def allocations(dtype, quick):
+    """What a tick takes by allocation, with no thruster at its limit and with some there."""
+    for where, place in (("within the limits", HERE), ("at the limits", FAR)):
+        for label, allocation in ALLOCATIONS.items():
+            scenes = {f"every {every}": bluerov2(every, allocation, place) for every in (10, 1)}
+            *_, tick = least_times(scenes, "psi_s", dtype, quick)
+            yield {"vehicle": "bluerov2_heavy", "dtype": dtype, "allocation": label, "thrusters": where,
+                   "ns_a_tick": round(tick, 1)}  # fmt: skip
 
 
 def settled(quick):
@@ -155,12 +189,18 @@ def run(quick):
         faults=[lw.control.Fault(of="control_fins", channel=0, time=5.0, gain=0.5)],
     )
     for dtype in ("float64", "float32"):
-        scenes = {"none": remus(0), "every 10": remus(10), "every step": remus(1)}
+        scenes = {"none": remus(0), "every 10": remus(10), "every 1": remus(1)}
         if dtype == "float64":
             scenes["every 10, sensors, delay, fault"] = remus(10, **delay_and_faults)
         yield from ratios("remus_100", scenes, "psi_x", dtype, quick)
-        scenes = {"none": bluerov2(0), "every 10": bluerov2(10), "every step": bluerov2(1)}
+        scenes = {
+            "none": bluerov2(0),
+            "every 10": bluerov2(10),
+            "every 1": bluerov2(1),
+            "none, by a schedule": at_work(),
+        }
         yield from ratios("bluerov2_heavy", scenes, "psi_s", dtype, quick)
+        yield from allocations(dtype, quick)
     yield from settled(quick)
     yield from callback(quick)
     yield from metrics(quick)

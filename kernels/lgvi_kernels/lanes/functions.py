@@ -25,6 +25,9 @@ greatest = overloads.family("greatest", "The larger of a and b; b where one is n
 clamp = overloads.family("clamp", "a kept between b and c; NaN stays NaN.")
 fused = overloads.family("fused", "a b + c, rounded once (with one lane, where the compiler joins them).")
 root = overloads.family("root", "Square root.")
+about_inverse_root = overloads.family(
+    "about_inverse_root", "1 / sqrt(a) to 7e-6 of a positive a, without a division; of 0 a large number."
+)
 rounded = overloads.family("rounded", "The nearest whole number; of two the even one.")
 exponential = overloads.family("exponential", "e^a, to 2 eps; 0 and inf beyond the format's range.")
 sine = overloads.family("sine", "sin a, to 2 eps for |a| <= 1e5 rad.")
@@ -61,6 +64,9 @@ def _declare_functions(width, real):
 
     @overloads.func_native(code("A", series.root(width).format("A")))
     def root(a: L) -> L: ...
+
+    @overloads.func_native(body("A", series.about_inverse_root(real)))
+    def about_inverse_root(a: L) -> L: ...
 
     @overloads.func_native(body("A", series.nearest(real)))
     def rounded(a: L) -> L: ...

@@ -16,6 +16,7 @@ from lgvi_kernels.lanes.native import head
 # digits          after the leading one;  bias: the exponent of 1.0
 # rounder         1.5 * 2^digits: a number added to it is rounded, and the last bits are that integer
 # rounder_bits    the same, and root_half_bits the square root of 1/2, read as integers
+# inverse_root    an integer: less half the bits of a number it has about the bits of one over its root (Lomont 2003)
 # half_pi, ln2    cut into parts so short that the products with the integers that occur are exact (Cody & Waite 1980)
 # extent          the arguments beyond which e^a is surely 0 or inf
 # single          the arguments for which 2^N is a normal number and, below which, 1 - e^a is 1
@@ -27,6 +28,7 @@ FORMATS = {
         "rounder": 1.5 * 2.0**52,
         "rounder_bits": 0x4338000000000000,
         "root_half_bits": 0x3FE6A09E667F3BCD,
+        "inverse_root": 0x5FE6EC85E7DE30DA,
         "half_pi": (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21),
         "ln2": (0.6931471805592082, 7.371002565167799e-13),
         "extent": (-746.0, 710.0),
@@ -42,6 +44,7 @@ FORMATS = {
         "rounder": 1.5 * 2.0**23,
         "rounder_bits": 0x4B400000,
         "root_half_bits": 0x3F3504F3,
+        "inverse_root": 0x5F375A86,
         "half_pi": (1.5703125, 0.0004825592041015625, 1.2665987014770508e-06, 9.920935184482005e-10),
         "ln2": (0.693115234375, 3.194618329871446e-05),
         "extent": (-105.0, 89.0),
@@ -115,6 +118,13 @@ def _bits(kind, y, x):
 def root(width):
     # Clang's generic square root is one instruction; with one lane (CUDA has no such builtin) so is the ordinary one.
     return "wp::sqrt({})" if width == 1 else "__builtin_elementwise_sqrt({})"
+
+
+def about_inverse_root(real):
+    """C++ that declares R, 1 / sqrt(A) to 7e-6, without a division: half the exponent, then a series in what that leaves."""
+    half = f"{_bits('U', 'N', 'A')} N = {FORMATS[real]['inverse_root']} - (N >> 1); {_bits('V', 'Y', 'N')}"
+    series = "((S)0.5 + E * ((S)0.375 + (S)0.3125 * E))"
+    return f"{half} V E = (S)1.0 - (A * Y) * Y; V R = Y + (Y * E) * {series};"
 
 
 def _rounded(real, x, factor):

@@ -10,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels.lanes.functions import about_inverse_root
 from lgvi_kernels.law import *
 
 # Coefficients of the start of a polynomial's inverse, and rows of one side of it: 1 / its largest value, that value, its
@@ -110,49 +111,102 @@ def make_estrin(sided):
     return sixteen
 
 
-@functools.cache
-def make_polynomial_inverse(powers, sided):
-    """(view, first, polynomials, t, side) -> the w at which a polynomial, which rises up to a largest value, has the value t.
-
-    Beyond the largest value it is where that is. It begins with a polynomial in s, t = (largest value) (1 - (1 - s^2)^2), in
-    which w is smooth where t begins as a square and where it turns; a step of Halley's follows, with one division. first: rows
-    of the inverse; polynomials: first row of the one ahead, with so many powers; sided: whether it is another one astern.
-    """
-    sixteen = make_estrin(sided)
+def make_side_row(sided):
+    """(view, row, astern, side) -> the number ahead where side > 0, else that `astern` rows behind; sided: see make_horner."""
 
     @wp.func
     def side_row(view: Any, row: int, astern: int, side: Any):
-        """A number ahead where side > 0, else the one astern."""
-        value = row1(view, row)
+        value = row1(view, row) * ones(side)
         if wp.static(sided):
             value = positive(side, value, row1(view, row + astern))
         return value
 
-    @wp.func
-    def polynomial_inverse(view: Any, first: int, polynomials: int, t: Any, side: Any):
-        unity = ones(t)
-        zero = unity - unity
-        half = view.h.dtype(0.5)
-        astern = wp.static(INVERSE_ROWS)
-        highest = side_row(view, first + 2, astern, side) * unity
-        slope_floor = side_row(view, first + 3, astern, side) * unity
-        value = least(t, side_row(view, first + 1, astern, side) * unity)
-        part = least(value * side_row(view, first, astern, side), unity)
-        # Round-off of s near 0 is repaired by the step.
-        s = root(unity - root(unity - part))
-        w = clamp(sixteen(view, first + 4, astern, side, s + s - unity), zero, highest)
-        # The polynomial is w g, its slope g + w g', and that of the slope 2 (g' + w g''/2).
-        g = side_row(view, polynomials + wp.static(powers - 1), wp.static(powers), side) * unity
-        g_slope = zero
-        g_bend = zero
-        for i in range(wp.static(powers - 1)):
-            g_bend = fused(g_bend, w, g_slope)
-            g_slope = fused(g_slope, w, g)
-            g = fused(g, w, side_row(view, polynomials + wp.static(powers - 2) - i, wp.static(powers), side) * unity)
-        slope = greatest(fused(w, g_slope, g), slope_floor)
-        short = value - w * g
-        # slope^2 + short slope' / 2, which is positive near a solution.
-        below = greatest(fused(short, fused(w, g_bend, g_slope), slope * slope), half * slope * slope)
-        return clamp(w + short * slope / below, zero, highest)
+    return side_row
 
-    return polynomial_inverse
+
+def make_derived(terms, powers, side_row):
+    """(view, row, z, side) -> c1 + c2 z + ..., coefficients every second row, its slope, and half of that of its slope."""
+
+    @wp.func
+    def derived(view: Any, row: int, z: Any, side: Any):
+        value = side_row(view, row + wp.static(2 * (terms - 1)), wp.static(powers), side)
+        slope = z - z
+        bend = slope
+        for k in range(wp.static(terms - 1)):
+            bend = fused(bend, z, slope)
+            slope = fused(slope, z, value)
+            value = fused(value, z, side_row(view, row + wp.static(2 * (terms - 2)) - 2 * k, wp.static(powers), side))
+        return value, slope, bend
+
+    return derived
+
+
+@functools.cache
+def make_polynomial_inverses(powers, sided, odd):
+    """(view, first, polynomials, t, u, side, other) -> the places where a rising polynomial has the values t and u.
+
+    Beyond the largest value it is the place of that. It begins with a polynomial in s, t = (largest value) (1 - (1 - s^2)^2),
+    in which the inverse is smooth where t begins as a square and where it turns; a step of Halley's follows.
+    Both values go through this side by side: what one waits for costs no time. first: rows of the inverse; polynomials: first
+    row of the one ahead, with so many powers; side, other: of t and u; sided: whether it is another one astern; odd: whether
+    it has odd powers alone, which changes no bit.
+    """
+    sixteen, side_row = make_estrin(sided), make_side_row(sided)
+    of_odd, of_even = (make_derived(max(terms, 1), powers, side_row) for terms in (powers - powers // 2, powers // 2))
+
+    @wp.func
+    def begun(view: Any, first: int, t: Any, side: Any):
+        """The start of the inverse."""
+        astern = wp.static(INVERSE_ROWS)
+        unity = ones(t)
+        part = least(t * side_row(view, first, astern, side), unity)
+        # s^2 = part / (1 + v), v^2 = 1 - part, which loses no digits near 0. At the turn, v = 0, it counts little how far v is
+        # off, and much how far s is: hence a step of Newton's.
+        half = view.h.dtype(0.5) * unity
+        rest = unity - part
+        square = part * fused(rest, about_inverse_root(rest), unity)
+        inverse = about_inverse_root(square)
+        s = part * fused(inverse, fused(half * square, -(inverse * inverse), half), inverse)
+        w = sixteen(view, first + 4, astern, side, fused(s, unity + unity, -unity))
+        return clamp(w, unity - unity, side_row(view, first + 2, astern, side))
+
+    @wp.func
+    def stepped(view: Any, first: int, polynomials: int, t: Any, w: Any, side: Any):
+        """w after a step of Halley's towards t."""
+        astern = wp.static(INVERSE_ROWS)
+        half = view.h.dtype(0.5)
+        # The polynomial is w a(z) + z b(z), z = w^2: its value over w, its slope, and half of the slope of that. Products
+        # are joined with sums here, and not by the compiler, which may choose otherwise where a curve is odd.
+        z = w * w
+        a, a_slope, a_bend = of_odd(view, polynomials, z, side)
+        twice = a_bend + a_bend
+        over = a
+        slope = fused(z + z, a_slope, a)
+        bend = w * fused(z, twice + twice, a_slope + a_slope + a_slope)
+        if wp.static(powers > 1 and not odd):
+            # Of an odd curve this adds exactly 0.
+            b, b_slope, b_bend = of_even(view, polynomials + 1, z, side)
+            twice = b_bend + b_bend
+            more = fused(z, twice + twice, b_slope + b_slope + b_slope + b_slope + b_slope)
+            over = fused(w, b, a)
+            slope = fused(w + w, fused(z, b_slope, b), slope)
+            bend = fused(z, more, bend) + b
+        slope = greatest(slope, side_row(view, first + 3, astern, side))
+        short = fused(w, -over, t)
+        # slope^2 + short slope' / 2, which is positive near a solution.
+        below = greatest(fused(short, bend, slope * slope), half * slope * slope)
+        w = w + short * slope / below
+        return clamp(w, w - w, side_row(view, first + 2, astern, side))
+
+    @wp.func
+    def polynomial_inverses(view: Any, first: int, polynomials: int, t: Any, u: Any, side: Any, other: Any):
+        astern = wp.static(INVERSE_ROWS)
+        t = least(t, side_row(view, first + 1, astern, side))
+        u = least(u, side_row(view, first + 1, astern, other))
+        v = begun(view, first, t, side)
+        w = begun(view, first, u, other)
+        v = stepped(view, first, polynomials, t, v, side)
+        w = stepped(view, first, polynomials, u, w, other)
+        return v, w
+
+    return polynomial_inverses

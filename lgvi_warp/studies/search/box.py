@@ -42,6 +42,9 @@ class SearchBox:
         if not isinstance(bounds, Mapping) or not bounds:
             faults.add(key, bounds, "maps no names to bounds", f"give {example}")
         for name, pair in bounds.items() if not faults else ():
+            if not isinstance(name, str):
+                faults.add(key, name, "is no name of a number", f"give {example}")
+                continue
             with faults.including():
                 scene_value(scene, name, key)
             values = tuple(pair) if isinstance(pair, list | tuple | np.ndarray) else ()

@@ -117,7 +117,7 @@ def ranks(table: SweepTable, at: Mapping[str, Any] | None) -> list[dict[str, Any
         if not any(table.record(cell).refused for cell in cells):
             shares[case] = np.mean([table.passed(cell) for cell in cells], axis=0)
     pairs = list(itertools.combinations(shares, 2))
-    tests = [_share_test(shares[a], shares[b], single, table.confidence) for a, b in pairs]
+    tests = [_share_test(shares[a], shares[b], single, table) for a, b in pairs]
     p = paired.holm(np.array([test.p for test in tests]))
     tested = {pair: (d.lower, d.upper, level) for pair, d, level in zip(pairs, tests, p, strict=True)}
     tested |= {(b, a): (-upper, -lower, level) for (a, b), (lower, upper, level) in tested.items()}
@@ -128,7 +128,7 @@ def ranks(table: SweepTable, at: Mapping[str, Any] | None) -> list[dict[str, Any
             least, most, level = tested[rival, case]
             if level < 1.0 - table.confidence:
                 better[rival] = f"{rival} by {100.0 * least:.4g} to {100.0 * most:.4g} points"
-        passing = _mean_share(share, table.confidence)
+        passing = _mean_share(share, table)
         if single:
             passing = probability(int(share.sum()), len(share), table.confidence, table.interval)
         rows.append({"rank": len(rows) + 1, "case": case, **passing._asdict(), "better_than": ", ".join(better),
@@ -136,12 +136,27 @@ def ranks(table: SweepTable, at: Mapping[str, Any] | None) -> list[dict[str, Any
     return rows
 
 
-def _share_test(a: np.ndarray, b: np.ndarray, single: bool, confidence: float) -> paired.Difference:
+def _share_test(a: np.ndarray, b: np.ndarray, single: bool, table: SweepTable) -> paired.Difference:
     if single:
-        return paired.proportions(int((a > b).sum()), int((b > a).sum()), len(a), confidence)
-    return paired.means(a, b, confidence)
+        return paired.proportions(int((a > b).sum()), int((b > a).sum()), len(a), table.confidence)
+    d = paired.means(a, b, table.confidence)
+    if d.lower < d.upper:
+        return d
+    # All members differ by as much: so many may do otherwise, and by anything; the test is that of signs.
+    others = _unseen(len(a), table)
+    lower, upper = d.value - others * (1.0 + d.value), d.value + others * (1.0 - d.value)
+    return d._replace(lower=lower, upper=upper, p=min(1.0, 2.0 * 0.5 ** len(a)) if d.value else 1.0)
 
 
-def _mean_share(share: np.ndarray, confidence: float) -> Probability:
-    d = paired.means(np.zeros(len(share)), share, confidence)
-    return Probability(d.value, max(0.0, d.lower), min(1.0, d.upper))
+def _mean_share(share: np.ndarray, table: SweepTable) -> Probability:
+    d = paired.means(np.zeros(len(share)), share, table.confidence)
+    if d.lower < d.upper:
+        return Probability(d.value, max(0.0, d.lower), min(1.0, d.upper))
+    # All members pass as many points: Student's t knows no others.
+    others = _unseen(len(share), table)
+    return Probability(d.value, d.value * (1.0 - others), d.value + others * (1.0 - d.value))
+
+
+def _unseen(count: int, table: SweepTable) -> float:
+    """The upper limit of the part of the members that do what none of so many did."""
+    return probability(0, count, table.confidence, table.interval).upper

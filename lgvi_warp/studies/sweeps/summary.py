@@ -65,7 +65,7 @@ def _in_full(sweep: Sweep) -> list[str]:
     lines += ["", "## What failures go with", ""]
     causes = [f"- {names_of(cells)}: {text}" for cells in groups if (text := _causes_text(sweep, cells[0]))]
     lines += causes or ["- With nothing that varies, as far as seen."]
-    return [*lines, "", "## Worst members", "", *(f"- {text}" for text in _worst_texts(sweep, 5))]
+    return [*lines, "", "## Worst members", "", *(f"- {text}" for text in _worst_texts(sweep, 5, groups))]
 
 
 def _brief(sweep: Sweep) -> list[str]:
@@ -78,7 +78,9 @@ def _brief(sweep: Sweep) -> list[str]:
     for case in list(ranked)[:MOST_CASES]:
         ends = sorted((sweep.passed(cell).mean(), cell.index) for cell in sweep.cells_of(case))
         text = f"{ranked[case]['rank']}. {_rank_text(ranked[case])}"
-        if len(ends) > 1:
+        if len(ends) > 1 and ends[0][0] == ends[-1][0]:
+            text += f"; {percent(ends[0][0])} % at each point"
+        elif len(ends) > 1:
             text += f"; from {percent(ends[0][0])} %{_at([sweep.cells[ends[0][1]].point])} to {percent(ends[-1][0])} %"
         lines.append(text + _tally([row for row in rows if row.second == case], sweep.baseline))
     if (others := len(ranked) - MOST_CASES) > 0:
@@ -88,7 +90,7 @@ def _brief(sweep: Sweep) -> list[str]:
         reason, count = refused.most_common(1)[0]
         lines.append(f"- {refused.total()} cells are refused, {count} of them: {reason}")
     lines += [f"- {text}" for text in _causes_of_all(sweep, groups)]
-    lines.append(f"- worst: {'; '.join(_worst_texts(sweep, 3))}")
+    lines.append(f"- worst: {'; '.join(_worst_texts(sweep, 3, groups))}")
     if same:
         lines.append(f"- {same} cells are as another one, to the bit: such as {names_of(max(groups, key=len))}")
     return [*lines, "", "table.csv has a line for each cell, comparison.csv all differences."]
@@ -142,10 +144,14 @@ def _tally(rows: Sequence[PairedComparison], baseline: str) -> str:
     return f"; beside {baseline}: {', '.join(counts)}"
 
 
-def _worst_texts(sweep: Sweep, count: int) -> Iterable[str]:
-    for row in sweep.worst(count):
-        at = _at([{name: row[name] for name in sweep.setup.axes}])
-        yield f"member {row['member']} of {row['case']}{at}, status {Status(row['status']).name.lower()}"
+def _worst_texts(sweep: Sweep, count: int, groups: Sequence[Sequence[SweepCell]]) -> Iterable[str]:
+    """The worst members; of cells that are alike, those of the first."""
+    again = {cell.index for cells in groups for cell in cells[1:]}
+    rows = sweep.worst(count * (1 + len(again)))
+    cells = (sweep.cell(row["case"], {name: row[name] for name in sweep.setup.axes}) for row in rows)
+    first = [(row, cell) for row, cell in zip(rows, cells, strict=True) if cell.index not in again]
+    for row, cell in first[:count]:
+        yield f"member {row['member']} of {row['case']}{_at([cell.point])}, status {Status(row['status']).name.lower()}"
 
 
 def _real_causes(sweep: Sweep, cell: SweepCell) -> list[dict[str, Any]]:

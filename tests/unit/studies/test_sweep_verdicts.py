@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
+from lgvi_warp.common.status import Status
 from tests.support.verbs import Study, main
 from tests.unit.studies.test_sweeps import CASES, MASS, METRICS, RISING, N, record, swept
 
@@ -144,3 +145,54 @@ def test_eighteen_cells_in_ten_lines():
     )
     judged = str(replace(many, matters={"success": 100.0}))
     assert "beside soft: 9 equivalent" in judged
+
+
+GRID = {"controller.delay": [0.02, 0.04, 0.06], "heading_pid.ki": [0.1, 0.2, 0.3]}
+ALL_FAIL = record(ends={i: (Status.NON_FINITE, 1.0) for i in range(N)})
+
+
+def test_eighteen_equal_cells_have_one_list_of_worst_members():
+    text = str(swept([record()] * 18, CASES[:2], grid=GRID))
+    assert "1. soft: 70 % (55.16 to 84.84); 70 % at each point" in text
+    assert "from 70 %" not in text
+    (worst,) = [line for line in text.splitlines() if line.startswith("- worst: ")]
+    assert [f"member {i} of soft at controller.delay = 0.02, heading_pid.ki = 0.1" in worst for i in (39, 38, 37)] == [
+        True
+    ] * 3
+    assert "- 17 cells are as another one, to the bit" in text
+    assert "beside soft: 9 not really different" in text
+
+
+@pytest.mark.parametrize(("shown", "share"), [(ALL_FAIL, 0.0), (record(np.full(N, 0.1)), 1.0)])
+def test_members_that_all_do_the_same_leave_an_interval(shown, share):
+    """Wilson's limit for none of forty: that share of all members may do otherwise."""
+    unseen = stats.binomtest(0, N).proportion_ci(0.95, "wilson").high
+    many = swept([shown] * 18, CASES[:2], grid=GRID)
+    for row in many.ranking():
+        ends = (0.0, unseen) if share == 0.0 else (1.0 - unseen, 1.0)
+        assert (row["value"], row["better_than"]) == (share, "")
+        assert (row["lower"], row["upper"]) == pytest.approx(ends)
+
+
+def test_a_case_that_always_fails_is_worse_by_what_is_sure():
+    unseen = stats.binomtest(0, N).proportion_ci(0.95, "wilson").high
+    first, second = swept([record(np.full(N, 0.1))] * 9 + [ALL_FAIL] * 9, CASES[:2], grid=GRID).ranking()
+    assert (first["case"], second["case"]) == ("soft", "stiff")
+    assert first["better_by"] == f"stiff by {100.0 * (1.0 - 2.0 * unseen):.4g} to 100 points"
+
+
+def test_cells_that_failed_in_all_members_have_no_verdict_on_metrics():
+    found = swept([record(), ALL_FAIL], CASES[:2])
+    assert verdicts(found, matters={"success": 1.0, OVERSHOOT: 0.1, IAE: 0.5}) == {
+        "success": "worse", OVERSHOOT: "undecided", IAE: "undecided"}  # fmt: skip
+    both = swept([ALL_FAIL, ALL_FAIL], CASES[:2])
+    assert verdicts(both, matters={"success": 9.0, OVERSHOOT: 0.1}) == {
+        "success": "equivalent", OVERSHOOT: "undecided", IAE: ""}  # fmt: skip
+    assert "soft, stiff: passes 0 to 8.762 % (0 of 40, 0 %)" in str(both)
+
+
+def test_one_cell_has_no_rank_and_no_comparison():
+    text = str(swept([record()], CASES[:1]))
+    assert "- soft: passes" in text
+    assert "## Rank" not in text
+    assert "## Against" not in text

@@ -759,6 +759,8 @@ def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     ({"metrics": "iae heading"}, "metrics = 'iae heading': is no list"),
     ({"metrics": {"type": "iae"}}, "is no list; give [\"overshoot depth\", lw.metrics.IAE(\"heading\")]"),
     ({"metrics": ["depth"]}, "metrics[0] = 'depth': is not one number of each member; give \"overshoot depth\""),
+    ({"metrics": ["iae heading", {"type": "settling_time", "of": "depth", "within": -1.0}]},
+     "metrics[1]: settling_time.within = -1.0: is not positive; give a number above 0"),
     ({"metrics": ["iae heading", lw.statistics.Mean("depth")]}, "metrics[1] = 'mean': is no metric: it is not one number"),
     ({"metrics": ["iae heading", lw.metrics.IAE("heading")]}, "metrics[1] = 'iae heading': is the name of another metric"),
     ({"confidence": 0.0}, "confidence = 0.0: is not between 0 and 1; give 0.95"),

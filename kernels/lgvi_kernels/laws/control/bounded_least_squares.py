@@ -11,7 +11,7 @@ from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.lanes.rotations import solve3
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.efforts import ROWS as effort_rows
-from lgvi_kernels.laws.control.efforts import make_size_for
+from lgvi_kernels.laws.control.efforts import make_command_for
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
@@ -35,7 +35,7 @@ def params(width, real):
 
     sided: whether polynomials astern are others than those ahead; rounds, and sweeps in each.
     """
-    words = ("first", "commands", "count", "shared", "size", "sided", "rounds", "sweeps")
+    words = ("first", "commands", "count", "shared", "size", "sided", "odd", "rounds", "sweeps")
     return struct("BoundedLeastSquares", **dict.fromkeys(words, wp.int32))
 
 
@@ -101,7 +101,7 @@ def solve_blocks(
 @functools.cache
 def made(features):
     """The allocation for efforts as of efforts.py, which sweeps before each solution, or "redistributes" alone."""
-    size_for, sweeping = make_size_for(features), "redistributes" not in features
+    command_for, sweeping = make_command_for(features), "redistributes" not in features
 
     @wp.func
     def sweep(y: Any, p: Any, channels: int, r: Any, clipped: Any):
@@ -233,9 +233,8 @@ def made(features):
             turning = turning + (effort - t) * row3(y, at + 3)
             c = positive(t, row1(y, at + 7), row1(y, at + 8))
             # A side without thrust has the coefficient 0, and gets no command.
-            part = positive(c, absolute(t) / positive(c, c, unity), absolute(t))
-            size = least(row1(y, at + 6), positive(part, size_for(y, p, i, part, t) + row1(y, at + 9), part))
-            remember(y, p.commands + i, positive(t, size, -size))
+            remember(y, p.commands + i, positive(c, t / positive(c, c, unity), t))
+        command_for(y, p, channels, wp.static(ROWS))
         first = p.first + wp.static(REST)
         wanted = by_priority(y, first, w.force)
         turned = by_priority(y, first + 3, w.torque)

@@ -8,7 +8,7 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.control.efforts import ROWS, make_size_for
+from lgvi_kernels.laws.control.efforts import ROWS, make_command_for
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
@@ -22,9 +22,9 @@ REST = rest_rows
 def params(width, real):
     """Params: first rows of the table and of the commands; count; sets; shared: rows before the curves; size: of a curve.
 
-    sided: whether polynomials astern are others than those ahead.
+    sided: whether polynomials astern are others than those ahead; odd: whether they are the same, with odd powers alone.
     """
-    words = ("first", "commands", "count", "sets", "shared", "size", "sided")
+    words = ("first", "commands", "count", "sets", "shared", "size", "sided", "odd")
     return struct("PseudoInverse", **dict.fromkeys(words, wp.int32))
 
 
@@ -40,7 +40,7 @@ def made(features):
 
     The feature "lost" says that channels may be known to be lost.
     """
-    loses, size_for = "lost" in features, make_size_for(features)
+    loses, command_for = "lost" in features, make_command_for(features)
 
     @wp.func
     def allocate_efforts(w: Any, y: Any, p: Any):
@@ -74,9 +74,7 @@ def made(features):
             # A side without thrust has the coefficient 0, and gets no command.
             wanted = positive(c, absolute(effort) / c, zero)
             t = least(positive(effort, row1(y, at + 12), row1(y, at + 13)), wanted)
-            # In this order what is no number stays so, and the tick sees it.
-            size = least(row1(y, at + 6), positive(t, size_for(y, p, i, t, effort) + row1(y, at + 9), t))
-            remember(y, p.commands + i, positive(effort, size, -size))
+            remember(y, p.commands + i, positive(effort, t, -t))
             # Nothing is cut off, to the last digit, where the curve reaches the effort: anti-windup looks at the sign.
             cut = absolute(effort) - c * t
             cut = positive(wanted - t, cut, zero)
@@ -84,6 +82,7 @@ def made(features):
             cut = positive(effort, cut, -cut)
             undelivered.force = undelivered.force + cut * row3(y, at)
             undelivered.torque = undelivered.torque + cut * row3(y, at + 3)
+        command_for(y, p, channels, wp.static(ROWS))
         return undelivered
 
     return device(__name__, features, params=params, allocate=allocate_efforts)

@@ -64,6 +64,30 @@ def test_a_trilinear_current_in_time_is_exact():
     np.testing.assert_allclose(known[0, 0], u(*result.position[-1, 0], 100.0), rtol=1e-12)
 
 
+ORDERS = {"phi": 1, "psi": 2, "psi_s": 2, "psi_1": 2, "psi_x": 2, "psi_x8": 2, "psi_w": 2, "rk4": 4, "rk5": 5}
+
+
+@pytest.mark.parametrize(
+    "method", [pytest.param(name, marks=() if name in ("psi_s", "rk4") else pytest.mark.slow) for name in ORDERS]
+)
+def test_within_a_cell_each_method_keeps_its_order(method):
+    def u(x, y, z, t):
+        steady = np.array([0.2 + 0.01 * y + 1e-4 * x * z, 0.1 - 2e-4 * x * y, 0.001 * z + 5e-4 * x])
+        return steady * (1.0 + 0.02 * t)
+
+    ends = np.meshgrid([-60.0, 60.0], [-60.0, 60.0], [0.0, 40.0], indexing="ij")
+    values = np.stack([np.stack(u(*ends, t), axis=-1) for t in (0.0, 50.0)])
+    field = lw.terms.CurrentField(
+        velocities=values, origin=[-60.0, -60.0, 0.0], spacing=[120.0, 120.0, 40.0], times=[0.0, 50.0]
+    )
+    start = np.array([-20.0, 10.0, 12.0])
+    path = solve_ivp(lambda t, b: u(*b, t), (0.0, 20.0), start, method="DOP853", rtol=1e-13, atol=1e-13)
+    fleet = one(scene(field), b=start, nu=u(*start, 0.0))
+    errors = [np.abs(last(lw.solve(fleet, method, h=h, t1=20.0))[0] - path.y[:, -1]).max() for h in (1.0, 0.5)]
+    # Below 1e-12 of 20 m it is round-off of both.
+    assert errors[1] < 2e-11 or errors[0] / errors[1] > 2.0 ** (ORDERS[method] - 0.1), errors
+
+
 def test_outside_the_grid_and_its_times_the_nearest_holds():
     field = lw.terms.CurrentField(
         velocities=np.array([0.1, 0.3])[:, None, None, None, None] * np.ones((1, 1, 1, 1, 3)),

@@ -170,7 +170,7 @@ def _navigation(few: Result, counted: np.ndarray, text: str) -> Iterator[Fan]:
     """Fans of how far members are from where their filters believe, and of NEES, as far as it was saved."""
     if {"measured_position", "estimate_sigma"} <= set(few.samples):
         off = np.linalg.norm(few.measured_position - few.position, axis=-1)
-        title = f"Off the estimated place [m] of {text}"
+        title = f"Off the estimated place [m] of {text}; orange: as filters believe"
         yield Fan(OFF, title, "m", at_levels(off, counted, LEVELS), believed_sigma(few, counted))
     if "nees" in few.samples:
         yield Fan("nees", f"NEES, 15 for a right filter, of {text}", "1", at_levels(few.nees, counted, LEVELS))

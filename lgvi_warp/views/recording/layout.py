@@ -74,7 +74,7 @@ def _right(runs: list[Drawn]) -> Any:
         limits = _limits(np.concatenate([fan.levels for fan in group], axis=1))
         # All have the same legend; it would cover their curves.
         below = _high(group[0], limits)
-        views[name] = _curve(f"curves/{name}", group[0].title, all_times, limits, name in ("height", OFF), below)
+        views[name] = _curve(f"curves/{name}", group[0].title, all_times, limits, name == "height", below)
     height = views.pop("height")
     energies = [views[name] for name in ("energy", ENERGY_USED) if name in views]
     motion = rrb.Tabs(views["speed"], *energies, active_tab=0)

@@ -264,7 +264,7 @@ class Guidance(Part):
 
     section: ClassVar[str] = "guidance"
     kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
-        "altitude", "reference_model", "set_point", "trajectory", "waypoints"
+        "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
 
 

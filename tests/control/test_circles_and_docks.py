@@ -173,7 +173,7 @@ def test_a_steady_circle_is_as_far_off_as_the_heading_and_the_course_tell():
     start = lw.Start(position=(3.0, 6.0, 4.0), attitude=lw.notation.matrix_from_rotation_vector([0, 0, np.pi]),
                      velocity=(1.0, 0.0, 0.0))  # fmt: skip
     save = lw.SaveAt(every=T, fields=("position", "attitude", "velocity", "reference_attitude", "demand"))
-    r = lw.solve(scene(lw.control.Loiter(**circle), start=start), "psi_s", h=H, t1=200.0, save=save)
+    r = lw.solve(scene(lw.control.Loiter(**circle), start=start), "psi_s", h=H, t1=300.0, save=save)
     b, R = r.position[-200:, 0], r.attitude[-200:, 0]
     angle, distance = turns_about(b, np.array(circle["center"]))
     assert np.ptp(distance) < 1e-6

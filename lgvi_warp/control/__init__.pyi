@@ -16,6 +16,7 @@ from lgvi_warp.control.heading_pid import HeadingPID as HeadingPID
 from lgvi_warp.control.heading_smc import HeadingSMC as HeadingSMC
 from lgvi_warp.control.heave_pid import HeavePID as HeavePID
 from lgvi_warp.control.imu import IMU as IMU
+from lgvi_warp.control.linear_mpc import LinearMPC as LinearMPC
 from lgvi_warp.control.loiter import Loiter as Loiter
 from lgvi_warp.control.low_pass import LowPass as LowPass
 from lgvi_warp.control.matrix import AllocationMatrix as AllocationMatrix

@@ -22,10 +22,10 @@ class Docking(Guidance):
 
     With e the way to starboard off the centre line and D the look-ahead, the wanted heading is the dock's less
     atan((e + kappa J) / D), where J gains D e / (D^2 + (e + kappa J)^2) a second, as of `Waypoints` with "ilos". The pace over
-    ground falls from `speed`, `slowing` before the dock, to `contact_speed` at it, evenly with the distance. The funnel has the
-    radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is outside within `judged` of the
-    dock goes round: to the place `offset` to starboard of where the line begins, `approach` before the dock, and from there on
-    along the line again. Once in the mouth at the dock's plane it is docked: speed 0, and the dock's place and heading.
+    ground falls from `speed`, `slowing` before the dock, to `contact_speed` at it, evenly with the distance. The funnel has
+    the radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is outside within `judged` of
+    the dock goes round: to the place `offset` to starboard of where the line begins, `approach` before the dock, and from
+    there along the line again. Once in the mouth at the dock's plane it is docked: speed 0, and the dock's place and heading.
 
     Args:
         position: The dock, (3,) [m], inertial axes: the middle of its mouth.
@@ -38,8 +38,8 @@ class Docking(Guidance):
         funnel: Half the opening angle of the funnel [rad], at most 1.5.
         approach: How far before the dock the line begins [m].
         judged: How far before the dock the funnel begins to count [m], at most `approach`.
-        offset: How far to starboard of the line's beginning vehicles go round to [m]; twice the radius of a turn lets them come
-            out of it on the line. 0 by default.
+        offset: How far to starboard of the line's beginning vehicles go round to [m]; twice the radius of a turn lets them
+            come out of it on the line. 0 by default.
         kappa: Gain of the integral [1/s]; 0.1 by default.
 
     Raises:

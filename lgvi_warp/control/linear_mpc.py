@@ -33,8 +33,8 @@ LONGEST = 20
 class Condensed(NamedTuple):
     """A problem of a horizon in its inputs alone, v (k,), each a part of its limit.
 
-    cost: H (k, k) of v H v / 2 + f v. slope: f = slope (x, d), (k, 2 n). rho: weight of the constraints in an iteration. best:
-    v = best (x, d) without limits. does, fixed: an iteration is v = does q + fixed (x, d), with q (k,) of copies within limits.
+    cost: H (k, k) of v H v / 2 + f v. slope: f = slope (x, d), (k, 2 n). rho: weight of the constraints in an iteration.
+    best: v = best (x, d) without limits. does, fixed: an iteration is v = does q + fixed (x, d), q (k,) of copies within them.
     """
 
     cost: np.ndarray
@@ -117,7 +117,9 @@ class LinearMPC(ControlLaw):
     def check(self, faults: Faults) -> None:
         states = list_of_names(faults, "states", self.states, tuple(COORDINATES))
         inputs = list_of_names(faults, "inputs", self.inputs, COMPONENTS)
-        tracked = states[: len(inputs)] if self.tracked is None else list_of_names(faults, "tracked", self.tracked, states)
+        tracked = (
+            states[: len(inputs)] if self.tracked is None else list_of_names(faults, "tracked", self.tracked, states)
+        )
         for key, names, size in (("states", states, len(self.A)), ("inputs", inputs, self.B.shape[1])):
             if names and len(names) != size:
                 faults.add(key, getattr(self, key), f"are {len(names)}", f"name the {size} of A and B")

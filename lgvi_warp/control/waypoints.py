@@ -56,7 +56,7 @@ class Waypoints(Guidance):
         clockwise: Whether circles go clockwise as seen from above; by default True.
 
     Raises:
-        SceneError: Where the points are no way, times do not rise, circles have no radius, or a radius no circle; and as `Term`.
+        SceneError: Where points are no way, times do not rise, circles have no radius, or a radius no circle; and as `Term`.
 
     Examples:
         >>> import lgvi_warp as lw

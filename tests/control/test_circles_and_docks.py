@@ -43,7 +43,9 @@ def states(n):
 
 def array(numbers):
     """Numbers as a twin takes them."""
-    return {name: np.array(value, float) if isinstance(value, tuple | list) else value for name, value in numbers.items()}
+    return {
+        name: np.array(value, float) if isinstance(value, tuple | list) else value for name, value in numbers.items()
+    }
 
 
 @pytest.mark.parametrize(("part", "twin"), [
@@ -75,7 +77,9 @@ def test_loops_are_those_of_the_twin(name):
     varied = {"docking": "docking.speed", "loiter": "loiter.radius"}.get(name, "waypoints.look_ahead")
     value = float(getattr(part, varied.partition(".")[2]))
     parameters = {varied: np.array([1.0, 1.1, 0.9]) * value}
-    result = lw.solve(lw.Ensemble.from_states(way, *given, parameters), "psi_s", h=H, t1=steps * H, save=lw.SaveAt(every=T))
+    result = lw.solve(
+        lw.Ensemble.from_states(way, *given, parameters), "psi_s", h=H, t1=steps * H, save=lw.SaveAt(every=T)
+    )
     for i in range(3):
         numbers = {key: values[i] for key, values in parameters.items()}
         b, R = twin_states(way, numbers, [x[i] for x in given], EVERY, H, steps)
@@ -110,7 +114,9 @@ def straight(x0, u0, current, pace, t1):
 @pytest.mark.slow_but("0.2")
 def test_it_is_at_its_points_in_time(current):
     times, ends = (2.0, 32.0, 72.0), (0.0, 18.0, 50.0)
-    way = lw.control.Waypoints(points=[(x, 0.0, 2.0) for x in ends], times=times, speed=1.5, look_ahead=2.0, radius=1e-6)
+    way = lw.control.Waypoints(
+        points=[(x, 0.0, 2.0) for x in ends], times=times, speed=1.5, look_ahead=2.0, radius=1e-6
+    )
     start = lw.Start(position=(0.0, 0.0, 2.0), velocity=(current, 0.0, 0.0))
     r = lw.solve(scene(way, (current, 0.0, 0.0), start=start), "rk8", h=H, t1=80.0, save=lw.SaveAt(every=T))
     leg = 0
@@ -160,7 +166,9 @@ def test_a_circle_is_left_after_its_turns(clockwise):
         lasted = (len(ticks)) * T
         enough = turned >= wanted - 1e-9, np.arange(len(b)) * T >= own["waypoints.loiter_time"][i, 1] - 1e-9
         # It goes on at the first tick at which both are reached.
-        assert enough[0][-1] and enough[1][-1] and not (enough[0][-2] and enough[1][-2])
+        assert enough[0][-1]
+        assert enough[1][-1]
+        assert not (enough[0][-2] and enough[1][-2])
         assert lasted >= own["waypoints.loiter_time"][i, 1] - 1e-9
         # On the circle: off it by what the heading is off in a steady turn, which the law has no integral against.
         assert np.abs(distance[200:] - 4.0).max() < 0.5
@@ -201,13 +209,16 @@ def test_a_circle_that_is_too_small_is_gone_round_outside():
     laws = [lw.control.DepthPID(kp=0.1, kp_pitch=5.0, kd_pitch=2.0), lw.control.HeadingPID(kp=1.0, kd=2.0)]
     fins = lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
     controller = lw.Controller(period=0.1, guidance=[way], laws=laws, allocation=[fins])
-    remus = lw.Scene.named("remus_100", start={"position": [0, 0, 10.0], "velocity": [1.5, 0, 0]}, controller=controller)
+    remus = lw.Scene.named(
+        "remus_100", start={"position": [0, 0, 10.0], "velocity": [1.5, 0, 0]}, controller=controller
+    )
     r = lw.solve(remus, "psi_x", h=0.05, t1=350.0, save=lw.SaveAt(every=0.1))
     assert r.status[0] == lw.Status.OK
     angle, distance = turns_about(r.position[:, 0], np.array((100.0, 0.0)))
     there = distance < 40.0
     assert np.ptp(angle[there]) > 4.0 * np.pi - 0.2
-    assert distance[there].min() < 15.0 and r.position[-1, 0, 1] > 100.0
+    assert distance[there].min() < 15.0
+    assert r.position[-1, 0, 1] > 100.0
 
 
 def funnels(b, numbers):
@@ -264,7 +275,10 @@ def test_it_docks_or_goes_round(docked):
 
 
 def test_contacts_are_those_of_the_path(docked):
-    values = {of: docked.statistics[f"each dock_contact {of}"].value[0, 0] for of in ("speed", "offset", "heading_error", "time")}
+    values = {
+        of: docked.statistics[f"each dock_contact {of}"].value[0, 0]
+        for of in ("speed", "offset", "heading_error", "time")
+    }
     for i in range(docked.members):
         b, R, v = (docked.samples[name][:, i] for name in ("position", "attitude", "velocity"))
         left, outside = funnels(b, DOCK)
@@ -287,7 +301,9 @@ def test_a_contact_of_a_cubic_path_is_exact():
     """left(t) = 1 - t^3 / 8 m meets the plane at 2 s; ticks of 0.3 s see only pieces of it."""
     t = np.arange(0.0, 3.1, 0.3)
     aside, below, turn = 0.3 - 0.1 * t, 0.05 * t, 0.2 + 0.1 * t
-    x = np.stack([1.0 - t**3 / 8.0, aside, below, -3.0 * t**2 / 8.0, -0.1 + 0 * t, 0.05 + 0 * t, turn, 0.5 + 0 * t], axis=1)
+    x = np.stack(
+        [1.0 - t**3 / 8.0, aside, below, -3.0 * t**2 / 8.0, -0.1 + 0 * t, 0.05 + 0 * t, turn, 0.5 + 0 * t], axis=1
+    )
     # A second member misses the mouth, a third meets the plane twice, a fourth never.
     missed, twice, never = x.copy(), x.copy(), x.copy()
     missed[:, 1] += 1.0
@@ -306,7 +322,7 @@ def test_a_contact_of_a_cubic_path_is_exact():
     ("Waypoints", WAY | {"times": (0, 2, 3)}, r"waypoints.times.*give 4 numbers"),
     ("Waypoints", WAY | {"loiter_turns": (0, 1, 0, 0)}, r"waypoints.loiter_radius = None: is missing; give the radius"),
     ("Waypoints", WAY | {"at_end": "loiter"}, r"waypoints.loiter_radius = None: is missing"),
-    ("Waypoints", WAY | {"loiter_radius": 3.0}, r"waypoints.loiter_radius = 3.0: is given, and nothing is circled; give loiter"),
+    ("Waypoints", WAY | {"loiter_radius": 3.0}, r"waypoints.loiter_radius = 3.0: is given, and nothing is circled"),
     ("Waypoints", CIRCLES | {"loiter_turns": (1, 1, 0, 0)}, r"waypoints.loiter_turns\[0\] = 1.0: is of the first point"),
     ("Waypoints", CIRCLES | {"at_end": "go_on"}, r"waypoints.loiter_turns\[3\] = 0.5: is of the last point"),
     ("Waypoints", CIRCLES | {"loiter_turns": (0, -1, 0, 0)}, r"waypoints.loiter_turns.*out of bounds"),
@@ -322,7 +338,7 @@ def test_bad_input(part, numbers, words):
 
 
 def test_a_contact_needs_a_dock():
-    with pytest.raises(lw.SceneError, match="dock_contact.of = 'depth': is nothing that is known at a dock"):
+    with pytest.raises(lw.SceneError, match=r"dock_contact\.of = 'depth': is nothing that is known at a dock"):
         lw.metrics.DockContact("depth")
     with pytest.raises(lw.SceneError, match="needs a guidance docking of the name 'docking'"):
         lw.solve(scene(lw.control.Loiter(**CIRCLE)), h=H, t1=1.0, statistics=[lw.metrics.DockContact("speed")])
@@ -360,4 +376,5 @@ def test_one_many_and_float32(part):
     short = lw.solve(fleet, "psi_s", h=H, t1=12.0, save=lw.SaveAt(every=4.0), dtype="float32")
     apart = np.abs(short.position - many.position).max(axis=(0, 2))
     # Round-off of float32 but for members that change their leg a tick apart, some 0.1 m of way.
-    assert np.mean(apart < 1e-3) > 0.95 and apart.max() < 0.5
+    assert np.mean(apart < 1e-3) > 0.95
+    assert apart.max() < 0.5

@@ -61,7 +61,9 @@ class DockContact(Metric):
 
     def meant(self) -> Quantity:
         if not isinstance(self.of, str) or self.of not in KNOWN:
-            raise refusal("dock_contact.of", self.of, "is nothing that is known at a dock", closest(str(self.of), KNOWN))
+            raise refusal(
+                "dock_contact.of", self.of, "is nothing that is known at a dock", closest(str(self.of), KNOWN)
+            )
         key = self.docking
 
         def numbers(samples: Fields, members: Members) -> np.ndarray:

@@ -201,7 +201,9 @@ def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], con
     for name, metric in metrics.items():
         dock = getattr(metric, "docking", None)
         if dock is not None and dock not in docks:
-            faults.add(key, name, f"needs a guidance docking of the name {dock!r}", "give [[controller.guidance]] docking")
+            faults.add(
+                key, name, f"needs a guidance docking of the name {dock!r}", "give [[controller.guidance]] docking"
+            )
     if controller is None:
         return
     wishes = {wish for part in controller.guidance for wish in part.gives}

@@ -50,8 +50,8 @@ def mpc(
         The law.
 
     Raises:
-        SceneError: If inputs are no components of a wrench, or states no coordinates of the motion; if a weight is at fault, or
-            no gains hold every state.
+        SceneError: If inputs are no components of a wrench, or states no coordinates of the motion; if a weight is at fault,
+            or no gains hold every state.
 
     Examples:
         >>> import lgvi_warp as lw

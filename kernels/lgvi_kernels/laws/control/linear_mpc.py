@@ -170,6 +170,9 @@ def control(w: Any, r: Any, y: Any, p: Any):
             remember(y, fixed + i, times(y, fixed_of + 2 * n * i, x, 2 * n, zero))
         for _ in range(p.iterations):
             iterate(y, p, limits, does, t, fixed, rhs, before)
+    # A lane leaves nothing behind that others made it calculate.
+    for i in range(3 * k):
+        remember(y, fixed + i, zero)
     for i in range(k):
         best = remembered(y, v + i)
         remember(y, t + i, positive(over, remembered(y, t + i), best))

@@ -47,4 +47,4 @@ class Loiter(Guidance):
         return ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        return Packed(numbers | {"sense": np.full(1, 1.0 if self.clockwise else -1.0)})
+        return Packed({**numbers, "sense": np.full(1, 1.0 if self.clockwise else -1.0)})

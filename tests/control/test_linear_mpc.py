@@ -226,7 +226,7 @@ def test_remus_goes_to_its_depth_by_fins_at_their_limit():
     scene = lw.Scene.named(
         "remus_100", vehicle={"buoyancy": 300.0}, start={"position": [0, 0, 5.0], "velocity": [1.5, 0, 0]}
     )
-    steady = lw.linear.trim(scene, fixed={"drift": 0.0, "roll": 0.0}, method="psi_x", h=0.05)
+    steady = lw.linear.trim(scene, method="psi_x", h=0.05)
     model = lw.linear.linearize(scene, steady, period=T, inputs="wrench")
     names = ("position[2]", "rotation[1]", "velocity[2]", "angular_velocity[1]")
     part = lw.linear.mpc(model.part(names, ("M",)), Q=[1.0, 3.0, 0.0, 0.3], R=[0.02], limit=[4.0], rate_limit=[10.0],

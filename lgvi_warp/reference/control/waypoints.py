@@ -2,6 +2,7 @@
 """Guidance along waypoints by line of sight."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,10 @@ class Waypoints(Part):
     """Numbers as those of `lw.control.Waypoints`."""
 
     method, kappa, gamma, at_end = "los", 0.1, 0.002, "stop"
-    times = loiter_radius = loiter_turns = loiter_time = None
+    times: Any = None
+    loiter_radius: Any = None
+    loiter_turns: Any = None
+    loiter_time: Any = None
     clockwise = True
 
     def begin(self) -> None:

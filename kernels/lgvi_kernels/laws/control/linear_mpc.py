@@ -15,9 +15,9 @@ from lgvi_kernels.laws.control.pose_error import attitude_error, rate_error, vel
 SEEN = 12
 DEMAND = 6
 
-# Rows of the table, with n states, m inputs and k = horizon m: places of the states, of the inputs; A, B; limits of inputs and of
-# their changes (as parts of these), m each; the best inputs without limits (k, 2 n) of state and disturbance; what they are in
-# an iteration, (k, 2 n); and what an iteration does (k, k).
+# Rows of the table, with n states, m inputs and k = horizon m: places of the states, of the inputs; A, B; limits of inputs and
+# of their changes (as parts of these), m each; the best inputs without limits (k, 2 n) of state and disturbance; what they are
+# in an iteration, (k, 2 n); and what an iteration does (k, k).
 # Rows of the memory: whether it has begun; the state (n), the inputs (m) and the disturbance (n); t of each input (k), and of
 # each change (k).
 
@@ -51,7 +51,7 @@ def place(y: Any, row: int):
 def times(y: Any, row: int, at: int, count: int, total: Any):
     """total + a line of the table times rows of the memory."""
     for j in range(count):
-        total = fused(row1(y, row + j), remembered(y, at + j), total)
+        total = total + row1(y, row + j) * remembered(y, at + j)
     return total
 
 

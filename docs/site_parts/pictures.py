@@ -57,6 +57,8 @@ MADE = {
     "controllers/depth_keeping.png": of_script("examples/controllers/depth_keeping.py"),
     "controllers/learning.png": of_script("examples/controllers/train_a_policy.py", "1.5"),
     "controllers/lost_bottom.png": of_script("examples/controllers/lost_bottom.py"),
+    "controllers/loiter_and_dock.png": of_script("examples/controllers/loiter_and_dock.py"),
+    "controllers/predictive_depth.png": of_script("examples/controllers/predictive_depth.py"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),
     "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),

@@ -70,9 +70,19 @@ def scene(tmp_path_factory):
             file=file, inputs=inputs, outputs=["Z", "K", "N"], **IDLE["policy"], output_activation="tanh"
         ),
         # Without weights of states and without a disturbance it wants nothing.
-        lw.control.LinearMPC(states=("position[2]", "velocity[2]"), inputs=("Z",), A=[(1.0, 0.1), (0.0, 0.95)],
-                             B=[(1e-4,), (2e-3,)], R=(1e-2,), limit=(10.0,), rate_limit=(60.0,), horizon=5, iterations=10,
-                             disturbance_time=np.inf, **IDLE["linear_mpc"]),
+        lw.control.LinearMPC(
+            states=("position[2]", "velocity[2]"),
+            inputs=("Z",),
+            A=[(1.0, 0.1), (0.0, 0.95)],
+            B=[(1e-4,), (2e-3,)],
+            R=(1e-2,),
+            limit=(10.0,),
+            rate_limit=(60.0,),
+            horizon=5,
+            iterations=10,
+            disturbance_time=np.inf,
+            **IDLE["linear_mpc"],
+        ),
     ]
     guidance = [
         lw.control.Trajectory(times=(0.5, 3.0, 8.0, 12.0), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6), (4, 3, 5)],

@@ -36,7 +36,7 @@ def params(width, real):
 def see(r: Any, y: Any, row: int):
     """Write all errors, measured less wanted."""
     remember3(y, row, y.position - r.position)
-    remember3(y, row + 3, neg(attitude_error(r, y)))
+    remember3(y, row + 3, attitude_error(r, y))
     remember3(y, row + 6, neg(velocity_error(r, y)))
     remember3(y, row + 9, neg(rate_error(r, y)))
 

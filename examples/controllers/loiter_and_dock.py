@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""BlueROV2 heavy sails a way on time, circles about a point, and docks: 24 vehicles in currents of their own go round again."""
+"""BlueROV2 heavy sails a way on time, circles about a point, and docks: 24 vehicles, each in a current of its own."""
 
 import sys
 from pathlib import Path
@@ -51,7 +51,7 @@ def contacts(docked):
 
 
 def ways(docked):
-    """Positions (k, n, 3) up to the dock, and which members turned back: what holds a vehicle there is not part of the scene."""
+    """Positions (k, n, 3) up to the dock, in which nothing holds a vehicle here; and which members turned back."""
     way = np.where((docked.time[:, None] <= contacts(docked)[2])[..., None], docked.position, np.nan)
     return way, np.nanmin(way[..., 0], axis=0) < way[0, :, 0] - 2.0
 

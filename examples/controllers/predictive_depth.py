@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A heavy vehicle with weak thrusters goes to a depth: predictive control overshoots half as far as a PID of the same weights."""
+"""A heavy vehicle with weak thrusters goes to a depth: predictive control beside a PID of the same weights."""
 
 import sys
 from pathlib import Path
-
-import numpy as np
 
 import lgvi_warp as lw
 

@@ -146,7 +146,7 @@ def metrics(quick):
 
 
 def predictive(quick):
-    """A tick of model predictive control of heave beside one of heave_pid: within its limits, and where every tick iterates."""
+    """A tick of predictive control of heave beside one of heave_pid: within its limits, and where every tick iterates."""
     members, steps, rounds = (64, 200, 2) if quick else (512, 500, 7)
     model = lw.linear.linearize(lw.Scene.named("bluerov2_heavy"), period=10 * H, inputs="wrench", method="psi_s", h=H)
     heave = model.part(("position[2]", "velocity[2]"), ("Z",))

@@ -269,7 +269,8 @@ def test_remus_goes_to_its_depth_by_fins_at_their_limit():
     M, delivered = (result.samples["demand"] - share * result.samples["unmet"] for share in (0.0, 1.0))
     M, delivered = M[:, 0, 4], delivered[:, 0, 4]
     assert result.status[0] == lw.Status.OK
-    assert np.abs(M).max() == pytest.approx(2.0, abs=1e-9)
+    # At its limit, up to what the iterations leave.
+    assert 1.99 < np.abs(M).max() <= 2.0 + 1e-9
     # From what acted over the last period.
     assert np.abs(M[1:] - delivered[:-1]).max() <= 10.0 * T + 1e-9
     assert abs(result.position[-1, 0, 2] - 10.0) < 0.02

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import lgvi_warp as lw
-from lgvi_warp.reference.control import docking, loiter, waypoints
+from lgvi_warp.reference.control import docking, loiter, trajectory, waypoints
 from tests.support.loops import torpedo, twin_states
 from tests.unit.statistics.test_metrics import each, number
 
@@ -17,6 +17,8 @@ WAY = dict(points=POINTS, speed=1.0, look_ahead=1.5, radius=0.8)
 CIRCLES = WAY | dict(loiter_radius=2.0, loiter_turns=(0.0, 1.25, 0.0, 0.5), loiter_time=(0.0, 0.0, 9.0, 2.0))
 DOCK = dict(position=(30.0, 5.0, 3.0), heading=0.4, speed=1.2, contact_speed=0.4, slowing=12.0, look_ahead=2.0, mouth=0.4,
             funnel=0.15, approach=18.0, judged=10.0, offset=4.0, kappa=0.3)  # fmt: skip
+STEPS = dict(times=(0.1, 0.2, 0.3), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6)], headings=(0.3, 2.0, -2.5), speed=(1, 2, 0),
+             interpolation="steps")  # fmt: skip
 CIRCLE = dict(center=(3.0, 1.0, 4.0), radius=5.0, speed=1.0, look_ahead=2.0, clockwise=False)
 LAWS = [
     lw.control.SpeedPID(kp=40.0, ki=4.0, drag=20.0),
@@ -52,6 +54,7 @@ def array(numbers):
     (lw.control.Waypoints(**CIRCLES, times=(0.05, 3.0, 9.0, 30.0), clockwise=False),
      waypoints.Waypoints(**array(CIRCLES | dict(times=(0.05, 3.0, 9.0, 30.0))), clockwise=False)),
     (lw.control.Loiter(**CIRCLE), loiter.Loiter(**array(CIRCLE))),
+    (lw.control.Trajectory(**STEPS), trajectory.Trajectory(**array(STEPS))),
     (lw.control.Docking(**DOCK), docking.Docking(**array(DOCK))),
 ], ids=lambda part: part.type if hasattr(part, "type") else "")  # fmt: skip
 @pytest.mark.kernel
@@ -140,6 +143,18 @@ def turns_about(b, center):
     """The angle that a path (k, 3) has turned about a place, clockwise from above, and its distance."""
     out = b[:, :2] - center[:2]
     return np.unwrap(np.arctan2(out[:, 1], out[:, 0])), np.hypot(*out.T)
+
+
+@pytest.mark.slow
+def test_set_points_are_wanted_from_their_times_on():
+    way = lw.control.Trajectory(**STEPS | {"times": (1.0, 2.5, 3.0)})
+    fields = ("reference_position", "reference_velocity", "reference_heading", "reference_speed")
+    r = lw.solve(scene(way), "psi_s", h=H, t1=4.0, save=lw.SaveAt(every=T, fields=fields))
+    which = np.clip(np.searchsorted((1.0, 2.5, 3.0), r.time + 1e-9, side="right") - 1, 0, 2)
+    np.testing.assert_array_equal(r.samples["reference_position"][:, 0], np.array(STEPS["positions"], float)[which])
+    np.testing.assert_allclose(r.samples["reference_heading"][:, 0], np.array(STEPS["headings"])[which], atol=1e-14)
+    np.testing.assert_array_equal(r.samples["reference_speed"][:, 0], np.array(STEPS["speed"], float)[which])
+    assert not r.samples["reference_velocity"].any()
 
 
 @pytest.mark.parametrize("clockwise", [True, False])

@@ -103,6 +103,7 @@ OTHERS = {
                                           mouth=0.5, funnel=0.2, approach=20.0, judged=5.0),
     "LinearMPC": lambda: lw.control.LinearMPC(states=["velocity[2]"], inputs=["Z"], A=[[0.9]], B=[[0.1]], Q=[1.0], R=[1.0],
                                               limit=[9.0]),
+    "Loiter": lambda: lw.control.Loiter(center=V, radius=4.0, speed=1.0, look_ahead=2.0),
     "DockContact": lambda: lw.metrics.DockContact("speed"),
     "Battery": lambda: lw.events.Battery(capacity=3.6e6),
     "Consistency": lambda: lw.metrics.Consistency(*[np.ones(2)] * 3, np.ones((2, 2)), np.ones(2), np.ones((2, 2)), 0.95),

@@ -7,5 +7,6 @@ from lgvi_warp.studies.linear.lqr import Regulator as Regulator
 from lgvi_warp.studies.linear.lqr import lqr as lqr
 from lgvi_warp.studies.linear.margins import Margins as Margins
 from lgvi_warp.studies.linear.margins import margins as margins
+from lgvi_warp.studies.linear.mpc import mpc as mpc
 from lgvi_warp.studies.linear.trim import Trim as Trim
 from lgvi_warp.studies.linear.trim import trim as trim

@@ -8,6 +8,7 @@ from lgvi_warp.statistics.metrics.actuator_metrics import ElectricalEnergy as El
 from lgvi_warp.statistics.metrics.actuator_metrics import SaturationShare as SaturationShare
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure as TimeToFailure
 from lgvi_warp.statistics.metrics.actuator_metrics import Travel as Travel
+from lgvi_warp.statistics.metrics.dock_contact import DockContact as DockContact
 from lgvi_warp.statistics.metrics.filter_metrics import NEES as NEES
 from lgvi_warp.statistics.metrics.filter_metrics import NIS as NIS
 from lgvi_warp.statistics.metrics.nearest import Nearest as Nearest

@@ -84,6 +84,8 @@ MADE = {
     ),
     "controllers/lost_bottom.png": of_script("examples/controllers/lost_bottom.py"),
     "controllers/saturated_thrusters.png": of_script("examples/controllers/saturated_thrusters.py"),
+    "controllers/loiter_and_dock.png": of_script("examples/controllers/loiter_and_dock.py"),
+    "controllers/predictive_depth.png": of_script("examples/controllers/predictive_depth.py"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),
     "guide/beside_others.png": Made(("benchmarks/rows/bars.json", "benchmarks/bars_picture.py"), BARS),

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
@@ -14,7 +14,7 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.declared import word
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, word_of
 
@@ -264,7 +264,7 @@ class Guidance(Part):
 
     section: ClassVar[str] = "guidance"
     kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
-        "altitude", "reference_model", "set_point", "trajectory", "waypoints"
+        "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
 
 
@@ -282,6 +282,7 @@ class ControlLaw(Part):
         "heading_pid",
         "heading_smc",
         "heave_pid",
+        "linear_mpc",
         "policy",
         "pose_pid",
         "pose_smc",
@@ -306,6 +307,17 @@ class ControlLaw(Part):
         law = copy.copy(self)
         object.__setattr__(law, "nominal", nominal)
         return law
+
+
+def list_of_names(faults: Faults, key: str, names: Any, known: Collection[str]) -> list[str]:
+    """Names of a list that are known and occur once; what is wrong with others is noted."""
+    if isinstance(names, str) or not isinstance(names, Sequence) or not names:
+        faults.add(key, names, "is no list of names", f"give some of {', '.join(known)}")
+        return []
+    for i, name in enumerate(names):
+        if faults.choice(f"{key}[{i}]", name, known) and among(name, names[:i]):
+            faults.add(f"{key}[{i}]", name, "is named twice", "leave one of them out")
+    return [name for name in names if among(name, known)]
 
 
 # How a law's integral is kept from growing while actuators are at their limits.

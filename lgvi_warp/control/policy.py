@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.declared import word
-from lgvi_warp.common.errors import Faults, among
+from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.npy_files import of_npz
-from lgvi_warp.control.base import ControlLaw, Numbers, Packed, PackingContext
+from lgvi_warp.control.base import ControlLaw, Numbers, Packed, PackingContext, list_of_names
 from lgvi_warp.physics.terms.base import number
 
 # What a policy may look at, in the device code's order: how many numbers each is, and what must be wanted for it.
@@ -83,8 +83,8 @@ class Policy(ControlLaw):
     checksum: int | None = None
 
     def check(self, faults: Faults) -> None:
-        places = _named(faults, "inputs", self.inputs, {name: name for name in (*INPUTS, *PLACES)})
-        outputs = _named(faults, "outputs", self.outputs, dict.fromkeys(OUTPUTS))
+        places = list_of_names(faults, "inputs", self.inputs, {name: name for name in (*INPUTS, *PLACES)})
+        outputs = list_of_names(faults, "outputs", self.outputs, dict.fromkeys(OUTPUTS))
         if self.scale is not None and len(self.scale) != len(outputs):
             faults.add(
                 "scale", self.scale, f"has {len(self.scale)} numbers", f"give {len(outputs)}, one for each output"
@@ -136,17 +136,6 @@ class Policy(ControlLaw):
         words |= {"hidden": FUNCTIONS.index(self.activation), "last": FUNCTIONS.index(self.output_activation)}
         scales = {"force": wrench[:, :3], "torque": wrench[:, 3:]}
         return Packed(words | scales, rows[None], work=len(PLACES) + len(OUTPUTS) + 2 * widest)
-
-
-def _named(faults: Faults, key: str, names: Any, known: dict[str, Any]) -> list[str]:
-    """Names of a list that are known and occur once."""
-    if isinstance(names, str) or not isinstance(names, Sequence) or not names:
-        faults.add(key, names, "is no list of names", f"give some of {', '.join(known)}")
-        return []
-    for i, name in enumerate(names):
-        if faults.choice(f"{key}[{i}]", name, known) and among(name, names[:i]):
-            faults.add(f"{key}[{i}]", name, "is named twice", "leave one of them out")
-    return [name for name in names if among(name, known)]
 
 
 def _read(faults: Faults, file: Any) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -14,7 +14,7 @@ from lgvi_warp.control.base import Guidance, Numbers, Packed, PackingContext
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import number
 
-INTERPOLATIONS = ("linear", "cubic")
+INTERPOLATIONS = ("linear", "cubic", "steps")
 # The largest rate between two times, in the unit of the numbers / s: beyond it squares of float32 are infinite.
 FASTEST = 1e15
 
@@ -29,9 +29,11 @@ class Trajectory(Guidance):
         times: Times (k,) [s], rising, at least two.
         positions: Wanted positions (k, 3) [m], inertial axes.
         headings: Wanted headings (k,) [rad]; from each to the next the short way round. Not wanted by default.
-        speed: Wanted speeds ahead through the water (k,) [m/s]; by default the size of the wanted velocity.
+        speed: Wanted speeds ahead through the water (k,) [m/s]; by default the size of the wanted velocity. Straight from one
+            to the next, or in steps, too.
         interpolation: "linear", the default: straight from place to place; or "cubic": by natural cubic splines, whose
-            velocities have no jumps within the times.
+            velocities have no jumps within the times; or "steps": set-points, each wanted from its time to the next one, at
+            rest.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -56,6 +58,8 @@ class Trajectory(Guidance):
         if len(self.times) < 2:
             faults.add("times", self.times, "are less than two", "give when the trajectory begins and when it ends")
         spans = np.diff(self.times)
+        if self.interpolation == "steps":
+            return
         for name in ("positions", "headings", "speed"):
             values = getattr(self, name)
             if values is not None:
@@ -98,9 +102,10 @@ def _pieces(t: np.ndarray, values: np.ndarray, interpolation: str) -> np.ndarray
         from scipy.interpolate import CubicSpline
 
         coefficients[:-1] = CubicSpline(t, values, bc_type="natural").c[::-1].transpose(1, 0, 2)
-    else:
+    elif interpolation == "linear":
         coefficients[:-1, 1] = np.diff(values, axis=0) / np.diff(t)[:, None]
     # A speed goes straight from one to the next.
     coefficients[:-1, 1:, -1] = 0.0
-    coefficients[:-1, 1, -1] = np.diff(values[:, -1]) / np.diff(t)
+    if interpolation != "steps":
+        coefficients[:-1, 1, -1] = np.diff(values[:, -1]) / np.diff(t)
     return np.concatenate([t[:, None], coefficients.reshape(k, -1)], axis=1)[None]

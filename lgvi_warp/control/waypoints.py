@@ -10,16 +10,20 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.declared import array, word
+from lgvi_warp.common.declared import array, flag, word
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.control.base import Guidance, Numbers, Packed, PackingContext
 from lgvi_warp.ocean.places import LocalPlane, check_places
 from lgvi_warp.physics.fields import PLACE_UNIT
+from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import number
 
 # How the heading follows from the way off the leg, and what is done at the last point.
 METHODS = ("los", "ilos", "alos")
-AT_END = ("stop", "go_on")
+AT_END = ("stop", "go_on", "loiter")
+# Numbers of each point.
+CIRCLES = ("loiter_turns", "loiter_time")
+OF_POINTS = ("times", *CIRCLES)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,14 +41,22 @@ class Waypoints(Guidance):
         points: The points, (k, 3) [m], inertial axes: at least two, each at another place of the map than the one before.
         geodetic: The points as latitude, longitude [deg, WGS 84] and depth [m], (k, 3), in place of `points`; the scene's
             environment must have an origin. Legs are straight in the plane of its axes. `points` vary, not `geodetic`.
-        speed: Wanted speed ahead through the water [m/s].
+        speed: Wanted speed ahead through the water [m/s]; with `times` the largest one.
         look_ahead: D [m].
         radius: Radius of acceptance [m], horizontal.
         method: "los", "ilos" or "alos"; by default "los".
         kappa: Gain of "ilos" [1/s]; 0.1 by default.
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
         at_end: At the last point "stop", the default: heading of the last leg, speed 0, the point itself as wanted position;
-            or "go_on": along the last leg, beyond its end.
+            "go_on": along the last leg, beyond its end; or "loiter": round a circle about it.
+        times: When to be at each point, (k,) [s], rising. Before the first of them the speed is 0. By default whenever it is.
+        loiter_radius: Radius [m] of the circles about points.
+        loiter_turns: Turns about each point, (k,), that of the first 0; by default none.
+        loiter_time: Least time on the circle about each point, (k,) [s], that of the first 0; by default none.
+        clockwise: Whether circles go clockwise as seen from above; by default True.
+
+    Raises:
+        SceneError: Where points are no way, times do not rise, circles have no radius, or a radius no circle; and as `Term`.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -65,6 +77,11 @@ class Waypoints(Guidance):
     kappa: Any = number((), "1/s", 0.1, least=0.0)
     gamma: Any = number((), "rad/(m s)", 0.002, least=0.0)
     at_end: str = word("stop", known=AT_END)
+    times: Any = number(("k",), "s", None, optional=True, rising=True)
+    loiter_radius: Any = number((), "m", None, optional=True, above=0.0)
+    loiter_turns: Any = number(("k",), "1", None, optional=True, least=0.0)
+    loiter_time: Any = number(("k",), "s", None, optional=True, least=0.0)
+    clockwise: bool = flag(True)
 
     def check(self, faults: Faults) -> None:
         chosen = [name for name in ("points", "geodetic") if getattr(self, name) is not None]
@@ -82,6 +99,28 @@ class Waypoints(Guidance):
                 return
             check_places(faults, "geodetic", places)
             _check_way(faults, "geodetic", places)
+            for name in OF_POINTS:
+                if (values := getattr(self, name)) is not None and len(values) != len(places):
+                    faults.add(name, values, f"are {len(values)} numbers", f"give {len(places)}, one for each point")
+        self._check_circles(faults)
+
+    def _check_circles(self, faults: Faults) -> None:
+        """Note circles without a radius and the reverse, those about the first point, and one that never ends."""
+        asked = {name: getattr(self, name) for name in CIRCLES if getattr(self, name) is not None}
+        circling = bool(asked) or self.at_end == "loiter"
+        if circling and self.loiter_radius is None:
+            faults.add("loiter_radius", None, "is missing", "give the radius of the circles [m]")
+        if self.loiter_radius is not None and not circling:
+            remedy = 'give loiter_turns or loiter_time, or at_end = "loiter"'
+            faults.add("loiter_radius", float(self.loiter_radius), "is given, and nothing is circled", remedy)
+        for name, values in asked.items():
+            if len(values) and values[0] > 0.0:
+                problem = "is of the first point, where the way begins"
+                faults.add(f"{name}[0]", float(values[0]), problem, "give 0; to circle first, begin with another point")
+            if len(values) and values[-1] > 0.0 and self.at_end == "go_on":
+                problem = "is of the last point, and at_end is to go on along its leg"
+                remedy = 'give 0, or at_end = "stop" or "loiter"'
+                faults.add(f"{name}[{len(values) - 1}]", float(values[-1]), problem, remedy)
 
     def located(self, plane: LocalPlane | None) -> Any:
         # With the points that the places are on the plane.
@@ -114,12 +153,30 @@ class Waypoints(Guidance):
         # All that a reference can have.
         return ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
 
+    @property
+    def circles(self) -> bool:
+        """Whether it circles about some point."""
+        return self.loiter_radius is not None
+
+    def device_in(self, aligned: bool) -> Any:
+        timed = ("timed",) if self.times is not None else ()
+        return "waypoints:" + ",".join(("legs", *timed, *(("circles",) if self.circles else ())))
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # The points in the table; memory of the leg, and of J or beta.
+        # The points in the table, then times, turns and times of circles; memory of the leg, J or beta, and of a circle.
         points = numbers["points"]
-        values = {name: value for name, value in numbers.items() if name != "points"}
-        words = {"legs": points.shape[1] - 1, "method": METHODS.index(self.method), "stops": int(self.at_end == "stop")}
-        return Packed(values | words, points.reshape(len(points), -1), np.zeros((1, 2)))
+        k = points.shape[1]
+        values = {name: numbers[name] for name in ("speed", "look_ahead", "radius", "kappa", "gamma")}
+        words = {"legs": k - 1, "method": METHODS.index(self.method), "stops": int(self.at_end != "go_on")}
+        rows = [points.reshape(len(points), -1)]
+        if self.times is not None:
+            rows.append(numbers["times"])
+        if self.circles:
+            values |= {"circle": numbers["loiter_radius"], "sense": np.full(1, 1.0 if self.clockwise else -1.0)}
+            words["circles"] = int(self.at_end == "loiter")
+            rows += [numbers.get(name, np.zeros((1, k))) for name in CIRCLES]
+        table = np.concatenate(repeated(*rows), axis=1)
+        return Packed(values | words, table, np.zeros((1, 6 if self.circles else 2)))
 
 
 def _check_way(faults: Faults, name: str, points: np.ndarray) -> None:

@@ -31,6 +31,7 @@ class Launches:
     real: Any  # Warp's type of the kernel's numbers
     sample_bytes: int  # what the kernel writes of a sample of one member [bytes]
     bytes_at_tick: int  # the same at a tick
+    width: int  # vehicles of a packet
     every: int | None  # steps between two ticks; None without a controller
     has_callback: bool  # a function of the host answers each tick
     ticks: bool  # samples are gathered at all ticks
@@ -82,8 +83,8 @@ class Launches:
         return int(steps.searchsorted(k0, side="right")), int(steps.searchsorted(k1, side="right"))
 
     def tick_bytes(self, count: int) -> int:
-        """Memory of what is gathered at a tick of a block of so many members [bytes]."""
-        return self.bytes_at_tick * count
+        """Memory of what is gathered at a tick of a block of so many members, in whole packets [bytes]."""
+        return self.bytes_at_tick * -(-count // self.width) * self.width
 
     @functools.cached_property
     def first_tick(self) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
+from lgvi_warp.control.loiter import Loiter
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.kernel_spec import COMPENSATED
 from lgvi_warp.engine.plan import Plan, choose_plan
@@ -38,6 +39,9 @@ UNDEFINED = {
     "quantum": "rounds: what follows jumps",
     "time": "sets the step at which something begins",
     "radius": "sets the tick at which a leg is done",
+    "loiter_turns": "sets the tick at which a circle is done",
+    "loiter_time": "sets the tick at which a circle is done",
+    **dict.fromkeys(("mouth", "funnel", "judged"), "sets the tick at which the vehicle goes round"),
     "at": "sets the time at which a member ends",
 }
 
@@ -87,10 +91,10 @@ def _names(faults: Faults, tangents: Any) -> tuple[str, ...]:
 
 
 def _timed(name: str, fleet: Ensemble) -> bool:
-    """Whether a name is that of a part of the controller, or of an event."""
+    """Whether a name is that of a part of the controller whose words these are, or of an event; a circle's radius is none."""
     scene = fleet.scene
     parts = scene.controller.parts if scene.controller else ()
-    return name.partition(".")[0] in {part.key for part in (*parts, *scene.events)}
+    return name.partition(".")[0] in {part.key for part in (*parts, *scene.events) if not isinstance(part, Loiter)}
 
 
 def _jumping(fleet: Ensemble) -> list[str]:

@@ -135,7 +135,11 @@ kd_pitch = 2.0; integral_limit = [20.0, 20.0]
 [[controller.sensors]]; type = "sensor"; of = "velocity"; bias = [0.01, 0.0, 0.0]
 [[controller.sensors]]; type = "dead_reckoning"
 [[controller.guidance]]; type = "waypoints"; points = [[0.0, 0.0, 5.0], [10.0, 0.0, 5.0], [10.0, 10.0, 6.0]]
-speed = 1.0; look_ahead = 3.0; radius = 1.0
+speed = 1.0; look_ahead = 3.0; radius = 1.0; times = [0.0, 12.0, 60.0]; loiter_radius = 2.0; loiter_turns = [0, 1.5, 0]
+[[controller.guidance]]; type = "loiter"; center = [0.0, 0.0, 5.0]; radius = 4.0; speed = 0.5; look_ahead = 2.0
+clockwise = false
+[[controller.guidance]]; type = "docking"; position = [9.0, 0.0, 5.0]; heading = 0.5; speed = 1.0; contact_speed = 0.2
+slowing = 5.0; look_ahead = 3.0; mouth = 0.5; funnel = 0.2; approach = 10.0; judged = 5.0; offset = 3.0
 [[controller.guidance]]; type = "set_point"; position = [0.0, 0.0, 5.0]; heading = 0.0
 [[controller.laws]]; type = "pose_pid"; kp = [40.0, 40.0, 60.0]; ki = [4.0, 4.0, 6.0]; kd = [60.0, 60.0, 80.0]
 kr = [10.0, 10.0, 10.0]; kw = [4.0, 4.0, 4.0]; feedforward = "restoring"
@@ -164,6 +168,8 @@ kr = [10.0, 10.0, 10.0]; kw = [4.0, 4.0, 4.0]; feedforward = "restoring"
 headings = [0.3, 2.0, -2.5]; interpolation = "cubic"
 [[controller.guidance]]; type = "set_point"; speed = 1.0
 [[controller.laws]]; type = "heave_pid"; kp = 20.0
+[[controller.laws]]; type = "linear_mpc"; states = ["velocity[2]"]; inputs = ["Z"]; A = [[0.9]]; B = [[0.003]]; Q = [1.0]
+R = [0.01]; limit = [10.0]; rate_limit = [50.0]; horizon = 3
 [[controller.laws]]; type = "speed_pid"; kp = 30.0; drag = 4.0
 [[controller.laws]]; type = "heading_smc"; lambda = 0.4; boundary = 0.1; k_sigma = 0.2; k_d = 0.8; nomoto_gain = 0.25
 nomoto_time = 1.5

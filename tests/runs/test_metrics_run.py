@@ -199,6 +199,16 @@ def test_numbers_do_not_depend_on_how_many_ticks_are_gathered_at_once(fleet, coa
         assert estimate.value.tobytes() == by_tick.statistics[name].value.tobytes(), name
 
 
+def test_so_it_is_where_members_fill_no_packet(fleet, monkeypatch):
+    # Three members take the memory of a whole packet: what is held there at once is counted for it, and for them alike.
+    few = lw.Ensemble(fleet.scene, 3, seed=1, vary=fleet.vary)
+    settings = {"t1": T1, "keep": "none", "statistics": [lw.metrics.IAE("depth", then=[lw.statistics.MemberValues()])]}
+    at_once = lw.solve(few, **settings).statistics["each iae depth"].value
+    # Of 121 ticks some are held at once, and more of three members than of a packet.
+    monkeypatch.setattr(launches, "GATHERED_BYTES", 3_000)
+    assert lw.solve(few, **settings).statistics["each iae depth"].value.tobytes() == at_once.tobytes()
+
+
 def test_metrics_change_no_bit_of_the_run(fleet, coarse):
     # The same kernel, which gathers nothing.
     fields = ("position", "reference_heading", "actuator", "demand")

@@ -29,7 +29,7 @@ class Trajectory(Part):
     def at(self, values: Array, t: float, h: float) -> tuple[float, float, float]:
         """A number, with values (k,) at the times, and its two derivatives at t; half a step h early counts as in time."""
         i = int(np.searchsorted(self.times, t + 0.5 * h)) - 1
-        if i < 0 or i == len(self.times) - 1:
+        if i < 0 or i == len(self.times) - 1 or self.interpolation == "steps":
             return float(values[max(i, 0)]), 0.0, 0.0
         length, u = self.times[i + 1] - self.times[i], t - self.times[i]
         bend, next_bend = self.bends(values)[i : i + 2]
@@ -41,7 +41,10 @@ class Trajectory(Part):
     def guide(self, r: Reference, y: Measurement) -> Reference:
         """Position and velocity; heading with its rates; speed."""
         position, velocity, _ = np.array([self.at(column, y.t, y.h) for column in np.transpose(self.positions)]).T
-        speed = np.linalg.norm(velocity) if self.speed is None else np.interp(y.t, self.times, self.speed)
+        speed = np.linalg.norm(velocity)
+        if self.speed is not None:
+            steps = self.interpolation == "steps"
+            speed = self.at(self.speed, y.t, y.h)[0] if steps else np.interp(y.t, self.times, self.speed)
         r = replace(r, position=position, velocity=velocity, speed=float(speed))
         if self.headings is None:
             return r

@@ -2,10 +2,12 @@
 """Guidance along waypoints by line of sight."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from lgvi_warp.reference.control import Measurement, Part, Reference, upright
+from lgvi_warp.reference.control.loiter import circled
 from lgvi_warp.reference.rotation import Array
 
 
@@ -13,10 +15,16 @@ class Waypoints(Part):
     """Numbers as those of `lw.control.Waypoints`."""
 
     method, kappa, gamma, at_end = "los", 0.1, 0.002, "stop"
+    times: Any = None
+    loiter_radius: Any = None
+    loiter_turns: Any = None
+    loiter_time: Any = None
+    clockwise = True
 
     def begin(self) -> None:
-        """The first leg; J and beta are 0."""
+        """The first leg, and no circle; J and beta are 0."""
         self.leg, self.J, self.beta = 0, 0.0, 0.0
+        self.circling, self.angle, self.since, self.bearing = False, 0.0, 0.0, 0.0
 
     def way(self, leg: int, position: Array) -> tuple[float, float, float, float]:
         """Angle and length of a leg on the map; how far the position is along, and to starboard of it."""
@@ -29,10 +37,17 @@ class Waypoints(Part):
     def guide(self, r: Reference, y: Measurement) -> Reference:
         """Change the leg where this one is done, then head along it."""
         legs = len(self.points) - 1
-        last = legs if self.at_end == "stop" else legs - 1
-        _, length, along, aside = self.way(min(self.leg, legs - 1), y.position)
-        if np.hypot(length - along, aside) < self.radius or along > length:
+        last = legs - 1 if self.at_end == "go_on" else legs
+        i = min(self.leg, legs - 1)
+        _, length, along, aside = self.way(i, y.position)
+        done = np.hypot(length - along, aside) < self.radius or along > length
+        center = self.points[i + 1]
+        if self.loiter_radius is not None:
+            done = self.circled_enough(y, i + 1, done and self.leg < legs)
+        if done:
             self.leg = min(self.leg + 1, last)
+        if self.circling or (self.leg == legs and self.at_end == "loiter"):
+            return circled(r, y, center, self.loiter_radius, self.look_ahead, self.speed, self.clockwise)
         i = min(self.leg, legs - 1)
         angle, length, along, aside = self.way(i, y.position)
         if self.leg == legs:
@@ -53,5 +68,31 @@ class Waypoints(Part):
         position[2] = np.interp(along, [0.0, length], [begin[2], end[2]])
         if 0.0 < along < length:
             direction[2] = (end[2] - begin[2]) / length
-        velocity = self.speed * direction / np.linalg.norm(direction)
-        return replace(r, position=position, velocity=velocity, R=upright(heading), speed=self.speed)
+        pace = speed = self.speed
+        if self.times is not None:
+            pace = self.pace_in_time(y, i, np.hypot(1.0, (end - begin)[2] / length) * (length - along))
+            speed = max(pace + y.water_velocity[0] - y.velocity[0], 0.0) if pace > 0.0 else 0.0
+        velocity = pace * direction / np.linalg.norm(direction)
+        return replace(r, position=position, velocity=velocity, R=upright(heading), speed=speed)
+
+    def pace_in_time(self, y: Measurement, leg: int, distance: float) -> float:
+        """The pace that makes a distance by the time of the end of a leg, up to the speed; 0 before the first time."""
+        if y.t + 0.5 * y.h <= self.times[0]:
+            return 0.0
+        return float(min(max(distance, 0.0) / max(self.times[leg + 1] - y.t, y.period), self.speed))
+
+    def circled_enough(self, y: Measurement, point: int, arrived: bool) -> bool:
+        """Whether a leg is done, to a point that may have to be circled about first."""
+        turns = 0.0 if self.loiter_turns is None else self.loiter_turns[point]
+        time = 0.0 if self.loiter_time is None else self.loiter_time[point]
+        out = y.position - self.points[point]
+        before, self.bearing = self.bearing, float(np.arctan2(out[1], out[0]))
+        if self.circling:
+            change = (self.bearing - before + np.pi) % (2.0 * np.pi) - np.pi
+            self.angle += change if self.clockwise else -change
+            self.since += y.period
+            self.circling = self.angle < 2.0 * np.pi * turns or self.since + 0.5 * y.h < time
+            return not self.circling
+        self.angle = self.since = 0.0
+        self.circling = arrived and max(turns, time) > 0.0
+        return arrived and not self.circling

@@ -196,7 +196,14 @@ def tracked_name(key: str, of: Any, known: tuple[str, ...]) -> str:
 
 
 def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
-    """Add a fault for each metric of what no guidance wants: its errors would be those from zero."""
+    """Add a fault for each metric of what no guidance wants: its errors would be those from zero; or of a dock without one."""
+    docks = [part.key for part in controller.guidance if part.type == "docking"] if controller else []
+    for name, metric in metrics.items():
+        dock = getattr(metric, "docking", None)
+        if dock is not None and dock not in docks:
+            faults.add(
+                key, name, f"needs a guidance docking of the name {dock!r}", "give [[controller.guidance]] docking"
+            )
     if controller is None:
         return
     wishes = {wish for part in controller.guidance for wish in part.gives}

@@ -72,7 +72,7 @@ class Answering:
     def answer(self) -> Derivatives:
         """Run the copies, and fill in what each group of members gave."""
         question, runs = self._question, self._runs
-        growth, from_here = runs.nudged(final=undefined.has_waypoints(question.scene))
+        growth, from_here = runs.nudged(final=undefined.has_legs(question.scene))
         self._growth = growth if runs.dtype == "float64" else np.zeros_like(growth)
         self._legs = self._legs_of(undefined.legs_done(question.scene, from_here))
         groups = self._groups()

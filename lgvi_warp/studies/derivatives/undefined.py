@@ -9,6 +9,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from lgvi_warp.common.status import Status, failed, stopped
+from lgvi_warp.control.docking import Docking
 from lgvi_warp.control.fault import Fault
 from lgvi_warp.control.sensor import Sensor
 from lgvi_warp.control.waypoints import Waypoints
@@ -50,8 +51,10 @@ def of_number(scene: Any, target: Target) -> str | None:
         reason = OF_SENSORS.get(name)
     elif isinstance(part, Fault) and name == "time":
         reason = "is that of the tick at or after it"
-    elif isinstance(part, Waypoints) and name == "radius":
+    elif isinstance(part, Waypoints) and name in ("radius", "loiter_turns", "loiter_time"):
         reason = "decides at which tick a leg is done"
+    elif isinstance(part, Docking) and name in ("mouth", "funnel", "judged"):
+        reason = "decides at which tick the vehicle goes round"
     elif isinstance(part, WrenchSchedule) and name == "times" and part.jumps:
         reason = "is when the push jumps, and a run meets that at whole steps"
     return f"{target.label} {reason}" if reason else None
@@ -100,17 +103,21 @@ def of_loop(rounding: Mapping[str, float]) -> str | None:
     return f"the loop goes in steps, since readings are rounded ({sensors}); smooth=True leaves that out"
 
 
-def has_waypoints(scene: Any) -> bool:
-    """Whether something guides along waypoints."""
-    return any(isinstance(part, Waypoints) for part in scene.parts)
+# Row of the memory, of guidance that jumps from one way to the next, which counts how often it did.
+COUNTING: Mapping[type, int] = {Waypoints: 0, Docking: 2}
+
+
+def has_legs(scene: Any) -> bool:
+    """Whether something guides along one leg after another."""
+    return any(type(part) in COUNTING for part in scene.parts)
 
 
 def legs_done(scene: Any, result: Result) -> np.ndarray:
-    """How many legs of waypoints members have done at the end of a run (n,), 0 without waypoints."""
+    """How many legs of waypoints, or ways to a dock, members have done at the end of a run (n,), 0 without any."""
     done = np.zeros(result.members)
-    for part in (part for part in scene.parts if isinstance(part, Waypoints)):
+    for part in (part for part in scene.parts if type(part) in COUNTING):
         remembered = result.final.lanes[f"{MEMORY}part {part.key} {type(part).__name__}"]
-        done = np.maximum(done, np.asarray(remembered, dtype=np.float64)[:, 0])
+        done = np.maximum(done, np.asarray(remembered, dtype=np.float64)[:, COUNTING[type(part)]])
     return np.rint(done)
 
 
@@ -131,7 +138,7 @@ def of_member(interest: OfResult, value: float, code: int, end: float, growth: f
     if growth > MOST_GROWTH:
         return f"a small difference of the start grows {growth:.1g} times, more than 1e6; ask at an earlier time"
     if legs > 0.0:
-        return f"it jumps with the tick at which a leg is done, and {legs:.0f} of the waypoints were; ask for a time before"
+        return f"it jumps with the tick at which a leg is done, and {legs:.0f} of them were; ask for a time before"
     return None
 
 

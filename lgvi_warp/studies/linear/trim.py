@@ -151,7 +151,7 @@ def step_of(scene: Any, h: float | None) -> float:
     """The step of a study [s]; h: None for the scene's."""
     faults, step = Faults(), scene.run.step if h is None else h
     if step is None:
-        faults.add("h", h, "is missing", "give the step in seconds: h=0.01 or [run] step")
+        faults.add("h", h, "is missing", "give the step in seconds: h=0.01, --step 0.01 or [run] step")
     else:
         step = faults.positive("h", step)
     faults.raise_if_any()

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Guidance into a dock along its centre line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.base import Guidance, Numbers, Packed, PackingContext
+from lgvi_warp.physics.terms.base import number
+
+# The largest half angle of a funnel [rad]: its tangent stays a number to calculate with.
+WIDEST = 1.5
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Docking(Guidance):
+    """Into a dock along its centre line, slower and slower, and round again where the vehicle is outside the funnel.
+
+    With e the way to starboard off the centre line and D the look-ahead, the wanted heading is the dock's less
+    atan((e + kappa J) / D), where J gains D e / (D^2 + (e + kappa J)^2) a second, as of `Waypoints` with "ilos". The pace over
+    ground falls from `speed`, `slowing` before the dock, to `contact_speed` at it, evenly with the distance. The funnel has
+    the radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is outside within `judged` of
+    the dock goes round: to the place `offset` to starboard of where the line begins, `approach` before the dock, and from
+    there along the line again. Once in the mouth at the dock's plane it is docked: speed 0, and the dock's place and heading.
+
+    Args:
+        position: The dock, (3,) [m], inertial axes: the middle of its mouth.
+        heading: Heading of a vehicle that enters [rad].
+        speed: Pace of the approach [m/s], over ground.
+        contact_speed: Pace at the dock [m/s], above 0.
+        slowing: How far before the dock the pace begins to fall [m].
+        look_ahead: D [m].
+        mouth: Radius of the mouth [m].
+        funnel: Half the opening angle of the funnel [rad], at most 1.5.
+        approach: How far before the dock the line begins [m].
+        judged: How far before the dock the funnel begins to count [m], at most `approach`.
+        offset: How far to starboard of the line's beginning vehicles go round to [m]; twice the radius of a turn lets them
+            come out of it on the line. 0 by default.
+        kappa: Gain of the integral [1/s]; 0.1 by default.
+
+    Raises:
+        SceneError: Where the funnel counts before the line begins, or the contact speed is above the speed; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> dock = dict(position=[200.0, 0.0, 10.0], heading=0.0, mouth=1.0, funnel=0.1)
+        >>> pace = dict(speed=1.5, contact_speed=0.8, slowing=60.0, look_ahead=10.0)
+        >>> lw.control.Docking(**dock, **pace, approach=150.0, judged=80.0).gives[0]
+        'depth'
+    """
+
+    type: ClassVar[str] = "docking"
+
+    position: Any = number((3,), "m")
+    heading: Any = number((), "rad")
+    speed: Any = number((), "m/s", above=0.0)
+    contact_speed: Any = number((), "m/s", above=0.0)
+    slowing: Any = number((), "m", above=0.0)
+    look_ahead: Any = number((), "m", above=0.0)
+    mouth: Any = number((), "m", above=0.0)
+    funnel: Any = number((), "rad", least=0.0, most=WIDEST)
+    approach: Any = number((), "m", above=0.0)
+    judged: Any = number((), "m", least=0.0)
+    offset: Any = number((), "m", 0.0)
+    kappa: Any = number((), "1/s", 0.1, least=0.0)
+
+    def check(self, faults: Faults) -> None:
+        for small, great in (("judged", "approach"), ("contact_speed", "speed")):
+            if getattr(self, small) > getattr(self, great):
+                remedy = f"give at most {great} = {float(getattr(self, great)):g}"
+                faults.add(small, float(getattr(self, small)), f"is above {great}", remedy)
+
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        bad = super().unphysical(numbers)
+        bad["judged"] = bad["judged"] | (numbers["judged"] > numbers["approach"])
+        bad["contact_speed"] = bad["contact_speed"] | (numbers["contact_speed"] > numbers["speed"])
+        return bad
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        return ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        # Cosine and sine of the heading, the tangent of the funnel; memory of what it does, of J, and of changes.
+        values = {name: value for name, value in numbers.items() if name not in ("heading", "funnel")}
+        angles = {"c": np.cos(numbers["heading"]), "s": np.sin(numbers["heading"]), "slope": np.tan(numbers["funnel"])}
+        return Packed(values | angles, memory=np.zeros((1, 3)))

@@ -55,7 +55,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         times = record(folder / "fleet.rrd")
-        shown = movie.of_recording(folder / "fleet.rrd", np.linspace(times[0], times[-1], FRAMES), folder)
+        shown = movie.of_recording(folder / "fleet.rrd", np.linspace(times[0], times[-1], FRAMES))
         frames = list(shown)
     look = {"duration": PERIOD, "loop": 0, "quality": 70, "method": 6, "xmp": digest(Path(__file__)).encode()}
     frames[0].save(MOVIE, save_all=True, append_images=frames[1:], **look)

@@ -99,11 +99,11 @@ def receiver(path):
 
 
 @contextlib.contextmanager
-def viewer(folder, size=(1000, 700)):
+def viewer(size=(1000, 700)):
     """A viewer; skips the test where the machine has no Vulkan driver."""
     pytest.importorskip("rerun_cli")
     try:
-        with headless.started(folder, size) as (client, address):
+        with headless.started(size) as (client, address):
             yield Viewer(client, address)
     except headless.DriverMissingError as error:
         pytest.skip(f"recordings are not looked at: {error}")

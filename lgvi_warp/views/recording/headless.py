@@ -8,10 +8,11 @@ import io
 import re
 import socket
 import subprocess
+import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from lgvi_warp.common.errors import one_line
 from lgvi_warp.views.recording.viewer import program, rerun
@@ -37,37 +38,37 @@ def free_port() -> int:
 
 
 @contextlib.contextmanager
-def started(folder: Path, size: tuple[int, int]) -> Iterator[tuple[Any, str]]:
-    """A client of a viewer of this size [pixels], and its address. folder: for its log. Raises DriverMissingError."""
+def started(size: tuple[int, int]) -> Iterator[tuple[Any, str]]:
+    """A client of a viewer of this size [pixels], and its address. Raises DriverMissingError."""
     rerun()
     from rerun.experimental import ViewerClient
 
     port = free_port()
     words = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "{}x{}".format(*size),
              "--hide-welcome-screen", "--memory-limit", "2GB"]  # fmt: skip
-    log = folder / "viewer.log"
-    with log.open("w") as file:
-        process = subprocess.Popen([str(program()), *words], stdout=file, stderr=file)
-    try:
-        client = _client(ViewerClient, process, port)
-        if client is None:
-            raise _why(log)
+    with tempfile.TemporaryFile("w+") as log:
+        process = subprocess.Popen([str(program()), *words], stdout=log, stderr=log)
         try:
-            yield client, f"rerun+http://127.0.0.1:{port}/proxy"
-        except ConnectionError:  # its graphics start after it answers
-            raise _why(log) from None
-    finally:
-        process.terminate()
-        try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+            client = _client(ViewerClient, process, port)
+            if client is None:
+                raise _why(log)
+            try:
+                yield client, f"rerun+http://127.0.0.1:{port}/proxy"
+            except ConnectionError:  # its graphics start after it answers
+                raise _why(log) from None
+        finally:
+            process.terminate()
+            try:
+                process.wait(10)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
 
 
-def _why(log: Path) -> Exception:
+def _why(log: IO[str]) -> Exception:
     """Why a viewer ended, by its log."""
-    text = log.read_text()
+    log.seek(0)
+    text = log.read()
     if NO_DRIVER.search(text):
         return DriverMissingError("no Vulkan driver; install one, such as mesa-vulkan-drivers")
     return OSError(f"the viewer ended: {one_line(text[-800:])}")
@@ -88,11 +89,11 @@ def show_time(client: Any, when: float, wait: float = DRAWN) -> None:
     time.sleep(wait)
 
 
-def shots(recording: Path, times: Iterable[float], folder: Path, size: tuple[int, int]) -> Iterator[Any]:
+def shots(recording: Path, times: Iterable[float], size: tuple[int, int]) -> Iterator[Any]:
     """Pictures of a recording's window at some times [s]."""
     from PIL import Image
 
-    with started(folder, size) as (client, _):
+    with started(size) as (client, _):
         load(client, recording)
         time.sleep(SETTLED)
         for when in times:

@@ -115,11 +115,11 @@ def _save(pictures: Iterator[Any], target: Path, seconds: float) -> None:
         every[0].save(beside, **look, **more)
 
 
-def of_recording(path: Path, times: Iterable[float], folder: Path) -> Iterator[Any]:
-    """Pictures of a recording in the viewer at some times [s]; folder: for the viewer's log."""
+def of_recording(path: Path, times: Iterable[float]) -> Iterator[Any]:
+    """Pictures of a recording in the viewer at some times [s]."""
     from PIL import Image
 
-    for shot in headless.shots(path, times, folder, WINDOW):
+    for shot in headless.shots(path, times, WINDOW):
         yield shot.crop(INSIDE).resize(SIZE, Image.Resampling.LANCZOS)
 
 
@@ -129,7 +129,7 @@ def _shot(result: Result, members: Any, count: int) -> Iterator[Any]:
         folder = Path(name)
         record(result, folder / "fleet.rrd", members=members)
         times = np.linspace(float(result.time[0]), float(result.time[-1]), count)
-        yield from of_recording(folder / "fleet.rrd", times, folder)
+        yield from of_recording(folder / "fleet.rrd", times)
 
 
 def plainly(result: Result, members: Any, count: int) -> Iterator[Any]:

@@ -31,7 +31,7 @@ LEAST_BODY = 8
 
 def faults_of(paths, times, folder, rgbs=None):
     """What is wrong with how recordings look in a viewer of their own: the last one opened is in front."""
-    with viewer(folder) as window:
+    with viewer() as window:
         return faults_in(window, paths, times, rgbs)
 
 
@@ -165,7 +165,7 @@ def test_a_mesh_is_seen(tmp_path):
 @pytest.mark.slow
 def test_a_run_that_goes_on_is_seen_to_grow(tmp_path):
     result, pictures = fleet(60), []
-    with viewer(tmp_path) as window:
+    with viewer() as window:
         recording = rr.RecordingStream("live", recording_id="live")
         recording.connect_grpc(window.address)
         live = Live(recording)
@@ -213,6 +213,6 @@ def test_a_fleet_is_seen_and_poses_that_are_not_finite_are_not(tmp_path):
     # One viewer for both: what a viewer shows of one recording does not hide faults of the next.
     whole = lw.record(fleet(60), tmp_path / "fleet.rrd")
     broken = broken_path("poses that are not finite", tmp_path)
-    with viewer(tmp_path, size=(800, 560)) as window:
+    with viewer(size=(800, 560)) as window:
         assert faults_in(window, [whole], (0.0, 60.0)) == []
         assert any("invalid rotation" in fault for fault in faults_in(window, [broken], (0.0, 60.0)))

@@ -56,7 +56,11 @@ def test_what_is_looked_for_is_among_the_first(listed, query):
 
 
 def test_added_mass_leads_to_its_section(listed):
-    assert listed["added mass"][0] == ["theory/coupled", "A full 6x6 inertia: psi_x and psi_w > Added mass", "#added-mass"]
+    assert listed["added mass"][0] == [
+        "theory/coupled",
+        "A full 6x6 inertia: psi_x and psi_w > Added mass",
+        "#added-mass",
+    ]
 
 
 def test_the_changelog_is_never_among_the_first_but_where_little_else_is(listed):

@@ -40,6 +40,8 @@ html_sidebars = {"**": [
 html_title = f"lgvi_warp {release}"
 html_show_sphinx = html_show_copyright = False
 html_copy_source = False
+# What a copy button takes of a block with prompts: the lines that are typed, without their prompt.
+copybutton_prompt_text = "$ "
 add_module_names = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"

@@ -7,6 +7,7 @@ A picture carries the hash of what made it, so that a stale one is found in any 
 from __future__ import annotations
 
 import hashlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -15,6 +16,10 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+sys.path.append(str(DOCS))
+
+from site_parts import tutorial  # noqa: E402
+
 LGVI = (sys.executable, "-m", "lgvi_warp")
 VALIDATION = (sys.executable, "-m", "benchmarks", "table", "validation", "--kept")
 KEPT = (sys.executable, "-m", "benchmarks", "table", "fronts", "--kept")
@@ -25,7 +30,7 @@ class Made(NamedTuple):
     """How a picture is made.
 
     Attributes:
-        sources: Files whose text made it: a script or a scene, measured rows, and the code that drew it.
+        sources: Files whose text made it: a script or a scene, measured rows, and the code that drew it; of a page its code.
         command: Words of the command; "{}" stands for a folder that it writes into.
         file: The picture's name in that folder; empty where the command puts it into its place itself.
     """
@@ -69,10 +74,13 @@ def of_comparison(name: str) -> Made:
     return Made((*drawn_by, *scenes), (*VALIDATION, name))
 
 
+CODE = re.compile(r"^```\w+\n([\s\S]*?)^```|^    \$ (.*)$", re.MULTILINE)
 COMPARISONS = sorted(path.stem for path in (ROOT / "benchmarks/validation").glob("[a-z]*.py"))
 FRONTS = "benchmarks/fronts_picture.py"
 LEARNT = "examples/controllers/learn_depth_keeping.py"
 STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out", "{}")
+TUTORIAL = ("docs/start/tutorial.md", "docs/site_parts/tutorial.py", *room("plots"))
+TYPED = (sys.executable, "docs/site_parts/tutorial.py", "{}")
 SWEEP = "examples/sweeps/depth_gain_map.toml"
 MADE = {
     "controllers/dead_thruster.png": of_script("examples/controllers/dead_thruster.py"),
@@ -104,13 +112,20 @@ MADE = {
         f"guide/accuracy_{name}.png": Made((f"benchmarks/rows/fronts_{name}.json", FRONTS), (*KEPT, name))
         for name in ("paper", "remus", "light", "short")
     },
+    **{f"start/{name}": Made(TUTORIAL, TYPED, name) for name in tutorial.WRITTEN.values()},
     **{f"validation/{name}.png": of_comparison(name) for name in COMPARISONS},
 }
 
 
+def code_of(page: str) -> str:
+    """The fenced code of a page, and its commands."""
+    return "\n".join(fenced or typed for fenced, typed in CODE.findall(page))
+
+
 def digest(*paths: Path) -> str:
     """The hash of texts, whatever their line ends and the lines that name their licence."""
-    lines = [line for path in paths for line in path.read_text().splitlines() if not line.startswith("# SPDX-")]
+    texts = [code_of(path.read_text()) if path.suffix == ".md" else path.read_text() for path in paths]
+    lines = [line for text in texts for line in text.splitlines() if not line.startswith("# SPDX-")]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 

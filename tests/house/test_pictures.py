@@ -50,6 +50,19 @@ def test_a_stale_picture_is_found(tmp_path):
     assert pictures.notes(kept) == {"script": digest}
 
 
+def test_of_a_page_its_code_counts_and_its_prose_does_not(tmp_path):
+    page = tmp_path / "page.md"
+    text = "# Title\n\n```toml\nx = 1\n```\n\nProse.\n\n    $ run it\n    printed\n"
+    page.write_text(text)
+    digest = pictures.digest(page)
+    for same in ("Prose.", "# Title", "printed"):
+        page.write_text(text.replace(same, "Other"))
+        assert pictures.digest(page) == digest, same
+    for other in ("x = 1", "run it"):
+        page.write_text(text.replace(other, "y"))
+        assert pictures.digest(page) != digest, other
+
+
 def test_the_table_of_fronts_follows_from_its_rows():
     before, after = pages.parts("fronts", ROOT / pages.PAGES["fronts"])
     text = (ROOT / pages.PAGES["fronts"]).read_text()

@@ -10,6 +10,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 import urllib.parse
 from pathlib import Path
 
@@ -175,18 +176,27 @@ def test_broken_links_are_found(tmp_path):
     assert broken_links(tmp_path) == ["a.html: b.html#y", "b.html: a.html#no", "b.html: #y", "b.html: no.png"]
 
 
-@pytest.mark.slow
-def test_the_site_is_built_without_warnings_and_its_links_lead_somewhere(tmp_path):
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """What the build said, and the folder of the site."""
     pytest.importorskip("sphinx")
-    site = tmp_path / "site"
+    folder = tmp_path_factory.mktemp("site")
+    site = folder / "html"
     # No network: a name that is looked up has no server.
     offline = os.environ | {name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy")}
+    offline |= {"LGVI_WARP_SITES": f"{lw.__version__} 0.0.1"}
     command = [
-        sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", str(tmp_path / "trees"), "docs", str(site),
+        sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", str(folder / "trees"), "docs", str(site),
     ]  # fmt: skip
-    done = subprocess.run(command, cwd=ROOT, env=offline, capture_output=True, text=True)
+    return subprocess.run(command, cwd=ROOT, env=offline, capture_output=True, text=True), site
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_warnings_and_its_links_lead_somewhere(built):
+    done, site = built
     assert done.returncode == 0, done.stderr
-    assert broken_links(site) == []
+    # The other version is beside this one.
+    assert {fault.rpartition(" ")[2].replace("../", "") for fault in broken_links(site)} <= {"0.0.1/", "./0.0.1/"}
     text = "".join(Path(page).read_text() for page in (site / "reference" / "built").glob("*.html"))
     missing = [
         name
@@ -194,3 +204,23 @@ def test_the_site_is_built_without_warnings_and_its_links_lead_somewhere(tmp_pat
         if not inspect.ismodule(operator.attrgetter(name)(lw)) and f'id="lgvi_warp.{name}"' not in text
     ]
     assert not missing
+
+
+@pytest.mark.slow
+def test_pages_say_their_version_and_where_to_edit_them(built):
+    source = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["urls"]["Source"]
+    for name in ("index.rst", "guide/your_vehicle.md", "theory/water.md"):
+        page = (built[1] / name).with_suffix(".html").read_text()
+        assert f'href="{source}/edit/main/docs/{name}"' in page
+        assert re.search(rf'version {re.escape(lw.__version__)} · <a href="[./]*/0\.0\.1/">', page)
+        assert "copybutton.js" in page
+
+
+@pytest.mark.slow
+def test_the_first_page_has_four_cards_with_pictures_and_links(built):
+    page = (built[1] / "index.html").read_text()
+    cards = re.split(r'class="sd-card sd-', page)[1:]
+    assert len(cards) == 4
+    for card in cards:
+        assert re.search(r'<img alt="[^"]+"', card)
+        assert re.search(r'class="sd-stretched-link[^>]*href="guide/\w+\.html"', card)

@@ -14,12 +14,11 @@ import pytest
 
 from tests.conftest import ROOT
 
+sys.path.append(str(ROOT / "docs"))
+
+from site_parts import tutorial
+
 pytestmark = pytest.mark.slow
-# A step of the tutorial: lines for the scene file, Python with what it prints, or a command with what it prints.
-STEP = re.compile(
-    r"^```toml\n([\s\S]*?)^```|^```python\n([\s\S]*?)^```\n\n((?:    .*\n)*)|^    \$ (.*)\n((?:    .*\n)*)",
-    re.MULTILINE,
-)
 # What differs from machine to machine, and from run to run.
 OF_MACHINE = re.compile(r"^(?:speed|kernel) .*\n|\(\d+\.\d MB\)", re.MULTILINE)
 
@@ -105,7 +104,7 @@ def test_an_example_runs(installed):
 def test_the_tutorial_prints_what_it_shows(installed):
     folder = Path(installed("python", "-c", "import os; print(os.getcwd())").strip())
     scene, code, expected, commands = "", "", "", 0
-    for lines, snippet, output, command, shown in STEP.findall((ROOT / "docs" / "start" / "tutorial.md").read_text()):
+    for lines, snippet, output, command, shown in tutorial.STEP.findall(tutorial.PAGE.read_text()):
         scene, code, expected = scene + lines + "\n", code + snippet, expected + output
         (folder / "dive.toml").write_text(scene)
         if command:
@@ -114,4 +113,4 @@ def test_the_tutorial_prints_what_it_shows(installed):
     assert as_shown(installed("python", "-c", code), expected)
     assert commands == 5
     assert code.count("import") == 1
-    assert (folder / "dive.png").exists()
+    assert all((folder / picture).exists() for picture in tutorial.WRITTEN)

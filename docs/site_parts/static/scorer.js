@@ -1,9 +1,14 @@
-// How pages are ranked by the search: a page by its title and what it explains before lists, the changelog last.
+// How pages are ranked by the search: what explains before what lists, a section on the words before its page, the changelog last.
 var Scorer = {
   score: ([docName, title, anchor, descr, score, filename, kind]) => {
     if (docName.includes("changelog")) return score - 40;
     if (docName.startsWith("reference/built/") && kind !== "object") return score - 15;
-    if (docName.startsWith("guide/") || docName.startsWith("theory/") || docName.startsWith("controllers/")) return score + 5;
+    // A page that is named as its title is has that for its subject.
+    const subject = docName.split("/").pop().replaceAll("_", " ");
+    if (title.toLowerCase().includes(subject)) score += 2;
+    if (kind === "title") score += 3;
+    if (docName.startsWith("guide/terms/")) return score + 4;
+    if (/^(guide|theory|controllers)\//.test(docName)) return score + 5;
     return score;
   },
   objNameMatch: 11,

@@ -2,9 +2,10 @@
 """Measure how long 10,000 REMUS 100 take for 60 s, here and by other tools, keep the rows, and draw them as bars.
 
 Each tool uses the cheapest of its settings that is right to 1e-2 (position [m] and attitude of every member that is
-judged). Python Vehicle Simulator has no such settings: its REMUS, its autopilots and its own step of 0.02 s, one vehicle
-after the other, written afresh from its equations (benchmarks/foreign_remus.py). The rows stay in benchmarks/rows;
-`--kept` writes the table and the picture again without measuring. Other tools: `make .venv-peers/.done`.
+judged). Python Vehicle Simulator (github.com/cybergalactic/PythonVehicleSimulator) has no such settings: its REMUS, its
+autopilots and its own step of 0.02 s, one vehicle after the other; `--simulator DIR` measures it, from a clone. The rows
+stay in benchmarks/rows; `--kept` writes the table and the picture again without measuring the others. These:
+`make .venv-peers/.done`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -28,6 +30,7 @@ from benchmarks.peers.run import keep_to_cores
 PROBLEM, TARGET = "remus_100", 1e-2
 PEERS = ("lgvi_warp", "numba_simd", "diffrax", "heyoka", "warp_ordinary")
 ROUNDS = 3
+LOOP, SAMPLE = "simulator", 0.02  # the simulator, and its own step [s]
 
 
 class Size(NamedTuple):
@@ -44,15 +47,21 @@ WHOLE, QUICK = Size(10_000, 60.0, 20.0), Size(64, 2.0, 0.2)
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="64 members and 2 s, into --rows: to see that it runs")
     parser.add_argument("--rows", type=Path, default=rows_of(), help="where the rows go (default: those of the page)")
+    clone = "a clone of Python Vehicle Simulator, which is measured anew; default: its row is kept"
+    parser.add_argument("--simulator", type=Path, metavar="DIR", help=clone)
     parser.add_argument("--kept", action="store_true", help="measure nothing: the table and the picture from the rows")
 
 
-def main(quick: bool, rows: Path, kept: bool) -> str | None:
+def main(quick: bool, rows: Path, simulator: Path | None, kept: bool) -> str | None:
     if quick and rows == rows_of():
         raise SystemExit("table bars --quick: rows of a small run are none of the page; name another file by --rows")
-    if not kept:
-        keep(rows, measured(QUICK if quick else WHOLE))
-    content = json.loads(rows.read_text())
+    size, before = QUICK if quick else WHOLE, json.loads(rows.read_text()) if rows.exists() else {"rows": []}
+    content = before if kept else measured(size)
+    if simulator or not kept:
+        loop = [alone(size, simulator)] if simulator else [row for row in before["rows"] if row["tool"] == LOOP]
+        content["rows"] = [row for row in content["rows"] if row["tool"] != LOOP] + loop
+        content["rows"].sort(key=lambda row: row["seconds"])
+        keep(rows, content)
     if rows != rows_of():
         print(text_of(content))
         return None
@@ -86,10 +95,9 @@ def measured(size: Size) -> dict[str, Any]:
     for peer, dtype in dict.fromkeys((row["tool"], row["dtype"]) for row in rows):
         same = [row for row in rows if (row["tool"], row["dtype"]) == (peer, dtype)]
         cheapest.append(min(same, key=lambda row: row["seconds"]))
-    cheapest.append(alone(size))
     return {"where": stamp("bars"), "members": size.members, "t1": size.t1, "target": TARGET,
             "judged": len(truth[0]), "missing": missing,
-            "rows": sorted(cheapest, key=lambda row: row["seconds"])}  # fmt: skip
+            "rows": cheapest}  # fmt: skip
 
 
 def enough(module: Any, problem: problems.Problem, truth: problems.End) -> Iterator[tuple[problems.Run, float]]:
@@ -106,22 +114,27 @@ def enough(module: Any, problem: problems.Problem, truth: problems.End) -> Itera
             yield run, error
 
 
-def timed(call: Any) -> float:
-    start = time.perf_counter()
+def timed(call: Any, clock: Any = time.perf_counter) -> float:
+    start = clock()
     call()
-    return time.perf_counter() - start
+    return clock() - start
 
 
-def alone(size: Size) -> dict[str, Any]:
+def alone(size: Size, clone: Path) -> dict[str, Any]:
     """The simulator's loop: one vehicle, as long as all members would take one after the other."""
-    from benchmarks import foreign_remus as simulator
+    sys.path.append(str(clone / "src"))
+    from python_vehicle_simulator.lib import simulate
+    from python_vehicle_simulator.vehicles import remus100
 
-    def call() -> None:
-        simulator.simulate(10.0, 0.5, size.alone, simulator.Sea(), simulator.Choices())
-
-    seconds = median(timed(call) for _ in range(ROUNDS)) * size.members * size.t1 / size.alone
-    return {"tool": "simulator", "method": "Euler", "setting": f"h={simulator.SAMPLE:g}", "dtype": "float64",
-            "measured": 1, "error": None, "seconds": float(f"{seconds:.3g}")}  # fmt: skip
+    commit = subprocess.run(
+        ["git", "-C", clone, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
+    )
+    steps = round(size.alone / SAMPLE)
+    vehicle = remus100("depthHeadingAutopilot", 10, 30, 1525, 0, 0)
+    seconds = median(timed(lambda: simulate(steps, SAMPLE, vehicle), time.process_time) for _ in range(ROUNDS))
+    return {"tool": LOOP, "method": "Euler", "setting": f"h={SAMPLE:g}, commit {commit.stdout.strip()}", "dtype": "float64",
+            "measured": 1, "error": None,
+            "seconds": float(f"{seconds * size.members * size.t1 / size.alone:.3g}")}  # fmt: skip
 
 
 def keep(path: Path, content: dict[str, Any]) -> None:
@@ -144,7 +157,8 @@ def text_of(content: dict[str, Any]) -> str:
         f"![Seconds for {content['members']:,} vehicles by tool]({picture_of().name})", "",
         f"{content['members']:,} REMUS 100 that sink under thrust for {content['t1']:g} s, one core, compiled before. "
         f"Errors are at the end, the largest of {content['judged']} members, position [m] and attitude; at most "
-        f"{content['target']:g} is asked. Where fewer vehicles were measured, the time is scaled. {content['where']}", "",
+        f"{content['target']:g} is asked. Where fewer vehicles were measured, the time is scaled; that of the loop is processor time. "
+        f"{content['where']}", "",
         *(f"{line}." for line in content["missing"]),
         markdown(head, rows, "lllrrrr"),
     ]  # fmt: skip

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The examples of README and of the first pages print what the pages say."""
 
+import re
 import runpy
 
 import matplotlib
@@ -36,6 +37,15 @@ def test_the_readme_is_short_and_shows_what_comes_of_it():
         "## Citation",
     ]  # fmt: skip
     assert sorted(order, key=text.index) == order
+
+
+def test_six_questions_are_answered_where_the_page_says():
+    page = (ROOT / "docs" / "develop" / "site.md").read_text().partition("## What a stranger asks")[2]
+    rows = re.findall(r'^\| .*\? \| "(.*)" \| "(.*)" \|$', page, re.MULTILINE)
+    assert len(rows) == 6
+    readme, first = ((ROOT / name).read_text() for name in ("README.md", "docs/index.rst"))
+    assert [words for words, _ in rows if words not in readme] == []
+    assert [words for _, words in rows if words not in first] == []
 
 
 def test_the_first_example(tmp_path, monkeypatch, capsys):

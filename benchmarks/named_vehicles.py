@@ -118,8 +118,8 @@ class Run(NamedTuple):
     def over_ground(self, member: str) -> tuple[float, float]:
         """Its level speed and its speed down at the end [m/s]."""
         which = MEMBERS.index(member)
-        east_north_down = self.attitude[-1, which] @ self.velocity[-1, which, :3]
-        return float(np.hypot(*east_north_down[:2])), float(east_north_down[2])
+        north_east_down = self.attitude[-1, which] @ self.velocity[-1, which, :3]
+        return float(np.hypot(*north_east_down[:2])), float(north_east_down[2])
 
 
 def parameters(name: str) -> dict[str, np.ndarray]:
@@ -140,7 +140,7 @@ def run(name: str, step: float | None = None, t1: float | None = None) -> Run:
     R[1] = [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]
     nu, zero = np.zeros((6, 3)), np.zeros((6, 3))
     nu[3:, 0] = trial.speed
-    at = zero + [0.0, 0.0, DEPTH]
+    at = np.tile([0.0, 0.0, DEPTH], (6, 1))
     fleet = lw.Ensemble.from_states(lw.Scene.named(name), at, R, nu, zero, parameters(name))
     h = step or trial.step
     save = lw.SaveAt(every=max(0.02, h), fields=("position", "attitude", "velocity", "angular_velocity"))
@@ -166,7 +166,7 @@ def righting(time: np.ndarray, angle: np.ndarray) -> str:
 
 
 def draw(name: str, file: str) -> None:
-    """Draw a vehicle's turn from above, and its angles after a release."""
+    """Draw a vehicle's way ahead and its turn from above, and its angles after a release."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -175,34 +175,42 @@ def draw(name: str, file: str) -> None:
     ran, trial = run(name), TRIALS[name]
     with plt.rc_context({"font.size": 12, "axes.titlesize": 12}):
         figure, (path, angles) = plt.subplots(1, 2, figsize=SIZE, layout="constrained")
-        for member, color, label in (("ahead", "#9aa5b1", trial.words[0]), ("turn", "#0072b2", trial.words[1])):
-            north, east, _ = ran.position[:, MEMBERS.index(member)].T
-            shown = slice(None, int(seen(ran, trial) / 0.02))
-            path.plot(east[shown], north[shown], color=color, label=label)
-            path.plot(east[0], north[0], "o", color="#333333", markersize=4)
-        path.set(xlabel="east [m]", ylabel="north [m]", title="ahead and in a turn, from above")
+        for member, color, label in (("ahead", "#8f9aa6", "ahead"), ("turn", "#0072b2", "turn")):
+            shown = (ran.time <= seen(ran, trial)) & near(ran, member)
+            north, east, _ = ran.position[shown, MEMBERS.index(member)].T
+            path.plot(east, north, color=color, label=label)
+        path.plot(0.0, 0.0, "o", color="#333333", markersize=5, label="start")
+        path.set(xlabel="east [m]", ylabel="north [m]", title="from above")
         path.set_aspect("equal", "datalim")
-        until = shortest(ran)
-        for member, color in (("rolled", "#d55e00"), ("pitched", "#0072b2")):
-            shown = ran.time <= until
-            word = {"rolled": "roll", "pitched": "pitch"}[member]
-            angles.plot(ran.time[shown], np.degrees(ran.angle(member)[shown]), color=color, label=word)
-        angles.axhline(0.0, color="#9aa5b1", linewidth=0.8)
-        angles.set(xlabel="time [s]", ylabel="angle [degrees]", title="left alone at 20 degrees")
-        angles.legend(frameon=False)
+        path.margins(0.12)
+        path.legend(frameon=False, loc="best")
+        shown = ran.time <= shortest(ran)
+        for member, color, label, dashes in (("rolled", "#d55e00", "roll", "-"), ("pitched", "#0072b2", "pitch", "--")):
+            angles.plot(ran.time[shown], np.degrees(ran.angle(member)[shown]), dashes, color=color, label=label)
+        angles.axhline(0.0, color="#8f9aa6", linewidth=0.8)
+        low, high = angles.get_ylim()
+        angles.set(xlabel="time [s]", ylabel="angle [degrees]", title="released at 20 degrees")
+        angles.set_ylim(low, high + 0.2 * (high - low))
+        angles.legend(frameon=False, ncols=2, loc="upper right")
         figure.savefig(file, dpi=FINE)
 
 
 def seen(ran: Run, trial: Trial) -> float:
-    """How much of the paths is shown [s]: a turn and a half."""
-    rate = abs(ran.end("turn")[5])
-    return float(min(trial.t1, 1.6 * 2.0 * np.pi / rate))
+    """How much of the paths is shown [s]: about a turn and a third."""
+    return float(min(trial.t1, 2.7 * np.pi / abs(ran.end("turn")[5])))
+
+
+def near(ran: Run, member: str) -> np.ndarray:
+    """Whether a member is still within two circles' breadth of its start (n,): the way ahead is shown no longer."""
+    circle = 2.0 * ran.over_ground("turn")[0] / abs(ran.end("turn")[5])
+    away = np.linalg.norm(ran.position[:, MEMBERS.index(member), :2], axis=-1)
+    return np.logical_and.accumulate(away < 2.0 * circle) if member == "ahead" else np.full(len(away), True)
 
 
 def shortest(ran: Run) -> float:
-    """How much of the angles is shown [s]: until both have swung or come back."""
+    """How much of the angles is shown [s]: until both have come back, 12 s at most."""
     late = [ran.time[np.flatnonzero(np.abs(ran.angle(member)) > 0.05 * ANGLE)[-1]] for member in ("rolled", "pitched")]
-    return float(min(1.5 * max(late), 20.0))
+    return float(min(1.2 * max(late), 12.0))
 
 
 if __name__ == "__main__":

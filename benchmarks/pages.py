@@ -24,6 +24,7 @@ PAGES = {
     "sizes": "docs/start/install.md",
     "solver": "docs/explain/solvers.md",
     "term": "docs/reference/term_costs.md",
+    "vehicles": "docs/guide/named_vehicles.md",
 }
 
 

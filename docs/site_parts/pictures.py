@@ -55,6 +55,13 @@ def of_example(script: str, file: str) -> Made:
     return Made(sources_of(ROOT / script), (sys.executable, "-c", inside, str(ROOT / script), "{}"), file)
 
 
+def of_vehicle(name: str) -> Made:
+    """The picture of a vehicle of the package that turns and rights itself."""
+    sources = (VEHICLES, f"lgvi_warp/vehicles/{name}.toml")
+    return Made(sources, (sys.executable, VEHICLES, name, "{}/picture.png"), "picture.png")
+
+
+VEHICLES = "benchmarks/named_vehicles.py"
 FRONTS = "benchmarks/fronts_picture.py"
 STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out", "{}")
 SWEEP = "examples/sweeps/depth_gain_map.toml"
@@ -69,6 +76,7 @@ MADE = {
     "guide/beside_others.png": Made(("benchmarks/rows/bars.json", "benchmarks/bars_picture.py"), BARS),
     "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
     "guide/glider_in_an_eddy.png": of_script("examples/studies/glider_in_an_eddy.py"),
+    **{f"guide/named_{name}.png": of_vehicle(name) for name in ("lauv", "eca_a9", "girona_500", "rexrov", "dsrv")},
     "guide/where_to_search.png": of_example("examples/where_to_search.py", "where_to_search.png"),
     "guide/tune_worst_5_percent.png": of_script("examples/sweeps/tune_worst_5_percent.py"),
     **{

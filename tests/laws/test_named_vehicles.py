@@ -57,14 +57,17 @@ def test_a_command_to_starboard_turns_to_starboard(name):
 
 @pytest.mark.parametrize(("name", "balance"), [
     ("lauv", lambda u: 14.0 - 2.4 * u - 2.4 * u * u), ("eca_a9", lambda u: 32.0 - 8.0 * u * u),
-    ("girona_500", lambda u: 0.5 * 153.7875 - 148.0 * u * u), ("dsrv", lambda u: 322.0846433879751 - 19.067175980960034 * u * u),
+    ("girona_500", lambda u: 0.5 * 153.7875 - 148.0 * u * u),
+    ("dsrv", lambda u: 322.0846433879751 - 19.067175980960034 * u * u),
 ])  # fmt: skip
 def test_a_neutral_one_s_speed_is_where_thrust_is_drag(name, balance):
     end, t1 = ran(name).end("neutral"), named.TRIALS[name].t1
     speed = brentq(balance, 0.0, 20.0, xtol=1e-13)
     assert end[0] == pytest.approx(speed, rel=1e-7)
     # The Girona 500 sinks before it is neutral no more than drag lets it: w below m / (k t), from any start.
-    assert np.abs(end[1:]).max() < (147.0 / (148.0 * t1) if name == "girona_500" else 2e-4 if name == "eca_a9" else 1e-7)
+    assert np.abs(end[1:]).max() < (
+        147.0 / (148.0 * t1) if name == "girona_500" else 2e-4 if name == "eca_a9" else 1e-7
+    )
 
 
 def test_the_rexrov_does_not_hold_its_heading():

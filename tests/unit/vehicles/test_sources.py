@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The vehicles that others have modelled: their files against the sources' own conventions, and the closed forms of their motion."""
+"""The vehicles that others have modelled: their files against the sources' conventions, and closed forms of their motion."""
 
 import numpy as np
 import pytest
@@ -187,4 +187,6 @@ def test_the_independent_motion_turns_the_remus_as_printed():
     for _ in range(20):
         v = rng.normal(size=6) * [1.0, 0.3, 0.3, 0.2, 0.2, 0.2]
         down = down_of(*rng.normal(size=2) * 0.3)
-        np.testing.assert_allclose(body.acceleration(v, down), remus.acceleration(v, down, 0.0, remus.LEVER), rtol=2e-5, atol=1e-6)
+        np.testing.assert_allclose(
+            body.acceleration(v, down), remus.acceleration(v, down, 0.0, remus.LEVER), rtol=2e-5, atol=1e-6
+        )

@@ -25,6 +25,7 @@ PAGES = {
     "solver": "docs/explain/solvers.md",
     "term": "docs/reference/term_costs.md",
     "validation": "docs/validation/README.md",
+    "vehicles": "docs/guide/named_vehicles.md",
 }
 
 

@@ -76,6 +76,15 @@ def of_comparison(name: str) -> Made:
 
 CODE = re.compile(r"^```\w+\n([\s\S]*?)^```|^    \$ (.*)$", re.MULTILINE)
 COMPARISONS = sorted(path.stem for path in (ROOT / "benchmarks/validation").glob("[a-z]*.py"))
+
+
+def of_vehicle(name: str) -> Made:
+    """The picture of a vehicle of the package that turns and rights itself."""
+    sources = (VEHICLES, f"lgvi_warp/vehicles/{name}.toml")
+    return Made(sources, (sys.executable, VEHICLES, name, "{}/picture.png"), "picture.png")
+
+
+VEHICLES = "benchmarks/named_vehicles.py"
 FRONTS = "benchmarks/fronts_picture.py"
 LEARNT = "examples/controllers/learn_depth_keeping.py"
 STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out", "{}")
@@ -100,6 +109,7 @@ MADE = {
     "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
     "guide/glider_by_its_battery.png": of_script("examples/laws/glider_by_its_battery.py"),
     "guide/glider_in_an_eddy.png": of_script("examples/studies/glider_in_an_eddy.py"),
+    **{f"guide/named_{name}.png": of_vehicle(name) for name in ("lauv", "eca_a9", "girona_500", "rexrov", "dsrv")},
     "guide/where_to_search.png": of_example("examples/where_to_search.py", "where_to_search.png"),
     "guide/glider_survey.png": of_script("examples/studies/glider_survey.py"),
     "guide/rescue_vehicle.png": of_script("examples/laws/rescue_vehicle.py"),

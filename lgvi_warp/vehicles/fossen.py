@@ -45,8 +45,8 @@ def vehicle_names() -> list[str]:
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> lw.vehicles.names()
-        ['bluerov2_heavy', 'nordkvist_sanyal', 'remus_100', 'seawing', 'slocum', 'sphere', 'torpedo']
+        >>> lw.vehicles.names()[:6]
+        ['bluerov2_heavy', 'dsrv', 'eca_a9', 'girona_500', 'lauv', 'nordkvist_sanyal']
     """
     folder = resources.files("lgvi_warp.vehicles")
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))

@@ -35,7 +35,7 @@ def test_the_vehicles_of_the_package_have_one_that_holds_their_water(name):
     volume = vehicle.buoyancy / (1025.0 * 9.81)
     # From a slender spheroid to the cylinder around it; an open frame displaces less.
     spheroid = 0.5236 * shape.length * shape.diameter**2
-    assert (0.2 if name == "bluerov2_heavy" else 0.95) < volume / spheroid < 1.5
+    assert (0.2 if name in ("bluerov2_heavy", "rexrov") else 0.95) < volume / spheroid < 1.5
     again = lw.Scene.from_dict(lw.Scene.named(name).to_dict()).vehicle.shape
     assert again == shape
     other = lw.Scene.named(name, vehicle={"shape": {"length": 9.0, "diameter": 1.0}})

@@ -13,7 +13,9 @@ from lgvi_warp.vehicles import fossen as co
 from tests.conftest import ROOT
 
 NAMES = co.vehicle_names()
-SIMPLE = [name for name in NAMES if name != "remus_100"]
+# Those whose inertia is none that a body can have say so.
+ODD = ("remus_100", "eca_a9")
+SIMPLE = [name for name in NAMES if name not in ODD]
 
 
 def content(name):
@@ -26,7 +28,8 @@ def term(name, kind):
 
 
 def test_the_list():
-    assert NAMES == ["bluerov2_heavy", "nordkvist_sanyal", "remus_100", "seawing", "slocum", "sphere", "torpedo"]
+    assert NAMES == ["bluerov2_heavy", "dsrv", "eca_a9", "girona_500", "lauv", "nordkvist_sanyal", "remus_100", "rexrov",
+                     "seawing", "slocum", "sphere", "torpedo"]  # fmt: skip
     with pytest.raises(lw.SceneError, match="did you mean 'remus_100'"):
         co.vehicle_file("remus100")
 

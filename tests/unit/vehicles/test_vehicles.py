@@ -13,9 +13,7 @@ from lgvi_warp.vehicles import fossen as co
 from tests.conftest import ROOT
 
 NAMES = co.vehicle_names()
-# Those whose inertia is none that a body can have say so.
-ODD = ("remus_100", "eca_a9")
-SIMPLE = [name for name in NAMES if name not in ODD]
+SIMPLE = [name for name in NAMES if name not in ("remus_100", "eca_a9")]
 
 
 def content(name):
@@ -133,7 +131,7 @@ def test_the_remus_fins_have_the_printed_coefficients():
     assert stern[4] == pytest.approx(-6.15, abs=0.01)
 
 
-@pytest.mark.parametrize("name", ["remus_100", "bluerov2_heavy"])
+@pytest.mark.parametrize("name", ["remus_100", "bluerov2_heavy", "lauv", "girona_500", "rexrov"])
 def test_drag_never_adds_energy(name):
     found = next(t for t in content(name)["terms"] if t["type"].startswith("drag"))
     linear, quadratic = (np.array(found[key]) for key in ("linear", "quadratic"))
@@ -233,6 +231,11 @@ def test_the_papers_vehicle_is_that_of_the_example():
 @pytest.mark.parametrize("name", SIMPLE)
 def test_simple_vehicles_load(name):
     assert lw.Vehicle(**content(name)["vehicle"]).warnings == ()
+
+
+def test_the_vehicle_of_a_doubtful_inertia_says_so():
+    (warning,) = lw.Vehicle(**content("eca_a9")["vehicle"]).warnings
+    assert "no rigid body has" in warning
 
 
 def test_the_full_vehicle_loads():

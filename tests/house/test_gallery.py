@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from lgvi_warp.views.recording.movie import SIZE
 from tests.conftest import ROOT
 
 sys.path.append(str(ROOT / "docs"))
@@ -34,7 +35,7 @@ def test_the_page_is_as_the_scripts_and_pictures_say():
 
 def test_the_moving_picture_is_of_its_script():
     with Image.open(movie.MOVIE) as picture:
-        assert (picture.n_frames, picture.size) == (movie.FRAMES, movie.SIZE)
+        assert (picture.n_frames, picture.size) == (movie.FRAMES, SIZE)
         assert picture.info["xmp"].decode() == pictures.digest(Path(movie.__file__)), "stale: run `make gallery`"
     assert movie.MOVIE.stat().st_size < 600_000
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.declared import real, whole
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.control.base import Bus, ControlLaw, Numbers, Packed, PackingContext, list_of_names
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Term, number
@@ -125,7 +126,7 @@ class LinearMPC(ControlLaw):
                 faults.add(key, getattr(self, key), f"are {len(names)}", f"name the {size} of A and B")
         if len(tracked) > len(inputs):
             faults.add("tracked", tracked, f"are {len(tracked)}", f"name at most {len(inputs)}, one for each input")
-        if self.horizon > LONGEST:
+        if is_whole(self.horizon, LONGEST + 1):
             faults.add("horizon", self.horizon, "is too long", f"give 1 to {LONGEST}")
         if self.P is not None and not faults and not _at_least_zero(self.P):
             faults.add("P", self.P, "is not symmetric and at least 0", "give such weights")

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.control.base import READINGS, MeasuringPart
 from lgvi_warp.physics.given_draws import Stream
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
@@ -87,7 +87,7 @@ class Sensor(MeasuringPart):
     place: Any = number((3,), "m", None, optional=True)
 
     def __post_init__(self) -> None:
-        if self.of != RANGE:
+        if not among(self.of, [RANGE]):
             faults = Faults(f"{self.key}.")
             faults.choice("of", self.of, READINGS)
             faults.raise_if_any()
@@ -110,8 +110,8 @@ class Sensor(MeasuringPart):
             if value != round(value):
                 near = f"{np.floor(value):g} or {np.ceil(value):g}"
                 faults.add(name, value, "is no whole number of ticks", f"give {near}")
-        if self.place is not None and self.of not in OF_A_PLACE:
-            remedy = "leave it out" if self.of != RANGE else "give point"
+        if self.place is not None and not among(self.of, OF_A_PLACE):
+            remedy = "leave it out" if not among(self.of, [RANGE]) else "give point"
             faults.add("place", self.place, f"has no meaning for a sensor of {self.of}", remedy)
 
     @property

@@ -138,7 +138,7 @@ def followed(x: State, body: Body, h: float) -> State:
 
     Raises ValueError for h < 0, which a stage of cg3 asks for: what a law remembers does not say how it came about.
     """
-    if h == 0.0 or not any(memory.size and follows(law) for law, memory in zip(body.terms, x.memory, strict=True)):
+    if h == 0.0 or not any(memory.size and follows(law) for law, memory in zip(body.terms, x.memory, strict=False)):
         return x
     if h < 0.0:
         raise ValueError(f"h = {h:.3g} s: what laws remember is not known before a step; use rkmk4")

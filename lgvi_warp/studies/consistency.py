@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.summaries import Rows, Summarized
 
@@ -89,6 +90,7 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
         >>> lw.SaveAt(every=1.0, fields=("nees", "nis", "nis_count")).fields
         ('nees', 'nis', 'nis_count')
     """
+    result_of(result)
     faults = Faults()
     chance = faults.number("level", level)
     if chance is not None and not 0.0 < chance < 1.0:

@@ -44,7 +44,7 @@ PARTS = ["docs/controllers/guidance.md", "docs/controllers/laws.md"]
 OF_A_RESULT = ["docs/guide/pictures.md", "docs/guide/recordings.md"]
 SCRIPT_NAMES = (
     "assimilation choose_method_and_step compare_with_your_simulator current energy_used exports geodetic_places going_on "
-    "notebooks resume tangents your_vehicle"
+    "named_vehicles notebooks resume tangents your_vehicle"
 )
 SCRIPTS = [f"docs/guide/{name}.md" for name in SCRIPT_NAMES.split()]
 

@@ -468,3 +468,17 @@ def test_warps_adjoint_gives_silent_zeros():
     tape.backward(grads={y: wp.array([(1.0, 1.0)], dtype=Lane, device="cpu")})
     np.testing.assert_array_equal(y.numpy(), [[9.0, 16.0]])
     np.testing.assert_array_equal(x.grad.numpy(), [[0.0, 0.0]])
+
+
+@pytest.mark.slow
+def test_commands_through_polynomials_of_thrust_have_slopes():
+    """A gain whose demand goes to the thrusters by the inverse of their polynomials, against differences of plain runs."""
+    controller = lw.Controller(
+        period=0.1, guidance=[lw.control.SetPoint(depth=6.0)], laws=[lw.control.HeavePID(kp=80.0, ki=1.0, kd=40.0)],
+        allocation=[lw.control.PseudoInverse(to="thrusters")])  # fmt: skip
+    scene = lw.Scene.named("bluerov2_heavy", start={"position": [0.0, 0.0, 5.0]}, controller=controller)
+    run, e = {"method": "rk4", "h": 0.05, "t1": 2.0, "save": lw.SaveAt(every=1.0)}, 1e-3
+    slope = lw.solve(scene, tangents=["heave_pid.kp"], **run).jacobian["position"][-1].ravel()[2]
+    below, above = (lw.solve(scene.with_numbers({"heave_pid.kp": 80.0 + d}), **run).position[-1, 0, 2] for d in (-e, e))
+    # The cubic's part is (e / kp)^2, and round-off 1e-15 / e.
+    assert slope == pytest.approx((above - below) / (2.0 * e), rel=1e-8)

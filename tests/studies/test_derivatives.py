@@ -302,10 +302,10 @@ def test_legs_of_waypoints():
     assert list(before.undefined) == ["position[1] by waypoints.radius"]
     says(before.undefined["position[1] by waypoints.radius"], "at which tick a leg is done")
     after = lw.derivatives(scene, ["position[1]", "position[1] at 2.0"], by, t1=5.0, **run)
-    says(after.undefined["position[1] by heading_pid.kp"], "tick at which a leg is done", "1 of the waypoints")
+    says(after.undefined["position[1] by heading_pid.kp"], "tick at which a leg is done", "1 of them were")
     assert abs(after.jacobian[1, 0] - before.jacobian[0, 0]) <= after.error[1, 0] + before.error[0, 0]
     between = lw.derivatives(scene, "position[1] at 4.9", "heading_pid.kp", t1=5.0, **run)
-    says(between.undefined["position[1] at 4.9 by heading_pid.kp"], "1 of the waypoints")
+    says(between.undefined["position[1] at 4.9 by heading_pid.kp"], "1 of them were")
 
 
 def test_a_number_that_may_not_be_less():

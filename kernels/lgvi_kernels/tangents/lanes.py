@@ -30,6 +30,7 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401  (families, to which o
     whole,
 )
 from lgvi_kernels.lanes.functions import (  # noqa: F401
+    about_inverse_root,
     arctangent2,
     clamp,
     cosine,
@@ -139,6 +140,9 @@ def _declare_functions(shape, code):
 
     @overloads.func_native(code["root"])
     def root(a: L) -> L: ...
+
+    @overloads.func_native(code["about_inverse_root"])
+    def about_inverse_root(a: L) -> L: ...
 
     @overloads.func_native(code["exponential"])
     def exponential(a: L) -> L: ...

@@ -154,6 +154,10 @@ def snippets(shape):
         "any_positive": native.any_positive(shape.width, shape.real),
         "rounded": function(shape, "A", "", "V()", series.nearest(shape.real)),
         "exponential": function(shape, "A", "", "dA * R", series.exponential(shape.real)),
+        # As of a root: of a number that is 0 and stays 0 the slope is 0.
+        "about_inverse_root": function(
+            shape, "A", "", "dA == (S)0 ? dA : dA * ((S)-0.5 * R * R * R)", series.about_inverse_root(shape.real)
+        ),
         "logarithm": function(shape, "A", "", "dA / A", series.logarithm(shape.real)),
         "sine": waves(shape, "N", "N + 1"),
         "cosine": waves(shape, "N + 1", "N + 2"),

@@ -605,7 +605,14 @@ class Term:
         return self.table_without(())
 
     def table_without(self, names: Collection[str]) -> dict[str, Any]:
-        """The table of `to_dict` without these fields, whose numbers no list is made of."""
+        """The table of `to_dict` without some fields, whose numbers no list is made of.
+
+        Args:
+            names: Names of the fields that are left out.
+
+        Returns:
+            As `to_dict`.
+        """
         content: dict[str, Any] = {"type": self.type} | ({"name": self.name} if self.name else {})
         for item in dataclasses.fields(self):
             value = getattr(self, item.name)
@@ -697,6 +704,9 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
         Rows (1 or n, d + (k - 1) (d + 2)), d numbers a value: the first value, then of each interval its place, 1 / length and
         the change of the value. `table1` and `table3` take k - 1 as their count.
 
+    Raises:
+        SceneError: at or values are no numbers of such shapes.
+
     Examples:
         >>> import lgvi_warp as lw
         >>> import numpy as np
@@ -704,7 +714,17 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
         >>> lw.laws.knots(depths, speeds).round(3).tolist()
         [[0.5, 0.0, 0.1, -0.2, 10.0, 0.05, -0.3]]
     """
-    at, values = repeated(at, values)
+    faults = Faults()
+    for key, value, size in (("at", at, 2), ("values", values, 3)):
+        found = faults.real(key, value)
+        if found is not None and (found.ndim != size or found.size == 0):
+            faults.add(key, value, f"has shape {found.shape}", f"give numbers of {size} dimensions, two knots or more")
+    if not isinstance(steps, bool | np.bool_):
+        faults.add("steps", steps, "is neither True nor False", "say whether values hold up to the next knot")
+    faults.raise_if_any()
+    at, values = repeated(np.asarray(at, dtype=float), np.asarray(values, dtype=float))
+    if at.shape[1] != values.shape[1]:
+        raise refusal("values", values, f"are at {values.shape[1]} knots", f"give {at.shape[1]}, one for each place")
     inverse = np.full((len(at), at.shape[1] - 1), STEEP) if steps else 1.0 / np.diff(at, axis=1)
     place = at[:, 1:] if steps else at[:, :-1]
     rows = [values[:, 0]]

@@ -18,7 +18,7 @@ NAMES = {
     "diffrax": "diffrax",
     "heyoka": "heyoka",
     "warp_ordinary": "ordinary Warp kernel",
-    "simulator": "Python Vehicle Simulator",
+    "simulator": "Python Vehicle Simulator, its own step",
 }
 # In inches; at 100 pixels to the inch as wide as the column of README, and drawn twice as fine.
 SIZE, FINE = (8.38, 3.4), 200

@@ -158,7 +158,7 @@ def text_of(content: dict[str, Any]) -> str:
         f"{content['members']:,} REMUS 100 that sink under thrust for {content['t1']:g} s, one core, compiled before. "
         f"Errors are at the end, the largest of {content['judged']} members, position [m] and attitude; at most "
         f"{content['target']:g} is asked. Where fewer vehicles were measured, the time is scaled; "
-        f"the loop's is processor time. {content['where']}", "",
+        f"the loop's is processor time (`--simulator DIR`). {content['where']}", "",
         *(f"{line}." for line in content["missing"]),
         markdown(head, rows, "lllrrrr"),
     ]  # fmt: skip

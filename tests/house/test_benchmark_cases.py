@@ -51,6 +51,19 @@ def test_peers_run_to_their_end_and_make_a_table(tmp_path):
     assert "BlueROV2 heavy" in peers.section(pages.read(tmp_path / "peers.jsonl"))
 
 
+@pytest.mark.slow
+def test_the_bars_of_readme_are_measured(tmp_path):
+    rows = tmp_path / "bars.json"
+    run = [sys.executable, "-m", "benchmarks", "table", "bars", "--quick", "--rows", str(rows)]
+    done = subprocess.run(run, cwd=pages.ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    content = json.loads(rows.read_text())
+    tools = {row["tool"] for row in content["rows"]}
+    assert {"lgvi_warp", "warp_ordinary"} <= tools
+    assert all(row["error"] <= content["target"] and row["seconds"] > 0.0 for row in content["rows"])
+    assert "| lgvi_warp | float64 |" in done.stdout
+
+
 def record_of(peer, problem, method, error, time, dtype="float64"):
     return {"peer": peer, "problem": problem, "method": method, "setting": "", "dtype": dtype, "threads": 1, "members": 9,
             "us_per_vehicle_second": time, "error_max": error}  # fmt: skip

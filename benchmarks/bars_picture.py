@@ -65,7 +65,7 @@ def draw(content: dict[str, Any]) -> None:
         axes.set_title(
             f"{content['members']:,} REMUS 100 for {content['t1']:g} s on one core, right to 1 cm", loc="left"
         )
-        axes.set_xlabel("seconds, logarithmic scale: each line is ten times the one before")
+        axes.set_xlabel("seconds: each line is ten times the one before")
         axes.grid(True, axis="x", alpha=0.3)
         axes.set_axisbelow(True)
         axes.minorticks_off()

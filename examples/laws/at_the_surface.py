@@ -34,18 +34,18 @@ def amplitude(angle, values):
 
 
 def responses(time, position, attitude, periods):
-    """Heave over the waves' amplitude, and pitch over the slope of the surface, by member."""
+    """Heave and its part of twice the frequency over the waves' amplitude, and pitch over the surface's slope, by member."""
     late = time > 60.0
     omega = 2.0 * np.pi / periods
     k = omega**2 / 9.81
     # The phase of the waves where the vehicle is, which drifts.
     angles = omega * time[late, None] + k * position[late, :, 0]
     pitch = -np.arcsin(attitude[late, :, 2, 0])
-    heave, swing = (
-        np.array([amplitude(angles[:, i], values[:, i]) for i in range(len(k))])
-        for values in (position[late, :, 2], pitch)
+    heave, twice, swing = (
+        np.array([amplitude(times * angles[:, i], values[:, i]) for i in range(len(k))])
+        for times, values in ((1, position[late, :, 2]), (2, position[late, :, 2]), (1, pitch))
     )
-    return heave / AMPLITUDE, swing / (AMPLITUDE * k)
+    return heave / AMPLITUDE, twice / AMPLITUDE, swing / (AMPLITUDE * k)
 
 
 def plot(periods, heave, pitch, path):
@@ -71,8 +71,10 @@ if __name__ == "__main__":
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/at_the_surface.png")
     target.parent.mkdir(parents=True, exist_ok=True)
     *path, periods = run()
-    heave, pitch = responses(*path, periods)
-    for period in (1.0, 2.0, 4.0, 6.0):
+    heave, twice, pitch = responses(*path, periods)
+    for period in (1.0, 2.0, 3.38, 3.5, 4.0, 6.0):
         i = np.abs(periods - period).argmin()
-        print(f"waves of {periods[i]:.1f} s: heave {heave[i]:.2f}, pitch {pitch[i]:.2f}")
+        print(
+            f"waves of {periods[i]:.1f} s: heave {heave[i]:.2f}, at twice their frequency {twice[i]:.2f}, pitch {pitch[i]:.2f}"
+        )
     print(plot(periods, heave, pitch, target))

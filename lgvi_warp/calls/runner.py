@@ -23,7 +23,7 @@ from lgvi_warp.engine.survey import Survey, survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.drawn import DrawnParameters
-from lgvi_warp.results.provenance import provenance, starts_at
+from lgvi_warp.results.provenance import provenance_but_scene, starts_at
 from lgvi_warp.results.quantities import EndQuantity, MetricQuantity, OfResult
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.request import ALL_SAMPLES, Request, enough_iterations
@@ -134,7 +134,7 @@ class Runner:
         few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
 
         def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
-            content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.request.observed))
+            content = plan.shared("provenance", {}, lambda numbers: provenance_but_scene(plan, self.request.observed))
             return {**content, "ensemble": few, **starts_at(plan)}, plan.grid.messages
 
         plan = self.plan(fleet)

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.deferred import Once
 from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.sampling.final import NUMBERS
@@ -25,8 +27,25 @@ def messages(plan: Plan) -> tuple[str, ...]:
 
 def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None) -> dict[str, Any]:
     """Everything that a result follows from: scene, ensemble, settings, versions and machine."""
+    return with_scene(provenance_but_scene(plan, observed, fields))
+
+
+def with_scene(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The provenance of a run, out of what `provenance_but_scene` returns."""
+    return {**content, "scene": content["scene"]()}
+
+
+def when_read(content: Mapping[str, Any]) -> Any:
+    """The field `provenance` of a result, which `with_scene` makes of this when it is first read."""
+    return functools.partial(with_scene, content)
+
+
+def provenance_but_scene(
+    plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None
+) -> dict[str, Any]:
+    """The provenance, with a function in place of the scene's tables: lists of all numbers of a field take seconds."""
     content = {
-        "scene": plan.ensemble.scene.to_dict(),
+        "scene": Once(plan.ensemble.scene.to_dict),
         "ensemble": plan.ensemble.to_dict(),
         "method": {
             "name": plan.method.name,

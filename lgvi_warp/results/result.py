@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common import npy_files, summaries
+from lgvi_warp.common.deferred import Deferred
 from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.reading import corrupt_file_as_scene_error
@@ -124,7 +125,7 @@ class Result(Summarized):
     substeps: np.ndarray
     parameters: Mapping[str, np.ndarray]
     messages: tuple[str, ...]
-    provenance: dict[str, Any]
+    provenance: dict[str, Any] = Deferred()  # type: ignore[assignment]
     terms: tuple[Term, ...] = ()
     statistics: Estimates = field(default_factory=Estimates)
     kept: Result | None = None

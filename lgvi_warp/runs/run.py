@@ -27,13 +27,13 @@ from lgvi_warp.results import member_fields
 from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
 from lgvi_warp.results.final import final_of
 from lgvi_warp.results.outcomes import begun_beyond, failure_text
-from lgvi_warp.results.provenance import at_end, messages, provenance
+from lgvi_warp.results.provenance import at_end, messages, provenance_but_scene, when_read
 from lgvi_warp.results.result import Result
 from lgvi_warp.sampling.final import Final
 from lgvi_warp.scene import plausibility
 from lgvi_warp.statistics.estimates.estimate import Estimates
 
-# Function from a plan to its provenance and messages.
+# Function from a plan to its provenance, as of `provenance_but_scene`, and messages.
 Known = Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]]
 
 
@@ -167,7 +167,7 @@ class _Gathered:
             starts=DrawnStarts(plan.ensemble, block.stop, block.first),
             weights=plan.ensemble.weights(block.first, block.stop),
             messages=(),
-            provenance=provenance(plan) | {"members": plan.ensemble.members},
+            provenance=when_read(provenance_but_scene(plan) | {"members": plan.ensemble.members}),
             terms=tuple(plan.ensemble.scene.terms),
         )
 
@@ -175,7 +175,7 @@ class _Gathered:
         """The result of the first n members; statistics are left out where they include other members (not `complete`)."""
         plan = self.plan
         if self.known is None:
-            content, texts = provenance(plan, self.observed, self.fields), messages(plan)
+            content, texts = provenance_but_scene(plan, self.observed, self.fields), messages(plan)
         else:
             content, texts = self.known(plan)
         of_members = {name: values[:n] for name, values in member_fields.member_fields(plan, self.outcome).items()}
@@ -193,7 +193,7 @@ class _Gathered:
             starts=DrawnStarts(plan.ensemble, n),
             weights=plan.ensemble.weights(0, n),
             messages=texts + remarks + on_the_way + begun_beyond(of_members["status"], of_members["failure_time"]),
-            provenance=at_end(content, of_members, n, plan.ensemble.members),
+            provenance=when_read(at_end(content, of_members, n, plan.ensemble.members)),
             terms=tuple(scene.terms),
             statistics=estimates,
             end=self.final(n, histories, of_members["status"]),

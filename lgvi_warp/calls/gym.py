@@ -101,7 +101,9 @@ class Vehicles:
         faults, names = Faults(), (instead_of,) if isinstance(instead_of, str) else tuple(instead_of)
         controller = ensemble.scene.controller
         if controller is None:
-            faults.add("fleet", "", "has no controller", "give [controller] with its period, guidance and sensors")
+            faults.add(
+                "controller", None, "is not in the scene", "give [controller] with its period, guidance and sensors"
+            )
             faults.raise_if_any()
         to = _actuator(faults, act, ensemble.scene)
         known = [law.key for law in controller.laws]

@@ -295,7 +295,7 @@ def test_bad_input(case):
 
 
 def test_bad_input_to_calls(env):
-    with pytest.raises(lw.SceneError, match="has no controller"):
+    with pytest.raises(lw.SceneError, match="controller = None: is not in the scene"):
         environment(lw.Scene(lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0))))
     env.reset()
     with pytest.raises(ValueError, match=r"have shape \(20, 2\); give \(20, 1\)"):

@@ -388,6 +388,8 @@ def test_what_is_refused():
     hull = lw.terms.SurfaceBuoyancy(heights=0.3)
     with pytest.raises(lw.SceneError, match="keep one of them"):
         floating("box", lw.terms.SurfaceBuoyancy(heights=0.3, name="second"))
+    with pytest.raises(lw.SceneError, match="is the name of 2 terms; keep one of them"):
+        floating("box", hull)
     with pytest.raises(lw.SceneError, match="heights"):
         lw.terms.SurfaceBuoyancy(heights=[0.3, 0.0, 0.0], stations=[0.0, 1.0, 2.0])
     with pytest.raises(lw.SceneError, match="heights"):

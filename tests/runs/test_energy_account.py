@@ -257,6 +257,9 @@ def test_what_does_not_go_together_is_a_sentence():
         scene_of(events=[battery])
     with pytest.raises(lw.SceneError, match="second account"):
         scene_of(account(), lw.terms.EnergyUse(name="other"))
+    # Other names would not help: a scene has one account.
+    with pytest.raises(lw.SceneError, match="is the name of 2 terms; keep one of them"):
+        scene_of(account(), account())
     with pytest.raises(lw.SceneError, match="energy_used': is not accounted"):
         lw.solve(scene_of(), h=0.1, t1=1.0, save=SAVE)
     with pytest.raises(lw.SceneError, match="energy_used': is not accounted"):

@@ -218,7 +218,7 @@ def test_a_copy_that_fails_does_not_settle(fleet):
 
 
 def test_scenes_without_margins():
-    with pytest.raises(lw.SceneError, match="has no controller"):
+    with pytest.raises(lw.SceneError, match="controller = None: is not in the scene"):
         lw.linear.margins(dataclasses.replace(scene(), controller=None), h=H)
     whole = scene()
     noisy = dataclasses.replace(whole.controller, sensors=[Sensor(of="heading", noise=0.1)])

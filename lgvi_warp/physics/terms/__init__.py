@@ -61,7 +61,8 @@ def from_list(entries: Any) -> tuple[Term, ...]:
     for key in sorted(key for key in counts if folded(key) in RESERVED):
         faults.add("terms", key, "is the name of a section of the scene", f'give another name: name = "{key}_term"')
     for key in sorted(key for key, count in counts.items() if count > 1):
-        remedy = f'give each a name of its own: name = "{key}_2"'
+        unique = all(term.unique for term in terms if term.key == key)
+        remedy = "keep one of them" if unique else f'give each a name of its own: name = "{key}_2"'
         faults.add("terms", key, f"is the name of {counts[key]} terms", remedy)
     faults.raise_if_any()
     return tuple(terms)

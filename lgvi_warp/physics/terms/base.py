@@ -207,6 +207,8 @@ class Term:
     accounts: ClassVar[bool] = False
     accounted: ClassVar[bool] = False
     looks_at_energy: ClassVar[bool] = False
+    # Whether a scene has one of its kind at most.
+    unique: ClassVar[bool] = False
     # Fields that follow from another one, of which alone a fault is told; set by a term before its fields are checked.
     following: ClassVar[tuple[str, ...]] = ()
     # Numbers with whose sizes the diagonal of `braking` grows, as it does with the speeds and the density where there are any.

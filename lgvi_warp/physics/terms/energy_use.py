@@ -33,6 +33,7 @@ class EnergyUse(Term):
 
     type: ClassVar[str] = "energy_use"
     accounts: ClassVar[bool] = True
+    unique: ClassVar[bool] = True
 
     hotel: Any = number((), "W", 0.0, least=0.0)
 

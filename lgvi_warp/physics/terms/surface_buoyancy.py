@@ -54,6 +54,7 @@ class SurfaceBuoyancy(Term):
     """
 
     type: ClassVar[str] = "surface_buoyancy"
+    unique: ClassVar[bool] = True
 
     heights: Any = number(("k",), "m", least=0.0)
     stations: Any = number(("k",), "m", (0.0,), rising=True)

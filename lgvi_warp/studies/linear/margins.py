@@ -316,7 +316,7 @@ def margins(
 def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: float) -> None:
     """Check that a controller has the law, and enough ticks in a run."""
     if controller is None:
-        faults.add("fleet", "the scene", "has no controller", "give [controller]")
+        faults.add("controller", None, "is not in the scene, and margins are those of a loop", "give [controller]")
     elif loop is not None and loop not in (keys := [law.key for law in controller.laws]):
         faults.add("loop", loop, "is no law of the controller", closest(loop, keys))
     elif not faults and seconds < LEAST_TICKS * controller.period:

@@ -182,7 +182,8 @@ def test_arguments_of_a_trim(capsys):
      ["--fixed = 'pitch': is no value; give pitch=0.1", "'roll=low'", "'=2'"]),
     (["margins", SCENE, "--loop", "heading", "--skew", "2"],
      ["loop = 'heading': is no law of the controller; did you mean 'heading_pid'?", "skew = 2.0: is out of bounds"]),
-    (["margins", str(ROOT / "examples" / "paper.toml")], ["has no controller; give [controller]"]),
+    (["margins", str(ROOT / "examples" / "paper.toml")],
+     ["controller = None: is not in the scene, and margins are those of a loop; give [controller]"]),
 ])  # fmt: skip
 def test_odd_arguments_are_refused_all_at_once(given, words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -136,15 +136,17 @@ def third(width, real):
     return f"{kind} r; memcpy(&r, &a.c[k * {width}], sizeof(r)); return r;"
 
 
-def whole(width, real, repeats=1):
+def whole(width, real, repeats=1, rest=0):
     """C++ of the whole numbers at or below those of a lane; what is no number, or beyond int32, becomes an end of int32.
 
     repeats: how often they stand one after the other; the lane has `width` numbers, and then others.
+    rest: how many of them follow once more: what pads the lane is an index of a row as well.
     """
     floor = "__builtin_floorf" if real == wp.float32 else "__builtin_floor"
     least, beyond = "(S)-2147483648.0", "(S)2147483648.0"
-    result = f"wp::vec_t<{width * repeats}, wp::int32> r;"
-    copies = f"for (int i = 0; i < {repeats}; ++i) memcpy(&r.c[i * {width}], &K, sizeof(K)); return r;"
+    result = f"wp::vec_t<{width * repeats + rest}, wp::int32> r;"
+    last = f" memcpy(&r.c[{width * repeats}], &K, {4 * rest});" if rest else ""
+    copies = f"for (int i = 0; i < {repeats}; ++i) memcpy(&r.c[i * {width}], &K, sizeof(K));{last} return r;"
     if width == 1:
         value = f"v >= {least} ? (v < {beyond} ? (int){floor}(v) : 2147483647) : -2147483647 - 1"
         return f"typedef wp::{real.__name__} S; const S v = a[0]; const int K = {value}; {result} {copies}"

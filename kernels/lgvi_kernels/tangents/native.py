@@ -129,7 +129,8 @@ def whole(shape):
 
     So a row that a vehicle gathers by its own index is gathered with its slopes.
     """
-    return native.whole(shape.width, shape.real, 1 + shape.tangents)
+    repeats = 1 + shape.tangents
+    return native.whole(shape.width, shape.real, repeats, shape.length - repeats * shape.width)
 
 
 def normals(shape):

@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.views.plots.canvas import panels, style, wrapped
+from lgvi_warp.views.plots.canvas import panels, style, widen, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 
 if TYPE_CHECKING:
@@ -66,6 +66,10 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
                 _curve(axes, *found.curve(name, way), label=f"by {way}", **style(i))
             _mark(axes, found.curve(name)[0], name)
             axes.set(xlabel=LABELS.get(name, f"peak gain to {name.removesuffix('_peak')}"), ylim=(0.0, 102.0))
+            widen(axes.xaxis)
+            # An offset of all ticks would lie over the label; equal numbers take few ticks of many digits.
+            axes.locator_params(axis="x", nbins=4)
+            axes.xaxis.set_major_formatter("{x:.6g}")
             axes.grid(alpha=0.3)
             axes.legend()
         for axes in grid[:, 0]:

@@ -15,7 +15,18 @@ from lgvi_warp.results import outcomes as ended_so
 from lgvi_warp.results.quantities import OfResult, quantities
 from lgvi_warp.views.choice import select_members
 from lgvi_warp.views.fleet import OUTCOME_STYLES, title
-from lgvi_warp.views.plots.canvas import COLORS, hatch, legend_below, mark, panel, panels, point_down, widen, wrapped
+from lgvi_warp.views.plots.canvas import (
+    COLORS,
+    hatch,
+    legend_below,
+    mark,
+    narrow,
+    panel,
+    panels,
+    point_down,
+    widen,
+    wrapped,
+)
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, some_of, unit_of
@@ -211,7 +222,9 @@ def pairs(
         values, labels, unit = at_one_time(result, meaning, choice.members)
         columns += list(values.T)
         names += [f"{in_words(label)} [{unit or '1'}]{', down' * (label in DEPTHS)}" for label in labels]
-    m = len(names)
+    m, small = len(names), narrow()
+    # In one column there is no room for long labels beside each other.
+    names = [name.replace(" [", "\n[") for name in names] if small else names
     if not 2 <= m <= MOST_PAIRS:
         raise refusal("of", list(of), f"has {m} numbers a member", f"name from 2 to {MOST_PAIRS}")
     groups = _groups(result, choice.members, float(result.time[-1]))
@@ -231,8 +244,11 @@ def pairs(
                 axes[i, j].xaxis.set_major_formatter("{x:.5g}")
                 axes[i, j].yaxis.set_major_formatter("{x:.5g}")
                 axes[i, j].tick_params(labelbottom=i == m - 1, labelleft=i != j and j == 0, axis="both")
+                axes[i, j].tick_params(axis="x", labelrotation=90 if small else 0)
         handles, labels = axes[1, 0].get_legend_handles_labels()
         axes[0, -1].figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+        axes[0, 0].figure.align_ylabels(axes[:, 0])
+        axes[0, 0].figure.align_xlabels(axes[-1])
         text = f"{some_of(result, len(choice.members))} at {result.time[-1]:g} s"
         axes[0, 0].figure.suptitle(wrapped(text, axes[0, 0].figure))
     return axes

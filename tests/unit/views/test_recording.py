@@ -492,15 +492,19 @@ def test_no_viewer_is_loaded_before_it_is_needed():
     assert said.stdout == "False\n"
 
 
-def test_2000_members_take_no_second(tmp_path):
+def test_2000_members_take_a_second(tmp_path):
     large = fleet(2000, 200)
     lw.record(fleet(3, 5), tmp_path / "warm.rrd")
-    costs = []
+    costs, of_python = [], []
     for _ in range(2):
         begun = time.process_time()
         path = lw.record(large, tmp_path / "large.rrd")
-        costs.append(time.process_time() - begun)
-    assert min(costs) < 1.0
+        recorded = time.process_time()
+        sum(i & 1 for i in range(10_000_000))
+        costs.append(recorded - begun)
+        of_python.append(time.process_time() - recorded)
+    # 2.3 times as long as Python takes to count ten million numbers; a call for each of 400,000 samples would take far more.
+    assert min(costs) < 4.0 * min(of_python), (costs, of_python)
     assert path.stat().st_size < 8e6
 
 

@@ -139,8 +139,12 @@ MOST_KNOWN = 60
 
 def closest(word: Any, known: Iterable[str]) -> str:
     """Suggest the known name nearest to a word."""
-    names = [str(name) for name in known]
-    text = word[:LONGEST_VALUE] if isinstance(word, str) else brief(word)
+    return _closest(word[:LONGEST_VALUE] if isinstance(word, str) else brief(word), tuple(map(str, known)))
+
+
+# A file may have the same fault in thousands of tables, of which few are told.
+@functools.lru_cache(maxsize=64)
+def _closest(text: str, names: tuple[str, ...]) -> str:
     near = [name for name in names if name.endswith(f".{text}")]
     near = near or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
     more = f" and {len(names) - MOST_KNOWN:,} more" if len(names) > MOST_KNOWN else ""

@@ -28,9 +28,8 @@ from tests.support import hostile
 BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
 START, VARY = BODY + "[start]\nposition = ", BODY + "[ensemble.vary]\n"
 TABLED = BODY + "[ensemble.sampling.table]\nfile = 'table.csv'\n"
-# Of this process's own time [s], and of its memory [kB]. The longest took 2.04 s on a busy core of an AMD EPYC; what grows
-# with the square of the faults takes minutes.
-MOST_SECONDS, MOST_KB = 5.0, 300_000
+# Of this process's own time, however busy the machine is [s], and of its memory [kB].
+MOST_SECONDS, MOST_KB = 2.0, 300_000
 
 
 def refused(call, *arguments, words=(), **named):

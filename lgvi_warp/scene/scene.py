@@ -188,10 +188,8 @@ class Scene(Summarized):
                 elif counts[key] > 1:
                     faults.add(place, key, f"is the name of two {word}s or of a term too",
                                f'give each a name of its own: name = "{key}_2"')  # fmt: skip
-        accounts = [term for term in self.terms if term.accounts]
-        if len(accounts) > 1:
-            faults.add("terms", accounts[1].key, "is a second account of the energy used", "keep one of them")
-        for event in (event for event in self.events if event.looks_at_energy and not accounts):
+        accounted = any(term.accounts for term in self.terms)
+        for event in (event for event in self.events if event.looks_at_energy and not accounted):
             problem = "looks at the energy used, which no term accounts"
             faults.add("events", event.key, problem, 'give a term of type "energy_use"')
         for first, second in alike(keys):

@@ -60,9 +60,14 @@ def from_list(entries: Any) -> tuple[Term, ...]:
     counts = Counter(term.key for term in terms)
     for key in sorted(key for key in counts if folded(key) in RESERVED):
         faults.add("terms", key, "is the name of a section of the scene", f'give another name: name = "{key}_term"')
-    for key in sorted(key for key, count in counts.items() if count > 1):
-        unique = all(term.unique for term in terms if term.key == key)
-        remedy = "keep one of them" if unique else f'give each a name of its own: name = "{key}_2"'
+    # Other names would not help these.
+    unique = [term for term in terms if term.unique]
+    for i, term in enumerate(unique):
+        if any(other.type == term.type for other in unique[:i]):
+            faults.add("terms", term.key, f"is a second term of the type {term.type}", "keep one of them")
+    several = {key for key, count in counts.items() if count > 1} - {term.key for term in unique}
+    for key in sorted(several):
+        remedy = f'give each a name of its own: name = "{key}_2"'
         faults.add("terms", key, f"is the name of {counts[key]} terms", remedy)
     faults.raise_if_any()
     return tuple(terms)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.declared import word
-from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, PackingContext, Term, number, rows_of
 from lgvi_warp.physics.terms.base import side_by_side as joined
 from lgvi_warp.physics.terms.cross_flow import GAUSS
@@ -76,9 +76,6 @@ class SurfaceBuoyancy(Term):
 
     def beside(self, terms: Sequence[Term]) -> Any:
         # Knows the waves by their names, whose numbers it reads when it is packed.
-        others = [other.key for other in terms if isinstance(other, SurfaceBuoyancy) and other.key != self.key]
-        if others:
-            raise refusal("terms", self.key, f"takes buoyancy off the hull beside {others[0]}", "keep one of them")
         waves = tuple(other.key for other in terms if isinstance(other, Waves))
         if waves == vars(self)["waves"]:
             return self

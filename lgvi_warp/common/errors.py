@@ -293,15 +293,19 @@ class Faults:
             return array
         return None
 
-    def number(self, key: str, value: Any, unit: str = "", least: float = -np.inf) -> float | None:
-        """Read one finite number from `least` on; None after noting a fault."""
+    def number(
+        self, key: str, value: Any, unit: str = "", least: float = -np.inf, most: float = np.inf
+    ) -> float | None:
+        """Read one finite number from `least` to `most`; None after noting a fault."""
         array = self.finite(key, value, (), unit)
         if array is None:
             return None
-        if array < least:
-            self.add(key, value, f"is below {least:g}", f"give a number [{unit}] from {least:g}")
-            return None
-        return float(array)
+        if least <= array <= most:
+            return float(array)
+        problem = f"is below {least:g}" if array < least else f"is above {most:g}"
+        bounds = (f" {word} {bound:g}" for word, bound in (("from", least), ("to", most)) if math.isfinite(bound))
+        self.add(key, value, problem, "give a number" + (f" [{unit}]" if unit else "") + "".join(bounds))
+        return None
 
     def positive(self, key: str, value: Any, unit: str = "s") -> float | None:
         """Read one finite number above 0; None after noting a fault."""

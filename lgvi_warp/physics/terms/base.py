@@ -233,6 +233,7 @@ class Term:
             object.__setattr__(self, item.name, _checked(field_faults, item, value, lengths, self.shape_of(item)))
         if not faults:
             read(self, faults)
+        if not faults:
             self.check(faults)
         faults.raise_if_any()
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from lgvi_warp.common.declared import word
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, SceneError, ragged
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 from lgvi_warp.physics.terms.events import Outside
 
@@ -152,13 +152,14 @@ class CurrentField(Term):
         return _with_data(cls(**known, outside=outside, scenario=scenario, name=name), numbers.data)
 
     def __post_init__(self) -> None:
-        velocities = np.asarray(self.velocities)
-        if velocities.ndim == 4:
-            velocities = velocities[None, None]
-        elif velocities.ndim == 5:
-            velocities = velocities[:, None] if self.times is None else velocities[None]
-        if velocities.ndim == 6:
-            object.__setattr__(self, "velocities", velocities)
+        if not ragged(self.velocities):
+            velocities = np.asarray(self.velocities)
+            if velocities.ndim == 4:
+                velocities = velocities[None, None]
+            elif velocities.ndim == 5:
+                velocities = velocities[:, None] if self.times is None else velocities[None]
+            if velocities.ndim == 6:
+                object.__setattr__(self, "velocities", velocities)
         super().__post_init__()
 
     @classmethod

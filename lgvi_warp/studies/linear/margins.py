@@ -281,8 +281,7 @@ def margins(
     for name, value in {"about": about, "settle": settle, "seconds": seconds, "longest": longest, "tilt": tilt}.items():
         faults.positive(name, value)
     faults.number("most", most, "", 1.0)
-    if not -1.0 <= float(skew) <= 1.0:
-        faults.add("skew", skew, "is out of bounds", "give a number from -1 to 1")
+    faults.number("skew", skew, "", -1.0, 1.0)
     if set(LINEAR) & set(of) and "eigenvalues" not in by:
         faults.add("by", by, "has no disk margins and no peaks, which are of a linear model", 'add "eigenvalues"')
     outputs = _outputs(faults, to, of)

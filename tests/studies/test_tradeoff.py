@@ -328,7 +328,8 @@ def test_a_busy_core_changes_no_method_of_the_front(scene):
     def names():
         found = lw.tradeoff(fleet, 4.0, methods=DISTURBED, seconds=ENOUGH)
         assert all(one.cost_spread >= 1.0 for one in found.measurements)
-        return {one.setting.name for one in found.front()}
+        # Errors of 10 m over up to 10,000 steps are of round-off below that: which of them is the least is chance.
+        return {one.setting.name for one in found.front() if one.error() > 1e-11}
 
     cores = os.sched_getaffinity(0)
     try:

@@ -69,6 +69,7 @@ def test_a_reading_is_exact_where_the_beam_meets_the_floor_once(size, tilt):
     np.testing.assert_allclose(seen, true, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_beams_with_errors_are_those_of_the_twin():
     n = 5
     varied = {
@@ -115,6 +116,7 @@ def test_without_an_echo_it_reads_its_reach_and_below_the_floor_nothing():
     np.testing.assert_allclose(readings(r, (0.0, 0.0, -1.0))[0], 20.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_other_sensors_do_not_move_where_it_looks_from():
     scene = scene_of(rough(1.0), lw.control.Altimeter())
     depth_cell, controller = lw.control.Sensor(of="position", bias=7.0), scene.controller
@@ -130,6 +132,7 @@ def test_other_sensors_do_not_move_where_it_looks_from():
     assert wanted[1] - wanted[0] == pytest.approx(7.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_fault_of_an_altimeter_begins_at_its_time():
     stuck = lw.control.Fault(of="altimeter", time=0.3, offset=4.0)
     fleet = one(scene_of(rough(0.0), lw.control.Altimeter(), [stuck]), b=(0.0, 0.0, 10.0))
@@ -196,6 +199,7 @@ def ran(scene):
     return r.time[240:], r.position[240:, 0]
 
 
+@pytest.mark.slow
 def test_terrain_following_errs_as_the_loop_errs_on_a_wanted_wave():
     """The error of the altitude on waves of the floor is that of the depth on a wave of time, which knows no floor."""
     time, b = ran(remus([lw.control.Altitude(altitude=5.0, source="chart")]))
@@ -212,6 +216,7 @@ def test_terrain_following_errs_as_the_loop_errs_on_a_wanted_wave():
     assert abs(over_floor - in_time) < 0.005 * abs(in_time)
 
 
+@pytest.mark.slow
 def test_an_altimeter_follows_as_the_chart_does_and_looking_ahead_stays_higher():
     clearances = {}
     for name, guidance, sensors in (
@@ -253,6 +258,7 @@ def test_bad_input(part, numbers, words):
         getattr(lw.control, part)(**numbers)
 
 
+@pytest.mark.slow
 def test_a_loop_with_an_altimeter_goes_on_where_it_was():
     sensor = lw.control.Altimeter(noise=0.1, drift=0.02, latency=2, every=3, dropout=0.1)
     scene = remus([lw.control.Altitude(altitude=5.0)], [sensor])

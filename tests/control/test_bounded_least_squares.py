@@ -102,6 +102,7 @@ def test_moments_before_forces():
     assert moments[0] < 0.5 * moments[1]
 
 
+@pytest.mark.slow
 def test_what_is_within_the_limits_is_the_pseudo_inverses_to_the_last_digit():
     demands = drawn(64, 0.1)
     for sweeps in (0, 2):
@@ -148,6 +149,7 @@ def test_members_beside_others_keep_their_bits():
         np.testing.assert_array_equal(asked(BoundedLeastSquares(to="thrusters"), demands[i : i + 1])[0][0], together[i])
 
 
+@pytest.mark.slow
 def test_curves_are_inverted_with_the_same_bits_beside_others():
     # The named vehicle's curve has odd powers alone; beside it one whose curve ahead has others.
     demands = drawn(40, 0.15)
@@ -163,6 +165,7 @@ def test_curves_are_inverted_with_the_same_bits_beside_others():
         np.testing.assert_allclose(made[inside], efforts[inside], rtol=0.0, atol=1e-8 * MOST)
 
 
+@pytest.mark.slow
 def test_a_demand_that_is_no_number_ends_the_member():
     law = PosePID(kp=[1e200] * 3, kd=[1e200] * 3, kr=[1e308] * 3, kw=[1e308] * 3)
     controller = lw.Controller(period=0.1, guidance=[SetPoint(position=[1e200, 0.0, 0.0], heading=0.0)], laws=[law],
@@ -236,12 +239,14 @@ def test_edges(edge, dtype):
         assert (np.abs(s * (w - B @ t))[~told] <= 1.001e-3 * size).all()
 
 
+@pytest.mark.slow
 def test_a_thruster_that_the_loop_does_not_know_to_be_dead():
     well, dead = allocated(SIDES, []), allocated(SIDES, [Fault(of="thrusters", channel=0, time=0.0, gain=0.0)])
     np.testing.assert_array_equal(dead[0], well[0] * [0.0, 1.0])
     np.testing.assert_array_equal(dead[1], well[1])
 
 
+@pytest.mark.slow
 def test_a_channel_that_makes_nothing_of_what_is_asked_for():
     # Laws ask for N alone: the second thruster pushes through the origin, its column is 0.
     term = lw.terms.Thrusters(position=((-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)), direction=((0.0, 1.0, 0.0),) * 2,

@@ -190,6 +190,7 @@ def test_a_circle_is_left_after_its_turns(clockwise):
         assert r.position[-1, i, 1] > 15.0
 
 
+@pytest.mark.slow
 def test_a_steady_circle_is_as_far_off_as_the_heading_and_the_course_tell():
     """d - radius = look_ahead tan(a), a the angle between the wanted heading and the tangent: geometry of the steady turn."""
     circle = CIRCLE | {"clockwise": True}
@@ -264,6 +265,7 @@ def docked():
     return lw.solve(fleet, "psi_s", h=H, t1=400.0, save=lw.SaveAt(every=T, fields=fields), statistics=contacts)
 
 
+@pytest.mark.slow
 def test_it_docks_or_goes_round(docked):
     """The way is judged by the path alone: a cone about the centre line, a plane at its end and one at its beginning."""
     went_round = 0
@@ -359,6 +361,7 @@ def test_a_contact_needs_a_dock():
         lw.solve(scene(lw.control.Loiter(**CIRCLE)), h=H, t1=1.0, statistics=[lw.metrics.DockContact("speed")])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [
     lw.control.Waypoints(**CIRCLES, times=(0.0, 9.0, 45.0, 70.0), method="ilos"), lw.control.Docking(**DOCK)
 ], ids=lambda part: part.type)  # fmt: skip

@@ -328,6 +328,7 @@ def falling():
     return lambda act="command": lw.gym.VectorEnv(fleet, act=act, observe=names, **SETTINGS)
 
 
+@pytest.mark.slow
 def test_events_and_sensors_of_later_episodes(falling):
     env = falling()
     assert np.array_equal(env.single_action_space.high, np.full(6, 2.0))

@@ -54,6 +54,7 @@ def test_every_state_and_input_is_that_of_the_twin():
     assert report.ok, str(report)
 
 
+@pytest.mark.slow
 def test_its_law_within_the_limits_is_that_of_the_regulator():
     """Of all states and inputs at once: the regulator's StateFeedback has a test of its own for its signs."""
     scene = lw.Scene.named("bluerov2_heavy", start={"position": [0.0, 0.0, 5.0]})
@@ -213,6 +214,7 @@ def loop(heave):
     return varied, lw.solve(fleet, "psi_s", h=H, t1=40.0, save=lw.SaveAt(every=T, fields=fields))
 
 
+@pytest.mark.slow
 def test_a_saturated_loop_is_that_of_the_twin(heave, loop):
     varied, result = loop
     given = start(5)
@@ -238,6 +240,7 @@ def test_a_loop_keeps_its_limits_and_leaves_no_error(loop):
     np.testing.assert_allclose(Z[-1], 3.0, atol=0.05)
 
 
+@pytest.mark.slow
 def test_without_a_disturbance_an_error_is_left(heave):
     """Then the law is a regulator: it settles where the gain of the depth makes what is missing."""
     plain = dataclasses.replace(heave, disturbance_time=np.inf)

@@ -55,6 +55,7 @@ def still(ticks, depth=10.0):
     return truth
 
 
+@pytest.mark.slow
 def test_estimates_are_the_twins():
     truth, listed = voyage(300), parts()
     seen = measured(fleet(listed, 2), truth, H)
@@ -85,6 +86,7 @@ def test_a_log_and_a_gyroscope_without_a_filter_are_the_twins():
     assert np.array_equal(seen[200:249, :, 12:15], seen[201:250, :, 12:15])
 
 
+@pytest.mark.slow
 def test_sensors_without_errors_measure_the_truth():
     truth = voyage(100)
     plain = [lw.control.DVL(), lw.control.IMU()]
@@ -105,6 +107,7 @@ def errors_of(listed, truth, members):
     return measured(fleet(listed, members), truth, H)[..., :3] - truth[..., :3]
 
 
+@pytest.mark.slow
 def test_without_a_log_the_position_drifts_as_the_integral_of_the_accelerometers_noise():
     # At rest, all else known: a walk of the velocity of N^2 T a tick, and the position by the mean of two velocities, so its
     # variance after k ticks is N^2 T^3 k (4 k^2 - 1) / 12, which goes to N^2 t^3 / 3. The log is silent from 0 s on.
@@ -121,6 +124,7 @@ def test_without_a_log_the_position_drifts_as_the_integral_of_the_accelerometers
     assert abs(each.sigma[0] ** 2 / variance - 1.0) < 1e-6
 
 
+@pytest.mark.slow
 def test_delayed_fixes_are_those_of_a_straight_line():
     # At rest with a unit that does not err, place and velocity of a line are all that is unknown: its posterior is that of a
     # regression on the fixes, each at the time at which it was taken, as soon as they are there.
@@ -149,6 +153,7 @@ def with_places(listed):
     return [dataclasses.replace(part, place=at[part.key]) if part.key in at else part for part in listed]
 
 
+@pytest.mark.slow
 def test_sensors_with_places_of_their_own_are_the_twins():
     truth, listed = voyage(150), with_places(parts())
     seen = measured(fleet(listed, 2), truth, H)
@@ -173,6 +178,7 @@ def test_sensors_with_places_of_their_own_are_the_twins():
     assert measured(fleet(deep, 2), sinking, H)[:, 0, 2] == pytest.approx([9.0, 9.2, 9.2])
 
 
+@pytest.mark.slow
 def test_a_fix_that_comes_after_the_run_changes_nothing():
     truth, plain = voyage(100), parts(("depth",))
     usbl = lw.control.Sensor(name="usbl", of="position", noise=0.5, every=1000, latency=900)
@@ -277,6 +283,7 @@ def test_the_twins_errors_are_as_large_as_it_believes():
     assert low < belief[..., 1].sum() < high
 
 
+@pytest.mark.slow
 def test_a_beam_whose_way_to_the_floor_is_beyond_its_range_has_no_echo():
     # 10 m above the floor: 11.55 m along each beam where the vehicle is level; rolled by 0.1 rad, 11.15 m and 12.10 m.
     level, rolled, c, s = slice(0, 200), slice(200, 400), np.cos(0.1), np.sin(0.1)
@@ -308,6 +315,7 @@ def test_beams_over_a_grid_are_those_of_the_twin(reach):
     assert 0.1 < held[1::2].mean() < 0.9
 
 
+@pytest.mark.slow
 def test_a_flat_floor_on_a_grid_is_a_flat_floor():
     truth, log = voyage(100), lw.control.DVL(noise=0.01, floor="ground", least_range=1.0, greatest_range=11.0)
     flat = lw.events.Floor(name="ground", depth=20.0)
@@ -318,6 +326,7 @@ def test_a_flat_floor_on_a_grid_is_a_flat_floor():
     assert 0.05 < np.any(seen[0] != free, axis=2).mean() < 0.95
 
 
+@pytest.mark.slow
 def test_a_fix_below_the_surface_does_not_count():
     listed = [lw.control.IMU(), lw.control.Sensor(name="gps", of="position", noise=0.1, deepest=9.0)]
     listed.append(lw.control.ErrorStateFilter(fix="gps", position_sigma=100.0))

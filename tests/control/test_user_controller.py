@@ -48,6 +48,7 @@ vary = { "bang.level" = { uniform = { low = 2.0, high = 4.0 } } }
 """
 
 
+@pytest.mark.slow
 def test_the_law_on_the_page_is_right_and_keeps_the_depth(page):
     report = lw.laws.check_controller(page.Bang(level=3.0))
     assert report.ok, str(report)

@@ -79,6 +79,7 @@ def test_a_volume_stays_within_its_limit():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 @pytest.mark.parametrize("lag", [0.0, 0.7])
@@ -115,6 +116,7 @@ SWAYING = lw.Start(
 RAMP = lw.terms.Ballast(position=[[0.4, 0.05, 0.1]], times=[-1.0, 9.0], command_schedule=[[-3e-4], [6e-4]])
 
 
+@pytest.mark.slow
 @pytest.mark.kernel
 @pytest.mark.parametrize(("method", "order"), [("rk4", 4.0), ("psi_s", 2.0)])
 def test_a_schedule_keeps_the_order(method, order):

@@ -34,6 +34,7 @@ def scene(*terms):
 TURN = 2.0 * np.pi / 200.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "h", "allowed"), [("rk8", 1.0, 1e-8), ("psi_s", 0.5, 2e-3)])
 def test_what_drifts_in_an_eddy_comes_back(method, h, allowed):
     # psi_s takes the water half way: its circle opens by (turn h)^4 / 8 of the radius a step, and lags by (turn h)^2 / 6.
@@ -45,6 +46,7 @@ def test_what_drifts_in_an_eddy_comes_back(method, h, allowed):
     assert np.abs(b - start).max() < allowed * 30.0
 
 
+@pytest.mark.slow
 def test_a_trilinear_current_in_time_is_exact():
     # A drifter goes as a particle does: through cells, by SciPy, in a current that is linear in each number and in time.
     def u(x, y, z, t):
@@ -89,6 +91,7 @@ def test_within_a_cell_each_method_keeps_its_order(method):
     assert errors[1] < 2e-11 or errors[0] / errors[1] > 2.0 ** (ORDERS[method] - 0.1), errors
 
 
+@pytest.mark.slow
 def test_outside_the_grid_and_its_times_the_nearest_holds():
     field = lw.terms.CurrentField(
         velocities=np.array([0.1, 0.3])[:, None, None, None, None] * np.ones((1, 1, 1, 1, 3)),
@@ -100,6 +103,7 @@ def test_outside_the_grid_and_its_times_the_nearest_holds():
     np.testing.assert_allclose(result.position[-1, 0] - [500.0, -500.0, 900.0], expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_scenarios_are_members_of_a_forecast():
     steady = np.array([[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, -0.3]])
     field = lw.terms.CurrentField(velocities=steady[:, None, None, None], spacing=[1.0, 1.0, 1.0])

@@ -125,6 +125,7 @@ def test_a_member_that_leaves_stops_where_it_does():
     np.testing.assert_allclose(held.position[-1, 0], [50.0, 120.0, 5.0], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_two_fields_have_two_events_which_go_with_them():
     scene = drifting(small("stop"), small("stop", "second"), small("hold", "third"))
     assert [event.key for event in scene.events] == ["outside", "second_outside"]
@@ -151,6 +152,7 @@ def test_a_run_that_lasts_longer_than_the_field_is_refused():
             lw.solve(drifting(read), "rk4", h=1.0, t1=3601.0)
 
 
+@pytest.mark.slow
 def test_members_of_a_forecast_under_waves_a_profile_and_noise(tmp_path):
     """One at a time, members have the bits that they have together, and a run that goes on those of one that was not cut."""
     import xarray as xr
@@ -209,6 +211,7 @@ def test_a_stored_run_goes_on_with_the_file_or_the_numbers(tmp_path, kept):
             lw.resume(tmp_path / "c.zarr")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", ["docs/guide/terms/current_field.md", "docs/guide/ocean_data.md"])
 def test_pages(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -52,6 +52,7 @@ METHODS = ["psi_s", "rk4", *(pytest.param(name, marks=pytest.mark.slow) for name
            ("psi_x", "psi_w", "psi_1", "phi", "psi", "tj4(psi_s)", "bm4(psi_x)", "rk8", "rkmk4", "cg3", "rkw3"))]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_held_commands_and_a_hotel_load_use_power_times_time(method):
     # Between knots of the table, and ahead beside astern: exact, to the round-off of a sum of 20 steps.
@@ -101,6 +102,7 @@ def place(begin, end, t):
     return end + (begin - end) * np.exp(-t / TAU)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "order", "steps"), [("rk4", 4, (0.2, 0.1)), ("psi_s", 2, (0.1, 0.05))])
 def test_a_lag_is_integrated_with_the_order_of_the_method(method, order, steps):
     # The cube of an exponential approach, in closed form by its expansion.
@@ -117,6 +119,7 @@ def test_a_lag_is_integrated_with_the_order_of_the_method(method, order, steps):
     assert errors[-1] < 1e-3 * exact
 
 
+@pytest.mark.slow
 def test_a_lag_through_a_table_agrees_with_quadrature():
     # Kinks of the table, of which the places pass one: the error of such a step is of order h^2.
     exact = 2.0 * HOTEL
@@ -127,6 +130,7 @@ def test_a_lag_through_a_table_agrees_with_quadrature():
     assert errors[1] < 5e-4
 
 
+@pytest.mark.slow
 def test_power_that_falls_with_the_speed_is_that_of_the_recorded_motion():
     # By Simpson's rule of the recorded speed through still water: an error of order h^4.
     law = lw.terms.Thrusters(position=[[-0.5, 0.0, 0.1]], direction=[[1.0, 0.0, 0.0]], coefficient=20.0, command=[0.8],
@@ -168,6 +172,7 @@ def test_the_kernel_uses_what_its_twin_uses(name, method):
     assert result.energy_used[-1, 0] == pytest.approx(x.used, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_motion_keeps_its_bits_beside_an_account():
     law = thrusters(command=[0.4, -0.7])
     with_account, without = (

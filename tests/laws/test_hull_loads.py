@@ -82,6 +82,7 @@ def bar(*more):
     return lw.Scene(body, water, terms=[hull, lw.terms.Waves(**WAVES), *more])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "h", "allowed"), [("rk8", 2e-3, 1e-8), ("psi_x", 5e-5, 1e-6)])
 def test_strips_move_as_their_lagrangian_says(method, h, allowed):
     nu = POSE["R"].T @ TWIST["v"]
@@ -149,6 +150,7 @@ def test_strips_meet_the_pressure_on_spheroids_as_these_grow_slender():
     assert apart[2] < 0.4 * apart[1] < 0.16 * apart[0] * 1.2
 
 
+@pytest.mark.slow
 def test_a_long_wave_is_a_growing_strain():
     apart = []
     for period in (6.0, 12.0):
@@ -171,6 +173,7 @@ def test_a_long_wave_is_a_growing_strain():
     assert apart[0] / apart[1] == pytest.approx(16.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_moment_is_newmans_in_a_wave_as_long_as_the_hull():
     """Newman (1977), 7.4: a slender body at rest in a stream feels rho S Dw/Dt + (d/dt + u d/dx)(a w) per length.
 

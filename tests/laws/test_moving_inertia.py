@@ -61,6 +61,7 @@ def test_a_move_within_one_step_recoils_as_far():
     assert run(alone(mass), t1=3.0).position[-1, 0, 0] == pytest.approx(-0.06, abs=1e-15)
 
 
+@pytest.mark.slow
 def test_a_spinning_pair():
     # Two masses go outward along a radius: J(r) w is kept, J = J0 + 2 m (r^2 - r0^2).
     arms = [
@@ -184,6 +185,7 @@ def test_orders_against_constraint_forces(method, order):
     assert errors[1] < {"rk4": 1e-7, "rkw3": 1e-5, "rkmk4": 1e-7}[method]
 
 
+@pytest.mark.slow
 def test_the_same_motion_as_by_constraint_forces():
     fleet = one(damped(lw.terms.MovingMass(**PATH)), **STATE)
     assert difference(last(run(fleet, "rk8", h=0.1)), KNOWN) < 2e-11
@@ -214,6 +216,7 @@ def shifted(vehicle, mass, home, there):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_mass_at_rest_is_a_vehicle_with_it_there():
     home, there = [0.02, 0.01, 0.05], [0.25, -0.1, 0.1]
     resting = lw.terms.MovingMass(mass=BATTERY, places=[there], reference=home)
@@ -226,6 +229,7 @@ def test_a_mass_at_rest_is_a_vehicle_with_it_there():
     assert difference(*ends) < 1e-9
 
 
+@pytest.mark.slow
 def test_no_motion_changes_nothing():
     still = lw.terms.MovingMass(mass=BATTERY, places=[[0.3, 0.1, 0.0]], times=[0.0])
     assert damped(still).terms[1].carried
@@ -233,12 +237,14 @@ def test_no_motion_changes_nothing():
     assert difference(last(run(one(damped(still), **STATE))), last(run(one(damped(), **STATE)))) < 1e-13
 
 
+@pytest.mark.slow
 def test_two_halves_are_one_mass():
     halves = [lw.terms.MovingMass(**PATH | {"mass": 0.5 * BATTERY, "inertia": True}, name=name) for name in ("a", "b")]
     ends = [last(run(one(damped(*masses), **STATE))) for masses in (halves, [lw.terms.MovingMass(**PATH)])]
     assert difference(*ends) < 1e-13
 
 
+@pytest.mark.slow
 def test_a_limited_rate_is_a_path():
     # Commanded by 8 cm, at 1 cm/s, to the limit of 6 cm; the velocity before the first tick is that of rest in both.
     mass, controller = held(
@@ -253,6 +259,7 @@ def test_a_limited_rate_is_a_path():
         assert difference(*ends) < 1e-12
 
 
+@pytest.mark.slow
 def test_a_blow_of_a_mass_without_a_limit():
     # Without a limit of its rate it is there after one step; the vehicle goes back as far as ever.
     mass, controller = held(
@@ -264,6 +271,7 @@ def test_a_blow_of_a_mass_without_a_limit():
     assert np.abs(result.velocity[2:]).max() < 1e-14
 
 
+@pytest.mark.slow
 def test_numbers_of_each_member():
     scales = np.array([1.0, 0.6, 1.2])
     vary = {"moving_mass.mass": BATTERY * scales, "moving_mass.places": scales[:, None, None] * PATH["places"]}
@@ -368,6 +376,7 @@ def under_autopilot(*masses):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_under_an_autopilot():
     # 5 of 30 kg, at rest where the vehicle has them: another kernel, the same run, with the same noise.
     still = lw.terms.MovingMass(mass=5.0, places=[[0.1, 0.0, 0.02]])

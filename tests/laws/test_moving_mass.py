@@ -74,6 +74,7 @@ def test_steady_pitch():
     assert abs(down[1]) < 1e-12
 
 
+@pytest.mark.slow
 def test_steady_roll_of_a_turned_mass():
     # Turned by phi about x, 6 cm below the axis: it is at 6 cm (-sin phi, cos phi), and the weight hangs below the buoyancy.
     mass, controller = held(turn_axis=[2.0, 0.0, 0.0], commands={0: 0.7}, rate_limit=0.05)
@@ -122,6 +123,7 @@ def test_orders_with_a_schedule(method, order, longest):
     assert slope(steps, errors) == pytest.approx(order, abs=0.2)
 
 
+@pytest.mark.slow
 def test_a_limited_rate():
     # Commanded by 8 cm at 1 cm/s: after 5 s it is 5 cm ahead, whatever the command; after 8 s it stays.
     mass, controller = held(slide_direction=[1.0, 0.0, 0.0], commands={0: 0.08}, rate_limit=0.01, limit=0.06)
@@ -134,6 +136,7 @@ def test_a_limited_rate():
     assert np.abs(driven.attitude - planned.attitude).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_two_masses_and_none():
     fleet = one(scene(lw.terms.MovingMass(**PATH)), **STATE)
     halves = [lw.terms.MovingMass(**PATH | {"mass": 0.5 * BATTERY}, name=name) for name in ("port", "starboard")]

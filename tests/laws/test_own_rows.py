@@ -154,6 +154,7 @@ def indexed_wildly(draws, shared, dtype, seed):
         np.testing.assert_allclose(velocity[:, 2], 0.0, atol=1e-6, err_msg=str(odd))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shared", "dtype"), [(False, "float64"), (True, "float32")])
 def test_laws_that_index_wildly_see_their_own_rows(shared, dtype):
     indexed_wildly(16, shared, dtype, 3)
@@ -216,6 +217,7 @@ class OwnActuator(lw.terms.ControlWrench):
         return copied(super().device_in(aligned))
 
 
+@pytest.mark.slow
 def test_an_actuator_of_a_users_own_reports_where_it_is():
     # A torque that lags behind a command that never changes: 1 - e^(-t / T) of it.
     lag, t1 = 0.5, 1.5
@@ -323,6 +325,7 @@ class Profile(lw.laws.Event):
         return lw.laws.Packed({"last": last, "inverse": 1.0 / numbers["spacing"]}, numbers["depth"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("knots", [7, 4000])
 def test_an_event_with_rows_stops_at_the_table(knots):
     rng = np.random.default_rng(7)
@@ -381,6 +384,7 @@ class NoseAsItStands(Nose):
         return lw.laws.Packed({"depth": numbers["depth"], "nose": numbers["nose"]})
 
 
+@pytest.mark.slow
 def test_a_point_of_the_body_is_that_of_an_event_in_all_axes():
     point = dict(depth=60.0, nose=[0.8, 0.1, -0.05])
     assert lw.laws.check_law(Nose(**point)).ok

@@ -156,6 +156,7 @@ def test_without_an_efficiency_the_account_knows_nothing_of_it():
     assert worked(falling(ACCOUNT, engine(efficiency=None)), "rk4", 0.1, 24.0)[0] == pytest.approx(0.0, abs=1e-11)
 
 
+@pytest.mark.slow
 @pytest.mark.kernel
 def test_members_have_efficiencies_of_their_own_and_two_engines_add_up():
     scene = falling(ACCOUNT, engine(first="up", volume_start=-1e-4), engine(first="up", volume_start=0.0, name="second"),
@@ -167,6 +168,7 @@ def test_members_have_efficiencies_of_their_own_and_two_engines_add_up():
     np.testing.assert_allclose(worked(fleet, "rk4", 0.4, 12.0, dtype="float32"), exact, rtol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.kernel
 def test_a_battery_ends_in_the_middle_of_the_work():
     # Hotel load and pump at a held depth: both are constant.
@@ -216,6 +218,7 @@ def test_ballast_pumps_against_the_pressure_at_its_points(method):
     assert worked(scene, method, 0.25, 14.0)[0] == pytest.approx(exact, rel=1e-10, abs=first)
 
 
+@pytest.mark.slow
 @pytest.mark.kernel
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_a_limited_rate_counts_the_volume_that_moved(method):
@@ -238,6 +241,7 @@ def test_a_limited_rate_counts_the_volume_that_moved(method):
         np.testing.assert_array_equal(*ends)
 
 
+@pytest.mark.slow
 @pytest.mark.kernel
 def test_a_controller_that_fills_ballast_pays_for_it():
     # Up from 12 m to 8 m: nothing that it pushes out comes for less than the pressure of the least depth, nor of the greatest.

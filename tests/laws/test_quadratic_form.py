@@ -140,6 +140,7 @@ def nps_scene():
     return lw.Scene(body, lw.Environment(FREE_FALL, water_density=RHO), terms=[form])
 
 
+@pytest.mark.slow
 def test_a_published_vehicle_accelerates_as_its_equations_say():
     # m (v' + Om x v + Om' x g + Om x (Om x g)) = F, I Om' + Om x I Om + m g x (v' + Om x v) = T: with the printed forces,
     # which hold all that the added mass makes but its part of the accelerations.
@@ -197,6 +198,7 @@ def dsrv():
     return lw.Scene(body, lw.Environment(GRAVITY, water_density=RHO), terms=[form]), added[[2, 4]][:, [2, 4]], unit
 
 
+@pytest.mark.slow
 def test_a_rescue_vehicle_swings_as_its_linear_equations_say():
     # m (w' - U q) = Z, I q' = M + M'theta theta, theta' = q: small motions about U ahead, by the exponential of the matrix.
     scene, added, unit = dsrv()

@@ -232,6 +232,7 @@ def test_it_flies_while_it_is_dry(added):
     assert np.abs(R - np.eye(3)).max() < 1e-14
 
 
+@pytest.mark.slow
 def test_far_below_nothing_changes():
     drag = lw.terms.Drag(quadratic=(5.0, 30.0, 30.0, 1.0, 5.0, 5.0))
     deep = {"b": (0.0, 0.0, 40.0), "R": turn([0.2, 0.5, -0.3]), "nu": (1.0, 0.2, -0.1), "Om": (0.1, 0.2, 0.3)}
@@ -278,6 +279,7 @@ def test_a_body_follows_waves(period):
     np.testing.assert_allclose(result.position[:, 0, 0], decayed * a * np.sin(omega * result.time), atol=1e-4 * a)
 
 
+@pytest.mark.slow
 def test_waves_tilt_a_long_hull():
     # Much longer waves than the hull: its pitch is the slope of the surface.
     period, a = 12.0, 1e-4
@@ -324,6 +326,7 @@ def test_waves_in_axes_that_are_not_the_users(section):
     assert difference(kernel, twin) < 5e-13
 
 
+@pytest.mark.slow
 def test_members_and_a_run_that_goes_on():
     # Numbers of their own, and waves of their own, in two runs as in one.
     wave = lw.terms.Waves(amplitudes=[0.1], periods=[2.5], headings_deg=[40.0])
@@ -347,6 +350,7 @@ def test_members_and_a_run_that_goes_on():
 REMUS_HULL = {"stations": [-0.72, -0.18, 0.42, 0.52, 0.61], "heights": [0.01, 0.191, 0.191, 0.16, 0.0]}
 
 
+@pytest.mark.slow
 def test_an_autopilot_that_climbs_stays_in_the_water():
     # A REMUS 100 under way that is told to keep a depth of -1 m.
     controller = lw.Controller(
@@ -384,6 +388,7 @@ def test_a_floating_vehicle_is_not_odd():
     assert "SurfaceBuoyancy" in messages
 
 
+@pytest.mark.slow
 def test_what_is_refused():
     hull = lw.terms.SurfaceBuoyancy(heights=0.3)
     with pytest.raises(lw.SceneError, match="keep one of them"):

@@ -46,6 +46,7 @@ def flow_at(twin, b, t):
     return twin.flow(View(np.eye(3), np.asarray(b), np.zeros(3), np.zeros(3), t))
 
 
+@pytest.mark.slow
 def test_a_vehicle_at_rest_in_accelerating_water_stays_with_it():
     # The push (rho V + A) a moves (m + A), and rho V = m: nothing is left of it but round-off, whatever M is.
     twin, h, steps = CurrentHarmonics(**arrays(HARMONICS)), 0.05, 200

@@ -124,6 +124,7 @@ KNOWN = {
 SLENDER = Spheroid(0.8, 0.1)
 
 
+@pytest.mark.slow
 def test_a_hull_of_a_small_vehicle_in_a_strain():
     strain = 0.05 * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     n = len(KNOWN)
@@ -136,6 +137,7 @@ def test_a_hull_of_a_small_vehicle_in_a_strain():
     assert np.abs(got[:, 1]).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_sphere_in_shear_has_autons_lift():
     # Auton, Hunt & Prud'homme (1988): m dv/dt = rho V ((1 + C) Du/Dt - C dv/dt - C_L (v - u) x curl u), C = C_L = 1/2.
     ball, shear = Spheroid(0.2 * (1.0 + 1e-9), 0.2), 0.4

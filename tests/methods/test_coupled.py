@@ -79,7 +79,7 @@ SEVERAL = {
     "in harmonics": ("drag", "current harmonics"),
     "in a profile": ("drag matrix", "current profile", "tether", "wrench schedule", "Gauss-Markov current"),
 }
-SHORT = ("psi_x-all together", "psi_x8-None", "psi_w-in a profile")
+SHORT = ("psi_x-in harmonics", "psi_x8-None", "psi_w-in a profile")
 
 
 @pytest.mark.slow_but(*SHORT)

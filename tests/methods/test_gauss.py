@@ -93,6 +93,7 @@ def test_a_fixed_number_of_iterations(scene, example):
     assert 1e-10 < difference(last(loose), last(exact)) < 1e-3
 
 
+@pytest.mark.slow
 def test_each_iteration_gains_an_order(scene):
     # The first step begins with the slopes at the start: after n iterations a step is wrong by h^(n + 1).
     method = lw.Method("gauss6", iterations=2, tolerance=0.99)

@@ -119,6 +119,7 @@ def test_the_kernel_is_as_the_twin(method, dtype, bound):
     assert difference(*both(scene, laws, method, 0.1, 12, dtype=dtype)) < bound
 
 
+@pytest.mark.slow
 def test_a_member_has_the_same_bits_among_others():
     # Commands that turn at other times, other lags and rates: the pieces of one lane are not those of its neighbours.
     varied = {"thrusters.times": lw.distributions.Normal(relative=0.1),
@@ -139,6 +140,7 @@ def test_the_linearly_implicit_kernel_is_as_the_twin():
     assert difference(last(result), ended(end, body)) < 1e-13
 
 
+@pytest.mark.slow
 def test_chosen_steps(body):
     # Both choose the same steps, so they agree far better than either meets its tolerance; refused steps leave no trace.
     scale = np.concatenate([np.ones(9), np.full(6, body.J.max())])

@@ -70,6 +70,7 @@ def slopes_of_fall(method, h):
     return np.concatenate([position[[0, 2]], velocity[[0, 2]]])
 
 
+@pytest.mark.slow
 def test_a_fall_against_drag():
     expected = by_complex_step(fallen, list(FALL.values()))
     # 8th order: at this step its error is below that of the differences of what is packed, 1e-12 of each number.
@@ -94,6 +95,7 @@ def free():
     return lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), start=start)
 
 
+@pytest.mark.slow
 def test_a_steady_spin_and_a_free_motion():
     names, t = ["start.angular_velocity[2]", "start.velocity_inertial[0]"], 3.0
     result = lw.solve(free(), "rk8", h=0.05, t1=t, save=lw.SaveAt(every=1.0), tangents=names, threads=1)
@@ -135,6 +137,7 @@ def looped(**sensor):
     return lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), terms, start, controller=controller)
 
 
+@pytest.mark.slow
 def test_a_sampled_loop():
     t1 = 50 * PERIOD
     save = lw.SaveAt(at=[t1], fields=("position", "velocity", "command"))
@@ -275,6 +278,7 @@ def test_threads_and_blocks_change_no_bit():
         np.testing.assert_array_equal(alone.jacobian[name], slopes[:, [5, 699]])
 
 
+@pytest.mark.slow
 def test_values_are_those_of_the_run_without_tangents():
     plain = lw.solve(falling(), "rk8", h=0.02, t1=TIME, threads=1)
     result = lw.solve(falling(), "rk8", h=0.02, t1=TIME, tangents=list(FALL), threads=1)
@@ -306,6 +310,7 @@ def test_members_have_slopes_of_their_own():
         np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-11 * np.abs(expected).max())
 
 
+@pytest.mark.slow
 def test_a_member_that_ended_has_no_derivatives_from_there_on():
     base = falling()
     scene = lw.Scene(base.vehicle, base.environment, base.terms, base.start, events=[lw.events.Floor(depth=0.8)])
@@ -368,11 +373,13 @@ def test_the_times_of_a_schedule_in_steps_have_no_derivative():
         lw.solve(scene, "psi_x", h=0.1, t1=0.3, tangents=["wrench_schedule.times[1]"])
 
 
+@pytest.mark.slow
 def test_one_name_may_stand_alone():
     result = lw.solve(falling(), "rk8", h=0.02, t1=0.1, tangents=" start.velocity[ 0 ] ", threads=1)
     assert result.tangents == ("start.velocity[0]",)
 
 
+@pytest.mark.slow
 def test_a_number_that_changes_nothing_is_refused():
     with pytest.raises(lw.SceneError, match="changes nothing that a run computes with"):
         lw.solve(looped(), "rk8", h=PERIOD / 2, t1=1.0, tangents=["environment.water_density"])

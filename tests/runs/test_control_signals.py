@@ -109,6 +109,7 @@ def looked():
     return np.arange(STEPS + 1) // EVERY * EVERY
 
 
+@pytest.mark.slow
 def test_a_scene_names_what_is_saved(whole):
     names = ("position", "command")
     run = lw.Scene.from_dict({**scene().to_dict(), "run": {"save_every": H, "save_fields": list(names)}})

@@ -278,6 +278,7 @@ def test_the_method_is_chosen_by_its_error_at_the_step(name):
             assert not told, (n, plan.method.name, own)
 
 
+@pytest.mark.slow
 @pytest.mark.kernel
 def test_remus_in_a_turn_is_not_off_by_metres():
     fleet, t1 = FLEETS["REMUS that rolls"]()

@@ -49,6 +49,7 @@ def test_a_battery_ends_where_constant_power_ends_it(method):
     assert used == pytest.approx(1.2345 * power, rel=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_a_battery_ends_within_a_ramp_of_power(method):
     # P = 40 t: E = 5 t + 20 t^2 = 50, from the closed root; both methods integrate each part of a step exactly.
@@ -60,6 +61,7 @@ def test_a_battery_ends_within_a_ramp_of_power(method):
     assert used == pytest.approx(50.0, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "order", "steps"), [("rk4", 4, (0.05, 0.025)), ("psi_s", 2, (0.1, 0.05))])
 def test_the_end_of_a_battery_has_the_order_of_the_method(method, order, steps):
     # By quadrature of the closed form of the power.
@@ -69,6 +71,7 @@ def test_the_end_of_a_battery_has_the_order_of_the_method(method, order, steps):
     assert slope(steps, errors) == pytest.approx(order, abs=0.4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_of_two_events_in_one_step_the_earlier_one_stops(method):
     # One step of 1 s: the battery ends at 0.4 s, and the time is over before, after, or far after.
@@ -104,6 +107,7 @@ def test_a_battery_that_ends_beside_the_floor_or_the_surface(method, first):
 SAVE_ALL = lw.SaveAt(fields=FIELDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_members_that_go_on_keep_their_bits_beside_empty_batteries(method):
     hotel = np.linspace(1.0, 9.0, 20)
@@ -137,6 +141,7 @@ def spinning(rates):
     return one(scene, nu=np.full((len(rates), 3), 0.2), Om=Om)
 
 
+@pytest.mark.slow
 def test_steps_that_are_made_in_parts_count_once():
     # The same members beside calm ones, and beside some whose steps have no solution until they are divided.
     calm, wild = [0.3, 0.5, 0.4, 0.2], [0.3, 9.0, 0.4, 5.0]
@@ -177,6 +182,7 @@ def test_a_run_that_goes_on_goes_on_counting(method):
     assert after.energy_used[-1, 0] == pytest.approx(3.0 * (HOTEL + watts(0.4) + watts(-0.7)), rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_float32_loses_nothing_over_many_steps(method):
     # 40,000 additions of 0.05 J: a plain sum of float32 would be off by a part of 1e-4 and more.
@@ -222,6 +228,7 @@ def test_members_have_power_of_their_own():
 WATTS_OF_ONE = TABLE["power"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "method"), [("bluerov2_dead_thruster", "rk4"), ("remus_100_autopilot", "psi_x")])
 def test_driven_vehicles_use_the_power_of_where_their_actuators_are(name, method):
     # A trapezoid of the recorded places of all thrusters, at each of the steps: an error of order h^2.
@@ -291,6 +298,7 @@ def test_pictures_and_recordings_show_it(tmp_path):
     np.testing.assert_allclose([median[t][0] for t in sorted(median)], [0.0, 1.0, 2.0, 3.0, 4.0], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_adaptive_steps_count_those_that_are_accepted():
     # A tolerance far below what is asked here; capacity and end by quadrature of the closed form.
     method = lw.Method("rk5", rtol=1e-9, atol=1e-9)

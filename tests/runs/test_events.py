@@ -38,6 +38,7 @@ def fleet(n, events, vehicle=VEHICLE, parameters=None, speed=1.0):
     return lw.Ensemble.from_states(scene, b + np.array([0.0, 0.0, 5.0]), R, nu, Om, parameters)
 
 
+@pytest.mark.slow
 def test_surface_and_floor_at_the_crossing():
     # Neutrally buoyant with M = m I: straight lines, so that the crossing is known, and the interpolation exact.
     ensemble = fleet(200, stops(surface=0.0, floor=8.0))
@@ -157,6 +158,7 @@ def test_a_start_at_the_surface_is_no_end():
     assert not any("begin" in message for message in r.messages)
 
 
+@pytest.mark.slow
 def test_what_begins_beyond_in_moving_water_or_under_control_keeps_its_start(tmp_path):
     """The state of such a kernel is relative to the water, which goes on moving; a controller has measured at t = 0."""
     start = {"position": [0.0, 0.0, 21.0], "velocity": [0.5, 0.0, -3.0]}

@@ -134,6 +134,7 @@ def check_run_and_kill(work, killed, finished, told):
     return times
 
 
+@pytest.mark.slow
 def test_a_killed_process_costs_what_is_at_work(tmp_path):
     """Python ends the whole pool when a process of it dies: the other one's block runs again, too."""
     work = Traced(tmp_path)
@@ -175,6 +176,7 @@ def test_a_killed_process_in_memory(whole):
     assert same(result, lw.open_run(whole))
 
 
+@pytest.mark.slow
 def test_dask(client, memory, tmp_path):
     from lgvi_warp.engine.executors.dask import Dask
 

@@ -202,6 +202,7 @@ def passed(group):
     return value[0] == value[1] if isinstance(value, tuple) else bool(value)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::UserWarning", "ignore::FutureWarning")
 def test_the_cf_checker_finds_no_fault(result, single, tmp_path):
     pytest.importorskip("compliance_checker")

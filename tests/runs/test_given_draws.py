@@ -63,6 +63,7 @@ def both():
     return pair(everything(), of=STATE)
 
 
+@pytest.mark.slow
 def test_a_call_has_the_bits_of_the_counters():
     given, xi = assert_same_bits(everything())
     assert xi.dtype == np.float64
@@ -151,6 +152,7 @@ def white():
     return pair(scene, of=["position", "velocity"], method="rk4")
 
 
+@pytest.mark.slow
 def test_a_white_force_on_linear_drag_is_the_recursion_of_its_normals(white):
     """rk4 on y' = A y + (0, f / m), f = S xi / sqrt(h) held over a step: y <- P y + h Q (0, f / m), two polynomials of h A."""
     given, _ = white
@@ -171,6 +173,7 @@ def test_a_white_force_on_linear_drag_is_the_recursion_of_its_normals(white):
         np.testing.assert_allclose(found[:, 3:], y[..., 1], rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_sensor_measures_the_truth_with_what_is_given():
     """Truth + walk + sigma xi, and the last reading where a normal says that this one is lost."""
     sigma, walking, loss = np.array([0.5, 0.4, 0.3]), 0.2, 0.3
@@ -225,6 +228,7 @@ class Gust(lw.laws.NoisyTerm):
     strength: Any = lw.laws.number((3,), "N s^1/2", axes="vector")
 
 
+@pytest.mark.slow
 def test_a_law_of_a_user_takes_them_too():
     """Between rows of others, held to its own: the sum of its second stream, as a force that is held over a step."""
     scene = lw.Scene(

@@ -68,7 +68,7 @@ def check(fleet, method, **settings):
     return whole
 
 
-@pytest.mark.slow_but("all together-psi_x", "thrusters-rk4", "Gauss-Markov current-psi_x")
+@pytest.mark.slow_but("thrusters-rk4", "Gauss-Markov current-psi_x")
 @pytest.mark.parametrize(
     ("name", "method"),
     # A current that wanders is no flow of an explicit method.
@@ -169,12 +169,14 @@ def test_a_controller(pieces, length):
     check(autopilot(), "psi_x", **how)
 
 
+@pytest.mark.slow
 def test_way_points():
     points = [[0, 0, 5], [0.5, 0, 5], [0.5, 5, 6], [9, 9, 9]]
     guidance = [dict(type="waypoints", points=points, speed=1.5, look_ahead=3.0, radius=0.3, method="ilos")]
     check(autopilot(guidance=guidance, sensors=[]), "psi_x", h=0.01, length=0.3)
 
 
+@pytest.mark.slow
 def test_allocation_within_limits():
     # Far from its place: thrusters are at their limits, integrals wait, and one dies on the way.
     gains = dict(kp=(40.0,) * 3, ki=(4.0,) * 3, kd=(60.0,) * 3, kr=(10.0,) * 3, kw=(4.0,) * 3)
@@ -275,6 +277,7 @@ def test_metrics_of_pieces_add_up(callback):
     np.testing.assert_allclose(total, expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_other_numbers_and_states():
     # With other numbers, or after a change, a run goes on from the states: to round-off where these are the same.
     fleet = fleet_of("torpedo", terms=list(CASES["waves"].terms))
@@ -313,6 +316,7 @@ def test_a_fall_goes_on_in_closed_form():
     assert second.velocity[-1, 0, 2] == pytest.approx(v, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_states_at_a_time():
     # Waves, a schedule and noise are those of the time: from states alone to round-off, where nothing is remembered.
     fleet = fleet_of("torpedo", terms=list(CASES["waves"].terms + CASES["wrench schedule"].terms))
@@ -358,6 +362,7 @@ def test_what_is_refused():
     assert kept.final.members == 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["psi_x", "psi_s"])
 def test_what_is_remembered_stays(method):
     # From states that somebody set anew, to what they were: the current and the thrusters go on with what they remember.
@@ -369,6 +374,7 @@ def test_what_is_remembered_stays(method):
     np.testing.assert_allclose(again.position[-1], whole.position[-1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_another_step_counts_the_same_time():
     # What is noted in steps, the end of a member and the time from which commands act, is told in the steps of the next run.
     events = [lw.events.StopTime(at=0.31)]
@@ -384,6 +390,7 @@ def test_another_step_counts_the_same_time():
     np.testing.assert_allclose(coarse.attitude[-1], whole.attitude[-1], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_an_end_that_does_not_fit():
     fleet = fleet_of("torpedo", events=[lw.events.StopTime(at=0.1)], terms=[])
     final = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2).final

@@ -177,6 +177,7 @@ def test_a_precompiled_header_serves_the_next_process(header, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_damaged_header_is_made_anew(header, capfd):
     header.write_bytes(header.read_bytes()[:-1000] + bytes(1000))
     assert headers_while_it_compiles() == 0
@@ -184,6 +185,7 @@ def test_a_damaged_header_is_made_anew(header, capfd):
     assert kernel_cache.is_whole(header)
 
 
+@pytest.mark.slow
 def test_a_header_that_clang_refuses_is_not_kept(header):
     header.write_bytes(bytes(1000))
     sums = {header.name: hashlib.sha256(bytes(1000)).hexdigest()}

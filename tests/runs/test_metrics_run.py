@@ -224,6 +224,7 @@ def test_metrics_change_no_bit_beside_the_bare_kernel(fleet, coarse):
         assert getattr(bare, name).tobytes() == getattr(coarse, name).tobytes(), name
 
 
+@pytest.mark.slow
 def test_the_arrays_of_a_run_are_freed_at_its_end(fleet):
     def alive():
         return {id(one) for one in gc.get_objects() if type(one) is Packets}

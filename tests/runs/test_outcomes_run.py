@@ -184,6 +184,7 @@ TEN = {
 }  # fmt: skip
 
 
+@pytest.mark.slow_for("remus_100-*", "bluerov2_dead_thruster-*")
 @pytest.mark.parametrize("stored", [False, True], ids=["memory", "store"])
 @pytest.mark.parametrize("name", TEN)
 def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, stored, monkeypatch, tmp_path):
@@ -255,6 +256,7 @@ def test_quantities_of_outcomes_and_times():
             lw.uq.sobol(members, text, samples=8, **how)
 
 
+@pytest.mark.slow
 def test_quantities_of_two_events_of_one_status():
     """Two shelves end a drift to the north and one to the south: by hand, since it goes straight on at its first velocity."""
     shelves = [Box(lower=(-1e6,) * 3, upper=(4.0, 1e6, 1e6), name="north"),

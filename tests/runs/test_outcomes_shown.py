@@ -100,6 +100,7 @@ def test_failed_and_stopped_are_told_apart():
     assert (of_result.stopped == stopped(codes)).all()
 
 
+@pytest.mark.slow
 def test_members_are_under_way_until_they_end(mixed):
     end = status.stop_time(mixed)
     np.testing.assert_allclose(end, [3.0, 6.0, 12.0, np.inf, np.inf, 12.5, 5.0], rtol=1e-9)

@@ -233,6 +233,7 @@ def test_as_many_newton_steps_as_the_start_needs(scene, solver, h, n):
     np.testing.assert_allclose(chosen.attitude, exact.attitude, rtol=0, atol=20 * 1e-12)
 
 
+@pytest.mark.slow
 def test_a_member_that_spins_up_is_told():
     # At rest no Newton step is needed; 2 rad/s later, at h = 0.1 s, one would be.
     body = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=0.0)

@@ -122,6 +122,7 @@ TABLED = (problems.waves, problems.fins)
 EACH_OF_THEM = [pytest.param(problems.ALL, dtype, marks=pytest.mark.slow) for dtype in ("float64", "float32")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("laws", "dtype"), [(TABLED, "float64"), *EACH_OF_THEM])
 def test_laws_with_rows_that_members_share(laws, dtype):
     """A number that all members share, given for each of them, has the same bits in another kernel."""

@@ -37,6 +37,7 @@ def runs(count=40):
     return b, v
 
 
+@pytest.mark.slow
 def test_a_tilted_plane_is_met_where_geometry_says():
     a = np.array([0.2, -0.1])
     b, v = runs()
@@ -104,6 +105,7 @@ def off(result, true):
     return max(abs(result.end_time[0] - true[0]), np.abs(state - true[1]).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "order", "steps"), [("rk4", 4, (0.4, 0.2, 0.1)), ("psi_s", 2, (0.2, 0.1, 0.05))])
 def test_the_arrival_on_hills_has_the_order_of_the_method(method, order, steps):
     # Cells of 0.25 m: the way goes through tens of them, and ends within one.
@@ -121,6 +123,7 @@ def test_the_arrival_on_hills_has_the_order_of_the_method(method, order, steps):
     assert abs(true[1][2] - smooth[1][2]) < 4.0 * left_out
 
 
+@pytest.mark.slow
 def test_of_two_floors_and_a_box_the_first_counts():
     # Straight down from 5 m at 1 m/s, and to the east: one millisecond apart, within one step of 0.3 s.
     for flat, grid, east, name in (
@@ -155,6 +158,7 @@ def test_members_have_a_clearance_or_a_floor_of_their_own():
     np.testing.assert_allclose(known[-1], r.position[-1, :, 2], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_outside_the_edge_holds_and_edges_stop():
     floor = grid_of(lambda x, y: 20.0 + 0.1 * x)
     far = one(scene(floor), b=[(900.0, 0.0, 1.0), (-900.0, 700.0, 1.0)], nu=(0.0, 0.0, 1.0))

@@ -441,6 +441,7 @@ entry()
 """
 
 
+@pytest.mark.slow
 def test_twice_while_files_are_written_names_what_is_there(tmp_path):
     with begun([*SHORT, "--out", str(tmp_path), "--quiet"], DRAWING) as process:
         assert process.stdout.readline() == "drawing\n"

@@ -115,6 +115,7 @@ def test_a_scene_is_begun_and_checked(tmp_path, capsys):
     assert cli.main(["check", str(tmp_path / "new" / "scene.toml")]) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the imitation is one of Linux")
 def test_all_of_them_without_what_windows_has_not():
     words = ["-q", "-p", "no:cacheprovider", "-p", "tests.support.windows",

@@ -134,6 +134,7 @@ def closed_loop(gains, linear=LINEAR, depth=2.0):
     return x[0], slopes[0]
 
 
+@pytest.mark.slow
 def test_a_sampled_linear_loop():
     by = ["state_feedback.K[2,2]", "state_feedback.K[2,8]", "start.position[2]"]
     found = lw.derivatives(looped(), "position[2]", by, **RUN)
@@ -160,6 +161,7 @@ IN_STEPS = {
 }
 
 
+@pytest.mark.slow
 def test_what_goes_in_steps_is_named():
     scene = sounding()
     metrics = [
@@ -222,6 +224,7 @@ def test_a_start_that_grows_beyond_measure():
     assert not slower.undefined
 
 
+@pytest.mark.slow
 def test_a_member_that_failed():
     scene = body(linear=1e5, start=lw.Start(velocity=[1.0, 0.0, 0.0]))
     found = lw.derivatives(scene, "position[0]", "start.velocity[0]", **RUN)
@@ -234,6 +237,7 @@ def test_a_member_that_failed():
 FLOOR = 4.0
 
 
+@pytest.mark.slow
 def test_across_an_event():
     """The time at which the fall reaches a depth moves by less the derivative of the depth over the speed there."""
     scene = body(quadratic=QUADRATIC, events=[lw.events.Floor(depth=FLOOR), lw.events.StopTime(at=100.0)])
@@ -260,6 +264,7 @@ def test_across_an_event():
     assert found.jacobian[2, 3] == 0.0
 
 
+@pytest.mark.slow
 def test_a_member_that_stops_at_a_time():
     scene = body(quadratic=QUADRATIC, events=[lw.events.StopTime(at=4.0)])
     found = lw.derivatives(scene, ["depth", "end_time time"], ["start.position[2]", "time.at"], **RUN)
@@ -289,6 +294,7 @@ def test_times_at_which_a_schedule_jumps():
     assert grows.jacobian[0, 0] == pytest.approx(-LINEAR / (6.0 * M * 2.0**2), rel=0.02)  # the step's own error, h^2
 
 
+@pytest.mark.slow
 def test_legs_of_waypoints():
     points = [[0.0, 0.0, 0.0], [6.0, 0.0, 0.0], [6.0, 100.0, 0.0]]
     controller = lw.Controller(
@@ -381,6 +387,7 @@ def test_members_that_need_other_increments_than_the_first_ones():
     assert (found.error[:, 0, 0] < 1e-2 * np.abs(truth)).all()
 
 
+@pytest.mark.slow
 def test_members_of_a_fleet_with_different_ends():
     fleet = lw.Ensemble(
         body(quadratic=QUADRATIC, events=[lw.events.Floor(depth=7.0)]),
@@ -414,6 +421,7 @@ def test_noise_is_that_of_the_member():
     assert not each.undefined
 
 
+@pytest.mark.slow
 def test_single_precision():
     """Round-off of 1e-7 and an error of e^6 leave some four digits."""
     by = ["vehicle.buoyancy", "drag.quadratic[2]"]
@@ -480,6 +488,7 @@ def test_progress_and_executors(found):
     assert shares[-1] == 1.0
 
 
+@pytest.mark.slow
 def test_the_code_of_the_page_on_derivatives(monkeypatch):
     monkeypatch.chdir(ROOT)
     names = {"lw": lw, "np": np}

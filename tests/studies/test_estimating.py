@@ -101,6 +101,7 @@ def test_single_precision_has_its_bias_told(h):
     assert abs(found.bias) > 0.1
 
 
+@pytest.mark.slow
 def test_a_suggestion_for_a_mean_knows_the_bias_of_a_scene_in_single_precision():
     scene = dataclasses.replace(closed.sphere(), start=lw.Start(position=[0.0, 0.0, 1e6]))
     scene = lw.Scene.from_dict(scene.to_dict() | {"run": {"dtype": "float32"}})
@@ -147,6 +148,7 @@ def test_steps_at_which_members_fail_are_left_out():
     says(" ".join(found.messages), "rk4 1 is left out: 64 of 64 members fail")
 
 
+@pytest.mark.slow
 def test_the_probability_of_an_event():
     scene = closed.sphere(events=[lw.events.Floor(depth=DEEP)])
     fleet = lw.Ensemble(scene, 4, vary=closed.falling().vary)
@@ -230,6 +232,7 @@ def test_levels_may_be_fixed_and_what_cannot_be_had_is_refused():
     says(refused(estimated, "fall", estimator="best"), "estimator = 'best'")
 
 
+@pytest.mark.slow
 def test_processes_have_the_bits_of_threads():
     how = {"estimator": "sobol", "h": 0.5}
     assert estimated("fall", executor="processes", **how)[0].value == estimated("fall", **how)[0].value
@@ -261,6 +264,7 @@ def test_a_suggestion_for_a_mean_stands_on_the_same_bias():
     says(refused(lw.suggest, fleet, 1e-14, "mean position[2]", t1=closed.TIME, methods=["rk4"]), "its bias is known to")
 
 
+@pytest.mark.slow
 def test_a_suggestion_for_a_mean_in_noise():
     found = lw.suggest(closed.pushed(), 0.02, "mean position[0]", t1=closed.TIME, methods=[closed.METHOD])
     assert 0.0 < found.expected <= 0.02

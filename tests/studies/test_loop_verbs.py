@@ -55,6 +55,7 @@ def document(given, capsys):
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_margins_are_those_of_the_sampled_loop(scene, tmp_path, capsys):
     """A double integrator with a held torque bears a factor of 2 J / (kd T), whatever kp is."""
     out = tmp_path / "margins"

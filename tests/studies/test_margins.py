@@ -368,6 +368,7 @@ def test_swings_that_wrap_and_slow_integrals(kp, ki, kd, drag, steps, most, tilt
     assert by_runs["gain_upper"][0] == pytest.approx(49.85, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_saturated_members_whose_sampled_loop_grows_are_never_steady():
     """Random gains: the loop by hand grows or not, whatever a torque at its limit shows at the time that is looked at."""
     rng = np.random.default_rng(4)
@@ -396,6 +397,7 @@ def turning(terms, allocation, laws=(), **wanted):
     return dataclasses.replace(scene(), terms=terms, controller=controller)
 
 
+@pytest.mark.slow
 def test_members_at_a_limit_and_members_that_fail_are_named():
     """A speed that drag does not allow: 1 N against 10 N s/m makes 0.1 m/s."""
     acting = [ControlWrench(limit=[1.0] * 5 + [50.0]), Drag(linear=[10.0] * 3 + [1.0] * 3)]
@@ -412,6 +414,7 @@ def test_members_at_a_limit_and_members_that_fail_are_named():
         assert [value is None for value in found.to_dict()[by]["delay"]] == [True, False, True]
 
 
+@pytest.mark.slow
 def test_a_loop_within_a_dead_band_moves_nothing():
     pushes = Thrusters(position=[[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]], direction=[[1.0, 0.0, 0.0]] * 2,
                           coefficient=[40.0] * 2, dead_band=[0.1] * 2, limit=[1.0] * 2)  # fmt: skip

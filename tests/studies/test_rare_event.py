@@ -108,6 +108,7 @@ def test_the_same_seed_has_the_same_answer(found):
     np.testing.assert_array_equal(again.normals, found.normals)
 
 
+@pytest.mark.slow
 def test_ways_to_say_an_event(found):
     bound = bound_of(1e-5)
     for limit in (f"position[0] above {bound:.12g}", {"position[0]": {"above": float(f"{bound:.12g}")}}):
@@ -144,6 +145,7 @@ def test_a_condition_that_never_differs_hides_no_other():
     assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.relative_error
 
 
+@pytest.mark.slow
 def test_an_event_of_the_scene_is_named():
     floor, rate = 2.0, 0.15
     p = 1e-5
@@ -160,6 +162,7 @@ def test_an_event_of_the_scene_is_named():
     assert floor < depth
 
 
+@pytest.mark.slow
 def test_the_least_distance_to_an_event():
     scene = scene_of(
         events=[lw.events.Floor(depth=1.2), lw.events.Box(lower=[-1, -1, -1], upper=[9, 1, 9], name="basin")]
@@ -179,6 +182,7 @@ def test_the_least_distance_to_an_event():
     assert result.statistics["each nearest floor"].unit == "m"
 
 
+@pytest.mark.slow
 def test_the_least_distance_is_between_looks():
     # A body falls back from a turning point, v0^2 / 2 g below its start: with looks 2 s apart none is near that.
     mass, up, rate = float(VEHICLE.mass), 33.0, 0.9
@@ -335,6 +339,7 @@ def test_the_picture(found, tmp_path):
     assert at_event == pytest.approx(found.runs[0].probability, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_snippets_of_the_page_on_rare_events(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(tmp_path)

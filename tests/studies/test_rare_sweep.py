@@ -80,6 +80,7 @@ def found(scene, folder):
     return swept(scene, out=folder)
 
 
+@pytest.mark.slow
 def test_rare_failures_are_those_of_the_normal_law(found):
     for case, p in (("near", NEAR), ("aside", FAR)):
         rare = found.rare(case)
@@ -202,6 +203,7 @@ def test_what_always_or_never_fails_is_told_and_the_others_go_on(scene):
         some.rare("always")
 
 
+@pytest.mark.slow
 def test_success_by_events_alone_and_by_nothing(scene):
     by_floor = swept(scene, cases=[{"name": "near"}], success=None, rare={"relative_error": 0.3})
     rare = by_floor.rare("near")

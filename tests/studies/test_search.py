@@ -54,6 +54,7 @@ def test_infinite_costs_do_not_stop_a_search():
     np.testing.assert_allclose(found.at, (0.7, 0.0), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_known_worst_corner():
     """A free body goes straight on, along its stable axis: the farther of two corners, both worse than what is beside them."""
     within = {"start.velocity[2]": (-2.0, 1.5), "start.position[2]": (-1.0, 2.0)}

@@ -266,6 +266,7 @@ def found():
     )
 
 
+@pytest.mark.slow
 def test_noise_and_numbers_are_both_moved(found):
     assert found.estimator == "splitting"
     # Steps of 0.1 s have 0.1 % less variance, 2 % less probability.
@@ -436,6 +437,7 @@ def test_against_many_plain_members():
     assert abs(mean - p) < 3.0 * error
 
 
+@pytest.mark.slow
 def test_an_event_that_stops_members():
     scene = scene_of(lw.events.Box(lower=[-99.0, -99.0, -99.0], upper=[place_of(1e-2), 99.0, 99.0], name="wall"))
     found = lw.rare_event(scene, "wall", by="splitting", relative_error=0.2, save=lw.SaveAt(every=H), **RUN)
@@ -460,6 +462,7 @@ def test_members_that_fail_are_the_event_and_told_apart():
         lw.rare_event(scene_of(), limit, by="splitting", failed="refuse", **RUN)
 
 
+@pytest.mark.slow
 def test_two_sides():
     bound, mean = place_of(5e-4), place_of(0.5)
     limit = {"max(position[0])": {"above": bound}, "min(position[0])": {"below": -bound + mean}}
@@ -469,6 +472,7 @@ def test_two_sides():
     assert found.probability > 5e-4
 
 
+@pytest.mark.slow_for("*reached by none of some")
 @pytest.mark.parametrize("limit, words", [
     ("position[0] - 1000.0", "was reached by none of some"),
     ("position[1] - 1.0", "has the same value for most members"),

@@ -134,6 +134,7 @@ def test_every_member_failing_is_an_exit_code_and_a_reason(tmp_path, capsys):
     assert (tmp_path / "result.npz").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.kernel
 def test_a_run_in_a_store(tmp_path, capsys):
     """run --store zarr, refused a second time, gone on with, described, exported."""

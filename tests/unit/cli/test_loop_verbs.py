@@ -181,7 +181,8 @@ def test_arguments_of_a_trim(capsys):
     (["trim", SCENE, "--fixed", "pitch", "--fixed", "roll=low", "--fixed", "=2"],
      ["--fixed = 'pitch': is no value; give pitch=0.1", "'roll=low'", "'=2'"]),
     (["margins", SCENE, "--loop", "heading", "--skew", "2"],
-     ["loop = 'heading': is no law of the controller; did you mean 'heading_pid'?", "skew = 2.0: is above 1; give a number from -1 to 1"]),
+     ["loop = 'heading': is no law of the controller; did you mean 'heading_pid'?",
+      "skew = 2.0: is above 1; give a number from -1 to 1"]),
     (["margins", str(ROOT / "examples" / "paper.toml")],
      ["controller = None: is not in the scene, and margins are those of a loop; give [controller]"]),
 ])  # fmt: skip

@@ -808,6 +808,7 @@ def test_time_that_other_programs_take_does_not_end_a_search(scene, study):
     assert found[0] == found[1]
 
 
+@pytest.mark.slow
 def test_what_was_asked_for_and_has_no_reading_is_named(scene):
     runs = Runs({"psi_s": 1e-2, "rk4": math.inf})
     found = tradeoff_by(runs, fleet_of(scene), methods=["psi_s", "rk4", "gauss4"])

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forty runs that keep their bits: results, statistics and stores, over the terms, methods, precisions and ways of running.
 
-Bits depend on the processor's vector instructions and on the versions of Warp and NumPy: the hashes are kept for each
-such machine, in tests/data/bits.json. On a machine that is not among them nothing is known.
+Bits depend on the processor, by its vector instructions and by what the compiler fuses for its family and model, and on
+the versions of Warp and NumPy: the hashes are kept for each such machine, in tests/data/bits.json. On a machine that is not
+among them nothing is known.
 """
 
 import argparse
 import functools
 import hashlib
 import json
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -149,11 +151,13 @@ RUNS: dict[str, Callable[[], str]] = _terms() | _methods() | _samplings() | _oth
 
 
 def machine() -> str:
-    """What bits depend on: vector instructions, versions of Warp and of NumPy."""
+    """What bits depend on: the processor, for which the compiler chooses what to fuse, and versions of Warp and of NumPy."""
     flags = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
     vectors = next((name for name in ("avx512f", "avx2") if name in flags), "unknown")
     vendor = next((name for name in ("AuthenticAMD", "GenuineIntel") if name in flags), "unknown")
-    return f"{vendor} {vectors}, warp {wp.config.version}, numpy {np.__version__}"
+    numbers = [re.search(rf"^{name}\s*: (\d+)$", flags, re.MULTILINE) for name in ("cpu family", "model")]
+    kind = " ".join(found[1] if found else "unknown" for found in numbers)
+    return f"{vendor} {kind} {vectors}, warp {wp.config.version}, numpy {np.__version__}"
 
 
 def recorded() -> dict[str, str]:

@@ -447,12 +447,13 @@ SHAPES = {
 def test_riccati_agrees_with_newton(shape, fraction):
     # fraction: |J^-1 a|, below 1. a near 0 loses digits of a, not of F.
     inertia, rng = SHAPES[shape], np.random.default_rng(5)
+    size = np.linalg.norm(rotation.modified_inertia(inertia), 2)
     for u in rng.normal(size=(10, 3)):
         a = inertia @ (fraction / np.linalg.norm(u) * u)
         F = riccati.sign(a, inertia)
-        # About ten inverses of 6 by 6, each with 6 units of round-off of the sign's norm (Higham 2008, section 5.1),
-        # which grows as the step nears its limit.
-        sign = riccati.matrix_sign(riccati.hamiltonian(a, inertia))
+        # About ten inverses of 6 by 6, each with 6 units of round-off of the sign's norm, which grows as the step nears
+        # its limit; in units of Jd, on which F does not depend.
+        sign = riccati.matrix_sign(riccati.hamiltonian(a / size, inertia / size))
         round_off = 10 * 6 * np.finfo(float).eps * np.linalg.norm(sign, 2)
         np.testing.assert_allclose(F, rotation.newton(a, inertia), rtol=0.0, atol=round_off)
         np.testing.assert_allclose(F, rotation.riccati(a, inertia), rtol=0.0, atol=round_off)

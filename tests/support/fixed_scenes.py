@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forty runs that keep their bits: results, statistics and stores, over the terms, methods, precisions and ways of running.
 
-Bits depend on the processor, by its vector instructions and by what the compiler fuses for its family and model, and on
-the versions of Warp and NumPy: the hashes are kept for each such machine, in tests/data/bits.json. On a machine that is not
-among them nothing is known.
+Bits depend on the processor's vector instructions and on the versions of Warp and NumPy, and may depend on its family and
+model, for which the compiler chooses its instructions: the hashes are kept for each such machine, in tests/data/bits.json.
+On a machine that is not among them nothing is known.
 """
 
 import argparse
@@ -151,7 +151,7 @@ RUNS: dict[str, Callable[[], str]] = _terms() | _methods() | _samplings() | _oth
 
 
 def machine() -> str:
-    """What bits depend on: the processor, for which the compiler chooses what to fuse, and versions of Warp and of NumPy."""
+    """What bits depend on, or may: the processor, versions of Warp and of NumPy."""
     flags = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
     vectors = next((name for name in ("avx512f", "avx2") if name in flags), "unknown")
     vendor = next((name for name in ("AuthenticAMD", "GenuineIntel") if name in flags), "unknown")

@@ -67,6 +67,14 @@ def test_no_odd_call_ends_in_a_raw_error(given):
     assert raw_of(calls[i] for i in some) == []
 
 
+@pytest.mark.kernel
+@pytest.mark.parametrize("name", ["Altitude", "CurrentField", "Trajectory", "Waypoints"])
+def test_no_odd_word_or_array_of_a_part_ends_in_a_raw_error(name, given):
+    calls = [call for call in odd_calls.odd_calls(*given) if call[0].startswith(f"{name}(")]
+    assert len(calls) > 100
+    assert raw_of(calls) == []
+
+
 @pytest.mark.slow
 @pytest.mark.kernel
 def test_no_odd_call_of_a_picture_or_a_method_ends_in_a_raw_error(given):

@@ -5,6 +5,7 @@ import contextlib
 import fnmatch
 import gc
 import json
+import os
 from pathlib import Path
 from unittest import mock
 
@@ -42,6 +43,44 @@ def pytest_collection_modifyitems(config, items):
     # A case that is asked for by its name comes alone.
     if wrong and not any("[" in argument for argument in config.args):
         raise pytest.UsageError(*wrong)
+
+
+SKIPPED_GUARDS = pytest.StashKey[dict]()
+
+
+def pytest_configure(config):
+    """Begin the list of skipped guards."""
+    config.stash[SKIPPED_GUARDS] = {}
+
+
+def pytest_itemcollected(item):
+    """Let reports say which tests are guards: `guard` is counted if skipped, `guard(in_ci=True)` fails there."""
+    if mark := item.get_closest_marker("guard"):
+        item.user_properties.append(("guard", "must run in CI" if mark.kwargs.get("in_ci") else "may be skipped"))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_terminal_summary(terminalreporter, config):
+    """Collect the guards that were skipped."""
+    for report in terminalreporter.stats.get("skipped", []):
+        if (kind := dict(report.user_properties).get("guard")) is not None:
+            config.stash[SKIPPED_GUARDS][report.nodeid] = kind
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_sessionfinish(session):
+    """In CI a guard that must run and was skipped is a failure."""
+    result = yield
+    if os.environ.get("CI") and "must run in CI" in session.config.stash[SKIPPED_GUARDS].values():
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+    return result
+
+
+def pytest_unconfigure(config):
+    """Say in the last line how many guards were skipped."""
+    if skipped := config.stash.get(SKIPPED_GUARDS, {}):
+        must = sum(kind == "must run in CI" for kind in skipped.values())
+        print(f"guards that were skipped: {len(skipped)}, of which must run in CI: {must} (reasons above)")
 
 
 def pytest_collection_finish():

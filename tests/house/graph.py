@@ -8,6 +8,7 @@ import ast
 import functools
 import graphlib
 import sys
+import tomllib
 from collections import Counter, defaultdict
 from pathlib import Path
 from typing import NamedTuple
@@ -15,11 +16,12 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[2]
 SOURCE_ROOTS = {"lgvi_warp": ROOT, "lgvi_kernels": ROOT / "kernels"}
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-# The lowest first; those of one floor side by side.
-ROOMS = (
-    ("common",), ("physics",), ("control",), ("methods",), ("sampling",), ("statistics",), ("vehicles",), ("scene",),
-    ("engine",), ("checks", "results"), ("runs",), ("store",), ("calls",), ("studies",), ("views",), ("cli",),
-)  # fmt: skip
+# The lowest first; those of one floor side by side: the contract of the linter is the only list of rooms.
+CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+ROOMS = tuple(
+    tuple(name.removeprefix("lgvi_warp.") for name in floor.split(" | "))
+    for floor in reversed(CONTRACTS[0]["layers"])
+)
 
 
 class Import(NamedTuple):
@@ -102,6 +104,31 @@ def arrows_up():
     return [arrow for arrow in arrows if None not in map(room, arrow) and room(arrow[0]) < room(arrow[1])]
 
 
+def circles_of_folders():
+    """{room: a circle of its inner folders by any import}; a loose file of a room stands for itself."""
+    found = {}
+    for one in (name for floor in ROOMS for name in floor):
+        below = defaultdict(set)
+        for module, others in graph("top", "lazy", "typing").items():
+            for other in others:
+                folders = [inner_folder(name, one) for name in (module, other)]
+                if None not in folders and folders[0] != folders[1]:
+                    below[folders[0]].add(folders[1])
+        try:
+            tuple(graphlib.TopologicalSorter(below).static_order())
+        except graphlib.CycleError as error:
+            found[one] = error.args[1]
+    return found
+
+
+def inner_folder(module, one):
+    """The folder of a room in which a module lies, or a loose file; None outside of the room, and for the room itself."""
+    parts = module.split(".")
+    if parts[:2] != ["lgvi_warp", one]:
+        return None
+    return parts[2] if len(parts) > 2 else None
+
+
 def loaded_by(module):
     """Modules of ours that importing this one names at once, without those named inside functions."""
     return {module_of(found.name) for found in modules()[module] if found.kind == "top"} - {None, module}
@@ -141,6 +168,7 @@ def report():
         yield f"floor {floor}: " + ", ".join(f"{name} ({sizes[name]} modules)" for name in rooms)
     yield f"circle of modules, all imports counted: {circle('top', 'lazy', 'typing') or 'none'}"
     yield f"arrows up: {arrows_up() or 'none'}"
+    yield f"circles of inner folders: {circles_of_folders() or 'none'}"
     late = defaultdict(Counter)
     for module, all_of_it in modules().items():
         for found in all_of_it:

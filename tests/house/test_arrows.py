@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from tests.house.graph import arrows_up, circle, closure, imports, modules
+from tests.house.graph import ROOMS, Import, arrows_up, circle, circles_of_folders, closure, imports, modules
 
 # What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
 OPTIONAL = {
@@ -132,3 +132,27 @@ def test_no_circle_and_no_arrow_up():
     # Imports inside functions and for typing counted; import-linter asserts the same of rooms (`make lint`).
     assert circle("top", "lazy", "typing") is None
     assert arrows_up() == []
+
+
+def test_the_rooms_are_all_folders_but_the_twin():
+    rooms = {name for floor in ROOMS for name in floor}
+    folders = {module.split(".")[1] for module in part("lgvi_warp") if module.count(".") > 1}
+    assert folders - rooms == {"reference"}
+    assert rooms <= folders
+
+
+def test_an_arrow_from_any_room_to_the_command_is_seen(monkeypatch):
+    lowest = {room: min(module for module in part(f"lgvi_warp.{room}") if module.count(".") > 1)
+              for floor in ROOMS[:-1] for room in floor}  # fmt: skip
+    for module in lowest.values():
+        with monkeypatch.context() as patch:
+            patch.setitem(modules(), module, [*modules()[module], Import("lgvi_warp.cli.command", "lazy")])
+            assert (module, "lgvi_warp.cli.command") in arrows_up()
+
+
+# Circles that are still there; the list may only become shorter.
+CIRCLES = {"statistics", "studies", "views"}
+
+
+def test_no_folders_of_a_room_import_each_other():
+    assert circles_of_folders().keys() == CIRCLES

@@ -29,6 +29,7 @@ def test_loops_are_found_and_weighed():
 
 
 @pytest.mark.slow
+@pytest.mark.guard
 @pytest.mark.skipif(ELSEWHERE, reason="the objects are for x86-64")
 @pytest.mark.skipif(hot_loops.disassembler() is None, reason="no objdump")
 @pytest.mark.parametrize("scene", hot_loops.SCENES)
@@ -43,6 +44,7 @@ def test_a_step_is_no_more_work_than_recorded(scene):
 
 
 @pytest.mark.slow
+@pytest.mark.guard
 @pytest.mark.skipif(ELSEWHERE, reason="the objects are for x86-64")
 @pytest.mark.skipif(hot_loops.disassembler() is None, reason="no objdump")
 def test_a_law_that_does_its_work_twice_is_noticed():

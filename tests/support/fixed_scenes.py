@@ -3,14 +3,19 @@
 
 Bits depend on the processor's vector instructions and on the versions of Warp and NumPy, and may depend on its family and
 model, for which the compiler chooses its instructions: the hashes are kept for each such machine, in tests/data/bits.json.
-On a machine that is not among them nothing is known.
+On a machine that is not among them nothing is known: `python -m tests.support.fixed_scenes --against REV` compares two trees
+on any machine.
 """
 
 import argparse
+import fnmatch
 import functools
 import hashlib
 import json
+import os
 import re
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +25,8 @@ import warp as wp
 
 import lgvi_warp as lw
 
-FILE = Path(__file__).parents[1] / "data" / "bits.json"
+ROOT = Path(__file__).parents[2]
+FILE = ROOT / "tests" / "data" / "bits.json"
 MEMBERS = 300
 
 STATISTICS = [
@@ -165,12 +171,56 @@ def recorded() -> dict[str, str]:
     return json.loads(FILE.read_text()).get(machine(), {}) if FILE.exists() else {}
 
 
-if __name__ == "__main__":
+def given_by(root: Path, pattern: str) -> dict[str, str]:
+    """Hashes of a tree's runs whose names match, by a process of its own; the tree's own file says what the runs are."""
+    code = (
+        "import fnmatch, json, sys; from tests.support.fixed_scenes import RUNS; "
+        "found = {name: run() for name, run in RUNS.items() if fnmatch.fnmatchcase(name, sys.argv[1])}; "
+        "print(json.dumps(found))"
+    )
+    paths = os.pathsep.join([str(root), str(root / "kernels")])
+    done = subprocess.run(
+        [sys.executable, "-c", code, pattern], cwd=root, env=os.environ | {"PYTHONPATH": paths},
+        stdout=subprocess.PIPE, text=True, check=True,
+    )  # fmt: skip
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def compared(revision: str, pattern: str = "*") -> tuple[list[str], dict[str, bool]]:
+    """(Runs that one tree alone has, {run of both: same bits}) of this tree and a revision, both run on this machine."""
+    with tempfile.TemporaryDirectory() as folder:
+        other = Path(folder) / "tree"
+        git = ["git", "-C", str(ROOT), "worktree"]
+        subprocess.run([*git, "add", "--quiet", "--detach", str(other), revision], check=True)
+        try:
+            old, new = given_by(other, pattern), given_by(ROOT, pattern)
+        finally:
+            subprocess.run([*git, "remove", "--force", str(other)], check=True)
+    return sorted(old.keys() ^ new.keys()), {name: old[name] == new[name] for name in new if name in old}
+
+
+def main() -> int:
+    """Compare with what is recorded, or with another revision; record."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--write", action="store_true", help="record what this machine gives")
-    asked = parser.parse_args()
-    known, found = recorded(), {name: run() for name, run in RUNS.items()}
-    print(f"{len(found)} runs, {sum(known.get(name) != one for name, one in found.items())} other than recorded")
-    if asked.write:
+    parser.add_argument("--write", action="store_true", help="record the bits of this machine")
+    parser.add_argument("--against", metavar="REV", help="run the tree of a git revision as well, and compare the bits")
+    parser.add_argument("--only", metavar="PATTERN", default="*", help='runs whose names match, such as "method *"')
+    chosen = parser.parse_args()
+    if chosen.against:
+        alone, same = compared(chosen.against, chosen.only)
+        changed = [name for name, equal in same.items() if not equal]
+        print(f"{len(same)} runs compared with {chosen.against}, {len(changed)} changed", *changed, sep="\n  ")
+        if alone:
+            print("in one tree only:", *alone, sep="\n  ")
+        return bool(changed) or not same
+    known = recorded()
+    now = {name: run() for name, run in RUNS.items() if fnmatch.fnmatchcase(name, chosen.only)}
+    print(f"{len(now)} runs, {sum(known.get(name) != one for name, one in now.items())} other than recorded")
+    if chosen.write:
         everything = json.loads(FILE.read_text()) if FILE.exists() else {}
-        FILE.write_text(json.dumps(everything | {machine(): found}, indent=1) + "\n")
+        FILE.write_text(json.dumps(everything | {machine(): known | now}, indent=1) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

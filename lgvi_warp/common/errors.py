@@ -72,6 +72,10 @@ def refusal(key: str, value: Any, problem: str, remedy: str) -> SceneError:
     return SceneError([f"{cut(key)} = {brief(value)}: {problem}; {remedy}"])
 
 
+class NoSuchMembers(SceneError, IndexError):  # noqa: N818
+    """Members are named that a run or an ensemble does not have."""
+
+
 class MembersFailed(RuntimeError):  # noqa: N818
     """Members failed in a run with on_failure="raise"; nothing of the run is lost.
 
@@ -153,7 +157,8 @@ def _closest(text: str, names: tuple[str, ...]) -> str:
 
 def among(value: Any, known: Iterable[Any]) -> bool:
     """Tell whether a value is one of those known, whatever the user gave: arrays and tables too."""
-    return any(type(value) is type(k) and value == k for k in known)
+    kind = str if isinstance(value, np.str_) else type(value)
+    return any(kind is type(k) and value == k for k in known)
 
 
 class _Brief(reprlib.Repr):

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from numbers import Integral, Real
 from typing import Any
 
@@ -21,6 +21,7 @@ class NotReal(ValueError):  # noqa: N818
 
 def real_numbers(value: Any) -> np.ndarray:
     """Read real numbers into a new float64 array of their shape; they may be NaN or infinite."""
+    value = plain(value)
     for leaf in _parts(value):
         _check(leaf)
     if isinstance(value, np.ma.MaskedArray):
@@ -34,6 +35,23 @@ def real_numbers(value: Any) -> np.ndarray:
     except (ValueError, TypeError, OverflowError, RuntimeError):
         pass
     raise NotReal("is not numeric")
+
+
+def plain(value: Any) -> Any:
+    """Read an iterator, a range and a data frame's column as a list or array, and NumPy's texts as texts.
+
+    Any other value is returned as it is. What is read from an iterator must be kept, since it can be read once.
+    """
+    if isinstance(value, np.str_):
+        return str(value)
+    if isinstance(value, range | Iterator | Generator):
+        return [plain(item) for item in value]
+    if isinstance(value, list | tuple):
+        return type(value)(map(str, value)) if value and all(type(item) is np.str_ for item in value) else value
+    if isinstance(value, np.ndarray):
+        return value.tolist() if value.dtype.kind == "U" and value.ndim else value
+    is_column = hasattr(value, "__array__") and hasattr(value, "__iter__") and not isinstance(value, np.generic | type)
+    return plain(np.asarray(value)) if is_column and column_names(value) is None else value
 
 
 def answered(who: str, values: Any) -> np.ndarray:

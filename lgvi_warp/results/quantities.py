@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.common.status import failed
+from lgvi_warp.common.times import rows_at
 from lgvi_warp.control.signals import SAVED
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
@@ -154,7 +155,7 @@ class EndQuantity(OfResult):
     def values(self, result: Result, members: Any = None) -> np.ndarray:
         """Compute its numbers for each member, float64, (n, m)."""
         if self.when is not None:
-            rows = np.flatnonzero(np.abs(result.time - self.when) <= 1e-9 * max(1.0, result.time[-1]))
+            rows = rows_at(result.time, self.when)
             if not len(rows):
                 raise refusal("of", self.label, "names no sample time", "keep one there: save=lw.SaveAt(at=[...])")
             return self._numbers(result, slice(rows[0], rows[0] + 1), members)

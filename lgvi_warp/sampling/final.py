@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.summaries import Rows, Summarized
 from lgvi_warp.physics import notation
@@ -98,19 +99,19 @@ class Final(Summarized):
         """Angular velocities in body axes [rad/s], shape (n, 3)."""
         return self._kept("angular_velocity")
 
-    def part(self, places: Sequence[int] | np.ndarray) -> Final:
+    def part(self, places: Sequence[int] | np.ndarray | slice) -> Final:
         """Select members, in the order given; one may come several times.
 
         Args:
-            places: Positions of the members (m,).
+            places: Positions of the members (m,), counted from 0; a slice; or a mask (n,).
 
         Returns:
             The end of these members.
 
         Raises:
-            IndexError: If there are no such members.
+            SceneError: If there are no such members (also an IndexError).
         """
-        at = np.asarray(places)
+        at = members_of("places", places, self.members)
         states, lanes = ({name: rows[at] for name, rows in each.items()} for each in (self.states, self.lanes))
         parameters = {name: rows[at] if len(rows) > 1 else rows for name, rows in self.parameters.items()}
         return replace(

@@ -189,13 +189,12 @@ def observe(fleet: Ensemble, statistics: Any = None, keep: Any = None, until: An
     with faults.including():
         condition = settings.until if until is None else until
         stop = None if condition is None or condition is False else from_dict(condition)
-    check_keep(faults, "keep", keep, fleet.members)
+    kept = check_keep(faults, "keep", keep, fleet.members)
     if stop is not None and not faults:
         with faults.including():
             watch_fields(stop, gathered)
     faults.raise_if_any()
-    chosen = keep if isinstance(keep, str) else tuple(sorted({int(i) for i in keep}))
-    return Observation(gathered, chosen, stop)
+    return Observation(gathered, kept if isinstance(kept, str) else tuple(kept), stop)
 
 
 def messages_about(

@@ -38,14 +38,14 @@ def check_device(device: Any) -> None:
     faults.raise_if_any()
 
 
-def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> str | list[int]:
-    """Read which members' samples are to be kept, one of KEEP or rising indices; note what is wrong."""
-    if isinstance(keep, str):
-        faults.choice(key, keep, KEEP)
-        return str(keep)
-    with faults.including():
+def read_keep(key: str, keep: Any, members: int | None = None) -> str | list[int]:
+    """Read which members' samples are to be kept: one of KEEP, or rising indices."""
+    if not isinstance(keep, str):
         return sorted(set(members_of(key, keep, members).tolist()))
-    return KEEP[0]
+    faults = Faults()
+    faults.choice(key, keep, KEEP)
+    faults.raise_if_any()
+    return str(keep)
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,8 @@ class RunSettings:
 
     def __post_init__(self) -> None:
         faults = Faults("run.")
-        object.__setattr__(self, "keep", check_keep(faults, "keep", self.keep))
+        with faults.including():
+            object.__setattr__(self, "keep", read_keep("run.keep", self.keep))
         if self.save_fields is not None:
             from lgvi_warp.control.signals import check_names
 

@@ -181,7 +181,9 @@ def _prediction(setup: Setup, threads: int | None, predict: Callable[..., Predic
 
 
 def duration_text(seconds: float) -> str:
-    """A time [s] in words."""
+    """A time [s] in words; NaN for one that was not kept."""
+    if np.isnan(seconds):
+        return "time not kept"
     for unit, size in (("years", 3.15e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.2g} {unit}"

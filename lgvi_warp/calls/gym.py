@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.observations import bounds, observer
+from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, MissingExtra, brief, closest, ragged, refusal
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import answered
@@ -99,7 +100,7 @@ class Vehicles:
         self._made_of = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         gymnasium = needed()
         ensemble = ensemble_of(fleet)
-        faults, names = Faults(), (instead_of,) if isinstance(instead_of, str) else tuple(instead_of)
+        faults, names = Faults(), tuple(listed("instead_of", instead_of, "keys of laws"))
         controller = ensemble.scene.controller
         if controller is None:
             faults.add(
@@ -122,6 +123,7 @@ class Vehicles:
         self.num_envs = ensemble.members if num_envs is None else num_envs
         if not isinstance(self.num_envs, int | np.integer) or not 1 <= self.num_envs < MOST_MEMBERS:
             faults.add("num_envs", num_envs, "is no number of environments", "give a whole number from 1")
+        outputs = listed("outputs", outputs, "demands")
         for i, name in enumerate(outputs):
             faults.choice(f"outputs[{i}]", name, COMPONENTS)
             if name in outputs[:i]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.real_numbers import NotReal, holds_words, real_numbers
+from lgvi_warp.common.real_numbers import NotReal, holds_words, plain, real_numbers
 
 # Most faults in one message; the rest are only counted, since a file may have a million of them.
 MOST_FAULTS = 20
@@ -324,6 +324,7 @@ class Faults:
 
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
         """Read a symmetric matrix, exactly so in float64, or the diagonal of a diagonal one; None after noting a fault."""
+        value = plain(value)
         if holds_words(value):
             self.finite(key, value, (size,), unit)  # notes the fault
             return None

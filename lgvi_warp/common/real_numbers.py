@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import math
 from collections.abc import Generator, Iterator
 from numbers import Integral, Real
@@ -50,8 +52,32 @@ def plain(value: Any) -> Any:
         return type(value)(map(str, value)) if value and all(type(item) is np.str_ for item in value) else value
     if isinstance(value, np.ndarray):
         return value.tolist() if value.dtype.kind == "U" and value.ndim else value
-    is_column = hasattr(value, "__array__") and hasattr(value, "__iter__") and not isinstance(value, np.generic | type)
-    return plain(np.asarray(value)) if is_column and column_names(value) is None else value
+    if isinstance(value, np.generic | type) or not (hasattr(value, "__array__") and hasattr(value, "__iter__")):
+        return value
+    # Names of columns, and of what xarray has along its dimensions, are for other readers.
+    return value if column_names(value) is not None or hasattr(value, "coords") else plain(np.asarray(value))
+
+
+def settle(settings: Any, *names: str) -> None:
+    """Replace what fields of a dataclass hold, all or those that are named, by what `plain` reads of it."""
+    for name in names or [item.name for item in dataclasses.fields(settings) if item.init]:
+        value = getattr(settings, name)
+        read = plain(value)
+        if read is not value:
+            object.__setattr__(settings, name, read)
+
+
+def settles_first(kind: type) -> None:
+    """Let a class read what its fields hold before its own checks."""
+    own = vars(kind).get("__post_init__")
+    if own is not None:
+
+        @functools.wraps(own)
+        def post_init(settings: Any) -> None:
+            settle(settings)
+            own(settings)
+
+        kind.__post_init__ = post_init  # type: ignore[attr-defined]
 
 
 def answered(who: str, values: Any) -> np.ndarray:

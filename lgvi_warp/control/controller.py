@@ -404,7 +404,7 @@ def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
 
 def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
     """The parts of a list, from objects or tables."""
-    check_list(section, entries, f"write [[controller.{section}]] and type = ... below")
+    entries = check_list(section, entries, f"write [[controller.{section}]] and type = ... below")
     faults, parts = Faults(), []
     known = base.kinds
     for i, entry in enumerate(entries):

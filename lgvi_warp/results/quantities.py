@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.common.status import failed
@@ -300,7 +301,8 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
     of: A text such as "max(depth)", "outcome floor", "end_time floor", "depth at 30" or "iae depth", a Quantity, a metric, a
         function of a Result or of (samples, members), one of these that was read before, or several of them.
     """
-    requests = list(of) if isinstance(of, list | tuple) else [of]
+    items = None if isinstance(of, OfResult | Statistic) or callable(of) else items_of(of)
+    requests = [of] if items is None else items
     faults = Faults()
     results: list[OfResult] = []
     for request in requests:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.times import longest_step, whole_steps
@@ -181,10 +182,11 @@ def drawn(fleet: Ensemble) -> Ensemble:
 
 def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
     """The same variation of each cheaper scene; names of what varies that a change fixes stay varied."""
-    if isinstance(cheaper, Mapping | str) or not isinstance(cheaper, Sequence):
+    listed = items_of(cheaper)
+    if listed is None:
         raise refusal("cheaper", cheaper, "is no list of scenes", 'give [{"controller.delay": 0.0}]')
     faults, fleets = Faults(), list[Ensemble]()
-    for i, entry in enumerate(cheaper):
+    for i, entry in enumerate(listed):
         with faults.including():
             if isinstance(entry, Mapping):
                 entry = fleet.scene.with_numbers(entry)  # type: ignore[attr-defined]

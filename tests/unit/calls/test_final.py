@@ -17,7 +17,9 @@ ARGUMENTS = {"h": 0.1, "t1": 0.4}
 
 @pytest.fixture(scope="module")
 def fleet():
-    scene = lw.Scene(lw.Vehicle(**BODY), terms=[lw.terms.Drag(linear=[1.0] * 6)], start=lw.Start(velocity=[1.0, 0.1, 0.0]))
+    scene = lw.Scene(
+        lw.Vehicle(**BODY), terms=[lw.terms.Drag(linear=[1.0] * 6)], start=lw.Start(velocity=[1.0, 0.1, 0.0])
+    )
     return lw.Ensemble(scene, 4, 1, {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)})
 
 
@@ -55,7 +57,8 @@ ODD_ARRAYS = [
 ]  # fmt: skip
 ODD_NUMBERS = [
     ("seed", -1), ("seed", 1.5), ("seed", "x"), ("seed", True), ("steps", -2), ("steps", 2.5), ("steps", 3), ("time", np.nan),
-    ("time", -1.0), ("time", "x"), ("time", None), ("step", 0.0), ("step", np.inf), ("step", 0.2), ("settings", None), ("settings", 3),
+    ("time", -1.0), ("time", "x"), ("time", None), ("step", 0.0), ("step", np.inf), ("step", 0.2), ("settings", None),
+    ("settings", 3),
 ]  # fmt: skip
 
 
@@ -112,7 +115,10 @@ def test_members_in_another_order_are_told(fleet, result):
     told = [text for text in lw.solve(fleet, "psi_s", **ARGUMENTS, start=result.final).messages if "start is" in text]
     assert told == []
     turned = lw.solve(fleet, "psi_s", **ARGUMENTS, start=result.final.part([3, 2, 1, 0])).messages
-    assert sum("the same members in another order: member 3 goes on in the place of member 0" in text for text in turned) == 1
+    assert (
+        sum("the same members in another order: member 3 goes on in the place of member 0" in text for text in turned)
+        == 1
+    )
     others = lw.solve(fleet.subset([0, 1]), "psi_s", **ARGUMENTS, start=result.final.part([2, 3])).messages
     assert any("is the end of other members" in text for text in others)
     right = lw.solve(fleet.subset([3, 1]), "psi_s", **ARGUMENTS, start=result.final.part([3, 1])).messages

@@ -12,16 +12,18 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.observations import bounds, observer
+from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, MissingExtra, brief, closest, ragged, refusal
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import answered
+from lgvi_warp.common.times import of_step, whole_steps
 from lgvi_warp.control.callback import Callback
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.episodes import Episodes
 from lgvi_warp.engine.host_callback import CallbackInput
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
-from lgvi_warp.methods.saveat import SaveAt, exact
+from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.runs.request import Request, ensemble_of
@@ -98,7 +100,7 @@ class Vehicles:
         self._made_of = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
         gymnasium = needed()
         ensemble = ensemble_of(fleet)
-        faults, names = Faults(), (instead_of,) if isinstance(instead_of, str) else tuple(instead_of)
+        faults, names = Faults(), tuple(listed("instead_of", instead_of, "keys of laws"))
         controller = ensemble.scene.controller
         if controller is None:
             faults.add(
@@ -121,6 +123,7 @@ class Vehicles:
         self.num_envs = ensemble.members if num_envs is None else num_envs
         if not isinstance(self.num_envs, int | np.integer) or not 1 <= self.num_envs < MOST_MEMBERS:
             faults.add("num_envs", num_envs, "is no number of environments", "give a whole number from 1")
+        outputs = listed("outputs", outputs, "demands")
         for i, name in enumerate(outputs):
             faults.choice(f"outputs[{i}]", name, COMPONENTS)
             if name in outputs[:i]:
@@ -152,7 +155,7 @@ class Vehicles:
         if isinstance(step, float | int) and np.isfinite(step) and step > 0.0:
             draws = [term.draws(step) for term in scene.terms if isinstance(term, NoisyTerm)]
             every = scene.controller.every(step)
-            t1 = float(exact(step) * (MOST_STEPS // max(draws, default=1) // every * every))
+            t1 = float(of_step(step) * (MOST_STEPS // max(draws, default=1) // every * every))
         members = max(self.num_envs, self._fleet.members) if self._random else self._fleet.members
         planned = self._fleet.with_seed(self._fleet.seed, members) if self._random else self._fleet
         save = SaveAt(fields=("position",))
@@ -431,7 +434,7 @@ def _whole_periods(duration: float | None, period: float) -> float:
     if duration is None:
         return np.inf
     count = round(duration / period)
-    if count < 1 or abs(duration - count * period) > 1e-9 * duration:
+    if count < 1 or whole_steps(duration, period) is None:
         raise refusal("duration", duration, f"is no whole number of periods of {period:.9g} s", "give a multiple")
     return count
 

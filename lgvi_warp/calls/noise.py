@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, ragged, refusal
+from lgvi_warp.common.arguments import members_of
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.engine.counted_draws import counted_draws, dtype_of
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.saveat import TimeGrid
@@ -87,13 +88,12 @@ def check_size(members: int, numbers: int, size: int) -> None:
 
 def checked_indices(indices: Any, members: int | None = None) -> np.ndarray:
     """Whose noise is meant, int64 (members,); members: how many there must be, None for any number."""
-    keys = np.asarray(None if ragged(indices) else indices)
-    one_each = keys.ndim == 1 and len(keys) > 0 and members in (None, len(keys)) and keys.dtype.kind in "iu"
-    if not one_each or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
+    keys = members_of("indices", indices)
+    if members not in (None, len(keys)) or keys.max() >= MOST_MEMBERS:
         problem = "are not one whole number from 0 for each member"
         shape = "(n,)" if members is None else f"({members},)"
         raise refusal("indices", indices, problem, f"give an array of shape {shape}, of numbers below {MOST_MEMBERS}")
-    return keys.astype(np.int64)
+    return keys
 
 
 def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members: int | None = None) -> np.ndarray:

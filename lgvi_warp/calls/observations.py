@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.engine.host_callback import CallbackInput
 from lgvi_warp.physics.terms.events import Box, Surface
@@ -132,10 +133,10 @@ def observer(
         for name, each in OBSERVATIONS.items()
         for i in (None, *(range(each.length) if each.length > 1 else ()))
     }
-    if isinstance(names, str) or not isinstance(names, Sequence) or not names:
+    listed = items_of(names)
+    if not listed:
         faults.add("observe", names, "is no list of names and no function", "give names such as depth_error")
-        names = ()
-    for i, entry in enumerate(names):
+    for i, entry in enumerate(listed or ()):
         if not isinstance(entry, str) or entry not in known:
             faults.add(f"observe[{i}]", entry, "is not known", closest(entry, known))
             continue

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.gym import Vehicles, step_by
+from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.errors import MissingExtra, refusal
+from lgvi_warp.common.real_numbers import is_whole
 
 # What the base class of Stable-Baselines3 calls indices: one, several, or None for all.
 Indices = int | Iterable[int] | None
@@ -196,7 +198,7 @@ class Baselines:
     def _chosen(self, indices: Indices) -> list[int]:
         if indices is None:
             return list(range(self.num_envs))
-        return [indices] if isinstance(indices, int | np.integer) else list(indices)
+        return members_of("indices", [indices] if is_whole(indices, 0) else indices, self.num_envs).tolist()
 
     def _of_each(self, value: Any, indices: Indices) -> list[Any]:
         by_row = isinstance(value, np.ndarray) and value.shape[:1] == (self.num_envs,)

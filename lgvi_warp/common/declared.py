@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from lgvi_warp.common.errors import Faults, refusal
-from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.real_numbers import is_whole, settle
 
 
 def declared(reader: Callable[..., Any], default: Any = dataclasses.MISSING, **arguments: Any) -> Any:
@@ -56,6 +56,7 @@ def _declared_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
 def read(settings: Any, faults: Faults, *names: str) -> dict[str, Any]:
     """Read declared fields of an object, all or those that are named, and note what is wrong; None after a fault."""
     values, known = {}, _declared_fields(type(settings))  # type: ignore[arg-type]  # a class is hashable
+    settle(settings, *names)
     for name in names or known:
         value, item = getattr(settings, name), known[name]
         skipped = value is None and item.default is None

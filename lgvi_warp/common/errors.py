@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.real_numbers import NotReal, holds_words, real_numbers
+from lgvi_warp.common.real_numbers import NotReal, holds_words, plain, real_numbers
 
 # Most faults in one message; the rest are only counted, since a file may have a million of them.
 MOST_FAULTS = 20
@@ -70,6 +70,10 @@ class SceneError(ValueError):
 def refusal(key: str, value: Any, problem: str, remedy: str) -> SceneError:
     """Make the error of a single fault."""
     return SceneError([f"{cut(key)} = {brief(value)}: {problem}; {remedy}"])
+
+
+class NoSuchMembers(SceneError, IndexError):  # noqa: N818
+    """Members are named that a run or an ensemble does not have."""
 
 
 class MembersFailed(RuntimeError):  # noqa: N818
@@ -153,7 +157,8 @@ def _closest(text: str, names: tuple[str, ...]) -> str:
 
 def among(value: Any, known: Iterable[Any]) -> bool:
     """Tell whether a value is one of those known, whatever the user gave: arrays and tables too."""
-    return any(type(value) is type(k) and value == k for k in known)
+    kind = str if isinstance(value, np.str_) else type(value)
+    return any(kind is type(k) and value == k for k in known)
 
 
 class _Brief(reprlib.Repr):
@@ -319,6 +324,7 @@ class Faults:
 
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
         """Read a symmetric matrix, exactly so in float64, or the diagonal of a diagonal one; None after noting a fault."""
+        value = plain(value)
         if holds_words(value):
             self.finite(key, value, (size,), unit)  # notes the fault
             return None

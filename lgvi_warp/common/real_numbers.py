@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from numbers import Integral, Real
 from typing import Any
 
@@ -21,6 +23,7 @@ class NotReal(ValueError):  # noqa: N818
 
 def real_numbers(value: Any) -> np.ndarray:
     """Read real numbers into a new float64 array of their shape; they may be NaN or infinite."""
+    value = plain(value)
     for leaf in _parts(value):
         _check(leaf)
     if isinstance(value, np.ma.MaskedArray):
@@ -34,6 +37,47 @@ def real_numbers(value: Any) -> np.ndarray:
     except (ValueError, TypeError, OverflowError, RuntimeError):
         pass
     raise NotReal("is not numeric")
+
+
+def plain(value: Any) -> Any:
+    """Read an iterator, a range and a data frame's column as a list or array, and NumPy's texts as texts.
+
+    Any other value is returned as it is. What is read from an iterator must be kept, since it can be read once.
+    """
+    if isinstance(value, np.str_):
+        return str(value)
+    if isinstance(value, range | Iterator | Generator):
+        return [plain(item) for item in value]
+    if isinstance(value, list | tuple):
+        return type(value)(map(str, value)) if value and all(type(item) is np.str_ for item in value) else value
+    if isinstance(value, np.ndarray):
+        return value.tolist() if value.dtype.kind == "U" and value.ndim else value
+    if isinstance(value, np.generic | type) or not (hasattr(value, "__array__") and hasattr(value, "__iter__")):
+        return value
+    # Names of columns, and of what xarray has along its dimensions, are for other readers.
+    return value if column_names(value) is not None or hasattr(value, "coords") else plain(np.asarray(value))
+
+
+def settle(settings: Any, *names: str) -> None:
+    """Replace what fields of a dataclass hold, all or those that are named, by what `plain` reads of it."""
+    for name in names or [item.name for item in dataclasses.fields(settings) if item.init]:
+        value = getattr(settings, name)
+        read = plain(value)
+        if read is not value:
+            object.__setattr__(settings, name, read)
+
+
+def settles_first(kind: type) -> None:
+    """Let a class read what its fields hold before its own checks."""
+    own = vars(kind).get("__post_init__")
+    if own is not None:
+
+        @functools.wraps(own)
+        def post_init(settings: Any) -> None:
+            settle(settings)
+            own(settings)
+
+        kind.__post_init__ = post_init  # type: ignore[attr-defined]
 
 
 def answered(who: str, values: Any) -> np.ndarray:

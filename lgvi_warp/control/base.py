@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.common import registry
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.physics import vehicle
@@ -311,13 +312,14 @@ class ControlLaw(Part):
 
 def list_of_names(faults: Faults, key: str, names: Any, known: Collection[str]) -> list[str]:
     """Names of a list that are known and occur once; what is wrong with others is noted."""
-    if isinstance(names, str) or not isinstance(names, Sequence) or not names:
+    listed = items_of(names)
+    if not listed:
         faults.add(key, names, "is no list of names", f"give some of {', '.join(known)}")
         return []
-    for i, name in enumerate(names):
-        if faults.choice(f"{key}[{i}]", name, known) and among(name, names[:i]):
+    for i, name in enumerate(listed):
+        if faults.choice(f"{key}[{i}]", name, known) and among(name, listed[:i]):
             faults.add(f"{key}[{i}]", name, "is named twice", "leave one of them out")
-    return [name for name in names if among(name, known)]
+    return [name for name in listed if among(name, known)]
 
 
 # How a law's integral is kept from growing while actuators are at their limits.

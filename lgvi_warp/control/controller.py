@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp.common import declared
 from lgvi_warp.common.declared import positive, read, real
 from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.times import ROUND_OFF, whole_steps
 from lgvi_warp.control.altimeter import Altimeter
 from lgvi_warp.control.base import SECTIONS, Allocation, Bus, Part
 from lgvi_warp.control.callback import Callback, CallbackCommands, refuse_second
@@ -29,8 +30,6 @@ from lgvi_warp.physics.vehicle import Vehicle
 if TYPE_CHECKING:
     from lgvi_warp.ocean.places import LocalPlane
 
-# A time and a whole number of steps that differ by less than this part of the step are the same.
-ROUND_OFF = 1e-9
 # A part of a component below this is round-off, when it is asked what actuators can make.
 SPANNED = 1e-8
 # What a scene without actuators lacks.
@@ -405,7 +404,7 @@ def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
 
 def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
     """The parts of a list, from objects or tables."""
-    check_list(section, entries, f"write [[controller.{section}]] and type = ... below")
+    entries = check_list(section, entries, f"write [[controller.{section}]] and type = ... below")
     faults, parts = Faults(), []
     known = base.kinds
     for i, entry in enumerate(entries):
@@ -427,4 +426,4 @@ def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
 
 def _is_whole(name: str, value: float, h: float) -> bool:
     """Whether a period, of one step at least, or a delay is a whole number of steps [s]."""
-    return (name == "delay" or value >= 0.5 * h) and abs(value - round(value / h) * h) <= ROUND_OFF * h
+    return (name == "delay" or value >= 0.5 * h) and whole_steps(value, h) is not None

@@ -12,6 +12,7 @@ import numpy as np
 from lgvi_warp.common.declared import real, whole
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.times import whole_steps
 from lgvi_warp.control.base import Bus, ControlLaw, Numbers, Packed, PackingContext, list_of_names
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Term, number
@@ -146,7 +147,7 @@ class LinearMPC(ControlLaw):
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         # A model of another period would be wrong without a sign of it.
-        if self.period is not None and abs(self.period - bus.period) > 1e-9 * bus.period:
+        if self.period is not None and whole_steps(self.period, bus.period) != 1:
             problem = f"is that of the model, and the controller's is {bus.period:g} s"
             raise refusal(f"{self.key}.period", self.period, problem, "make the model anew with this period")
         return super().wired(bus, others)

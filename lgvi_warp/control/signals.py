@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.fields import FIELDS, TABLE, Field
 
@@ -140,13 +141,14 @@ def row_of(name: str, bus: Bus, noted: Mapping[str, int]) -> int:
     return firsts[name] if name in firsts else noted[signal.group] + signal.row
 
 
-def check_names(faults: Faults, key: str, names: Any) -> None:
-    """Add a fault for each name that no sample has."""
-    if isinstance(names, str) or not isinstance(names, Collection):
+def check_names(faults: Faults, key: str, names: Any) -> tuple[str, ...]:
+    """Read a list of names of samples, and add a fault for each that no sample has."""
+    read = items_of(names)
+    if read is None:
         faults.add(key, names, "is no list of names", 'give one, such as ["position", "attitude"]')
-        return
-    for name in names:
+    for name in read or ():
         faults.choice(key, name, SAVED)
+    return tuple(read or ())
 
 
 def check_signals(faults: Faults, key: str, names: Iterable[str], scene: Any) -> None:

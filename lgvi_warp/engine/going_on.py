@@ -111,7 +111,20 @@ def begun(plan: Plan) -> Plan:
     for name in wrong:
         faults.add(name, final.lanes[name].shape, "is damaged", "run what it is the end of again")
     faults.raise_if_any()
-    return plan
+    return _of_same_members(plan, final)
+
+
+def _of_same_members(plan: Plan, final: Final) -> Plan:
+    """The plan, with a message where its members are others than those whose end it is, or in another order."""
+    now = plan.ensemble.indices
+    if np.array_equal(now, final.indices) or "indices" in plan.ensemble.explicit():  # given: noise that is meant
+        return plan
+    i = int(np.flatnonzero(now != final.indices)[0])
+    same = np.array_equal(np.sort(now), np.sort(final.indices))
+    who = "the same members in another order" if same else "other members"
+    text = f"start is the end of {who}: member {final.indices[i]} goes on in the place of member {now[i]}"
+    text += "; give final.part(places) in the order of the members"
+    return plan if text in plan.grid.messages else replace(plan, grid=plan.grid.telling(text))
 
 
 def left_by(packets: Packets) -> dict[str, np.ndarray]:

@@ -9,6 +9,7 @@ from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
+from lgvi_warp.common.times import whole_steps
 from lgvi_warp.engine.kernel_choice import KernelChoice
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
@@ -17,9 +18,6 @@ from lgvi_warp.scene.like import SceneLike
 
 # Sub-maps whose equation may have no solution.
 SOLVING = {"D", "W", "A", "Phi", "Phi*"}
-
-# A step and the draws that fill it differ by less than this part, the round-off of their quotient and of their texts.
-STEP_ROUND_OFF = 1e-12
 
 
 def check_settings(
@@ -72,10 +70,10 @@ def check_noise_steps(choice: KernelChoice, grid: TimeGrid) -> None:
         if not isinstance(term, NoisyTerm) or term.noise_step is None:
             continue
         noise_step, draws = float(term.noise_step), term.draws(h)
-        if abs(h - draws * noise_step) > STEP_ROUND_OFF * h:
+        if whole_steps(h, noise_step) != draws:
             multiple = round(spacing / noise_step)
             problem = f"is no whole multiple of {term.key}.noise_step = {noise_step:.9g} s"
-            if multiple < 1 or abs(spacing - multiple * noise_step) > STEP_ROUND_OFF * spacing:
+            if multiple < 1 or whole_steps(spacing, noise_step) is None:
                 remedy = f"give a noise_step that divides the {spacing:.9g} s between samples"
             else:
                 count = min(divisors(multiple), key=lambda count: abs(multiple / count * noise_step - h))

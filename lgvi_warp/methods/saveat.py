@@ -6,16 +6,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, among
+from lgvi_warp.common.times import MOST_SHORTENING, meeting, of_step, whole_steps
 from lgvi_warp.control.signals import check_names
 from lgvi_warp.physics.fields import FIELDS
 
-# A grid whose step would be more than this many times shorter than the one asked for is refused.
-MOST_SHORTENING = 20
 # Most samples of a run: 1.4 GB for one member.
 MOST_SAMPLES = 10_000_000
 
@@ -58,12 +56,13 @@ class SaveAt:
         if self.every is not None and self.at is not None:
             faults.add("save", "every and at", "are both given", "give one of them")
         if self.every is not None:
-            faults.positive("save.every", self.every)
+            object.__setattr__(self, "every", faults.positive("save.every", self.every))
         if self.at is not None:
             times = faults.finite("save.at", self.at)
             if times is not None and (times.ndim != 1 or np.any(times < 0.0) or np.any(np.diff(times) <= 0.0)):
-                faults.add("save.at", self.at, "is not a rising list of times >= 0", "sort it and drop repetitions")
-        check_names(faults, "save.fields", self.fields)
+                faults.add("save.at", times, "is not a rising list of times >= 0", "sort it and drop repetitions")
+            object.__setattr__(self, "at", times if times is None else tuple(times.ravel().tolist()))
+        object.__setattr__(self, "fields", check_names(faults, "save.fields", self.fields))
         faults.raise_if_any()
 
 
@@ -99,34 +98,27 @@ class TimeGrid:
 
     def shifted(self, t0: float) -> TimeGrid:
         """The same steps and samples from another start t0 [s] on, a whole number of steps from t = 0."""
-        step, begin, faults = exact(self.h), exact(t0), Faults()
-        first = begin / step
-        if first.denominator != 1 or first < 0:
-            near = max(0, round(first)) * self.h
+        step, first, faults = of_step(self.h), whole_steps(t0, self.h), Faults()
+        if first is None or first < 0:
+            near = max(0, round(t0 / self.h)) * self.h
             faults.add("t0", t0, f"is no whole number of steps of {self.h:.9g} s", f"give {near:.9g}")
         elif first + self.steps >= 2**31 - 1:
             faults.add("t0", t0, "is too many steps from t = 0", "at most 2,147,483,646 can be counted")
         faults.raise_if_any()
-        steps = self.sample_steps - self.first + int(first)
+        steps = self.sample_steps - self.first + (first or 0)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
         return TimeGrid(self.h, steps, times, self.messages, self.asked)
 
     def ticks(self, every: int, goes_on: bool = False) -> TimeGrid:
         """The same steps with samples at the ticks of a controller alone; where the run goes on, the first one was made."""
         first = self.first + 1 if goes_on else self.first
-        step, steps = exact(self.h), np.arange(-(-first // every) * every, self.last + 1, every)
+        step, steps = of_step(self.h), np.arange(-(-first // every) * every, self.last + 1, every)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
         return TimeGrid(self.h, steps, times, self.messages, self.asked)
 
     def telling(self, *messages: str) -> TimeGrid:
         """The same steps and samples with more messages."""
         return replace(self, messages=(*self.messages, *messages))
-
-
-def exact(x: float) -> Fraction:
-    """The number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself."""
-    simple = Fraction(repr(float(x))).limit_denominator(10**6)
-    return simple if abs(float(simple) - x) <= 1e-15 * abs(x) else Fraction(f"{x:.15g}")
 
 
 def time_grid(h: float, t1: float, save: SaveAt, t0: float = 0.0) -> TimeGrid:
@@ -140,41 +132,34 @@ def time_grid(h: float, t1: float, save: SaveAt, t0: float = 0.0) -> TimeGrid:
     length = t1 - t0
     if t1 > 0 and not length > 0.0:
         faults.add("t1", t1, f"is not after the start, {t0:.9g} s", "give the time of the end, counted from t = 0")
-    if save.at is not None and len(save.at) and t1 > 0 and max(save.at) > t1 * (1 + 1e-12):
-        faults.add("save.at", max(save.at), f"lies beyond the end, {t1} s", "drop it or run longer")
-    if save.at is not None and len(save.at) and min(save.at) < t0 * (1 - 1e-12):
-        faults.add("save.at", min(save.at), f"lies before the start, {t0:.9g} s", "drop it")
-    if save.every is not None and length > 0 and save.every > length * (1 + 1e-12):
+    at = () if save.at is None else save.at
+    if at and not faults and max(at) > t1 and whole_steps(max(at), t1) != 1:
+        faults.add("save.at", max(at), f"lies beyond the end, {t1} s", "drop it or run longer")
+    if at and not faults and min(at) < t0 and whole_steps(min(at), t0) != 1:
+        faults.add("save.at", min(at), f"lies before the start, {t0:.9g} s", "drop it")
+    if save.every is not None and 0.0 < length < save.every and whole_steps(save.every, length) != 1:
         faults.add("save.every", save.every, f"is longer than the run, {length} s", "save more often or run longer")
     if save.every is not None and length > 0 and 0 < save.every < length / MOST_SAMPLES:
         fault = f"asks for more than {MOST_SAMPLES} samples"
         faults.add("save.every", save.every, fault, "save less often, or run in parts")
     faults.raise_if_any()
-    begin, end, meant = exact(t0), exact(t1), exact(h)
-    every = end - begin if save.every is None else exact(save.every)
-    regular = int((end - begin) / every)
-    sample_times = sorted({exact(t) for t in save.at or ()} | {begin, end})
-    spacing = every
-    for t in sample_times:
-        shared = math.gcd(spacing.numerator * t.denominator, t.numerator * spacing.denominator)
-        spacing = Fraction(shared, spacing.denominator * t.denominator)
-    step = spacing / math.ceil(spacing / meant)
+    step, meant, times = meeting(h, t1, [t0, *at] if save.every is None else [t0, *at, save.every])
     if meant / step > MOST_SHORTENING:
         fault = f"would have to shrink to {float(step):.3g} s to meet every sample time and the end"
         faults.add("step", h, fault, "choose sample times and a duration that are multiples of the step")
-    if end / step >= 2**31 - 1:
+    if times[0] / step >= 2**31 - 1:
         remedy = "at most 2,147,483,646 steps can be made: use a longer step"
-        faults.add("step", h, f"needs {int(end / step)} steps", remedy)
+        faults.add("step", h, f"needs {int(times[0] / step)} steps", remedy)
     faults.raise_if_any()
     messages: tuple[str, ...] = ()
     if step != meant:
         messages = (f"step shortened from {h} s to {float(step):.9g} s, so that it divides every sample time",)
-    regular_steps = int(begin / step) + np.arange(regular + 1) * int(every / step)
-    steps = np.union1d(regular_steps, [int(t / step) for t in sample_times])
+    counts = [min(int(t / step), int(times[0] / step)) for t in times]
+    every = counts.pop() if save.every is not None else counts[0]
+    steps = np.union1d(np.arange(counts[1], counts[0] + 1, every), counts)
     # A quotient of whole numbers is the float nearest to each time; a sum of steps would not be.
-    times = [k * step.numerator / step.denominator for k in steps.tolist()]
-    asked = None if step == meant else float(meant)
-    return TimeGrid(float(step), steps.astype(np.int64), np.array(times), messages, asked)
+    kept = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
+    return TimeGrid(float(step), steps.astype(np.int64), kept, messages, None if step == meant else float(meant))
 
 
 def divisors(count: int) -> list[int]:

@@ -145,17 +145,18 @@ def only_diagonal(matrices: np.ndarray) -> np.ndarray | None:
     return np.einsum("nii->ni", matrices) if none_beside else None
 
 
-def rotations(R: np.ndarray) -> np.ndarray:
-    """Which matrices are rotations to within ORTHOGONAL.
+def rotations(R: np.ndarray, limit: float = ORTHOGONAL) -> np.ndarray:
+    """Which matrices are rotations to within a limit.
 
     Args:
         R: Matrices (..., 3, 3).
+        limit: Most that an entry of R^T R - I may have, by default 1e-9.
 
     Returns:
         Mask (...), False where a number is not finite.
     """
     with np.errstate(invalid="ignore", over="ignore"):
-        close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2)) <= ORTHOGONAL
+        close = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2)) <= limit
         return np.asarray(close & (np.linalg.det(R) > 0.0))
 
 

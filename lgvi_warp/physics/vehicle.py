@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import summaries
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.declared import array, checked, positive, read, real, symmetric, text
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.summaries import Summarized
@@ -36,7 +37,8 @@ class RepeatedWarning(str):
 
 def _are_texts(value: Any) -> bool:
     """Whether a value is a list of texts."""
-    return isinstance(value, list | tuple) and all(isinstance(text, str) for text in value)
+    items = items_of(value)
+    return items is not None and all(isinstance(text, str) for text in items)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.common.status import failed
+from lgvi_warp.common.times import rows_at
 from lgvi_warp.control.signals import SAVED
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
@@ -154,7 +156,7 @@ class EndQuantity(OfResult):
     def values(self, result: Result, members: Any = None) -> np.ndarray:
         """Compute its numbers for each member, float64, (n, m)."""
         if self.when is not None:
-            rows = np.flatnonzero(np.abs(result.time - self.when) <= 1e-9 * max(1.0, result.time[-1]))
+            rows = rows_at(result.time, self.when)
             if not len(rows):
                 raise refusal("of", self.label, "names no sample time", "keep one there: save=lw.SaveAt(at=[...])")
             return self._numbers(result, slice(rows[0], rows[0] + 1), members)
@@ -299,7 +301,8 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
     of: A text such as "max(depth)", "outcome floor", "end_time floor", "depth at 30" or "iae depth", a Quantity, a metric, a
         function of a Result or of (samples, members), one of these that was read before, or several of them.
     """
-    requests = list(of) if isinstance(of, list | tuple) else [of]
+    items = None if isinstance(of, OfResult | Statistic) or callable(of) else items_of(of)
+    requests = [of] if items is None else items
     faults = Faults()
     results: list[OfResult] = []
     for request in requests:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import functools
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common import npy_files, summaries
+from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.deferred import Deferred
 from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.phases import Phases
@@ -281,15 +282,19 @@ class Result(Summarized):
         """
         return own(term, self.parameters)
 
-    def part(self, places: np.ndarray) -> Result:
-        """Select members, in the order given.
+    def part(self, places: Sequence[int] | np.ndarray | slice) -> Result:
+        """Select members, in the order given; one may come several times.
 
         Args:
-            places: Indices of the members in this result, shape (m,).
+            places: Indices of the members in this result, counted from 0, shape (m,); a slice; or a mask (n,).
 
         Returns:
             A result of these members alone; statistics stay those of the whole run.
+
+        Raises:
+            SceneError: If there are no such members (also an IndexError).
         """
+        places = members_of("places", places, self.members)
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
         samples = {name: values[:, places] for name, values in self.samples.items()}
         starts = {name: values[places] for name, values in self.starts.items()}

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.control.loiter import Loiter
@@ -82,9 +83,8 @@ def check(request: Request, tangents: Any, store: Any, start: Any, on_block: Any
 
 
 def _names(faults: Faults, tangents: Any) -> tuple[str, ...]:
-    listed = tangents.tolist() if isinstance(tangents, np.ndarray) else tangents
-    listed = [listed] if isinstance(listed, str) else listed
-    if not isinstance(listed, list | tuple) or not listed or not all(isinstance(name, str) for name in listed):
+    listed = [tangents] if isinstance(tangents, str) else items_of(tangents)
+    if not listed or not all(isinstance(name, str) for name in listed):
         faults.add("tangents", tangents, "is no list of names", 'give tangents=["vehicle.mass", "start.velocity[0]"]')
         return ()
     return tuple(", ".join(target.label for target in targets(name)) for name in listed)

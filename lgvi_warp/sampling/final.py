@@ -9,10 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.arguments import MOST, mapping_of, members_of
+from lgvi_warp.common.errors import Faults, ragged
+from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.status import Status
 from lgvi_warp.common.summaries import Rows, Summarized
+from lgvi_warp.common.times import whole_steps
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.notation import ORTHOGONAL
+
+# Most that an attitude of a run may have drifted from the rotations, |R^T R - I|.
+MOST_DRIFT = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,19 +106,19 @@ class Final(Summarized):
         """Angular velocities in body axes [rad/s], shape (n, 3)."""
         return self._kept("angular_velocity")
 
-    def part(self, places: Sequence[int] | np.ndarray) -> Final:
+    def part(self, places: Sequence[int] | np.ndarray | slice) -> Final:
         """Select members, in the order given; one may come several times.
 
         Args:
-            places: Positions of the members (m,).
+            places: Positions of the members (m,), counted from 0; a slice; or a mask (n,).
 
         Returns:
             The end of these members.
 
         Raises:
-            IndexError: If there are no such members.
+            SceneError: If there are no such members (also an IndexError).
         """
-        at = np.asarray(places)
+        at = members_of("places", places, self.members)
         states, lanes = ({name: rows[at] for name, rows in each.items()} for each in (self.states, self.lanes))
         parameters = {name: rows[at] if len(rows) > 1 else rows for name, rows in self.parameters.items()}
         return replace(
@@ -137,12 +145,8 @@ class Final(Summarized):
                 array = faults.finite(name, values, (n, 3, 3) if name == "attitude" else (n, 3))
                 arrays |= {} if array is None else {name: array}
         faults.raise_if_any()
-        R = arrays.get("attitude")
-        if R is not None and not notation.rotations(R).all():
-            bad = int(np.argmin(notation.rotations(R)))
-            raise SceneError(
-                [f"attitude of member {bad} = {R[bad].tolist()}: is not a rotation; give R^T R = I, det R = 1"]
-            )
+        _check_rotations(faults, arrays.get("attitude"))
+        faults.raise_if_any()
         lanes = {name: rows for name, rows in self.lanes.items() if name not in EXACT}
         return replace(self, states={**self.states, **arrays}, lanes=lanes)
 
@@ -171,16 +175,97 @@ class Final(Summarized):
 
         Returns:
             The end.
+
+        Raises:
+            SceneError: If something is missing, or is nothing that a run ends with: a status, an index, a shape, an attitude.
         """
-        own = {name.removeprefix(PREFIX): rows for name, rows in arrays.items() if name.startswith(PREFIX)}
+        mapping_of("arrays", arrays, "arrays by name, as of Final.to_arrays")
+        mapping_of("numbers", numbers, f"{', '.join(NUMBERS)}")
+        mapping_of("parameters", parameters, "arrays (n, ...) by name")
+        own = {name.removeprefix(PREFIX): rows for name, rows in arrays.items() if str(name).startswith(PREFIX)}
         states, lanes = (
             {name.removeprefix(kind): rows for name, rows in own.items() if name.startswith(kind)}
             for kind in ("states.", "lanes.")
         )
+        faults = Faults("final.")
+        for name in [name for name in NUMBERS if name not in numbers] + [
+            n for n in ("status", "indices") if n not in own
+        ]:
+            faults.add(name, None, "is missing", "give what Final.to_arrays and the attributes of the end say")
+        faults.raise_if_any()
         known = {name: numbers[name] for name in NUMBERS}
-        return cls(
+        end = cls(
             **known, states=states, lanes=lanes, status=own["status"], indices=own["indices"], parameters=parameters
         )
+        return end.checked()
+
+    def checked(self) -> Final:
+        """The end itself, after a check of what a file could hold.
+
+        Returns:
+            This end.
+
+        Raises:
+            SceneError: If a number, a status, an index, a shape or an attitude is none that a run ends with.
+        """
+        faults, remedy = Faults("final."), "give an end that lgvi-warp wrote"
+        time, step = faults.number("time", self.time, "s", 0.0), faults.positive("step", self.step)
+        for name in ("steps", "seed"):
+            if not is_whole(getattr(self, name), 0):
+                faults.add(name, getattr(self, name), "is no whole number from 0", remedy)
+        if not faults and whole_steps(time or 0.0, step or 1.0) != self.steps:
+            faults.add("time", self.time, f"is not that of {self.steps} steps of {self.step:.9g} s", remedy)
+        codes = _whole_numbers(faults, "status", self.status, remedy)
+        keys = _whole_numbers(faults, "indices", self.indices, remedy)
+        n = -1 if codes is None else len(codes)
+        odd = [] if codes is None else sorted(set(codes.tolist()) - {int(code) for code in Status})
+        for code in odd[:1]:
+            faults.add("status", code, "is none that a member ends with", remedy)
+        if keys is not None and (len(keys) != n or (n and not 0 <= keys.min() <= keys.max() < MOST)):
+            faults.add("indices", keys, f"are not {n} whole numbers from 0 to {MOST - 1}", remedy)
+        for name, rows in self.states.items():
+            shape = (n, 3, 3) if name == "attitude" else (n, 3)
+            if faults.choice("states", name, FIELDS) and (
+                np.shape(rows) != shape or np.asarray(rows).dtype.kind != "f"
+            ):
+                faults.add(f"states.{name}", rows, f"is no array of shape {shape}", remedy)
+        for name, rows in self.lanes.items():
+            if np.ndim(rows) != 2 or len(rows) != n or np.asarray(rows).dtype.kind not in "fiu":
+                faults.add(f"lanes.{name}", np.shape(rows), f"is not the shape of rows of {n} members", remedy)
+        if not isinstance(self.settings, Mapping):
+            faults.add("settings", self.settings, "is no mapping", remedy)
+        faults.raise_if_any()
+        # Runge-Kutta methods and float32 let attitudes drift, about which their runs warn.
+        keeps = self.settings.get("dtype") == "float64" and not str(self.settings.get("method")).startswith("rk")
+        rows = self.lanes.get("state", np.zeros((n, 0)))
+        for R in (self.states.get("attitude"), rows[:, :9].reshape(n, 3, 3) if rows.shape[1] > 9 else None):
+            exact = keeps and R is not None and R.dtype == np.float64
+            _check_rotations(faults, R, np.asarray(codes) == Status.OK, ORTHOGONAL if exact else MOST_DRIFT)
+        faults.raise_if_any()
+        return self
+
+
+def _whole_numbers(faults: Faults, key: str, values: Any, remedy: str) -> np.ndarray | None:
+    """Whole numbers (n,) of a file; None after noting a fault."""
+    array = np.asarray(None if ragged(values) else values)
+    if array.ndim == 1 and array.dtype.kind in "iu":
+        return array
+    faults.add(key, values, "is no list of whole numbers", remedy)
+    return None
+
+
+def _check_rotations(
+    faults: Faults, R: np.ndarray | None, judged: np.ndarray | None = None, limit: float = ORTHOGONAL
+) -> None:
+    """Note the first attitude (n, 3, 3) that is no rotation; judged: mask of the members to look at, whose NaN are taken."""
+    if R is None:
+        return
+    good = notation.rotations(R, limit)
+    if judged is not None:
+        good |= ~judged | ~np.isfinite(R).all(axis=(1, 2))
+    if not good.all():
+        bad = int(np.argmin(good))
+        faults.add(f"attitude of member {bad}", R[bad], "is not a rotation", "give R^T R = I, det R = 1")
 
 
 def joined_rows(parts: Sequence[Mapping[str, np.ndarray]], counts: Sequence[int]) -> dict[str, np.ndarray]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.labelled import match
 from lgvi_warp.sampling.designs.space import Space
@@ -17,8 +18,8 @@ from lgvi_warp.scene.variations import MATRICES, Target, Variation, targets
 
 def names_of(faults: Faults, vary: Any, argument: str = "vary") -> tuple[str, ...]:
     """Check and normalise a list of names without distributions; argument: what lists them, for faults."""
-    listed = [vary] if isinstance(vary, str) else vary
-    if not isinstance(listed, Sequence) or not listed or not all(isinstance(name, str) for name in listed):
+    listed = [vary] if isinstance(vary, str) else items_of(vary)
+    if not listed or not all(isinstance(name, str) for name in listed):
         remedy = (
             'give {"vehicle.mass": lw.distributions.Normal(...)} '
             'or a list of names, ["vehicle.mass", "start.position[2]"]'

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common import summaries
-from lgvi_warp.common.arguments import of_kind
-from lgvi_warp.common.errors import Faults, brief, ragged, refusal
+from lgvi_warp.common.arguments import members_of, of_kind
+from lgvi_warp.common.errors import Faults, NoSuchMembers, brief, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics.terms import base
@@ -128,11 +128,7 @@ class Ensemble(Summarized):
             scene.note_checked_ensemble()
         if settings.indices is None:
             return ensemble
-        most = int(np.max(settings.indices))
-        if most >= ensemble.members:
-            fault = f"is no member of {ensemble.members}"
-            raise refusal("ensemble.indices", most, fault, f"give 0 to {ensemble.members - 1}")
-        return ensemble.subset(settings.indices)
+        return ensemble.subset(members_of("ensemble.indices", settings.indices, ensemble.members))
 
     @classmethod
     def from_scene(cls, scene: SceneLike) -> Ensemble:
@@ -322,10 +318,12 @@ class Ensemble(Summarized):
             velocity (n, 3) [m/s, body axes] and angular velocity (n, 3) [rad/s, body axes].
 
         Raises:
-            IndexError: If there are no such members.
+            SceneError: If there are no such members (also an IndexError).
         """
         if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
-            raise IndexError(f"members {first} to {stop} of {self.members}")
+            raise NoSuchMembers(
+                [f"members {brief(first)} to {brief(stop)}: are not among {self.members:,}; give others"]
+            )
         given = None if self.given is None else self.given.of_members(slice(first, stop))
         values, indices = self._values(first, stop), self.indices_of(first, stop)
         members = self._draws.members_of(values, indices, self.seed, self.weights(first, stop), given)
@@ -420,24 +418,19 @@ class Ensemble(Summarized):
         """Whether the initial state differs from member to member."""
         return not self.varied_names <= self._draws.scene.parameters.keys()
 
-    def subset(self, indices: Sequence[int] | np.ndarray) -> Ensemble:
+    def subset(self, indices: Sequence[int] | np.ndarray | slice) -> Ensemble:
         """Return some members as an ensemble of their own, with the same numbers.
 
         Args:
-            indices: Positions of the members (k,), in the order wanted.
+            indices: Positions of the members (k,), counted from 0, in the order wanted; a slice; or a mask (members,).
 
         Returns:
             The ensemble of k members.
 
         Raises:
-            IndexError: If this is no list of whole numbers, or there are no such members.
+            SceneError: If this names no members, or some that there are not (also an IndexError).
         """
-        chosen = np.asarray(None if ragged(indices) else indices)
-        if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu" or np.ma.is_masked(indices):
-            raise IndexError(f"members {brief(indices)}: give a list of one or more whole numbers")
-        if chosen.min() < 0 or chosen.max() >= self.members:
-            raise IndexError(f"members {chosen.min()} to {chosen.max()} of {self.members}")
-        chosen = chosen.astype(np.int64)
+        chosen = members_of("members", indices, self.members)
         places = chosen if self._draws.places is None else self._draws.places[chosen]
         ensemble = self._drawing(places=places)
         ensemble._indices = None if self._indices is None else self._indices[chosen]
@@ -560,9 +553,9 @@ class Ensemble(Summarized):
             The ensemble of one member.
 
         Raises:
-            IndexError: If there is no such member.
+            SceneError: If there is no such member (also an IndexError).
         """
-        return self.subset([index])
+        return self.subset(np.array([index if is_whole(index, 0) else -1]))
 
     @property
     def replicates(self) -> int:

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.declared import checked, positive, read, text, whole, word
-from lgvi_warp.common.errors import Faults, SceneError, among, ragged
+from lgvi_warp.common.errors import Faults, SceneError, among
 from lgvi_warp.common.machine import DTYPES
-from lgvi_warp.common.real_numbers import holds_words
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.methods.method import Method
 from lgvi_warp.sampling.designs import sampling_of
@@ -37,19 +38,14 @@ def check_device(device: Any) -> None:
     faults.raise_if_any()
 
 
-def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:
-    """Check which members' samples are to be kept, some of KEEP or indices below the members; note what is wrong."""
-    if isinstance(keep, str):
-        faults.choice(key, keep, KEEP)
-        return
-    listed = isinstance(keep, list | tuple | np.ndarray | range) and not ragged(keep)
-    indices = np.asarray(keep if listed else None)
-    is_list = indices.ndim == 1 and indices.size > 0 and indices.dtype.kind in "iu" and not np.ma.is_masked(keep)
-    if not is_list or np.any(indices < 0):
-        faults.add(key, keep, "names no members", f"give {', '.join(map(repr, KEEP))}, or a list of indices from 0")
-    elif members is not None and np.any(indices >= members):
-        fault = f"is beyond the last of {members} members"
-        faults.add(key, int(indices.max()), fault, f"give indices up to {members - 1}")
+def read_keep(key: str, keep: Any, members: int | None = None) -> str | list[int]:
+    """Read which members' samples are to be kept: one of KEEP, or rising indices."""
+    if not isinstance(keep, str):
+        return sorted(set(members_of(key, keep, members).tolist()))
+    faults = Faults()
+    faults.choice(key, keep, KEEP)
+    faults.raise_if_any()
+    return str(keep)
 
 
 @dataclass(frozen=True)
@@ -99,11 +95,12 @@ class RunSettings:
 
     def __post_init__(self) -> None:
         faults = Faults("run.")
-        check_keep(faults, "keep", self.keep)
+        with faults.including():
+            object.__setattr__(self, "keep", read_keep("run.keep", self.keep))
         if self.save_fields is not None:
             from lgvi_warp.control.signals import check_names
 
-            check_names(faults, "save_fields", self.save_fields)
+            object.__setattr__(self, "save_fields", check_names(faults, "save_fields", self.save_fields))
         # Most scenes have neither statistics nor a stopping rule: their import is a quarter of that of a scene.
         if self.statistics or not isinstance(self.statistics, tuple):
             from lgvi_warp.statistics.base import from_list
@@ -180,8 +177,11 @@ class EnsembleSettings:
         if (read(self, faults)["members"] or 0) > MOST_MEMBERS:
             problem = f"are more members than the {MOST_MEMBERS} that there can be"
             faults.add("members", self.members, problem, f"give {MOST_MEMBERS} or less")
-        if self.indices is not None and not _whole_numbers(self.indices):
-            faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
+        if self.indices is not None:
+            with faults.including():
+                count = self.members if is_whole(self.members, 1) else None
+                chosen = members_of("ensemble.indices", self.indices, count)
+                object.__setattr__(self, "indices", chosen.tolist())
         if isinstance(self.vary, Mapping):
             named = {", ".join(key) if isinstance(key, tuple) else key: value for key, value in self.vary.items()}
             for key, distribution in named.items():
@@ -208,15 +208,3 @@ def section(
     if sampling.kind != "random":
         content["sampling"] = sampling.to_dict()
     return content | ({} if indices is None else {"indices": np.asarray(indices).tolist()})
-
-
-def _whole_numbers(value: Any) -> bool:
-    """Return whether a value is a list of one or more whole numbers from 0."""
-    try:
-        if holds_words(value):
-            return False
-        array = np.asarray(value)
-    except ValueError:
-        return False
-    plain = not np.ma.is_masked(value)
-    return bool(array.ndim == 1 and len(array) > 0 and array.dtype.kind in "iu" and plain and array.min() >= 0)

@@ -17,7 +17,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common import registry
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
+from lgvi_warp.common.real_numbers import settle, settles_first
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.estimates.estimate import Estimate
@@ -131,9 +133,11 @@ class Statistic:
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        settles_first(cls)
         registry.add(TYPES, cls)
 
     def __post_init__(self) -> None:
+        settle(self)
         faults = Faults(f"{self.type}.")
         if self.of is None and self.default is not None:
             object.__setattr__(self, "of", self.default)
@@ -345,11 +349,12 @@ def as_toml(value: Any) -> Any:
 
 def from_list(entries: Any, key: str = "statistics", *, unique_names: bool = True) -> tuple[Statistic, ...]:
     """Return statistics from tables of a scene file, from `Statistic` objects, or from a mix of both."""
-    if isinstance(entries, str | Mapping | Statistic) or not isinstance(entries, Sequence):
+    listed = items_of(entries)
+    if listed is None:
         example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.statistics.Mean("position")]'
         raise refusal(key, entries, "is no list", example)
     faults, statistics = Faults(), list[Statistic]()
-    for i, entry in enumerate(entries):
+    for i, entry in enumerate(listed):
         with faults.including():
             statistics.append(from_table(f"{key}[{i}]", entry))
     if unique_names and not faults:

@@ -13,6 +13,7 @@ import numpy as np
 
 from lgvi_warp.common.declared import declared, from_table, positive, read, text, whole
 from lgvi_warp.common.errors import Faults, SceneError, among, closest, refusal
+from lgvi_warp.common.times import rows_at
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.statistics.estimates.naming import canonical
@@ -139,7 +140,7 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> S
     if until.at == "all":
         rows = np.arange(len(times))
     elif until.at is not None:
-        rows = np.flatnonzero(np.abs(times - until.at) <= 1e-9 * max(1.0, times[-1]))
+        rows = rows_at(times, until.at)
         if not len(rows):
             faults.add("at", until.at, "is no sample time", "give a time at which samples are kept, or leave it out")
     target = None

@@ -43,7 +43,7 @@ def end_of(path: Path, places: slice | np.ndarray, parameters: Mapping[str, np.n
     # Joined, members come block by block: back into the order of the places.
     by_block, order = joined(parts), np.argsort(np.argsort(of_block, kind="stable"))
     group = folder.group()
-    return Final(
+    end = Final(
         time=float(folder.times()[-1]),
         step=float(folder.recipe["step"]),
         steps=int(group["step"][-1]),
@@ -55,6 +55,8 @@ def end_of(path: Path, places: slice | np.ndarray, parameters: Mapping[str, np.n
         lanes={name: values[order] for name, values in by_block.items()},
         settings=settings,
     )
+    with corrupt_store_as_scene_error(folder.path):
+        return end.checked()
 
 
 def check_parts(folder: Folder, sums: Any, block: Block) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.arguments import path_of
+from lgvi_warp.common.arguments import members_of, path_of
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.common.write_lock import writer_of
@@ -122,7 +122,8 @@ def open_run(
 
     Args:
         path: A store, or a folder with one store.
-        members: Indices or a slice of the members to open; default all.
+        members: Indices of the members to open, counted from 0, in the order wanted; a slice; or a mask with a truth value for
+            each member; default all.
         incomplete: Whether to open a run that has not ended as well; members that were not reached read as NaN and status 0.
         statistics: The statistics that the run was given. Needed if they are of functions, which a store does not hold.
 
@@ -131,7 +132,7 @@ def open_run(
 
     Raises:
         SceneError: If there is no run, or it is not complete, or a file of it is missing.
-        IndexError: If there are no such members.
+        SceneError: If there are no such members (also an IndexError).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -258,13 +259,13 @@ def _chosen_places(group: Any) -> np.ndarray | None:
 
 
 def _places(members: Any, n: int) -> slice | np.ndarray:
-    """Slice or indices of the members asked for among n; all by default. Raises IndexError."""
-    if members is None or isinstance(members, slice):
-        return slice(*(members or slice(None)).indices(n))
-    indices = np.asarray(members, dtype=int)
-    if len(indices) and (indices.min() < 0 or indices.max() >= n):
-        raise IndexError(f"members {indices.min()} to {indices.max()} of {n}")
-    return indices
+    """Slice or indices of the members asked for among n; all by default."""
+    if members is None:
+        return slice(0, n, 1)
+    indices = members_of("members", members, n)
+    # A rising slice reads whole chunks.
+    rising = isinstance(members, slice) and (members.step is None or members.step > 0)
+    return slice(*members.indices(n)) if rising else indices
 
 
 def chosen(result: Result, members: Sequence[int]) -> Result:

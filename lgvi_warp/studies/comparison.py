@@ -15,6 +15,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed as failed_members
 from lgvi_warp.common.status import stop_time
+from lgvi_warp.common.times import exact, whole_steps
 from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.methods import saveat
 from lgvi_warp.methods.method import Method
@@ -130,11 +131,10 @@ class Sample:
         self.ensemble = ensemble if ensemble.members <= members else ensemble.subset(range(members))
         self._drawn_once_a_step = self.ensemble
         self.members = self.ensemble.members
-        end = saveat.exact(self.t1)
+        end = exact(self.t1)
         every = settings.save_every
-        divides = every is not None and every <= self.t1 and (end / saveat.exact(every)).denominator == 1
-        self.spacing = saveat.exact(every) if divides and every is not None else end / samples
-        count = int(end / self.spacing)
+        count = samples if every is None or every > self.t1 else whole_steps(self.t1, every) or samples
+        self.spacing = end / count
         self.index = np.unique(np.linspace(0, count, min(count, samples) + 1).round().astype(np.int64))
         self.times = np.array([float(int(i) * self.spacing) for i in self.index])
         start = self.ensemble.select(0, self.members)
@@ -157,12 +157,12 @@ class Sample:
         faults, counts = Faults(), [0]
         for term in self.ensemble.scene.terms:
             if isinstance(term, NoisyTerm) and term.noise_step is not None:
-                count = self.spacing / saveat.exact(term.noise_step)
-                if count.denominator != 1:
+                count = whole_steps(float(self.spacing), float(term.noise_step))
+                if not count:
                     problem = f"does not divide the {float(self.spacing):g} s between the times of the comparison"
                     remedy = "give run.save_every a multiple of it"
                     faults.add(f"{term.key}.noise_step", term.noise_step, problem, remedy)
-                counts.append(int(count))
+                counts.append(count or 0)
         faults.raise_if_any()
         return math.gcd(*counts)
 

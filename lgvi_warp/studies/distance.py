@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.results.quantities import samples_of
@@ -81,7 +82,7 @@ def compared_in(of: Any) -> Distance:
             raise SceneError([f"of = {of!r}: {problem}"])
         inner = entry.functional or functional("of", entry.name)
         return replace(entry, name=MEAN + entry.name, functional=inner, mean=True)
-    if isinstance(of, list | tuple):
+    if not callable(of) and items_of(of) is not None:
         raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
     parsed = functional("of", of)
     if parsed.over_path:

@@ -538,7 +538,7 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
 
 @pytest.mark.parametrize(("given", "text"), [
     ({"statistics": "mean"}, "no list"), ({"statistics": [3]}, "no statistic"), ({"keep": "some"}, "keep"),
-    ({"keep": [5]}, "beyond the last"), ({"keep": [-1]}, "names no members"), ({"keep": 3}, "names no members"),
+    ({"keep": [5]}, "is none of the"), ({"keep": [-1]}, "is negative"), ({"keep": 3}, "is no list of members"),
     ({"statistics": [Mean("depth"), Mean("depth")]}, "name of 2 statistics"),
     ({"until": 3}, "no table"),
     ({"statistics": [Mean()]}, "mean.of"),

@@ -15,7 +15,7 @@ from lgvi_warp.control.signals import SIGNALS, ordered
 from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.scene.settings import check_keep
+from lgvi_warp.scene.settings import read_keep
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
@@ -189,13 +189,14 @@ def observe(fleet: Ensemble, statistics: Any = None, keep: Any = None, until: An
     with faults.including():
         condition = settings.until if until is None else until
         stop = None if condition is None or condition is False else from_dict(condition)
-    check_keep(faults, "keep", keep, fleet.members)
+    kept: str | list[int] = []
+    with faults.including():
+        kept = read_keep("keep", keep, fleet.members)
     if stop is not None and not faults:
         with faults.including():
             watch_fields(stop, gathered)
     faults.raise_if_any()
-    chosen = keep if isinstance(keep, str) else tuple(sorted({int(i) for i in keep}))
-    return Observation(gathered, chosen, stop)
+    return Observation(gathered, kept if isinstance(kept, str) else tuple(kept), stop)
 
 
 def messages_about(

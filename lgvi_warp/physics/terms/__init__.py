@@ -51,7 +51,7 @@ def register(kind: type[AnyTerm]) -> type[AnyTerm]:
 
 def from_list(entries: Any) -> tuple[Term, ...]:
     """Build the terms of a scene from tables of a scene file, `Term` objects, or both, in their order."""
-    check_list("terms", entries, "write [[terms]] and type = ... below, or terms=[lw.terms.Drag(...)]")
+    entries = check_list("terms", entries, "write [[terms]] and type = ... below, or terms=[lw.terms.Drag(...)]")
     faults, terms = Faults(), list[Term]()
     for i, entry in enumerate(entries):
         with faults.including():

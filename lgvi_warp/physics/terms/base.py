@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.common import names, registry
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.declared import read
 from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
+from lgvi_warp.common.real_numbers import settle, settles_first
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.notation import repeated
 
@@ -218,10 +220,12 @@ class Term:
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        settles_first(cls)
         cls.device = cls.device or cls.type
         registry.add(cls.kinds, cls)
 
     def __post_init__(self) -> None:
+        settle(self)
         faults = Faults(f"{self.key}.")
         if not isinstance(self.name, str):
             faults.add("name", self.name, "is not a text", "give a name, or leave it out")
@@ -780,9 +784,11 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
 MOST_TERMS = 1000
 
 
-def check_list(key: str, entries: Any, example: str) -> None:
-    """Refuse what is no list, or a list of more terms or events than a scene may have."""
-    if not isinstance(entries, Sequence) or isinstance(entries, str):
+def check_list(key: str, entries: Any, example: str) -> list[Any]:
+    """Read a list; refuse what is none, or has more terms or events than a scene may have."""
+    listed = items_of(entries)
+    if listed is None:
         raise refusal(key, entries, "is no list", example)
-    if len(entries) > MOST_TERMS:
-        raise SceneError([f"{key}: are {len(entries):,}; give at most {MOST_TERMS:,}"])
+    if len(listed) > MOST_TERMS:
+        raise SceneError([f"{key}: are {len(listed):,}; give at most {MOST_TERMS:,}"])
+    return listed

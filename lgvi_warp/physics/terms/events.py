@@ -177,7 +177,7 @@ TYPES = Event.kinds
 
 def from_list(entries: Any) -> tuple[Event, ...]:
     """Build the events of a scene."""
-    check_list("events", entries, "write [[events]] and type = ... below, or events=[lw.events.Surface()]")
+    entries = check_list("events", entries, "write [[events]] and type = ... below, or events=[lw.events.Surface()]")
     faults, events = Faults(), list[Event]()
     for i, entry in enumerate(entries):
         with faults.including():

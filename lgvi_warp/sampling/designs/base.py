@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.real_numbers import is_whole, settles_first
 from lgvi_warp.sampling.designs.space import Space
 
 # A block's members are a multiple of this, so that it has equally many points of each replicate.
@@ -49,6 +49,7 @@ class Sampling:
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        settles_first(cls)
         registry.add(cls.kinds, cls, "kind")
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, MissingExtra, closest, refusal
 from lgvi_warp.common.random import generator
 from lgvi_warp.common.real_numbers import is_whole
@@ -51,12 +52,13 @@ class Saltelli(Sampling):
         if isinstance(groups, Mapping):
             pairs = list(groups.items())
         else:
-            pairs = list(groups) if isinstance(groups, list | tuple) else [groups]
+            pairs = items_of(groups) or ([] if groups == () else [groups])
         if not all(isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
             faults.add("groups", groups, "is no mapping of names to lists of factors", example)
             pairs = []
+        pairs = [(name, items_of(members)) for name, members in pairs]
         for name, members in pairs:
-            if not isinstance(members, list | tuple) or not members or not all(isinstance(m, str) for m in members):
+            if not members or not all(isinstance(m, str) for m in members):
                 faults.add(f"groups.{name}", members, "is no list of names of factors", example)
         faults.raise_if_any()
         object.__setattr__(self, "replicates", int(self.replicates))

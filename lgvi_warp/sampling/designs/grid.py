@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.real_numbers import plain
 from lgvi_warp.sampling.designs.base import Drawn, Sampling
 from lgvi_warp.sampling.designs.random import Random
 from lgvi_warp.sampling.designs.space import Space
@@ -46,6 +47,7 @@ class Grid(Sampling):
         if not isinstance(self.axes, Mapping) or not self.axes:
             remedy = 'write grid = { "vehicle.mass" = [100.0, 110.0] }'
             raise refusal("ensemble.sampling.grid.axes", self.axes, "names nothing", remedy)
+        object.__setattr__(self, "axes", {name: plain(axis) for name, axis in self.axes.items()})
         faults = Faults("ensemble.sampling.grid.")
         for name, axis in self.axes.items():
             if isinstance(axis, int | np.integer) and not isinstance(axis, bool):

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
+from lgvi_warp.common.real_numbers import settle
 from lgvi_warp.sampling.designs.base import Drawn, Sampling
 from lgvi_warp.sampling.designs.designs import salib_problem
 from lgvi_warp.sampling.designs.space import Space
@@ -40,6 +41,7 @@ class UnitCubePoints(Sampling):
 
     def __post_init__(self) -> None:
         faults = Faults("ensemble.sampling.levels.")
+        settle(self, "names")
         points = self.points
         if is_labelled(points):
             points = self._by_name(faults)

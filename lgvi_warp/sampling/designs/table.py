@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.reading import UnreadableError, file_bytes
@@ -112,11 +113,11 @@ class Table(Sampling):
             chosen = getattr(self, name)
             if chosen is None:
                 continue
-            is_list = isinstance(chosen, list | tuple) and len(chosen) > 0
-            if not is_list or not all(isinstance(entry, str) for entry in chosen):
+            listed = items_of(chosen)
+            if not listed or not all(isinstance(entry, str) for entry in listed):
                 faults.add(name, chosen, "is no list of names", f'write {name} = ["vehicle.mass"]')
             else:
-                object.__setattr__(self, name, list(chosen))
+                object.__setattr__(self, name, listed)
         if self.columns is not None and self.ignore is not None:
             faults.add("ignore", self.ignore, "is given beside columns", "keep one of them")
 

@@ -15,6 +15,7 @@ import numpy as np
 from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import FAR
+from lgvi_warp.common.real_numbers import settle, settles_first
 
 Spread = float | tuple[float, ...] | list[float] | np.ndarray
 
@@ -56,9 +57,11 @@ class Distribution:
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        settles_first(cls)
         registry.add(cls.kinds, cls, "kind")
 
     def __post_init__(self) -> None:
+        settle(self)
         faults = Faults(f"{self.kind}.")
         widths_given = [name for name in self.widths if getattr(self, name) is not None]
         if self.widths and len(widths_given) != 1:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.sampling.distributions.basic import Distribution
 from lgvi_warp.sampling.distributions.joint import JointLaw, combined, components, covariance_of, normals, root, split
@@ -49,8 +50,9 @@ class Copula(JointLaw):
     several: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        faults, marginals = Faults(f"{self.kind}."), self.marginals
-        if not isinstance(marginals, Mapping | list | tuple) or not len(marginals):
+        faults = Faults(f"{self.kind}.")
+        marginals: Any = self.marginals if isinstance(self.marginals, Mapping) else items_of(self.marginals)
+        if not marginals:
             remedy = "give [lw.distributions.Normal(...), ...], or a mapping of names to distributions"
             faults.add("marginals", marginals, "are no list of distributions", remedy)
             faults.raise_if_any()

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.estimates.estimate import Estimate
@@ -34,7 +35,8 @@ class MemberStatistic(Statistic):
         super().check(faults)
 
         entries = self.then_default() if self.then is None else self.then
-        entries = entries if isinstance(entries, list | tuple) else [entries]
+        items = items_of(entries)
+        entries = [entries] if items is None else items
         statistics: list[Statistic] = []
         with faults.including():
             statistics = list(from_list(entries, f"{self.type}.then", unique_names=False))

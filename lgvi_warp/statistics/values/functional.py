@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.statistics.values import reductions
 from lgvi_warp.statistics.values.quantity import KNOWN, Quantity, joined, named
@@ -157,10 +158,10 @@ def quantity(key: str, of: Any) -> Quantity:
         return functional(key, of).as_quantity()
     if callable(of):
         return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
-    if isinstance(of, Sequence) and len(of):
-        parts = [quantity(f"{key}[{i}]", item) for i, item in enumerate(of)]
-        for i, (part, item) in enumerate(zip(parts, of, strict=True)):
-            if len(of) > 1 and over_path(part):
+    if items := items_of(of):
+        parts = [quantity(f"{key}[{i}]", item) for i, item in enumerate(items)]
+        for i, (part, item) in enumerate(zip(parts, items, strict=True)):
+            if len(items) > 1 and over_path(part):
                 fault = "looks over the path, and a list is of numbers at each time"
                 raise refusal(f"{key}[{i}]", item, fault, "ask for it alone")
         return joined(parts)

@@ -13,7 +13,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import closest, refusal
-from lgvi_warp.common.real_numbers import NotReal, real_results
+from lgvi_warp.common.real_numbers import NotReal, real_results, settle
 from lgvi_warp.control.signals import CHANNELS, SIGNALS, ordered
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
@@ -57,6 +57,7 @@ class Quantity:
     entries: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
     def __post_init__(self) -> None:
+        settle(self, "fields")
         labels = listed("labels", () if self.labels is None else self.labels, "texts")
         object.__setattr__(self, "labels", tuple(labels))
         if not labels:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.errors import SceneError, ragged, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.control.signals import SAVED, SIGNALS
@@ -164,7 +165,7 @@ def tracks_of(result: Result, members: Any, environment: Environment) -> Tracks:
     identities = _identities(result, source)
     if members is None:
         return Tracks(source, np.arange(source.members), identities, environment)
-    wanted = _wanted(members, result.members)
+    wanted = np.array(list(dict.fromkeys(members_of("members", members, result.members).tolist())))
     order = np.argsort(present, kind="stable")
     at = np.minimum(np.searchsorted(present, wanted, sorter=order), len(present) - 1)
     places = order[at]
@@ -172,26 +173,6 @@ def tracks_of(result: Result, members: Any, environment: Environment) -> Tracks:
         problem = f"is none of the {len(present):,} members that were kept"
         raise refusal("members", int(lost[0]), problem, "leave members out, or run again with keep='all'")
     return Tracks(source, places, identities[places], environment)
-
-
-def _wanted(members: Any, total: int) -> np.ndarray:
-    """Indices of the members that the user asks for."""
-    remedy = "give indices, members=[3, 17], or a slice"
-    if isinstance(members, slice):
-        wanted = np.arange(total)[members]
-    else:
-        wanted = np.asarray([0.5] if ragged(members) else members)
-        if wanted.ndim != 1 or wanted.dtype.kind not in "iu" or isinstance(members, str):
-            raise refusal("members", members, "is no list of members", remedy)
-    if not len(wanted):
-        raise refusal("members", members, f"is none of the {total:,} members", remedy)
-    for index in (int(wanted.min()), int(wanted.max())):
-        if not 0 <= index < total:
-            problem = f"is none of the {total:,} members"
-            raise refusal("members", index, problem, f"give indices from 0 to {total - 1}")
-    if len(np.unique(wanted)) < len(wanted):
-        raise refusal("members", members, "names a member twice", remedy)
-    return wanted
 
 
 def _identities(result: Result, source: Result) -> np.ndarray:

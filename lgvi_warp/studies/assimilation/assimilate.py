@@ -15,8 +15,9 @@ from lgvi_warp.common.arguments import listed, names_of, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import failed, stopped
+from lgvi_warp.common.times import of_step, whole_steps
 from lgvi_warp.methods.method import Method
-from lgvi_warp.methods.saveat import SaveAt, exact
+from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.runs.request import ensemble_of
@@ -159,20 +160,19 @@ class _Steps:
         count = round(seconds / self.h)
         if count not in self.runs:
             save = SaveAt(fields=FIELDS, final=True)
-            length = float(count * exact(self.h))
+            length = float(count * of_step(self.h))
             self.runs[count] = prepare(Ensemble(self.scene), t1=length, save=save, **self.settings)
         return self.runs[count]
 
 
 def _check_times(times: np.ndarray, steps: _Steps) -> None:
     """Refuse times that are no whole number of steps."""
-    h = exact(steps.h)
     if times[0] <= 0.0:
         raise SceneError(
             ["series.time = 0: is where the members start; give times after it, and what is known there as starts"]
         )
     for time in times:
-        if (exact(float(time)) / h).denominator != 1:
+        if whole_steps(float(time), steps.h) is None:
             near = round(float(time) / steps.h) * steps.h
             problem = f"is no whole number of steps of {steps.h:g} s"
             raise SceneError(

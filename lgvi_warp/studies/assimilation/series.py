@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.times import rows_at
 from lgvi_warp.results.quantities import OfResult, quantities
 
 # Quantities that are angles: a measurement differs from a prediction by less than half a turn.
@@ -86,7 +87,7 @@ class Series:
         Returns:
             Values (m,), or None where nothing was measured then.
         """
-        rows = np.flatnonzero(np.abs(self.time - time) <= 1e-9 * max(1.0, time))
+        rows = rows_at(self.time, time)
         return np.asarray(self.values[rows[0]]) if len(rows) else None
 
     def near(self, measured: np.ndarray, predicted: np.ndarray) -> np.ndarray:

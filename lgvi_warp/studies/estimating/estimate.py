@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.times import longest_step, whole_steps
 from lgvi_warp.engine.executors import check_threads
-from lgvi_warp.methods import saveat
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.runs.default_method import is_damped
@@ -181,10 +182,11 @@ def drawn(fleet: Ensemble) -> Ensemble:
 
 def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
     """The same variation of each cheaper scene; names of what varies that a change fixes stay varied."""
-    if isinstance(cheaper, Mapping | str) or not isinstance(cheaper, Sequence):
+    listed = items_of(cheaper)
+    if listed is None:
         raise refusal("cheaper", cheaper, "is no list of scenes", 'give [{"controller.delay": 0.0}]')
     faults, fleets = Faults(), list[Ensemble]()
-    for i, entry in enumerate(cheaper):
+    for i, entry in enumerate(listed):
         with faults.including():
             if isinstance(entry, Mapping):
                 entry = fleet.scene.with_numbers(entry)  # type: ignore[attr-defined]
@@ -199,16 +201,13 @@ def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
 
 def spacing_of(scene: Any, t1: float) -> Fraction:
     """The longest step that a scene takes [s]: it divides the run, the samples, and the times of the controller."""
-    times = [saveat.exact(t1)]
+    times = [t1]
     every, controller = scene.run.save_every, scene.controller
     if every is not None and every <= t1:
-        times.append(saveat.exact(every))
+        times.append(every)
     if controller is not None:
-        times += [saveat.exact(float(each)) for each in (controller.period, controller.delay) if each > 0.0]
-    spacing = times[0]
-    for other in times[1:]:
-        shared = math.gcd(spacing.numerator * other.denominator, other.numerator * spacing.denominator)
-        spacing = Fraction(shared, spacing.denominator * other.denominator)
+        times += [float(each) for each in (controller.period, controller.delay) if each > 0.0]
+    spacing = longest_step(times)
     return spacing / 20 if len(times) == 1 else spacing
 
 
@@ -247,9 +246,8 @@ def ladders_of(
     if h is None:
         return [[Setting(name, float(coarsest / 2**k), dtype) for k in range(HALVINGS)] for name in taken], noise
     # The step that is made divides the run and its samples: of a longer one half may be no shorter.
-    exact = saveat.exact(actual)
-    longer = [exact * 2**k for k in range(DOUBLINGS, 0, -1) if (spacing / (exact * 2**k)).denominator == 1]
-    return [[Setting(taken[0], float(step), dtype) for step in (*longer, exact, exact / 2)]], noise
+    longer = [actual * 2**k for k in range(DOUBLINGS, 0, -1) if whole_steps(float(spacing), actual * 2**k)]
+    return [[Setting(taken[0], step, dtype) for step in (*longer, actual, actual / 2)]], noise
 
 
 def short_and_own(fleet: Ensemble, alone: bool) -> Sequence[Any]:

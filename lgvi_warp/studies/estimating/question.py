@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp import statistics
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
@@ -98,7 +99,7 @@ def _read(of: Any) -> Question:
         return _of_statistic(of)
     if isinstance(of, str):
         return _of_text(of.strip())
-    if isinstance(of, list | tuple):
+    if not callable(of) and items_of(of) is not None:
         raise refusal("of", of, "is several quantities", "ask for one at a time")
     return _of_quantity(of)
 

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.calls.prepared import prepare
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.random import generator
 from lgvi_warp.scene import variations
@@ -58,10 +59,11 @@ class ChainLimit:
 
 def cheaper_of(entries: Any, fleet: Ensemble, settings: Mapping[str, Any]) -> list[Cheaper]:
     """Read the cheaper settings: mappings of numbers of the scene and settings of the run to their values."""
-    if isinstance(entries, Mapping) or not isinstance(entries, Sequence) or isinstance(entries, str):
+    listed = items_of(entries)
+    if listed is None:
         raise refusal("cheaper", entries, "is no list", 'give [{"h": 0.1, "dtype": "float32"}]')
     faults, settled = Faults(), []
-    for i, entry in enumerate(entries):
+    for i, entry in enumerate(listed):
         if not isinstance(entry, Mapping) or not entry:
             faults.add(f"cheaper[{i}]", entry, "names nothing that differs", 'give {"h": 0.1, "controller.delay": 0.0}')
             continue

@@ -14,8 +14,8 @@ import numpy as np
 from lgvi_warp.calls.prepared import Prepared, prepare
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import failed
+from lgvi_warp.common.times import of_step
 from lgvi_warp.control.signals import ordered
-from lgvi_warp.methods.saveat import exact
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.quantities import quantities
 from lgvi_warp.runs.request import Request
@@ -79,16 +79,16 @@ class VehicleWalk(Varying):
 
     def _unit(self, save: Any) -> int:
         """The steps by which pieces begin: at samples, and at ticks of a controller."""
-        scene, step = self.fleet.scene, exact(self.h)
-        every = [] if save.every is None else [exact(save.every)]
+        scene = self.fleet.scene
+        every = [] if save.every is None else [save.every]
         if scene.controller is not None:
-            every.append(exact(float(scene.controller.period)))
-        return math.lcm(*(max(1, round(each / step)) for each in every)) if every else 1
+            every.append(scene.controller.period)
+        return math.lcm(*(max(1, round(float(each) / self.h)) for each in every)) if every else 1
 
     def _run(self, steps: int) -> Prepared:
         """The run of so many steps."""
         if steps not in self._runs:
-            length = float(steps * exact(self.h))
+            length = float(steps * of_step(self.h))
             settings, save = dict(self._settings), self._settings["save"]
             if save.every is not None and save.every > length:
                 settings["save"] = replace(save, every=None)

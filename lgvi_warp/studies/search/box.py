@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.prepared import scene_value
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults
 
 # Candidates of a generation for each number, at least so many.
@@ -47,9 +48,9 @@ class SearchBox:
                 continue
             with faults.including():
                 scene_value(scene, name, key)
-            values = tuple(pair) if isinstance(pair, list | tuple | np.ndarray) else ()
+            values = tuple(items_of(pair) or ())
             log = len(values) == 3 and values[2] == "log"
-            ends = faults.finite(f'{key}."{name}"', values[:2] if log or len(values) == 2 else pair, (2,))
+            ends = faults.finite(f'{key}."{name}"', values[:2] if log else values or pair, (2,))
             if ends is None:
                 continue
             if not ends[0] < ends[1]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics import rates as member_rates
@@ -154,8 +155,9 @@ def axis_of(axis: Any) -> Axis:
     """The axis that a user describes: an Axis, a text for Axis.parse, or (name, low, high)."""
     if isinstance(axis, Axis):
         return axis
-    if isinstance(axis, tuple | list) and len(axis) == 3:
-        return Axis(str(axis[0]), axis[1], axis[2])
+    items = items_of(axis) or ()
+    if len(items) == 3:
+        return Axis(*items)
     return Axis.parse(axis)
 
 

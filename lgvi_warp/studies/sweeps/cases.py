@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.control.base import SECTIONS
 from lgvi_warp.physics import terms
@@ -105,11 +104,9 @@ def cases_of(tables: Any) -> tuple[Case, ...]:
         arguments = set(Case.__dataclass_fields__) - {"name"}
         entries = [{"name": name, **(table if isinstance(table, Mapping) and table.keys() <= arguments else {"set": table})}
                    for name, table in tables.items()]  # fmt: skip
-    elif isinstance(tables, str) or not isinstance(tables, Sequence) or not tables:
+    elif not (entries := items_of(tables) or []):
         example = 'give [{"name": "pid"}, {"name": "stiff", "set": {"heading_pid.kp": 2.0}}]'
         raise refusal("cases", tables, "is no list of cases", example)
-    else:
-        entries = list(tables)
     for i, entry in enumerate(entries):
         if isinstance(entry, Case):
             cases.append(entry)
@@ -144,14 +141,14 @@ def grid_of(grid: Any) -> dict[str, list[Any]]:
     if not isinstance(grid, Mapping):
         raise refusal("grid", grid, "is no table", 'write [grid] and "controller.delay" = [0.0, 0.1] below')
     faults = Faults("grid.")
-    axes = {name: values.tolist() if isinstance(values, np.ndarray) else values for name, values in grid.items()}
+    axes = {name: items_of(values) or [] for name, values in grid.items()}
     for name, values in axes.items():
-        if isinstance(values, str) or not isinstance(values, Sequence) or not len(values):
-            faults.add(f'"{name}"', values, "is no list of values", "give [0.0, 0.1, 0.2]")
+        if not values:
+            faults.add(f'"{name}"', grid[name], "is no list of values", "give [0.0, 0.1, 0.2]")
         elif any(value in values[:i] for i, value in enumerate(values)):
             faults.add(f'"{name}"', values, "has a value twice", "keep one of them")
     faults.raise_if_any()
-    return {name: list(values) for name, values in axes.items()}
+    return axes
 
 
 def points_of(axes: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:

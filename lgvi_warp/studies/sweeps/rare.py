@@ -186,8 +186,9 @@ class RareFailures:
         """Write an answer; the file is there whole or not at all."""
         if self.folder is None or answer.found is None or answer.members is None:
             return
+        # No file holds times: they differ from run to run, where all else is the same to the byte.
         nothing = np.zeros((0, 0))
-        small = replace(answer.found, normals=nothing, draws=nothing)
+        small = replace(answer.found, normals=nothing, draws=nothing, seconds=0.0, plain_seconds=0.0)
         words = np.frombuffer(json.dumps({"key": key, "found": small.to_dict()}).encode(), np.uint8)
         place_of(self._path(key), self.folder).parent.mkdir(parents=True, exist_ok=True)
         write_npz(self._path(key), {"words": words, "u": answer.members.u, "weights": answer.members.weights,
@@ -206,6 +207,7 @@ class RareFailures:
                 return None
             count = len(words["found"]["moved"])
             found = RareEvent.from_dict(words["found"] | {"normals": u[:, :count], "draws": u[:, count:]})
+            found = replace(found, seconds=np.nan, plain_seconds=np.nan)
             return RareFailure(found, members)
         except (OSError, ValueError, KeyError, TypeError):
             return None

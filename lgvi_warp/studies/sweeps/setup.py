@@ -15,6 +15,7 @@ import numpy as np
 from lgvi_warp.calls.predict import Prediction, predict
 from lgvi_warp.calls.solve import solve
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.identity import UNKNOWN
 from lgvi_warp.methods.saveat import SaveAt
@@ -181,7 +182,9 @@ def _prediction(setup: Setup, threads: int | None, predict: Callable[..., Predic
 
 
 def duration_text(seconds: float) -> str:
-    """A time [s] in words."""
+    """A time [s] in words; NaN for one that was not kept."""
+    if np.isnan(seconds):
+        return "time not kept"
     for unit, size in (("years", 3.15e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.2g} {unit}"
@@ -241,18 +244,18 @@ def _base(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
 
 def electrical(entries: Any, scene: Any) -> Any:
     """The metrics, "energy" as what is used where the scene keeps an account of it, and not as mechanical work."""
-    if isinstance(entries, str | Mapping) or not isinstance(entries, Sequence):
+    if (listed := items_of(entries)) is None:
         return entries
     accounted = any(term.accounts for term in scene.terms)
-    return [ElectricalEnergy(name="energy") if accounted and entry == "energy" else entry for entry in entries]
+    return [ElectricalEnergy(name="energy") if accounted and entry == "energy" else entry for entry in listed]
 
 
 def metrics_of(entries: Any) -> dict[str, Statistic]:
     """Metrics by name, each with the number of every member; "time_to_failure" is added."""
-    if isinstance(entries, str | Mapping) or not isinstance(entries, Sequence):
+    if (listed := items_of(entries)) is None:
         raise refusal("metrics", entries, "is no list", 'give ["overshoot depth", lw.metrics.IAE("heading")]')
     faults, metrics = Faults(), dict[str, Statistic]()
-    for i, entry in enumerate((*entries, TimeToFailure())):
+    for i, entry in enumerate((*listed, TimeToFailure())):
         with faults.including():
             name, metric = metric_of(f"metrics[{i}]", entry)
             if name in metrics and name != END:

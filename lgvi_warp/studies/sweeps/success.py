@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.statistics.estimates import intervals
@@ -88,7 +89,7 @@ def success_of(conditions: Any, metrics: Sequence[str]) -> Success:
         raise refusal("success", conditions, "is no table", remedy)
     faults = Faults("success.")
     words = conditions.get("status", OK)
-    statuses = (words,) if isinstance(words, str) else tuple(words) if isinstance(words, list | tuple) else (words,)
+    statuses = tuple(items_of(words) or (words,))
     known = (OK, NOT_FAILED, *(status.name.lower() for status in Status if status.stopped))
     for word in statuses:
         faults.choice("status", word, known)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import Status, stop_time, under_way
 from lgvi_warp.control.signals import CHANNELS, ENERGY_USED
@@ -184,13 +185,7 @@ def believed_sigma(few: Result, counted: np.ndarray) -> np.ndarray:
 
 def places_of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:
     """Find the places of the user's indices among the kept members."""
-    indices = np.asarray(members)
-    if indices.ndim != 1 or not indices.size or indices.dtype.kind not in "iu":
-        raise refusal("members", members, "is no list of members", "give indices: members=[3, 17]")
-    for index in (indices.min(), indices.max()):
-        if not 0 <= index < total:
-            fault = f"is none of the {total:,} members"
-            raise refusal("members", int(index), fault, f"give indices from 0 to {total - 1}")
+    indices = members_of("members", members, total)
     if len(lost := np.setdiff1d(indices, kept)):
         raise refusal("members", int(lost[0]), "has no samples", f"keep them: keep={[int(index) for index in indices]}")
     return np.flatnonzero(np.isin(kept, indices))

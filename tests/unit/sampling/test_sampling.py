@@ -671,7 +671,7 @@ def test_the_attitude_varies_in_one_way_only(scene):
 
 def test_indices_that_are_not_there(scene):
     content = scene.to_dict() | {"ensemble": {"members": 4, "indices": [1, 4]}}
-    assert "no member of 4" in faults(lw.Scene.from_dict, content)[0]
+    assert "is none of the 4 members" in faults(lw.Scene.from_dict, content)[0]
     content["ensemble"]["indices"] = [0.5]
     assert "whole numbers" in faults(lw.Scene.from_dict, content)[0]
     fleet = lw.Ensemble(scene, 10)

@@ -437,8 +437,8 @@ def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
 
 @pytest.mark.parametrize(("arguments", "kind", "words"), [
     ({"members": [40]}, lw.SceneError, "members = 40: is none of the 40 members; give indices from 0 to 39"),
-    ({"members": [-1]}, lw.SceneError, "members = -1: is none of the 40 members"),
-    ({"members": []}, lw.SceneError, "is no list of members"),
+    ({"members": [-1]}, lw.SceneError, "members = -1: is negative; count members from 0"),
+    ({"members": []}, lw.SceneError, "names no member"),
     ({"members": "3"}, lw.SceneError, "is no list of members"), ({"path": None}, ValueError, "give path="),
     ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*start a viewer with "rerun"'),
     ({"to": "nowhere"}, OSError, "no viewer answers"),

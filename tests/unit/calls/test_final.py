@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The end of a run that comes from elsewhere is checked before members go on from it."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from tests.support.odd_calls import BODY
+
+pytestmark = pytest.mark.kernel
+NUMBERS = ("time", "step", "steps", "seed", "settings")
+ARGUMENTS = {"h": 0.1, "t1": 0.4}
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    scene = lw.Scene(
+        lw.Vehicle(**BODY), terms=[lw.terms.Drag(linear=[1.0] * 6)], start=lw.Start(velocity=[1.0, 0.1, 0.0])
+    )
+    return lw.Ensemble(scene, 4, 1, {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)})
+
+
+@pytest.fixture(scope="module")
+def result(fleet):
+    return lw.solve(fleet, "psi_s", h=0.1, t1=0.2)
+
+
+def parts_of(final):
+    return dict(final.to_arrays()), {name: getattr(final, name) for name in NUMBERS}, dict(final.parameters)
+
+
+def again(final, arrays=None, **numbers):
+    own, known, parameters = parts_of(final)
+    return type(final).from_arrays(own | (arrays or {}), known | numbers, parameters)
+
+
+def test_an_end_from_arrays_goes_on_to_the_bit(fleet, result):
+    one = lw.solve(fleet, "psi_s", **ARGUMENTS, start=again(result.final))
+    np.testing.assert_array_equal(one.position[-1], lw.solve(fleet, "psi_s", **ARGUMENTS).position[-1])
+
+
+MIRROR = np.broadcast_to(np.diag([1.0, 1.0, -1.0]), (4, 3, 3))
+ODD_ARRAYS = [
+    ("states.attitude", np.zeros((4, 3, 3)), "not a rotation"), ("states.attitude", MIRROR.copy(), "not a rotation"),
+    ("states.attitude", np.broadcast_to(1.001 * np.eye(3), (4, 3, 3)).copy(), "not a rotation"),
+    ("states.attitude", np.zeros((3, 3, 3)), "shape"), ("states.position", np.zeros((4, 2)), "shape"),
+    ("states.velocity", np.array([["a"] * 3] * 4), "shape"), ("states.speed", np.zeros((4, 3)), "not known"),
+    ("status", np.array([0, 0, 0, 250]), "none that a member"), ("status", np.array([0, -1, 0, 0]), "none that a member"),
+    ("status", np.zeros(4), "whole numbers"), ("status", np.zeros((4, 1), int), "whole numbers"), ("status", None, "whole"),
+    ("indices", np.array([0, 1, 2, -3]), "whole numbers"), ("indices", np.array([0, 1, 2]), "whole numbers"),
+    ("indices", np.array([0, 1, 2, 2**40]), "whole numbers"), ("indices", np.array([0.0, 1.0, 2.0, 3.0]), "whole numbers"),
+    ("indices", "x", "whole numbers"), ("lanes.state", np.zeros((4, 18)), "not a rotation"),
+    ("lanes.state", np.zeros(4), "rows"), ("lanes.still", np.zeros((3, 1)), "rows"),
+]  # fmt: skip
+ODD_NUMBERS = [
+    ("seed", -1), ("seed", 1.5), ("seed", "x"), ("seed", True), ("steps", -2), ("steps", 2.5), ("steps", 3), ("time", np.nan),
+    ("time", -1.0), ("time", "x"), ("time", None), ("step", 0.0), ("step", np.inf), ("step", 0.2), ("settings", None),
+    ("settings", 3),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "value", "text"), ODD_ARRAYS)
+def test_arrays_that_no_run_ends_with_are_refused(name, value, text, result):
+    with pytest.raises(lw.SceneError, match=text):
+        again(result.final, {f"final.{name}": value})
+
+
+@pytest.mark.parametrize(("name", "value"), ODD_NUMBERS)
+def test_numbers_that_no_run_ends_with_are_refused(name, value, result):
+    with pytest.raises(lw.SceneError, match=r"final\."):
+        again(result.final, **{name: value})
+
+
+def test_what_is_missing_is_told(result):
+    arrays, numbers, parameters = parts_of(result.final)
+    for odd in ({}, 3, None, "x"):
+        with pytest.raises(lw.SceneError):
+            type(result.final).from_arrays(odd, numbers, parameters)
+        with pytest.raises(lw.SceneError):
+            type(result.final).from_arrays(arrays, odd, parameters)
+    with pytest.raises(lw.SceneError, match="parameters"):
+        type(result.final).from_arrays(arrays, numbers, 3)
+
+
+@pytest.mark.parametrize("tampered", ["attitude", "final.status", "final.indices", "final"])
+def test_a_tampered_file_is_refused(tampered, result, tmp_path):
+    path = result.save(tmp_path / "run.npz")
+    content = dict(np.load(path))
+    if tampered == "attitude":
+        content["attitude"][-1] = -content["attitude"][-1]
+    elif tampered == "final":
+        content["final"] = np.array(json.dumps(json.loads(str(content["final"])) | {"seed": -5}))
+    else:
+        content[tampered][0] = -7
+    np.savez(path, **content)
+    with pytest.raises(lw.SceneError, match=r"final\."):
+        lw.Result.load(path)
+
+
+def test_members_that_failed_and_drifted_attitudes_are_taken(fleet, result, tmp_path):
+    final = result.final
+    states = dict(final.states)
+    states["attitude"] = np.where(np.arange(4)[:, None, None] == 2, np.nan, states["attitude"])
+    failed = dataclasses.replace(final, states=states, status=np.array([0, 0, lw.Status.NON_FINITE, 0]))
+    assert failed.checked() is failed
+    for method, dtype in (("rk4", "float64"), ("psi_s", "float32")):
+        other = lw.solve(fleet, method, h=0.1, t1=0.2, dtype=dtype)
+        lw.Result.load(other.save(tmp_path / "run.npz")).final.checked()
+
+
+def test_members_in_another_order_are_told(fleet, result):
+    told = [text for text in lw.solve(fleet, "psi_s", **ARGUMENTS, start=result.final).messages if "start is" in text]
+    assert told == []
+    turned = lw.solve(fleet, "psi_s", **ARGUMENTS, start=result.final.part([3, 2, 1, 0])).messages
+    assert (
+        sum("the same members in another order: member 3 goes on in the place of member 0" in text for text in turned)
+        == 1
+    )
+    others = lw.solve(fleet.subset([0, 1]), "psi_s", **ARGUMENTS, start=result.final.part([2, 3])).messages
+    assert any("is the end of other members" in text for text in others)
+    right = lw.solve(fleet.subset([3, 1]), "psi_s", **ARGUMENTS, start=result.final.part([3, 1])).messages
+    assert not any("start is the end" in text for text in right)

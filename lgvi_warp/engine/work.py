@@ -132,6 +132,8 @@ def run_block(
                 values = divided(
                     plan.layout.tick_fields, packets.gathered(when), plan.layout.table, plan.layout.tick_entries
                 )
+                if warned and "position" in values:
+                    packets.heights.look(values["position"][..., 2], grid.sample_steps[when])
                 samples = samples_of(plan, grid, when, values, ends)
                 for tick_taker in tick_takers:
                     tick_taker(when, samples)

@@ -58,11 +58,12 @@ def above_surface(warnings: np.ndarray, value: np.ndarray) -> tuple[str, ...]:
     if not len(high):
         return ()
     height = np.asarray(value)[high]
-    some = f"position: {len(high):,} of {len(bits):,} members rise above the surface, where no water is"
+    some = f"{RISEN}{len(high):,} of {len(bits):,} members rise above the surface, where no water is"
     most = f"the highest, member {high[int(height.argmax())]}, by {height.max():.4g} m"
     return (f"{some} ({most}); {STOP}",)
 
 
+RISEN = "position: "
 STOP = "stop members there by the event lw.events.Surface(), or let them float by lw.terms.SurfaceBuoyancy(...)"
 
 

@@ -309,7 +309,9 @@ def beyond(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
         numbers, b = own(event, members.parameters), members.position
         if event.type == "floor":
             left = event.height(b, np.zeros(3), numbers)[0]
-            left = np.where(b[:, 2] + left <= LIMITS["depth"].value, np.inf, left)  # `depths` tells of a floor above the sea
+            left = np.where(
+                b[:, 2] + left <= LIMITS["depth"].value, np.inf, left
+            )  # `depths` tells of a floor above the sea
         elif event.type == "surface":
             left = b[:, 2] - numbers["depth"]
         elif event.type == "box":

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.real_numbers import is_whole, whole_remedy
 
 # What a path of files can be given as.
 PATH = "give a path, as text or pathlib.Path"
@@ -50,7 +50,9 @@ def file_path(key: str, value: Any) -> Path:
 def whole_number(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int:
     """Read a whole number."""
     if not is_whole(value, least, most):
-        raise refusal(key, value, f"is no whole number from {least} to {most:,}", f"give one from {least}")
+        raise refusal(
+            key, value, f"is no whole number from {least} to {most:,}", whole_remedy(value, f"give one from {least}")
+        )
     return int(value)
 
 

@@ -4,7 +4,7 @@
     indices = lw.uq.sobol(scene, "position[2]", samples=1024, h=0.01, t1=60.0)
     print(indices)
 
-The designs and the estimates are SALib's (extra: uq).
+Morris' design and its estimates are SALib's (extra: uq). The designs and estimates of Sobol' indices are our own.
 """
 
 from lgvi_warp.common.doors import names_in_stub

@@ -19,6 +19,7 @@ from lgvi_warp.calls.sizes import Sizes, sizes, with_ends
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.near import near_names
 from lgvi_warp.engine.block import Block, blocks, parts
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Samples
@@ -115,6 +116,7 @@ def _share(wanted: int, available: int | None, of: str) -> str:
     return f" ({wanted / available:.0%} of {of})" if available else ""
 
 
+@near_names(Request.of, Request.__init__)
 def predict(
     fleet: Ensemble | Scene, *, threads: int | None = None, store: Store | str | None = None, **settings: Any
 ) -> Prediction:

@@ -15,6 +15,7 @@ from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, outputs, samples_for, 
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
+from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
@@ -322,6 +323,7 @@ def scene_value(scene: Any, name: str, argument: str = "vary") -> np.ndarray:
     return target.of(known[target.name])
 
 
+@near_names()
 def prepare(
     fleet: Scene | Ensemble,
     vary: Mapping[Any, Any] | Sequence[str] | None = None,

@@ -31,26 +31,32 @@ def check(chosen: argparse.Namespace) -> int:
 
     scene = load_scene(chosen)
     ensemble = Ensemble.from_scene(scene)
-    head, messages = _settings(ensemble)
+    head, messages, choice = _settings(ensemble)
     messages += (*scene.vehicle.warnings, *plausibility.of_ensemble(ensemble).messages(ensemble.members))
     end = "can run, with notes: nothing is refused for them" if messages else "can run"
-    lines = [f"scene       {chosen.scene}, {head}", *controller_lines(scene.to_dict())]
+    lines = [f"scene       {chosen.scene}, {head}", *([f"method      {choice}"] if choice else [])]
+    lines += controller_lines(scene.to_dict())
     lines += [*(f"note        {text}" for text in messages), f"result      {end}"]
-    document = {"scene": chosen.scene, "members": ensemble.members, "notes": messages}
+    document = {"scene": chosen.scene, "members": ensemble.members, "method": choice or None, "notes": messages}
     tell(chosen, lambda: document, lambda: "\n".join(lines))
     return 0
 
 
-def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
-    """The run in a few words, and remarks on its settings. Raises SceneError for what a run would refuse."""
+def _settings(ensemble: Any) -> tuple[str, tuple[str, ...], str]:
+    """The run in a few words, remarks on its settings, and the choice of its method. Raises SceneError as a run would."""
+    from lgvi_warp.runs.default_method import cost
     from lgvi_warp.runs.request import Request
+    from lgvi_warp.runs.step_error import rates
 
     run = ensemble.scene.run
     members = f"members {ensemble.members:,}"
     missing = [f"run.{name}" for name in ("step", "duration") if getattr(run, name) is None]
     if missing:
-        return members, (f"{' and '.join(missing)}: not given, so the method was not looked at; a run wants it",)
+        return members, (f"{' and '.join(missing)}: not given, so the method was not looked at; a run wants it",), ""
     # Automatic iterations are found only by a run.
     method = replace(run.method_of(), iterations=None) if run.iterations == "auto" else None
     plan = Request(ensemble, method).plan()
-    return f"{members}, {plan.method.name}, step {plan.grid.h:g} s, {plan.grid.steps:,} steps", plan.grid.messages
+    name, reason, h = plan.method.name, plan.method.reason, plan.grid.h
+    text = cost(plan.method, rates(ensemble), h) if reason else ""
+    choice = f"{name}, chosen {reason}" + (f": {text}" if text else "") if reason else ""
+    return f"{members}, {name}, step {h:g} s, {plan.grid.steps:,} steps", plan.grid.messages, choice

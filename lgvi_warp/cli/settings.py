@@ -44,7 +44,7 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
     for text in chosen.set:
         key, equals, value = text.partition("=")
         if not equals:
-            raise SceneError([f"--set {text}: has no value; write --set vehicle.mass=120"])
+            raise SceneError([f"--set {text}: has no value; write --set vehicle.buoyancy=300"])
         changes[key.strip()] = value.strip()
     return changes
 

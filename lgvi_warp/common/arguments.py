@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import NoSuchMembers, ragged, refusal
-from lgvi_warp.common.real_numbers import holds_words, is_whole, plain
+from lgvi_warp.common.real_numbers import holds_words, is_whole, plain, whole_remedy
 
 # Members are counted below this.
 MOST = 2**31
@@ -54,7 +54,9 @@ def file_path(key: str, value: Any) -> Path:
 def whole_number(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int:
     """Read a whole number."""
     if not is_whole(value, least, most):
-        raise refusal(key, value, f"is no whole number from {least} to {most:,}", f"give one from {least}")
+        raise refusal(
+            key, value, f"is no whole number from {least} to {most:,}", whole_remedy(value, f"give one from {least}")
+        )
     return int(value)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from lgvi_warp.common.errors import Faults, refusal
-from lgvi_warp.common.real_numbers import is_whole, settle
+from lgvi_warp.common.real_numbers import is_whole, settle, whole_remedy
 
 
 def declared(reader: Callable[..., Any], default: Any = dataclasses.MISSING, **arguments: Any) -> Any:
@@ -45,7 +45,11 @@ flag = functools.partial(
 
 def whole(least: int, problem: str, remedy: str, default: Any = dataclasses.MISSING) -> Any:
     """Declare a whole number, of Python or of NumPy."""
-    return checked(functools.partial(is_whole, least=least), problem, remedy, default)
+    return declared(_whole, default, least=least, problem=problem, remedy=remedy)
+
+
+def _whole(faults: Faults, key: str, value: Any, least: int, problem: str, remedy: str) -> Any:
+    return value if is_whole(value, least) else faults.add(key, value, problem, whole_remedy(value, remedy))
 
 
 @functools.cache

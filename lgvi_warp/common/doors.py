@@ -27,7 +27,12 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
 
     def find(name: str) -> Any:
         if name not in places:
-            raise AttributeError(f"module {door!r} has no attribute {name!r}")
+            from lgvi_warp.common.near import nearest
+
+            # What asks for private names asks whether a module has them.
+            near = None if name.startswith("_") else nearest(name, tuple(sorted(places)))
+            remedy = f"; did you mean {near!r}?" if near else ""
+            raise AttributeError(f"module {door!r} has no attribute {name!r}{remedy}")
         home, name_there = places[name]
         # What a door holds of itself is a module.
         value = import_module(f"{door}.{name}") if home == door else getattr(import_module(home), name_there)

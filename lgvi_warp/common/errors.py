@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import difflib
 import functools
 import math
 import reprlib
@@ -143,16 +142,12 @@ MOST_KNOWN = 60
 
 def closest(word: Any, known: Iterable[str]) -> str:
     """Suggest the known name nearest to a word."""
-    return _closest(word[:LONGEST_VALUE] if isinstance(word, str) else brief(word), tuple(map(str, known)))
+    from lgvi_warp.common.near import nearest  # loaded where something is wrong
 
-
-# A file may have the same fault in thousands of tables, of which few are told.
-@functools.lru_cache(maxsize=64)
-def _closest(text: str, names: tuple[str, ...]) -> str:
-    near = [name for name in names if name.endswith(f".{text}")]
-    near = near or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
+    names = tuple(map(str, known))
+    near = nearest(word[:LONGEST_VALUE] if isinstance(word, str) else brief(word), names)
     more = f" and {len(names) - MOST_KNOWN:,} more" if len(names) > MOST_KNOWN else ""
-    return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(names[:MOST_KNOWN])}{more}"
+    return f"did you mean {near!r}?" if near else f"known: {', '.join(names[:MOST_KNOWN])}{more}"
 
 
 def among(value: Any, known: Iterable[Any]) -> bool:

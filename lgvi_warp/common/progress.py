@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import Any, ParamSpec, TextIO, TypeVar
 
 from lgvi_warp.common.errors import refusal
+from lgvi_warp.common.near import near_names
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -124,11 +125,12 @@ def bar(
 
 
 def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
-    """Let `progress=True` of a function show its progress; a decorator.
+    """Let `progress=True` of a function show its progress, and refuse unknown keywords with the nearest; a decorator.
 
     Returns: The same function, which takes True (a bar on a terminal or in a notebook, lines elsewhere) and False (nothing)
         too.
     """
+    call = near_names()(call)
 
     @functools.wraps(call)
     def wrapper(*args: P.args, **settings: P.kwargs) -> R:

@@ -121,6 +121,13 @@ def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
     return isinstance(value, Integral) and not isinstance(value, bool) and least <= int(value) <= most
 
 
+def whole_remedy(value: Any, remedy: str) -> str:
+    """What to give in place of a value that is no whole number: of 1e4, which Python and TOML read as a float, 10000."""
+    if isinstance(value, float | np.floating) and math.isfinite(value) and value == round(value):
+        return f"write {round(value)}, since a number with a point or an exponent is no whole number here"
+    return remedy
+
+
 def column_names(value: Any) -> list[Any] | None:
     """Column names of a table such as pandas.DataFrame or polars.DataFrame; None for a value without them."""
     for name in ("column_names", "columns"):  # pyarrow's `columns` are the columns themselves

@@ -26,6 +26,8 @@ Packets = Any
 
 # The controller's own rows of the memory.
 SIGNALS = f"{MEMORY}signals"
+# Heights above the surface.
+HEIGHTS = "heights"
 # Parts of a Spec that change no state and nothing that is remembered.
 BESIDE: dict[str, Any] = dict(
     width=0, shared_rows=False, checked=True, warning_rows=(), energy=False, backward=False, substep=False, control=None
@@ -144,6 +146,8 @@ def left_by(packets: Packets) -> dict[str, np.ndarray]:
     if packets.bus_rows:
         rows["noted"] = np.full((m, 1), packets.plan.layout.noted_bits)
     bits, values = packets.warned_at_start
+    if len(heights := packets.heights.left()):
+        rows[HEIGHTS] = heights
     if bits.any():
         rows |= {"start_warnings": bits[:, None], "start_values": values[:, None]}
     return rows

@@ -36,6 +36,7 @@ class Launches:
     has_callback: bool  # a function of the host answers each tick
     ticks: bool  # samples are gathered at all ticks
     begins: int = STARTS  # how the first launch begins (see lgvi_kernels.advance.beginning)
+    looks: int | None = None  # steps between two looks at the depth; None for a look at the end alone
     recalls: bool = False  # members go on from a tick, which is gathered again from what is remembered of it
 
     @property
@@ -51,6 +52,10 @@ class Launches:
     def beginning(self, k0: int) -> int:
         """How the launch of the steps from k0 on begins."""
         return self.begins if k0 == self.grid.first else 0
+
+    def looks_at(self, k: int) -> bool:
+        """Whether the depth of the members is looked at after k steps, whatever the launches are."""
+        return k == self.grid.last or (self.looks is not None and k % self.looks == 0)
 
     def is_tick(self, k: int) -> bool:
         """Whether the controller has a tick after k steps."""
@@ -134,6 +139,8 @@ class Launches:
         while k < self.grid.last:
             last = self.samples_due(k, k)[1] + most_samples
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
+            if self.looks:
+                k1 = min(k1, (k // self.looks + 1) * self.looks)
             if every:
                 # Up to the last tick for which there is a slot before those of earlier ones are taken again.
                 next_slot = k // every + 1 - self.first_tick

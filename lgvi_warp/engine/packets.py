@@ -19,6 +19,7 @@ from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import going_on
+from lgvi_warp.engine import heights as of_surface
 from lgvi_warp.engine.arrays import PLAIN, Group, LawArrays, Structs, memory_rows
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.packing import Packing
@@ -159,6 +160,7 @@ class Packets:
         if self.slopes is not None:
             self.slopes.check_moved()
         self._warned: tuple[np.ndarray, np.ndarray] | None = None
+        self._heights: of_surface.Heights | None = None
         if self._written:
             for view in self.noted.values():
                 view.fill(0)
@@ -169,6 +171,7 @@ class Packets:
             going_on.take(self, members.final)
             if plan.launches.goes_on_exactly:
                 self._warned = going_on.start_warnings(members.final, members.count)
+                self.heights.take(members.final.lanes.get(going_on.HEIGHTS))
 
     def _packed(self, members: Members) -> Packing:
         """The packing of members, of their copies too where numbers carry slopes; frame, scale and water are the members'."""
@@ -216,6 +219,20 @@ class Packets:
         if self._warned is None:
             self._warned = self._warned_at_start()
         return self._warned
+
+    @property
+    def heights(self) -> of_surface.Heights:
+        """The heights of the members above the surface so far."""
+        if self._heights is None:
+            self._heights = of_surface.Heights(self.plan.ensemble.scene, self.members.position[:, 2])
+        return self._heights
+
+    def look_at_depth(self, k: int, when: slice, position: np.ndarray | None) -> None:
+        """Look at the depth in samples (samples, m, 3) [m] of the launch up to step k, and at its end where that is due."""
+        if position is not None:
+            self.heights.look(position[..., 2], self.plan.grid.sample_steps[when])
+        if self.plan.launches.looks_at(k):
+            self.heights.look(of_surface.of_states(self), np.array([k]))
 
     def _bus(self) -> tuple[int, int]:
         """Rows of the controller's bus, and the first of those where frozen lanes keep their signals."""
@@ -402,6 +419,10 @@ class Packets:
 
         Step and value are those of the more serious of the two; of two equals, those of the start.
         """
+        return self.heights.added(*self._of_steps())
+
+    def _of_steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same of the warnings about the step."""
         bits, value = self.warned_at_start
         step = np.zeros(len(bits), np.int64)
         value = value if len(value) else np.full(len(bits), np.nan)

@@ -19,6 +19,7 @@ from lgvi_warp.common.phases import Phases
 from lgvi_warp.control.signals import check_signals, ordered
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.going_on import begun
+from lgvi_warp.engine.heights import steps_between_looks
 from lgvi_warp.engine.kernel import Kernel
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, resists
 from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of, with_tangents
@@ -130,7 +131,7 @@ class Plan:
             ensemble=self.ensemble.subset(indices),
             fields=layout.fields,
             layout=layout,
-            launches=_launches(self.grid, self.method, self.spec, layout, False),
+            launches=_launches(self.grid, self.method, self.spec, layout, False, self.launches.looks),
             shared=_shared(self.ensemble, self.shared.user_axes),
             free_packets=[],
             parent=(self, indices, fields),
@@ -221,7 +222,7 @@ def choose_plan(
         width_source=width_source,
         kernel=Kernel(spec, choice),
         layout=layout,
-        launches=_launches(grid, method, spec, layout, ticks),
+        launches=_launches(grid, method, spec, layout, ticks, steps_between_looks(scene, grid.h)),
         facts=facts,
         shared=shared,
     )
@@ -247,7 +248,9 @@ def _adds_forces(method: Method) -> bool:
     return method.tableau is not None and not method.linearly_implicit
 
 
-def _launches(grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, ticks: bool) -> Launches:
+def _launches(
+    grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, ticks: bool, looks: int | None
+) -> Launches:
     controller, size = layout.choice.controller, 8 if spec.real == wp.float64 else 4
     return Launches(
         grid,
@@ -259,6 +262,7 @@ def _launches(grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, 
         every=None if controller is None else controller.every(grid.h),
         has_callback=layout.choice.has_callback,
         ticks=ticks,
+        looks=looks,
     )
 
 

@@ -34,7 +34,7 @@ def run_single_block(
     names: of the samples to keep. warned: whether warnings are looked for. advanced: called with the steps of vehicles so far.
     final: whether what the packets leave is wanted; else none of it is returned.
     """
-    samples, packets = _advanced(plan, names, advanced)
+    samples, packets = _advanced(plan, names, advanced, warned)
     with np.errstate(invalid="ignore", over="ignore"):
         outcome = packets.outcome(warned)
         rows = left_by(packets) if final else {}
@@ -46,14 +46,14 @@ def run_for_samples(
     plan: Plan, advanced: Callable[[Block, int], None] = lambda block, steps: None
 ) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
     """Advance all members; their samples, and their status (n,), None where all reached the end."""
-    samples, packets = _advanced(plan, plan.fields, advanced)
+    samples, packets = _advanced(plan, plan.fields, advanced, False)
     status = None if packets.untroubled else packets.outcome(warned=False).status
     packets.leave()
     return samples, status
 
 
 def _advanced(
-    plan: Plan, names: Sequence[str], advanced: Callable[[Block, int], None]
+    plan: Plan, names: Sequence[str], advanced: Callable[[Block, int], None], warned: bool
 ) -> tuple[dict[str, np.ndarray], Packets]:
     """Samples of all members, and their packets at the end."""
     n = plan.ensemble.members
@@ -70,6 +70,8 @@ def _advanced(
             when = slice(*plan.launches.samples_due(k0, k1))
             if when.start < when.stop and names:
                 _keep(samples, when, unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table))
+            if warned:
+                packets.look_at_depth(k1, when, samples["position"][when] if "position" in samples else None)
             advanced(block, n * (k1 - plan.grid.first))
     return samples, packets
 

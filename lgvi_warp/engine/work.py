@@ -132,6 +132,8 @@ def run_block(
                 values = divided(
                     plan.layout.tick_fields, packets.gathered(when), plan.layout.table, plan.layout.tick_entries
                 )
+                if warned and "position" in values:
+                    packets.heights.look(values["position"][..., 2], grid.sample_steps[when])
                 samples = samples_of(plan, grid, when, values, ends)
                 for tick_taker in tick_takers:
                     tick_taker(when, samples)
@@ -160,12 +162,14 @@ def run_block(
                 keep_start()
             if plan.launches.gathered and (ticks := plan.launches.ticks_of(k0, k1)).start < ticks.stop:
                 keep_ticks(plan.launches.gathered, ticks)
-            when = slice(*plan.launches.samples_due(k0, k1))
+            when, values = slice(*plan.launches.samples_due(k0, k1)), dict[str, np.ndarray]()
             if when.start < when.stop and block_keepers:
                 values = unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table)
                 keep(when, {name: values[name] for name in plan.fields}, packets.ended)
                 for slope_taker in slope_takers:
                     slope_taker(when, slopes_in_advance(packets, k0, k1))
+            if warned:
+                packets.look_at_depth(k1, when, values.get("position"))
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome(warned)
         for block_keeper in block_keepers:

@@ -48,6 +48,11 @@ class DrawnParameters(Mapping[str, np.ndarray]):
     def __len__(self) -> int:
         return len(self._drawn)
 
+    def __repr__(self) -> str:
+        """The names and the number of members, for which nothing is drawn."""
+        few = type(self)(self.ensemble, self._first + 1, self._first) if self._stop > self._first + 1 else self
+        return f"{type(self).__name__} of {self._stop - self._first:,} members: {', '.join(few) or 'none'}"
+
 
 class DrawnStarts(DrawnParameters):
     """Numbers of the start that vary, of members of an ensemble that follow each other, drawn when they are first read."""

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lgvi_warp.common.status import Status, stop_time, stopped
+from lgvi_warp.common.status import Status, Warnings, stop_time, stopped
 from lgvi_warp.methods.limits import too_large
 from lgvi_warp.methods.method import Method
 
@@ -37,6 +38,33 @@ def outcome_text(result: Result, code: Status) -> str:
     value = "" if code.stopped else f", value {result.failure_value[first]:.4g}"
     text = too_large(Method(result.provenance["method"]["name"])) if code == Status.STEP_TOO_LARGE else code.text
     return f"{many} (first: member {first} at {stop_time(result)[first]:g} s{value}): {text}"
+
+
+def on_members(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    """Tell of members that rose above the surface, and of those that an event stopped before their first step."""
+    return above_surface(fields["warnings"], fields["warning_value"]) + begun_beyond(
+        fields["status"], fields["failure_time"]
+    )
+
+
+def above_surface(warnings: np.ndarray, value: np.ndarray) -> tuple[str, ...]:
+    """Count the members that rose above the surface without a term or an event for it.
+
+    warnings: Bits of `Warnings` of each member, (n,).
+    value: Value of the most serious warning, which this is, (n,).
+    """
+    bits = np.asarray(warnings)
+    high = np.flatnonzero(bits & np.uint16(Warnings.ABOVE_SURFACE)) if bits.any() else bits[:0]
+    if not len(high):
+        return ()
+    height = np.asarray(value)[high]
+    some = f"{RISEN}{len(high):,} of {len(bits):,} members rise above the surface, where no water is"
+    most = f"the highest, member {high[int(height.argmax())]}, by {height.max():.4g} m"
+    return (f"{some} ({most}); {STOP}",)
+
+
+RISEN = "position: "
+STOP = "stop members there by the event lw.events.Surface(), or let them float by lw.terms.SurfaceBuoyancy(...)"
 
 
 def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...]:

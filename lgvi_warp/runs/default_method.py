@@ -24,7 +24,9 @@ from lgvi_warp.scene.ensemble import Ensemble
 SHARES = {"drag": 0.9, "rotation": 0.5}
 # Largest h (l + 2 q |v|) / I that rkw3 is trusted with: of quadratic drag it knows that at the step's start.
 MOST_IMPLICIT = 1000.0
-# Error over the length of the path that a cheaper method may have, and above which a run says so.
+# Estimated error over the length of the path that a cheaper method may have: the estimate is right to a factor of five.
+CHEAPER = 0.001
+# The same above which a run says that its step is long.
 ALLOWED = 0.01
 # The choice looks so far ahead, whatever the length of the run: a longer run begins with the bits of a shorter one [s].
 AHEAD = 30.0
@@ -80,11 +82,11 @@ def choices(ensemble: Ensemble, h: float, known_rates: Rates | None = None) -> I
 def ranked(errors: dict[str, float], well: Collection[str]) -> list[str]:
     """Rank methods by their errors at a step.
 
-    Returns: Those whose error is allowed, the cheapest first; then the others, the least error first. Near its limit of
+    Returns: Those whose error is small, the cheapest first; then the others, the least error first. Near its limit of
         damping a method is one of the others.
     """
     known = [name for name in errors if name in well or math.isfinite(errors[name])]
-    return sorted(known, key=lambda name: 0.0 if name in well and errors[name] <= ALLOWED else errors[name])
+    return sorted(known, key=lambda name: 0.0 if name in well and errors[name] <= CHEAPER else errors[name])
 
 
 def messages(method: Method, rates: Rates, h: float, t1: float) -> tuple[str, ...]:
@@ -104,6 +106,26 @@ def messages(method: Method, rates: Rates, h: float, t1: float) -> tuple[str, ..
     )
     remedy = f"h = {shorter:.3g} s keeps that" if shorter > 0.0 else "shorten it"
     return (f"{text}; {remedy}, or ask for an error: lw.suggest, --error",)
+
+
+def cost(method: Method, rates: Rates, h: float) -> str:
+    """Tell how far a method for damped scenes is off, and what it costs beside the cheapest one, and that would lose.
+
+    h: Step [s].
+    Returns: A text; "" for a method that is not chosen by its error.
+    """
+    if method.name not in DAMPED:
+        return ""
+
+    def text(each: Method) -> str:
+        error = path_error(each, rates, h, AHEAD) if stable(each, h_rates(rates, h), 1.0) else math.inf
+        return f"off by about {100.0 * error:.1g} % of the path" if error < 1.0 else "unstable or off by the path"
+
+    cheap, own = Method(next(iter(DAMPED))), f"{text(method)} by its rates"
+    if method.linearly_implicit or method.name == cheap.name or method.tableau is None or cheap.tableau is None:
+        return own
+    times = len(method.tableau.b) / len(cheap.tableau.b)
+    return f"{own}; a step costs {times:.2g} times one of {cheap.name}, which would be {text(cheap)}"
 
 
 def best_error(method: Method, rates: Rates, h: float, t1: float) -> float:

@@ -26,7 +26,7 @@ from lgvi_warp.engine.work import Work
 from lgvi_warp.results import member_fields
 from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
 from lgvi_warp.results.final import final_of
-from lgvi_warp.results.outcomes import begun_beyond, failure_text
+from lgvi_warp.results.outcomes import failure_text, on_members
 from lgvi_warp.results.provenance import at_end, messages, provenance_but_scene, when_read
 from lgvi_warp.results.result import Result
 from lgvi_warp.sampling.final import Final
@@ -184,7 +184,7 @@ class _Gathered:
             estimates, remarks = self.observing.read(content["ensemble"], of_members["status"])
         # The arrays have room for all members; beyond the last one that ran nothing was written.
         histories, scene = self.histories(slice(n)), plan.ensemble.scene
-        on_the_way = plausibility.on_the_way(scene, histories).messages(n) if self.known is None else ()
+        on_the_way = plausibility.on_the_way(histories).messages(n) if self.known is None else ()
         return Result(
             time=plan.grid.times,
             samples=histories,
@@ -192,7 +192,7 @@ class _Gathered:
             parameters=DrawnParameters(plan.ensemble, n),
             starts=DrawnStarts(plan.ensemble, n),
             weights=plan.ensemble.weights(0, n),
-            messages=texts + remarks + on_the_way + begun_beyond(of_members["status"], of_members["failure_time"]),
+            messages=texts + remarks + on_the_way + on_members(of_members),
             provenance=when_read(at_end(content, of_members, n, plan.ensemble.members)),
             terms=tuple(scene.terms),
             statistics=estimates,

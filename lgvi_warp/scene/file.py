@@ -98,7 +98,7 @@ def override(content: dict[str, Any], key: str, value: Any) -> None:
     if isinstance(value, str) and rest:
         value = _value_of(key, value)
     if not rest:
-        raise SceneError([f"{cut(key)}: is not a dotted key; write section.key=value, such as vehicle.mass=120"])
+        raise SceneError([f"{cut(key)}: is not a dotted key; write section.key=value, such as vehicle.buoyancy=300"])
     table = content.setdefault(section, {})
     if section == "ensemble" and rest.startswith("vary.") and isinstance(table, dict):
         table, rest = table.setdefault("vary", {}), rest.removeprefix("vary.").strip("\"'")

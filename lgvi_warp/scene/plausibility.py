@@ -47,6 +47,7 @@ LIMITS = {
     "fin angle": Limit(math.pi / 2.0, "rad", "a fin across the flow; 20 would be in degrees"),
     "speed": Limit(30.0, "m/s", "the fastest torpedoes without a cavity; km/h or mm/s would be more"),
     "depth": Limit(0.0, "m", ABOVE),
+    "height": Limit(0.1, "m", "members that rise so far above the mean surface on the way are counted"),
 }
 # Fields of terms that hold velocities of water [m/s].
 CURRENTS = {
@@ -64,6 +65,9 @@ MOST_SAMPLES = 30_000_000
 # Texts of oddities, for the numbers of a member.
 FAST = f"a current of {{:.4g}} m/s is beyond the {LIMITS['current'].value:g} m/s of the strongest tides: a unit?"
 FAR = "an angle of {:.4g} rad is beyond 90 degrees: is it given in degrees?"
+SHALLOW = ("a depth of {:.4g} m is within one hull length, {:.3g} m, of a surface with waves: where the hull leaves the water "
+           "is known to the event surface and the term surface_buoyancy alone")  # fmt: skip
+BEYOND = "the start is {:.4g} m beyond this event: the member stops before its first step; start it before the event"
 HIGH = "a depth of {:.4g} m is above the surface: depth is positive down"
 FAR_AWAY = ("a place is {:.0f} km from environment.origin: lengths across the way to it are {:.2g} % too long there; take an "
             "origin nearer to the mission")  # fmt: skip
@@ -249,7 +253,13 @@ def of_ensemble(ensemble: Ensemble) -> Oddities:
 
     def look(first: int, stop: int) -> Oddities:
         members = ensemble.select(first, stop)
-        return of_numbers(ensemble.scene, members.parameters, first, stop) | of_start(ensemble.scene, members, first)
+        with np.errstate(all="ignore"):
+            begun = gathered(beyond(ensemble.scene, members), first, stop)
+        return (
+            of_numbers(ensemble.scene, members.parameters, first, stop)
+            | of_start(ensemble.scene, members, first)
+            | begun
+        )
 
     return functools.reduce(operator.or_, over_members(look, ensemble.members))
 
@@ -266,6 +276,9 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
     yield "start.velocity", speed > limit, lambda i: f"a speed of {speed[i]:.4g} m/s is beyond {limit:g} m/s: a unit?"
     if not ends_at_the_surface(scene) and not floats(scene):
         yield "start.position", depth < LIMITS["depth"].value, _text(HIGH, depth)
+        if any(term.type == "waves" and np.any(term.amplitudes) for term in scene.terms):
+            length = hull_length(scene, members.parameters)
+            yield "start.position", depth < length, _text(SHALLOW, *np.broadcast_arrays(depth, length))
     if scene.environment.origin is not None:
         yield _far_away("environment.origin", np.hypot(members.position[:, 0], members.position[:, 1]))
     for term in own_flows(scene):
@@ -274,6 +287,38 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
         if water is not None:
             flow = _speed(water[0])
             yield term.key, flow > LIMITS["current"].value, _text(FAST, flow)
+
+
+def hull_length(scene: SceneLike, p: Numbers) -> np.ndarray:
+    """The length of the hull (1 or n,) [m]: by its shape or its strips; else of a spheroid of its mass and inertia."""
+    stations = [p[f"{term.key}.stations"] for term in scene.terms if isinstance(term, StripTerm)]
+    if stations:
+        return np.asarray(np.max([x[:, -1] - x[:, 0] for x in np.broadcast_arrays(*stations)], axis=0))
+    shape = scene.vehicle.shape
+    if shape is not None and not shape.mesh:
+        return np.array([shape.length])
+    rigid = (
+        p["vehicle.inertia"] if "vehicle.inertia" in p else vehicles.about_center(p["vehicle.rigid_body_mass_matrix"])
+    )
+    return np.asarray(np.sqrt(20.0 * _diagonal(rigid).max(axis=1) / vehicles.dry_mass(p)))
+
+
+def beyond(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
+    """Look for members that start at or beyond a floor, the surface or a side of a box."""
+    for event in scene.events:
+        numbers, b = own(event, members.parameters), members.position
+        if event.type == "floor":
+            left = event.height(b, np.zeros(3), numbers)[0]
+            left = np.where(
+                b[:, 2] + left <= LIMITS["depth"].value, np.inf, left
+            )  # `depths` tells of a floor above the sea
+        elif event.type == "surface":
+            left = b[:, 2] - numbers["depth"]
+        elif event.type == "box":
+            left = np.minimum(b - numbers["lower"], numbers["upper"] - b).min(axis=1)
+        else:
+            continue
+        yield event.key, left <= 0.0, _text(BEYOND, np.abs(left))
 
 
 def own_flows(scene: SceneLike) -> list[Term]:
@@ -293,54 +338,31 @@ def floats(scene: SceneLike) -> bool:
     return any(term.type == "surface_buoyancy" for term in scene.terms)
 
 
-def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
+def on_the_way(samples: Mapping[str, np.ndarray]) -> Oddities:
     """What became odd of members that began well, by samples that are in memory anyway.
 
-    samples: "position" and "velocity", (k, n, 3) [m, m/s], of which the first is the start.
+    samples: "velocity", (k, n, 3) [m/s], of which the first is the start.
     """
     limit = LIMITS["speed"].value
     with np.errstate(all="ignore"):
-        fast, speed = _later(samples.get("velocity"), _speed, _no_speed_above, limit)
-        high, height = _later(samples.get("position"), _higher, _nothing_higher_than, -LIMITS["depth"].value)
-    if ends_at_the_surface(scene) or floats(scene):
-        high = np.zeros_like(high)
-    checked: list[OddityCheck] = [
-        ("velocity", fast, lambda i: f"{speed[i]:.4g} m/s on the way is beyond {limit:g} m/s: a unit, or the step?"),
-        ("position", high, lambda i: f"rises {height[i]:.4g} m above the surface, where no water is: {STOP}"),
-    ]
-    return gathered(checked, 0, max(len(fast), len(high)))
+        fast, speed = _later(samples.get("velocity"), limit)
+    text: OddityCheck = (
+        "velocity", fast, lambda i: f"{speed[i]:.4g} m/s on the way is beyond {limit:g} m/s: a unit, or the step?"
+    )  # fmt: skip
+    return gathered([text], 0, len(fast))
 
 
-STOP = "stop members there by the event lw.events.Surface(), or let them float by lw.terms.SurfaceBuoyancy(...)"
-
-
-def _higher(position: np.ndarray) -> np.ndarray:
-    return -position[:, 2]
-
-
-def _nothing_higher_than(position: np.ndarray) -> float:
-    return -float(position[:, 2].min())
-
-
-def _later(
-    samples: np.ndarray | None,
-    size: Callable[[np.ndarray], np.ndarray],
-    bound: Callable[[np.ndarray], float],
-    limit: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each member (n,) whether its size passed the limit only after the start, and its largest size then.
-
-    bound: of the size of all members, in a fifth of the time.
-    """
+def _later(samples: np.ndarray | None, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return for each member (n,) whether its speed passed the limit only after the start, and its largest speed then."""
     if not isinstance(samples, np.ndarray) or len(samples) < 2:
         return np.zeros(0, dtype=bool), np.zeros(0)
     times = range(1, len(samples)) if samples.size <= MOST_SAMPLES else range(len(samples) - 1, len(samples))
-    if all(bound(samples[time]) < limit for time in times):
+    if all(_no_speed_above(samples[time]) < limit for time in times):
         return np.zeros(samples.shape[1], dtype=bool), np.zeros(0)
     largest = np.full(samples.shape[1], -np.inf)
     for time in times:
-        np.fmax(largest, size(samples[time]), out=largest)
-    return (size(samples[0]) < limit) & (largest > limit), largest
+        np.fmax(largest, _speed(samples[time]), out=largest)
+    return (_speed(samples[0]) < limit) & (largest > limit), largest
 
 
 def _speed(velocity: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.real_numbers import is_whole, whole_remedy
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.estimates.estimate import Estimate, along
@@ -89,7 +89,7 @@ class Histogram(Counted):
         if self.edges is None:
             limits, bins = np.array([0.0, 1.0]) if run else faults.finite("limits", self.limits, (2,)), self.bins
             if bins is None or not is_whole(bins, 1):
-                faults.add("bins", bins, "is no whole number above 0", "give 50")
+                faults.add("bins", bins, "is no whole number above 0", whole_remedy(bins, "give 50"))
                 return
             object.__setattr__(self, "bins", int(bins))
             edges = None if limits is None else np.linspace(limits[0], limits[1], int(bins) + 1)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.cli import main
 from lgvi_warp.cli.report import members_line
 from lgvi_warp.methods import limits
 from lgvi_warp.reference.terms import View
@@ -53,7 +54,7 @@ def chosen(*terms, h=0.1, start=AHEAD, **settings):
 
 
 def test_remus_takes_runge_kutta_methods_by_its_step():
-    steps = {"rk4": (0.01, 0.1, 0.2), "rk8": (0.4, 0.5, 0.75), "rkw3": (5.0,)}
+    steps = {"rk4": (0.01, 0.05, 0.1), "rk8": (0.2, 0.25, 0.4, 0.5, 0.75), "rkw3": (5.0,)}
     for name, those in steps.items():
         assert {planned(REMUS, h).method.name for h in those} == {name}
 
@@ -74,7 +75,7 @@ def test_what_runge_kutta_methods_do_not_take():
     assert chosen(DRAG, noise) == chosen(DRAG, dtype="float32_compensated") == "psi_x"
     assert chosen(DRAG, on_failure="substep") == "psi_s"
     spinning = dataclasses.replace(AHEAD, angular_velocity=[8.0, 0.0, 0.0])
-    assert [chosen(DRAG, start=spinning, h=h) for h in (0.03, 0.1, 0.2, 0.5)] == ["rk4", "rk8", "rk8", "psi_s"]
+    assert [chosen(DRAG, start=spinning, h=h) for h in (0.01, 0.1, 0.2, 0.5)] == ["rk4", "rk8", "rk8", "psi_s"]
 
 
 @pytest.mark.parametrize(("strength", "name"), [(1.0, "rk4"), (1e3, "rkw3"), (1e6, "psi_x")])
@@ -183,7 +184,7 @@ def test_it_is_told_and_kept(tmp_path):
 def test_a_prepared_run_chooses_once():
     """Also for members that would choose another method by themselves."""
     slow, fast = (
-        dataclasses.replace(AHEAD, velocity=[1.5, 0.3, 0.0], angular_velocity=[x, 0.0, 0.0]) for x in (1.0, 20.0)
+        dataclasses.replace(AHEAD, velocity=[0.5, 0.1, 0.0], angular_velocity=[x, 0.0, 0.0]) for x in (0.1, 20.0)
     )
     run = lw.prepare(torpedo(MATRIX, start=slow), ["start.angular_velocity[0]"], of="position[1]", h=0.1, t1=0.5)
     assert planned(torpedo(MATRIX, start=fast)).method.name == "rk8"
@@ -241,11 +242,16 @@ FLEETS = {"REMUS": turning_remus, "REMUS that rolls": lambda: turning_remus((0.1
           "BlueROV2": driven_bluerov, "torpedo": torpedo_in_a_turn}  # fmt: skip
 
 
+def length_of(result):
+    """The length of each member's path (n,) [m], by its samples."""
+    return np.linalg.norm(np.diff(result.position, axis=0), axis=2).sum(axis=0)
+
+
 def measured(fleet, t1, method, steps):
     """Largest error in position over the length of the path, for each number of steps; the truth: rk8 at steps of 1/160 s."""
     save = lw.SaveAt(every=t1 / 4)
     truth = lw.solve(fleet, "rk8", h=1.0 / 160.0, t1=t1, save=save)
-    path = np.linalg.norm(np.diff(truth.position, axis=0), axis=2).sum(axis=0)
+    path = length_of(truth)
     errors = []
     for n in steps:
         result = lw.solve(fleet, method, h=t1 / n, t1=t1, save=save)
@@ -267,11 +273,13 @@ def test_the_method_is_chosen_by_its_error_at_the_step(name):
     fleet, t1 = FLEETS[name]()
     counts = [4 * round(t1 / h / 4) for h in (0.5, 0.375, 0.25, 0.15, 0.1, 0.05)]
     errors = {method: measured(fleet, t1, method, counts) for method in ("rk4", "rk8", "rkw3")}
+    length = length_of(lw.solve(fleet, "rk8", h=1.0 / 160.0, t1=t1, save=lw.SaveAt(every=t1 / 4))).max()
     for i, n in enumerate(counts):
         plan = make_plan(fleet, h=t1 / n, t1=t1)
         own, best = errors[plan.method.name][i], min(errors[method][i] for method in errors)
         told = any("off by more than 1 % of the path" in text for text in plan.grid.messages)
         assert own <= 0.05 or own <= 2.0 * best or told, (n, plan.method.name, own, best)
+        assert own * length <= 0.3 or own <= 20.0 * best, (n, plan.method.name, own * length, best * length)
         if own > 0.05:
             assert told, (n, plan.method.name, own)
         if own < 0.002:
@@ -287,6 +295,55 @@ def test_remus_in_a_turn_is_not_off_by_metres():
     assert lost > 0.1
     assert kept < 1e-3
     assert plan.method.name == "rk8"
+
+
+STEPS = (0.5, 0.375, 0.25, 0.2, 0.15, 0.1, 0.05, 0.02)
+
+
+@pytest.mark.parametrize("name", [*FLEETS, *lw.vehicles.names()])
+def test_the_choice_is_off_by_a_thousandth_of_the_path_or_least(name):
+    """By the estimate, of all steps; cheaper methods go before those that are off by less."""
+    start = {"position": [0.0, 0.0, 20.0], "velocity": [1.0, 0.1, 0.0]}
+    fleet = FLEETS[name]()[0] if name in FLEETS else lw.Ensemble(lw.Scene.named(name, start=start), 4, 1)
+    found = step_error.rates(fleet)
+    for h in STEPS if default_method.is_damped(fleet) else ():
+        numbers = default_method.h_rates(found, h)
+        errors = {
+            method: step_error.path_error(lw.Method(method), found, h, 30.0)
+            for method in default_method.DAMPED
+            if default_method.stable(lw.Method(method), numbers)
+        }
+        good = [method for method in errors if errors[method] <= 0.001]
+        taken = make_plan(fleet, h=h, t1=30.0 * h).method.name
+        if good:
+            assert taken == good[0], (h, errors)
+        elif taken in errors:
+            assert errors[taken] == min(errors.values()), (h, errors)
+
+
+@pytest.mark.kernel
+def test_remus_in_a_turn_is_off_by_millimetres_at_a_coarse_step():
+    """At 0.25 s rk4 is off by more than a quarter of a metre of 40 m, rk8 by less than 1 mm."""
+    fleet, t1 = turning_remus()
+    plan = make_plan(fleet, h=0.25, t1=t1)
+    (taken,), (cheap,) = (measured(fleet, t1, method, [120]) for method in (plan.method.name, "rk4"))
+    assert plan.method.name == "rk8"
+    assert taken < 1e-4
+    assert cheap > 20.0 * taken
+
+
+def test_check_says_what_the_choice_costs(tmp_path, capsys):
+    file = tmp_path / "scene.toml"
+    file.write_text('[vehicle]\nname = "remus_100"\n[start]\nposition = [0, 0, 20]\nvelocity = [1.5, 0, 0]\n'
+                    '[run]\nstep = 0.25\nduration = 5.0\n')  # fmt: skip
+    assert main(["check", str(file)]) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("method"))
+    assert "rk8, chosen since the scene is damped and the step long: off by about" in line
+    assert line.endswith("a step costs 3 times one of rk4, which would be off by about 0.8 % of the path")
+    assert main(["check", str(file), "--step", "0.05"]) == 0
+    assert "rk4, chosen since the scene is damped: off by about 0.001 % of the path" in capsys.readouterr().out
+    assert main(["check", str(file), "--method", "rk4"]) == 0
+    assert "\nmethod" not in capsys.readouterr().out
 
 
 @pytest.mark.kernel

@@ -221,9 +221,9 @@ def test_scenes_without_margins():
     with pytest.raises(lw.SceneError, match="controller = None: is not in the scene"):
         lw.linear.margins(dataclasses.replace(scene(), controller=None), h=H)
     whole = scene()
-    noisy = dataclasses.replace(whole.controller, sensors=[Sensor(of="heading", noise=0.1)])
-    with pytest.raises(lw.SceneError, match=r"sensor\.noise.*has no linear model"):
-        lw.linear.margins(dataclasses.replace(whole, controller=noisy), h=H)
+    late = dataclasses.replace(whole.controller, sensors=[Sensor(of="heading", latency=2.0)])
+    with pytest.raises(lw.SceneError, match=r"sensor\.latency.*has no linear model"):
+        lw.linear.margins(dataclasses.replace(whole, controller=late), h=H)
 
 
 def autopilot():
@@ -428,9 +428,38 @@ def test_a_loop_within_a_dead_band_moves_nothing():
     assert np.isnan(found.values["gain_upper"][0])
 
 
-def test_noise_lets_no_motion_be_steady():
+@pytest.mark.parametrize("by", ["eigenvalues", "runs"])
+def test_noise_is_taken_as_its_mean_and_faults_as_off(by):
+    """Also a fault whose time varies: the margins are those of the loop without them, to the bit, and say what they left out."""
     whole = scene()
-    for words in ({"noise": 0.1}, {"drift": 0.1}):
-        noisy = dataclasses.replace(whole.controller, sensors=[Sensor(of="heading", **words)])
-        with pytest.raises(lw.SceneError, match="lets no motion be steady, as margins need it"):
-            lw.linear.margins(dataclasses.replace(whole, controller=noisy), by="runs", h=H)
+    words = {"noise": 0.1, "drift": 0.01} | ({"quantum": 0.02} if by == "eigenvalues" else {})
+    sensor, clean = (Sensor(of="heading", bias=0.05, **more) for more in (words, {}))
+    fault = lw.control.Fault(name="dead", of="sensor", time=3.0, gain=0.0)
+    noisy = dataclasses.replace(
+        whole, controller=dataclasses.replace(whole.controller, sensors=[sensor], faults=[fault])
+    )
+    quiet = dataclasses.replace(whole, controller=dataclasses.replace(whole.controller, sensors=[clean]))
+    vary = {"dead.time": Uniform(1.0, 9.0)}
+    found = lw.linear.margins(lw.Ensemble(noisy, 2, 1, vary), by=by, h=H, about=20.0)
+    expected = lw.linear.margins(lw.Ensemble(quiet, 2, 1), by=by, h=H, about=20.0)
+    for name, values in expected.values.items():
+        np.testing.assert_array_equal(found.values[name], values)
+    (text,) = found.messages
+    assert text.startswith("of the loop as a linear one: sensor.noise, sensor.drift")
+    assert "dead taken as off" in text
+    assert expected.messages == ()
+    with pytest.raises(lw.SceneError, match=r"sensor\.noise.*varies, where margins take it as 0"):
+        lw.linear.margins(lw.Ensemble(noisy, 2, 1, {"sensor.noise": Uniform(0.0, 0.2)}), by=by, h=H)
+
+
+def test_a_closed_model_leaves_out_what_has_the_mean_0():
+    whole = scene()
+    sensor, clean = (Sensor(of="heading", **more) for more in ({"noise": 0.1, "quantum": 0.1}, {}))
+    noisy, quiet = (
+        dataclasses.replace(whole, controller=dataclasses.replace(whole.controller, sensors=[each]))
+        for each in (sensor, clean)
+    )
+    found, expected = (lw.linear.linearize(each, 1.0, closed=True, h=H) for each in (noisy, quiet))
+    np.testing.assert_array_equal(found.A, expected.A)
+    assert "sensor.noise, sensor.quantum taken as 0" in found.messages[0]
+    assert expected.messages == ()

@@ -8,6 +8,7 @@ from typing import Any
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, among, closest
+from lgvi_warp.common.real_numbers import whole_remedy
 from lgvi_warp.engine.executors.base import Executor
 
 NAMES = ("threads", "processes", "dask")
@@ -23,7 +24,7 @@ def check_threads(faults: Faults, threads: Any) -> None:
         return
     remedy = "give 1 or more, or leave it out for all cores"
     if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        faults.add("threads", threads, "is not a whole number above 0", remedy)
+        faults.add("threads", threads, "is not a whole number above 0", whole_remedy(threads, remedy))
     elif threads > MOST_THREADS:
         faults.add("threads", threads, f"is more than {MOST_THREADS:,}", remedy)
 

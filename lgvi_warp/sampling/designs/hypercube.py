@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import generator
-from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.real_numbers import is_whole, whole_remedy
 from lgvi_warp.sampling.designs.base import Drawn, Replicated, inside
 from lgvi_warp.sampling.designs.space import Space
 
@@ -48,7 +48,7 @@ class LatinHypercube(Replicated):
         if group is None:
             faults.add("group", group, "is missing", example)
         elif not is_whole(group, 2, LARGEST_GROUP):
-            faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}", example)
+            faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}", whole_remedy(group, example))
         else:
             object.__setattr__(self, "group", int(group))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
+from lgvi_warp.common.near import near_names
 from lgvi_warp.control.dvl import DVL
 from lgvi_warp.control.error_state_filter import ErrorStateFilter
 from lgvi_warp.control.imu import IMU
@@ -45,6 +46,7 @@ class LinearModel:
         states: names of the states (n,), such as "velocity[0]", "control_fins.place[1]", "heading_pid.memory[0]".
         inputs: names of the inputs (m,), such as "control_fins[0]", or "X" to "N" of a wrench.
         about: the motion: position, attitude, velocity and angular_velocity by name, after which the period begins.
+        messages: what the model leaves out of the scene: noise, drift and rounding of sensors, faults.
     """
 
     A: np.ndarray
@@ -55,6 +57,7 @@ class LinearModel:
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     about: Mapping[str, np.ndarray]
+    messages: tuple[str, ...] = ()
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -118,6 +121,7 @@ def chosen_places(faults: Faults, key: str, wanted: Sequence[str], known: tuple[
     return places
 
 
+@near_names()
 def linearize(
     scene: Scene,
     about: Trim | float | None = None,
@@ -132,7 +136,8 @@ def linearize(
     """The linear model of one period: of the plant from commands that are held, or of the closed loop.
 
     Central differences of the run's own steps, all in one launch: the model holds the method, the lags of actuators and the
-    hold as they are in a run. Its error is step^2 times a third derivative, and round-off / step: some 1e-10.
+    hold as they are in a run. Its error is step^2 times a third derivative, and round-off / step: some 1e-10. A closed loop
+    takes noise, drift and rounding of sensors as 0, their mean, and faults as off.
 
     Args:
         scene: The scene, without waves and noise; of an Ensemble, its scene.
@@ -184,8 +189,10 @@ def linearize(
     h = step_of(scene, h)
     scene = replace(scene, events=seen_floors(scene.controller, scene.events))
     if closed:
+        scene, _, messages = of_the_mean(scene)
         check_parts(scene.controller, "closed")
-        return _closed_model(scene, about if isinstance(about, int | float) else 0.0, method, h, step)
+        model = _closed_model(scene, about if isinstance(about, int | float) else 0.0, method, h, step)
+        return replace(model, messages=messages)
     return _plant_model(scene, about if isinstance(about, Trim) else None, inputs, period, method, h, step)
 
 
@@ -274,8 +281,31 @@ def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool
     return rows
 
 
-# What of a sensor changes from tick to tick by chance, in whatever motion.
+# What of a sensor changes from tick to tick by chance, in whatever motion; and beside it what linear models take as such.
 RANDOM = ("noise", "drift")
+OF_MEAN_ZERO = (*RANDOM, "quantum")
+
+
+def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, tuple[str, ...], tuple[str, ...]]:
+    """A scene whose sensors have none of some errors of mean zero, and whose faults never begin.
+
+    Returns: The scene, the names of the numbers that are 0 in it, and what to say of it.
+    """
+    controller, sensors, zeros = scene.controller, [], list[str]()
+    if controller is None:
+        return scene, (), ()
+    for part in controller.sensors:
+        acting = [word for word in words if isinstance(part, Sensor) and np.any(getattr(part, word))]
+        zeros += [f"{part.key}.{word}" for word in acting]
+        sensors.append(replace(part, **dict.fromkeys(acting, 0.0)) if acting else part)
+    faults = [fault.key for fault in controller.faults]
+    if not (zeros or faults):
+        return scene, (), ()
+    texts = [f"{', '.join(zeros)} taken as 0, its mean"] * bool(zeros) + [f"{', '.join(faults)} taken as off"] * bool(
+        faults
+    )
+    scene = replace(scene, controller=replace(controller, sensors=sensors, faults=()))
+    return scene, tuple(zeros), (f"of the loop as a linear one: {'; '.join(texts)}",)
 
 
 def check_parts(controller: Any, purpose: str, refused: Collection[str] | None = None) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.near import near_names
 from lgvi_warp.control.delay import MOST_PERIODS
 from lgvi_warp.methods.method import Method
 from lgvi_warp.runs.request import ensemble_of
@@ -21,7 +22,7 @@ from lgvi_warp.studies.files import Saved
 from lgvi_warp.studies.linear.bench import COORDINATES, calm
 from lgvi_warp.studies.linear.disk import disks
 from lgvi_warp.studies.linear.edges import edges
-from lgvi_warp.studies.linear.linearize import RANDOM, check_parts, chosen_places
+from lgvi_warp.studies.linear.linearize import OF_MEAN_ZERO, RANDOM, check_parts, chosen_places, of_the_mean
 from lgvi_warp.studies.linear.loops import IDLE, LEAST_TICKS, UNSETTLED, Loops, Study
 from lgvi_warp.studies.linear.peaks import OF_THE_DEMAND, peaks
 from lgvi_warp.studies.linear.sampled_loop import SampledLoop
@@ -191,6 +192,7 @@ class Margins(Saved):
         return "\n".join([*lines, *self.messages])
 
 
+@near_names()
 def margins(
     fleet: Ensemble | Scene,
     loop: str | None = None,
@@ -225,6 +227,8 @@ def margins(
     as well. The error is not judged: a slow integral hides a small fast limit cycle in it.
 
     Where the answer changes more than once, the edge is one of them.
+
+    Noise and drift of sensors are taken as 0, their mean, and faults as off; by eigenvalues rounding, too: see `messages`.
 
     The disk margin is that of the sampled loop, opened at all components of the law's demand: at any frequency each may have
     a complex factor of its own in the disk (1 + (1 - skew) d / 2) / (1 - (1 + skew) d / 2), |d| < margin (Seiler, Packard,
@@ -288,10 +292,13 @@ def margins(
     _check_loop(faults, scene.controller, loop, seconds)
     faults.raise_if_any()
     calm(scene, "margins")
-    if "eigenvalues" in by:
-        check_parts(scene.controller, 'margins by="eigenvalues"')
-    else:
-        check_parts(scene.controller, "margins", RANDOM)
+    linear = "eigenvalues" in by
+    scene, zeros, messages = of_the_mean(scene, OF_MEAN_ZERO if linear else RANDOM)
+    check_parts(scene.controller, 'margins by="eigenvalues"' if linear else "margins", None if linear else RANDOM)
+    for name in ensemble.varied_names.intersection(zeros):
+        faults.add(name, "...", "varies, where margins take it as 0", "leave it out of what varies")
+    faults.raise_if_any()
+    ensemble = ensemble.in_scene(scene) if messages else ensemble
     study = Study(ensemble, loop, about, settle, seconds, tilt, method, step_of(scene, h))
     of_way = {"eigenvalues": of, "runs": [word for word in of if word not in LINEAR]}
     peak_names = [f"{name}_{of_peak}" for name in (*OF_THE_DEMAND, *outputs) for of_peak in ("peak", "frequency")]
@@ -309,7 +316,9 @@ def margins(
                 for name, column in of_loops[way].items():
                     answers[way][name][loops.places] = column
     grid = study.bench.plan.grid
-    return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, grid.h, grid.messages)
+    return Margins(
+        loop or "all laws", answers["eigenvalues"], answers["runs"], why, grid.h, (*grid.messages, *messages)
+    )
 
 
 def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: float) -> None:

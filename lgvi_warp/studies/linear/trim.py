@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.near import near_names
 from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics import notation
@@ -77,6 +78,7 @@ class Trim:
         return f"steady motion: {listed(self.values)}; fixed: {listed(self.fixed)}; {remainder}"
 
 
+@near_names()
 def trim(
     scene: Scene,
     speed: float | None = None,

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.calls.prepared import prepare
 from lgvi_warp.common import machine
 from lgvi_warp.common.arguments import whole_number
 from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.runs.request import ensemble_of
@@ -34,6 +36,7 @@ LEAST_ERROR, FEWEST = 0.005, 10_000
 
 
 @shows_progress
+@near_names(prepare)
 def rare_event(
     fleet: Scene | Ensemble,
     limit: OfInterest | Mapping[str, Any],

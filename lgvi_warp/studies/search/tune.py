@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.calls.prepared import Prepared, scene_value
+from lgvi_warp.calls.prepared import Prepared, prepare, scene_value
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.quantities import OfInterest
@@ -75,6 +76,7 @@ class Tuned:
 
 
 @shows_progress
+@near_names(prepare)
 def tune_gains(
     fleet: Ensemble | Scene,
     over: Mapping[str, Any],

@@ -10,7 +10,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.calls.prepared import prepare
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.sampling.designs.table import Table
@@ -82,6 +84,7 @@ class WorstCase(Saved):
 
 
 @shows_progress
+@near_names(prepare)
 def worst_case(
     fleet: Scene | Ensemble,
     within: Mapping[str, Any],

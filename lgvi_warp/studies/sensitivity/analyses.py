@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import ensemble_of, of_kind
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
+from lgvi_warp.common.real_numbers import whole_remedy
 from lgvi_warp.common.status import Status
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.sampling.designs.base import Sampling
@@ -277,7 +278,7 @@ def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 
     faults = Faults()
     for name, value in (("samples", samples), ("resamples", resamples)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 2:
-            faults.add(name, value, "is not a whole number from 2", "give 2 or more")
+            faults.add(name, value, "is not a whole number from 2", whole_remedy(value, "give 2 or more"))
     number = faults.number("confidence", confidence)
     if number is not None and not 0.0 < number < 1.0:
         faults.add("confidence", confidence, "is not between 0 and 1", "give a level, such as 0.95")

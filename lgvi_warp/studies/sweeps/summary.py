@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.status import Status
+from lgvi_warp.results.outcomes import RISEN
 from lgvi_warp.studies.sweeps.comparisons import PairedComparison
 from lgvi_warp.studies.sweeps.rare_output import rare_lines
 from lgvi_warp.studies.sweeps.setup import SweepCell
@@ -42,7 +43,20 @@ def summary(sweep: Sweep) -> str:
     if sweep.rares is not None:
         at = len(lines) if brief else lines.index("## What failures go with") - 1
         lines[at:at] = ["", "## Rare failures", "", *rare_lines(sweep)]
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_above_surface(sweep)]) + "\n"
+
+
+def _above_surface(sweep: Sweep) -> list[str]:
+    """Lines on the cells whose members rise above the surface without a term or event for it."""
+    found = [
+        (cell.name, text) for cell in sweep.cells for text in sweep.record(cell).messages if text.startswith(RISEN)
+    ]
+    if not found:
+        return []
+    return [
+        "",
+        f"In {len(found)} of {len(sweep.cells)} cells members leave the water; the first, {': '.join(found[0])}.",
+    ]
 
 
 def _in_full(sweep: Sweep) -> list[str]:

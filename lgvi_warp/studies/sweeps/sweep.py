@@ -8,8 +8,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from lgvi_warp.calls.solve import solve
 from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -29,6 +31,7 @@ NOT_KEPT = "cannot be told from other functions, so this cell runs in every call
 
 
 @shows_progress
+@near_names(solve)
 def sweep(
     scene: Scene | Ensemble | str | os.PathLike[str],
     cases: Any = None,

@@ -11,6 +11,8 @@ import lgvi_warp as lw
 from benchmarks import problems
 from lgvi_warp.cli import main
 from lgvi_warp.distributions import Choice, Normal, Uniform
+from lgvi_warp.engine.heights import Heights
+from lgvi_warp.results.outcomes import above_surface
 from lgvi_warp.scene import plausibility, slices
 from lgvi_warp.scene.plausibility import LIMITS
 from tests.conftest import ROOT
@@ -162,7 +164,8 @@ def test_a_vehicle_without_weight_has_none_to_compare():
 )
 def test_an_event_at_the_surface_knows_what_is_above(event):
     above = {"start": {"position": [0.0, 0.0, -0.1]}}
-    assert said(scene(**above, events=[event])) == ()
+    (text,) = said(scene(**above, events=[event]))
+    says(text, event["type"], "0.1 m beyond this event")
     below = {"type": "box", "lower": [-9.0, -9.0, -9.0], "upper": [9.0, 9.0, 9.0]}
     assert len(said(scene(**above, events=[below]))) == 1
 
@@ -204,31 +207,83 @@ def samples(**fields):
 
 
 def test_what_becomes_odd_on_the_way_is_said():
-    z = [[[0, 0, 1.0], [0, 0, 0.0], [0, 0, -2.0]], [[0, 0, -0.5], [0, 0, -3.0], [0, 0, -3.0]], [[0, 0, 2.0]] * 3]
     v = [[[29.0, 0, 0]] * 3, [[0, 31.0, 0], [np.nan, 0, 0], [0, 0, 30.0]], [[1.0, 0, 0]] * 3]
-    found = plausibility.on_the_way(scene(), samples(position=z, velocity=v)).messages(3)
-    # Members that begin at the surface, or above it as is said already, say nothing of where they mean it to be.
-    assert len(found) == 2
-    assert "31 m/s" in found[0]
-    says(found[1], "rises 0.5 m", "lw.events.Surface()")
-    assert all("(1 of 3 members; first: member 0)" in text for text in found)
-    assert len(plausibility.on_the_way(scene(events=[{"type": "surface"}]), samples(position=z)).messages(3)) == 0
-    assert plausibility.on_the_way(scene(), samples(position=z)).messages(3) == found[1:]
-    assert plausibility.on_the_way(scene(), {}).messages(3) == ()
+    (found,) = plausibility.on_the_way(samples(velocity=v)).messages(3)
+    says(found, "31 m/s", "(1 of 3 members; first: member 0)")
+    assert plausibility.on_the_way({}).messages(3) == ()
+
+
+def test_heights_above_the_surface_count_from_a_limit_on():
+    """Of a start above the surface another message tells; a depth that is no number counts for nothing."""
+    limit = LIMITS["height"].value
+    looked = Heights(scene(), np.array([1.0, 0.0, -2.0, 5.0, 5.0]))
+    looked.look(
+        np.array([[1.0, 0.0, -2.0, 5.0, 5.0], [-limit, -3.0, -3.0, np.nan, -0.5], [2.0, -1.0, 2.0, 5.0, -9.0]]),
+        np.array([0, 7, 9]),
+    )
+    looked.look(np.array([[2.0, -4.0, -9.0, 5.0, 5.0]]), np.array([12]))
+    none = np.zeros(5, np.uint16), np.zeros(5, np.int64), np.full(5, np.nan)
+    bits, step, value = looked.added(*none)
+    assert bits.tolist() == [0, 1024, 0, 0, 1024]
+    assert step.tolist() == [0, 7, 0, 0, 7]
+    assert value[[1, 4]].tolist() == [4.0, 9.0]
+    (text,) = above_surface(bits, value)
+    says(text, "2 of 5 members rise above the surface", "member 4, by 9 m", "lw.events.Surface()")
+    known = Heights(scene(events=[{"type": "surface"}]), np.zeros(5))
+    known.look(np.full((1, 5), -9.0), np.array([1]))
+    assert known.added(*none) is not None
+    assert not known.added(*none)[0].any()
+    assert above_surface(none[0], none[2]) == ()
+
+
+def in_waves(depth, **sections):
+    sea = {"type": "waves", "amplitudes": [0.5], "periods": [8.0], "headings_deg": [0.0]}
+    return scene(start={"position": [0.0, 0.0, depth]}, terms=[sea, *sections.pop("terms", [])], **sections)
+
+
+def test_a_start_within_a_hull_length_of_the_surface_in_waves_is_said():
+    """The length is that of the shape, of the strips, or of a spheroid of this mass and inertia: 1.41 m."""
+    length = math.sqrt(20.0 * 3.0 / 30.0)
+    assert said(in_waves(1.001 * length)) == ()
+    (text,) = said(in_waves(0.999 * length))
+    says(text, "start.position", "one hull length, 1.41 m")
+    assert said(in_waves(1.61, terms=[HULL])) == ()
+    assert len(said(in_waves(1.59, terms=[HULL]))) == 1
+    (text,) = said(lw.Ensemble(in_waves(9.0), 50, 1, {"start.position[2]": Uniform(low=0.0, high=2.0 * length)}))
+    assert " of 50 members; first: member " in text
+    assert said(in_waves(0.5, events=[{"type": "surface"}])) == ()
+    assert said(in_waves(0.5, terms=[{"type": "surface_buoyancy", "heights": 0.2}])) == ()
+    (text,) = said(in_waves(-0.5))
+    assert "above the surface" in text
+
+
+@pytest.mark.parametrize(
+    ("event", "by"),
+    [
+        ({"type": "floor", "depth": 20.0}, 5.0),
+        ({"type": "floor", "depth": [[20.0, 40.0], [20.0, 40.0]], "spacing": [10.0, 10.0], "clearance": 1.0}, 6.0),
+        ({"type": "surface", "depth": 26.0}, 1.0),
+        ({"type": "box", "lower": [-9.0, -9.0, 0.0], "upper": [9.0, 9.0, 22.0]}, 3.0),
+    ],
+)
+def test_a_start_beyond_an_event_is_said(event, by):
+    (text,) = said(scene(start={"position": [0.0, 0.0, 25.0]}, events=[event]))
+    says(text, event["type"], f"{by:g} m beyond")
+    assert said(scene(start={"position": [0.0, 0.0, 25.0]}, events=[{"type": "floor", "depth": 25.1}])) == ()
 
 
 def test_a_fast_member_is_found_beside_one_that_is_no_number():
     v = [[[1.0, 0, 0]] * 2, [[np.nan, 0, 0], [-18.0, 18.0, -18.0]]]
-    assert "31.18 m/s" in plausibility.on_the_way(scene(), samples(velocity=v)).messages(2)[0]
+    assert "31.18 m/s" in plausibility.on_the_way(samples(velocity=v)).messages(2)[0]
     v[1][1] = [-17.0, 17.0, -17.0]
-    assert plausibility.on_the_way(scene(), samples(velocity=v)).messages(2) == ()
+    assert plausibility.on_the_way(samples(velocity=v)).messages(2) == ()
 
 
 def test_of_very_many_samples_the_last_are_looked_at(monkeypatch):
     monkeypatch.setattr(plausibility, "MOST_SAMPLES", 5)
     v = [[[0.0, 0.0, 0.0]], [[50.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]]]
-    assert plausibility.on_the_way(scene(), samples(velocity=v)).messages(1) == ()
-    assert len(plausibility.on_the_way(scene(), samples(velocity=v[:2])).messages(1)) == 1
+    assert plausibility.on_the_way(samples(velocity=v)).messages(1) == ()
+    assert len(plausibility.on_the_way(samples(velocity=v[:2])).messages(1)) == 1
 
 
 @pytest.mark.kernel

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The known name that is nearest to a word, whatever its case; without NumPy, for the doors."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# Of the flags of a function's code: it takes any keyword.
+CO_VARKEYWORDS = 8
+# Fewest letters of a word that names are searched for.
+SHORTEST = 3
+# Names of arguments in other packages, and what they are called here.
+ELSEWHERE = {
+    "h": ("dt", "step", "stepsize", "step_size", "timestep", "time_step", "delta_t"),
+    "t1": ("duration", "end", "t_end", "t_final", "tf", "tmax", "t_max", "stop", "horizon"),
+    "members": ("n", "size", "count", "samples", "n_members", "n_samples"),
+    "fleet": ("ensemble", "scene"),
+    "of": ("quantity", "output", "outputs"),
+    "save": ("saveat", "save_at", "every"),
+}
+
+
+# A file may have the same fault in thousands of tables, of which few are told.
+@functools.lru_cache(maxsize=64)
+def nearest(word: str, names: tuple[str, ...]) -> str | None:
+    """Find the name that a word ends, that differs in case alone, that is spelt alike, or that has the word in it."""
+    import difflib  # loads slowly
+
+    folded = {name.casefold(): name for name in reversed(names)}
+    text = word.casefold()
+    found = [name for name in folded if name.endswith(f".{text}")] or [name for name in folded if name == text]
+    found = found or difflib.get_close_matches(text, folded, n=1, cutoff=0.6)
+    found = found or [name for name in folded if len(text) >= SHORTEST and text in name]
+    return folded[found[0]] if found else None
+
+
+def near_names(*takers: Callable[..., Any]) -> Callable[[F], F]:
+    """Decorate a function so that it refuses an unknown keyword with the nearest known one.
+
+    takers: Functions that its `**settings` go to.
+    """
+
+    def decorate(call: F) -> F:
+        names = arguments_of(call, *takers)
+        if names is None:
+            return call
+        known = frozenset(names)
+
+        @functools.wraps(call)
+        def wrapper(*args: Any, **settings: Any) -> Any:
+            if not known.issuperset(settings):
+                refuse_argument(call.__qualname__, next(name for name in settings if name not in known), names)
+            return call(*args, **settings)
+
+        return wrapper  # type: ignore[return-value]
+
+    return decorate
+
+
+def arguments_of(*functions: Any) -> tuple[str, ...] | None:
+    """The keywords of functions, the first of which hands its own `**settings` on; None where the last takes any."""
+    names = dict[str, None]()
+    for function in functions:
+        while hasattr(function, "__wrapped__"):
+            function = function.__wrapped__
+        code = function.__code__
+        names |= dict.fromkeys(code.co_varnames[code.co_posonlyargcount : code.co_argcount + code.co_kwonlyargcount])
+    any_word = code.co_flags & CO_VARKEYWORDS
+    return None if any_word else tuple(name for name in names if name not in {"self", "cls"})
+
+
+def refuse_argument(function: str, word: str, names: tuple[str, ...]) -> None:
+    """Raise the TypeError of an unknown keyword."""
+    meant = next((name for name in names if word.casefold() in ELSEWHERE.get(name, ())), None) or nearest(word, names)
+    remedy = f"did you mean {meant!r}?" if meant else f"known: {', '.join(names)}"
+    raise TypeError(f"{function}() got an unexpected keyword argument {word!r}; {remedy}")

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The heights of members above the mean surface, in scenes that have no term or event for it.
+
+Depths are looked at in samples, at the end of a run and, in waves, between launches: the kernel has no code for it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.status import Warnings
+from lgvi_warp.engine.states import into
+from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.scene.plausibility import LIMITS, ends_at_the_surface, floats
+
+# Looks in a period of the highest wave, and fewest steps between two of them.
+LOOKS, FEWEST = 8.0, 8
+
+
+def steps_between_looks(scene: SceneLike, h: float) -> int | None:
+    """Steps of h [s] between two looks at the depth in waves; None where no waves are, or the surface is known."""
+    seas = [term for term in scene.terms if term.type == "waves" and np.any(term.amplitudes)]
+    if not seas or ends_at_the_surface(scene) or floats(scene):
+        return None
+    period = min(float(np.ravel(sea.periods)[np.argmax(np.ravel(sea.amplitudes))]) for sea in seas)
+    return max(FEWEST, int(period / LOOKS / h))
+
+
+class Heights:
+    """The greatest height of each member above the surface so far [m], and the steps made when it first was too high."""
+
+    def __init__(self, scene: SceneLike, depth: np.ndarray):
+        self._open = not (ends_at_the_surface(scene) or floats(scene))
+        self._limit = LIMITS["height"].value
+        # Of a start above the surface a message of its own tells.
+        self._above = depth < 0.0
+        self._height, self._step = np.full(len(depth), -np.inf), np.zeros(len(depth), np.int64)
+
+    def look(self, depth: np.ndarray, steps: np.ndarray) -> None:
+        """Look at depths (k, m) [m] after so many steps (k,); most often a comparison of the least suffices."""
+        if not self._open or depth.size == 0 or depth.min() >= -self._limit:
+            return
+        high = (depth < -self._limit) & ~self._above
+        first = high.any(axis=0) & (self._height <= self._limit)
+        self._step = np.where(first, steps[high.argmax(axis=0)], self._step)
+        self._height = np.fmax(self._height, np.where(self._above, -np.inf, -np.fmin.reduce(depth, axis=0)))
+
+    def added(self, bits: np.ndarray, step: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Add the warning, the most serious one, of members that rose too high; arrays (m,) each, as of `Warnings`."""
+        high = self._height > self._limit
+        if not high.any():
+            return bits, step, value
+        warned = bits | np.uint16(Warnings.ABOVE_SURFACE) * high
+        return warned, np.where(high, self._step, step), np.where(high, self._height, value)
+
+    def left(self) -> np.ndarray:
+        """Rows (m, 3) from which a run goes on exactly; none where no member was above the surface."""
+        rows = np.stack([np.maximum(self._height, 0.0), self._step, self._above], axis=1)
+        return rows if rows.any() else rows[:0]
+
+    def take(self, rows: np.ndarray | None) -> None:
+        """Go on from what another run left; None: nothing."""
+        count = len(self._above)
+        self._height, self._step, above = np.zeros((3, count)) if rows is None else rows.T
+        self._above = above != 0.0
+
+
+def of_states(packets: Any) -> np.ndarray:
+    """The depths (1, m) [m] of the user's origin, by the states between two launches."""
+    lanes, frame = packets.state_lanes.view[:, 6:12, : packets.plan.spec.width], packets.frame
+    rows = lanes.transpose(0, 2, 1).reshape(-1, 6)[: packets.members.count]
+    depth = rows[:, 5]
+    if frame.shifted:
+        depth = depth - np.einsum(
+            "nj,nj->n", rows[:, :3], np.broadcast_to(into(frame.Q, frame.origin), rows[:, :3].shape)
+        )
+    return np.asarray(depth[None])

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is unknown is refused with the nearest known name: methods, vehicles, keywords of functions, public names."""
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.common.near import nearest
+from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
+from tests.support.refusals import says
+
+SCENE = lw.Scene.named("sphere")
+
+
+@pytest.mark.parametrize(
+    ("word", "names", "found"),
+    [
+        ("RK4", ("psi_s", "rk4", "rk8"), "rk4"),
+        ("current", ("Current", "CurrentField", "Drag"), "Current"),
+        ("PID", ("HeadingPID", "PosePID", "LQR"), "PosePID"),
+        ("track", ("summary", "Some_tracks_of_all"), "Some_tracks_of_all"),
+        ("kp", ("heading_pid.kp", "depth_pid.ki"), "heading_pid.kp"),
+        ("xyz", ("mass", "inertia"), None),
+        ("", ("mass",), None),
+    ],
+)
+def test_the_nearest_name_whatever_its_case(word, names, found):
+    assert nearest(word, names) == found
+
+
+def test_names_in_another_case():
+    for call, name in (
+        (lambda: lw.Method("RK4"), "rk4"),
+        (lambda: lw.solve(SCENE, "Psi_S", h=0.1, t1=0.1), "psi_s"),
+        (lambda: lw.Scene.named("REMUS_100"), "remus_100"),
+        (lambda: lw.Scene.from_dict({"vehicle": {"Mass": 3.0}}), "mass"),
+    ):
+        with pytest.raises(lw.SceneError, match=f"did you mean '{name}'"):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("door", "word", "name"),
+    [("terms", "current", "Current"), ("control", "PID", "PosePID"), ("events", "floor", "Floor"),
+     ("distributions", "normal", "Normal"), ("statistics", "mean", "Mean"), ("designs", "sobol", "Sobol"),
+     ("metrics", "overshoot", "Overshoot"), ("", "sovle", "solve"), ("", "ensemble", "Ensemble")],
+)  # fmt: skip
+def test_public_names_that_are_nearly_right(door, word, name):
+    module = getattr(lw, door) if door else lw
+    assert name in dir(module)
+    with pytest.raises(AttributeError, match=f"has no attribute '{word}'; did you mean '{name}'"):
+        getattr(module, word)
+    assert not hasattr(module, "__path_of_nothing__")
+
+
+# Functions that take settings of a run, and keywords of other packages with what they are here.
+FUNCTIONS = {
+    "solve": lw.solve, "prepare": lw.prepare, "predict": lw.predict, "sweep": lw.sweep, "rare_event": lw.rare_event,
+    "estimate": lw.estimate, "stability_map": lw.stability_map, "worst_case": lw.worst_case, "tune_gains": lw.tune_gains,
+    "derivatives": lw.derivatives, "margins": lw.linear.margins, "trim": lw.linear.trim, "linearize": lw.linear.linearize,
+}  # fmt: skip
+ELSEWHERE = {"dt": "h", "timestep": "h", "Metod": "method", "H": "h"}
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_unknown_keywords_name_the_nearest(name):
+    for word, known in ELSEWHERE.items():
+        told = rf"^{name}\(\) got an unexpected keyword argument '{word}'; did you mean '{known}'"
+        with pytest.raises(TypeError, match=told):
+            FUNCTIONS[name](SCENE, **{word: 0.1})
+    with pytest.raises(TypeError, match=r"known: .*\bh\b"):
+        FUNCTIONS[name](SCENE, **{"zzz": 0.1})
+
+
+def test_a_float_that_is_whole_is_refused_with_the_number_to_write():
+    for call, key in (
+        (lambda: lw.Ensemble(SCENE, members=1e4), "ensemble.members"),
+        (lambda: lw.solve(SCENE, h=0.1, t1=0.1, threads=1e4), "threads"),
+        (lambda: lw.designs.LatinHypercube(group=1e4), "group"),
+        (lambda: lw.statistics.Histogram("depth", bins=1e4, limits=(0.0, 1.0)), "bins"),
+    ):
+        with pytest.raises(lw.SceneError) as refused:
+            call()
+        says(str(refused.value), key, "whole number", "write 10000")
+    with pytest.raises(lw.SceneError, match="give 1 or more"):
+        lw.Ensemble(SCENE, members=1.5)
+
+
+def test_drawn_numbers_are_shown_by_their_names():
+    fleet = lw.Ensemble(SCENE, 5, 1, {"vehicle.buoyancy": lw.distributions.Normal(std=0.1)})
+    drawn = DrawnParameters(fleet, 5)
+    assert repr(drawn) == f"DrawnParameters of 5 members: {', '.join(drawn)}"
+    assert "vehicle.buoyancy" in repr(drawn)
+    assert repr(DrawnStarts(fleet, 5)) == "DrawnStarts of 5 members: none"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Self
 
 from lgvi_warp.common import summaries
@@ -104,7 +104,7 @@ class Estimated(Summarized, Saved):
         return "\n".join(f"{label:<{width}}  {text}" for label, (_, text) in zip(labels, rows, strict=True))
 
     def to_dict(self) -> dict[str, Any]:
-        names = [name for name in self.__dataclass_fields__ if name not in ("provenance", "settings")]
+        names = [item.name for item in fields(self) if item.name not in ("provenance", "settings")]
         content = {name: getattr(self, name) for name in names} | {"members": dict(self.members)}
         return dict(finite_or_none(content | {"rivals": dict(self.rivals), "recipe": dict(self.recipe)}))
 
@@ -113,12 +113,25 @@ class Estimated(Summarized, Saved):
         low, high = content["interval"]
         ends = (-math.inf if low is None else low, math.inf if high is None else high)
         settings = Setting.from_dict(content["recipe"]["setting"]).options()
-        numbers = {name: with_missing_as(content[name], math.inf) for name in ("error", "sampling_error", "plain_seconds")}
+        numbers = {
+            name: with_missing_as(content[name], math.inf) for name in ("error", "sampling_error", "plain_seconds")
+        }
         more = {"interval": ends, "bias_interval": tuple(with_missing_as(content["bias_interval"], math.inf))}
         return cls(**content | numbers | more | {"messages": tuple(content["messages"]), "settings": settings})
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        names = ("of", "unit", "value", "error", "sampling_error", "bias", "setting", "reference", "estimator", "seconds")
+        names = (
+            "of",
+            "unit",
+            "value",
+            "error",
+            "sampling_error",
+            "bias",
+            "setting",
+            "reference",
+            "estimator",
+            "seconds",
+        )
         low, high = self.interval
         yield {name: getattr(self, name) for name in names[:3]} | {"low": low, "high": high} | {
             name: getattr(self, name) for name in names[3:]} | {"members": sum(self.members.values())}  # fmt: skip

@@ -48,7 +48,9 @@ def answered(
     chosen = setting_of(pilot, ladders, fixed, own)
     report(0.1)
     if constant(pilot, chosen.setting):
-        return told(pilot, chosen, [], [], None, one_run(pilot.runs, chosen.setting, pilot.grid(chosen.setting)), own, content)
+        return told(
+            pilot, chosen, [], [], None, one_run(pilot.runs, chosen.setting, pilot.grid(chosen.setting)), own, content
+        )
     while True:
         top = chosen.setting
         seen = looked(pilot, chosen, coarser_than(pilot, chosen, coarse))
@@ -166,7 +168,7 @@ def levels_of(pilot: Pilot, seen: Observed, way: Way) -> list[Level]:
         coarse = seen.settings[way.chain[i + 1]] if i + 1 < len(way.chain) else None
         if coarse is None and pilot.target.tail < 1.0:
             # Fewer have none in the tail; the worst ones are skewed, and replicates have a 16th of them each.
-            members = max(members, pilot.first * (4 if pilot.target.kind == "cvar" else 1))
+            members = max(members, pilot.first * (4 if pilot.target.kind == "cvar" else 2))
         slope = way.slopes[i] if coarse is not None else 0.0
         name = f"estimate level {i} {way.kind}"
         levels.append(
@@ -256,7 +258,7 @@ def told(
     if found is None:
         messages.append("nothing varies and no noise acts: one run is the answer, with its bias alone")
     if len(runs.strata) > 1:
-        messages.append(f"{len(runs.strata) - 1} rare branches of what is chosen are strata of their own")
+        messages.append(f"rare values of a Choice are sampled apart, as strata: {len(runs.strata) - 1}")
     variance_of_one = pilot.variance(top, pilot.first) if found else 0.0
     members = rounded("plain", variance_of_one / max(chosen.variance, 1e-300), 0) if found else 1
     recipe = {
@@ -302,7 +304,8 @@ def answer_of(
         low, high = between_members(target, levels, part, low, high, bias)
     return Estimated(
         of=runs.question.label, unit=runs.question.unit, value=part.value, interval=(low, high), error=recipe["error"],
-        sampling_error=math.sqrt(part.variance), bias=bias.value, bias_interval=(bias.value - bias.half, bias.value + bias.half),
+        sampling_error=math.sqrt(part.variance), bias=bias.value,
+        bias_interval=(bias.value - bias.half, bias.value + bias.half),
         setting=str(top), settings=top.options(), reference=recipe["reference"], estimator=recipe["estimator"],
         members=members or {str(top): 1}, seconds=runs.seconds,
         plain_seconds=recipe["plain_members"] * runs.measured_cost(top, recipe["grid"]), recipe=recipe,
@@ -313,9 +316,9 @@ def answer_of(
 def between_members(
     target: Sought, levels: Sequence[Level], part: MeanEstimate, low: float, high: float, bias: Bias
 ) -> tuple[float, float]:
-    """The interval of a quantile that few members are beyond: between those at the ends of its level's interval (Woodruff 1952).
+    """The interval of a quantile that few members are beyond: between the quantiles at the ends of its level's interval.
 
-    As `lw.statistics.Quantiles` has it. Without an end where less than one member is beyond.
+    docs/theory/estimators.md, (E12). As `lw.statistics.Quantiles` has it. Without an end where less than one member is beyond.
     """
     samples = samples_of(levels)
     level, at = target.level, target.solved(samples)

@@ -131,9 +131,7 @@ def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: floa
     return Way(kind, chain, tuple(slopes), members, seconds, left)
 
 
-def _spread(
-    seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float, reach: float = 0.0
-) -> VarianceModel:
+def _spread(seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float, reach: float = 0.0) -> VarianceModel:
     least = abs(weight) * seen.least
     if kind == "sobol":
         model = spread_of_replicates(z, cost, least)

@@ -28,7 +28,7 @@ from lgvi_warp.scene.settings import EnsembleSettings
 from lgvi_warp.studies.estimating import answering
 from lgvi_warp.studies.estimating.answer import Estimated
 from lgvi_warp.studies.estimating.choice import ESTIMATORS
-from lgvi_warp.studies.estimating.levels import Runs, Setting
+from lgvi_warp.studies.estimating.levels import Level, Runs, Setting
 from lgvi_warp.studies.estimating.pilot import Pilot
 from lgvi_warp.studies.estimating.question import Question, question_of
 from lgvi_warp.studies.ladders import SHORT
@@ -133,15 +133,15 @@ def estimate(
     faults.raise_if_any()
     assert question is not None
     whole = drawn(ensemble_of(fleet))
+    fleets = [whole, *cheaper_fleets(whole, cheaper)]
+    if recipe is not None:
+        seed, t1 = recipe_of(recipe, question, len(fleets))
     t1 = whole.scene.run.duration if t1 is None else t1
     if t1 is None:
         raise refusal("t1", t1, "is missing", "give the end in seconds: t1=150.0 or [run] duration")
     faults.positive("t1", t1)
     faults.raise_if_any()
     seed = whole.seed if seed is None else int(EnsembleSettings(1, seed).seed)
-    fleets = [whole, *cheaper_fleets(whole, cheaper)]
-    if recipe is not None:
-        seed, t1 = recipe_of(recipe, question, len(fleets))
     clock = time.process_time if executor == "threads" else time.perf_counter
     execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
     runs = Runs(fleets, question, float(t1), seed=seed, execution=execution, clock=clock)
@@ -170,11 +170,25 @@ def recipe_of(recipe: Mapping[str, Any], question: Question, scenes: int) -> tup
     remedy = "give found.recipe of an answer to the same question"
     try:
         seed, t1, label = int(recipe["seed"]), float(recipe["t1"]), recipe["of"]
-        most = max((each[name]["scene"] for each in recipe["levels"] for name in ("fine", "coarse") if each[name]), default=0)
-    except (KeyError, TypeError, ValueError, AttributeError):
+        levels = [Level.from_dict(each) for each in recipe["levels"]]
+        settings = [
+            Setting.from_dict(recipe["setting"]),
+            *(s for each in levels for s in (each.fine, each.coarse) if s),
+        ]
+        counts = [
+            n for share, row in recipe["rounds"] for n in row if len(row) == len(levels) and share >= 0.0 and n >= 0
+        ]
+        if len(counts) != len(levels) * len(recipe["rounds"]) or sum(counts) > answering.MOST:
+            raise ValueError("rounds")
+        most = max(each.scene for each in settings)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, SceneError):
+            raise
         raise refusal("recipe", recipe, "is no recipe of an answer", remedy) from None
     if label != question.label or most >= scenes:
-        raise refusal("recipe", label, f"is of another question than {question.label}, or of more cheaper scenes", remedy)
+        raise refusal(
+            "recipe", label, f"is of another question than {question.label}, or of more cheaper scenes", remedy
+        )
     return seed, t1
 
 

@@ -164,12 +164,12 @@ def best_numbers(spreads: Sequence[VarianceModel], variance: float) -> np.ndarra
     if not unseen.any() or not variance > 0.0:
         return numbers
     numbers = np.maximum(numbers, unseen * math.sqrt(len(spreads) / (UNSEEN_SHARE * variance)))
-    low, high = 0.0, 1.0
+    low, high = 0.5, 2.0
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        reached = sum(each.at(n * (1.0 + middle)) for each, n in zip(spreads, numbers, strict=True)) <= variance
+        reached = sum(each.at(n * middle) for each, n in zip(spreads, numbers, strict=True)) <= variance
         low, high = (low, middle) if reached else (middle, high)
-    return np.asarray(numbers * (1.0 + high))
+    return np.asarray(numbers * high)
 
 
 def numbers_without_unseen(spreads: Sequence[VarianceModel], variance: float) -> np.ndarray:
@@ -201,9 +201,9 @@ def numbers_without_unseen(spreads: Sequence[VarianceModel], variance: float) ->
 def tail_index(y: np.ndarray, part: int = 32) -> float:
     """The exponent by which the largest distances from the median fall off; below 2 the variance is infinite.
 
-    Of the largest 32nd of the members, or another part, at least 16: where a power law holds, i log(y_i / y_i+1) of the i-th
-    largest are exponential with its inverse as mean (Renyi 1953). Their median does not see the gaps between clusters, as members
-    that stopped leave them. Infinite where these are all alike, or where members are too few.
+    Of the largest 32nd of the members, or another part, at least 16. Where a power law holds, i log(y_i / y_i+1) of the i-th
+    largest are exponential, with its inverse as mean (Renyi 1953). Their median does not see the gaps between clusters, as
+    members that stopped leave them. Infinite where these are all alike, or where members are too few.
     """
     far = np.sort(np.abs(y - np.median(y)))[::-1]
     k = max(16, len(y) // part)

@@ -14,9 +14,9 @@ import numpy as np
 from lgvi_warp.calls.prepared import Prepared, prepare
 from lgvi_warp.common import machine
 from lgvi_warp.common.random import generator
+from lgvi_warp.methods.method import Method
 from lgvi_warp.sampling.designs.sequences import SOBOL_BITS, sobol_points
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.methods.method import Method
 from lgvi_warp.studies.comparison import drawn_every
 from lgvi_warp.studies.estimating.estimators import REPLICATES, MeanEstimate, plain, regressed, replicated, together
 from lgvi_warp.studies.estimating.question import Question
@@ -112,7 +112,7 @@ class Runs:
     def __call__(
         self, setting: Setting, grid: float | None, points: np.ndarray, indices: np.ndarray, stratum: int = 0
     ) -> np.ndarray:
-        """The numbers of members (n,) at points (n, d) of a stratum, with the noise of these indices; NaN for those that failed."""
+        """The numbers of members (n,) at points (n, d) of a stratum, with noise of these indices; NaN where they failed."""
         run, n = self.prepared(setting, grid), len(points)
         groups, points = [], self.strata[stratum].placed(points)
         self.counted += CALL + n * self.cost(setting, grid)

@@ -39,8 +39,8 @@ STALLED = 0.8
 # Conditions and quantiles are smoothed over this part of the numbers' spread to see how a step changes them.
 WIDTH = 0.2
 # A tail that falls off by a smaller power has no finite variance, with what is known of so many members; where it seems so,
-# so many more show whether it falls off faster farther out, in the largest 128th.
-HEAVY, KNOWN, SURE, FARTHER = 1.5, 256, 4096, 128
+# so many show whether it falls off faster farther out, in smaller parts of the largest.
+HEAVY, KNOWN, SURE, PARTS = 1.5, 256, 16384, (32, 128, 512)
 # Hits that a probability needs before its spread is known.
 HITS = 4
 
@@ -178,7 +178,7 @@ class Pilot:
         if self.target.kind not in ("mean", "cvar") or len(y) < KNOWN or tail_index(y) >= HEAVY:
             return
         y = self.y(setting, self.grid(setting), max(len(y), SURE)) if len(y) < SURE else y
-        index = max(tail_index(y), tail_index(y, FARTHER))
+        index = max(tail_index(y, part) for part in PARTS)
         if not index < HEAVY:
             return
         problem = (

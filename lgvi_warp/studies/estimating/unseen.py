@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.random import generator
 from lgvi_warp.sampling.distributions.basic import Choice, floats
+from lgvi_warp.scene.columns import as_given
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies.estimating.estimators import fitted
 
@@ -44,9 +45,8 @@ class Stratum:
 def strata_of(fleet: Ensemble) -> list[Stratum]:
     """The common part of the cube first; then one stratum for each rare branch of a Choice, the others before it common."""
     rest, common, found = 1.0, dict[int, tuple[np.ndarray, np.ndarray]](), list[Stratum]()
-    keys = [key for key, size in zip(fleet.space.keys, fleet.space.sizes, strict=True) for _ in range(size)]
-    for column, key in enumerate(keys):
-        law = fleet.vary.get(key)
+    laws = [variation.distribution for variation in as_given(fleet) for _ in range(variation.size)]
+    for column, law in enumerate(laws):
         if not isinstance(law, Choice):
             continue
         starts, widths, branch = branches(law)

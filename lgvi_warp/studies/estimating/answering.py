@@ -219,6 +219,7 @@ def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[list[
         counts = [level.more(share) if grows else 0 for level, grows in zip(levels, much, strict=True)]
         at, part = grown(runs, target, levels, (share, counts), part)
         rounds.append((share, counts))
+        pilot.check_tail(chosen.setting, np.concatenate(levels[0].y))
     return rounds, part
 
 

@@ -52,7 +52,7 @@ class Content:
 
 # Study -> name of the public class of what it found.
 CLASSES = {"tradeoff": "Tradeoff", "stability": "StabilityMap", "rare": "RareEvent", "derivatives": "Derivatives",
-           "worst_case": "WorstCase"}  # fmt: skip
+           "worst_case": "WorstCase", "estimate": "Estimated", "assimilate": "Assimilated", "tune_gains": "Tuned"}  # fmt: skip
 
 
 def _study(kind: str) -> Any:
@@ -65,6 +65,10 @@ def _study(kind: str) -> Any:
         from lgvi_warp.studies.linear.margins import Margins
 
         return Margins
+    if kind == "trim":
+        from lgvi_warp.studies.linear.trim import Trim
+
+        return Trim
     from lgvi_warp import studies
 
     return getattr(studies, CLASSES[kind])

@@ -78,8 +78,11 @@ def estimate_arguments(verb: Any) -> None:
         "place of the mean")  # fmt: skip
     add("--cheaper", metavar="KEY=VALUE", action="append", default=[], help="a number whose scene costs less and behaves "
         "alike, as controller.delay=0.0; may be given several times")  # fmt: skip
-    add_shared(verb, "--duration --method --step --dtype --seed --threads --set", method="fixes the method",
-               step="fixes the step [s]", dtype="fixes the precision", seed="seed of points and noise")  # fmt: skip
+    add("--heavy-tail", action="store_true", help="tell a mean all the same whose variance seems to be infinite")
+    add("--recipe", metavar="FILE", help="run the members of an answer again: its estimate.json")
+    add_shared(verb, "--out --duration --method --step --dtype --seed --threads --set", method="fixes the method",
+               step="fixes the step [s]", dtype="fixes the precision", seed="seed of points and noise",
+               out="folder for estimate.json, .csv and .txt, replaced if they exist (default: none is written)")  # fmt: skip
 
 
 @as_verb(
@@ -93,6 +96,10 @@ def estimate(chosen: argparse.Namespace, *, study: Part = None) -> int:
 
     Returns: The exit code, 0.
     """
+    recipe = None
+    if chosen.recipe is not None:
+        content = file_json(chosen.recipe)
+        recipe = content.get("recipe", content) if isinstance(content, dict) else content
     risk, cheaper = _risk(chosen.risk), [_number_of(text) for text in chosen.cheaper]
     scene = load_scene(chosen)
     from lgvi_warp.studies.estimating.estimate import estimate as answer
@@ -104,8 +111,10 @@ def estimate(chosen: argparse.Namespace, *, study: Part = None) -> int:
     with progress_bar(chosen.quiet) as progress:
         found = (study or answer)(
             scene, chosen.of, chosen.error, relative_error=chosen.relative_error, risk=risk, cheaper=cheaper,
-            threads=chosen.threads, progress=progress, **fixed,
+            threads=chosen.threads, progress=progress, recipe=recipe, heavy_tail=chosen.heavy_tail, **fixed,
         )  # fmt: skip
+    if chosen.out is not None:
+        return finish(Written(found.save(folder(chosen))), chosen, {"estimate": found.to_dict()}, str(found))
     tell(chosen, found.to_dict, lambda: str(found))
     return 0
 

@@ -30,6 +30,10 @@ STUDY_FILES = {
     "derivatives": "derivatives.json",
     "margins": "margins.json",
     "worst_case": "worst_case.json",
+    "estimate": "estimate.json",
+    "assimilate": "assimilate.json",
+    "tune_gains": "tune_gains.json",
+    "trim": "trim.json",
 }
 
 

@@ -201,7 +201,7 @@ def test_refusals():
     says(ask(risk="large"), "is no risk")
     says(ask("position[2] above 425", risk=0.5), "leave it out")
     says(ask(lambda result: 1.0 / (result.position[-1, :, 2] - 422.0), 0.01), "has no finite variance", "risk=0.5")
-    says(ask("position[2] above 900", None, relative_error=0.1), "lw.rare_event", "1,024 members")
+    says(ask("position[2] above 900", None, relative_error=0.1), "lw.rare_event", "65,536 members")
     says(ask(lambda result: 0.0 * result.position[-1, :, 2], None, relative_error=0.1), "which is 0", "give error=")
     says(ask(error=1e-9), "would take", "give a larger one")
     says(ask(error=1e-300), "would take", "give a larger one")

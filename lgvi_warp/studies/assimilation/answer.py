@@ -3,20 +3,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+import base64
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from lgvi_warp.common import summaries
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.sampling.designs.table import Table
-from lgvi_warp.sampling.final import Final
+from lgvi_warp.sampling.final import NUMBERS, Final
+from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Assimilated(Summarized):
+class Assimilated(Summarized, Saved):
     """Members that followed what was measured, after each measurement.
 
     Attributes:
@@ -35,6 +37,8 @@ class Assimilated(Summarized):
         messages: What the user should know.
         provenance: Scene, ensemble, settings, versions and machine.
     """
+
+    study: ClassVar[str] = "assimilate"
 
     time: np.ndarray
     mean: Mapping[str, np.ndarray]
@@ -61,6 +65,36 @@ class Assimilated(Summarized):
         rows += [("message", text) for text in self.messages]
         return f"Assimilation of {len(self.time):,} times to {self.time[-1]:g} s", rows
 
+    def to_dict(self) -> dict[str, Any]:
+        content = {item.name: getattr(self, item.name) for item in fields(self)}
+        ends = {name: getattr(self.final, name) for name in NUMBERS}
+        arrays = [self.final.to_arrays(), self.final.parameters]
+        ends["arrays"], ends["parameters"] = ({name: _packed(rows) for name, rows in each.items()} for each in arrays)
+        return dict(finite_or_none({**content, "final": ends}))
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        ends, read = content["final"], dict[str, Any](content)
+        arrays, parameters = (
+            {name: _unpacked(rows) for name, rows in ends[key].items()} for key in ("arrays", "parameters")
+        )
+        for item in fields(cls):
+            if item.type == "np.ndarray":
+                read[item.name] = _array(content[item.name])
+            elif item.type == "Mapping[str, np.ndarray]":
+                read[item.name] = {name: _array(rows) for name, rows in content[item.name].items()}
+        read["final"] = Final.from_arrays(arrays, ends, parameters)
+        return cls(**read | {"messages": tuple(content["messages"])})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        kinds = {"mean": self.mean, "std": self.std, "innovation": self.innovations}
+        columns = {f"{kind} {name}": np.asarray(rows).reshape(len(self.time), -1)
+                   for kind, each in kinds.items() for name, rows in each.items()}  # fmt: skip
+        for k, time in enumerate(self.time):
+            entries = {f"{name}[{i}]" if rows.shape[1] > 1 else name: float(value)
+                       for name, rows in columns.items() for i, value in enumerate(rows[k])}  # fmt: skip
+            yield {"time": float(time), "effective": float(self.effective[k])} | entries
+
     def consistency(self) -> dict[str, float]:
         """Compare innovations with their spread.
 
@@ -85,3 +119,21 @@ class Assimilated(Summarized):
 def _text(values: Any) -> str:
     """A few numbers, to four digits."""
     return ", ".join(f"{value:.4g}" for value in np.atleast_1d(values).ravel())
+
+
+def _array(values: Any) -> np.ndarray:
+    """Numbers of a file, NaN where they were not finite."""
+    return np.array(with_missing_as(values, np.nan), np.float64)
+
+
+def _packed(rows: np.ndarray) -> dict[str, Any]:
+    """An array to the bit, as texts: a run that goes on needs it so."""
+    rows = np.ascontiguousarray(rows)
+    return {"dtype": rows.dtype.str, "shape": list(rows.shape), "base64": base64.b64encode(rows.tobytes()).decode()}
+
+
+def _unpacked(content: Mapping[str, Any]) -> np.ndarray:
+    dtype = np.dtype(content["dtype"])
+    if dtype.kind not in "fiub":
+        raise ValueError(f"{dtype} are no numbers")
+    return np.frombuffer(base64.b64decode(content["base64"]), dtype).reshape(content["shape"]).copy()

@@ -4,16 +4,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
 
 from lgvi_warp.common import summaries
 from lgvi_warp.common.summaries import Summarized
+from lgvi_warp.studies.estimating.levels import Setting
+from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
 
 
 @dataclass(frozen=True, repr=False)
-class Estimated(Summarized):
+class Estimated(Summarized, Saved):
     """A statistic with its interval, made by `lw.estimate`.
 
     Attributes:
@@ -36,8 +38,13 @@ class Estimated(Summarized):
         own_seconds: the same at the scene's own step; None where it has none.
         rivals: estimator -> how many times less than plain Monte Carlo it was predicted to cost, in that setting.
         messages: notes for the user.
+        recipe: what it takes to run the same members again, to the bit, as lw.estimate(fleet, of, recipe=found.recipe): seed,
+            setting, estimator, and by level settings, slopes, strata and members.
         provenance: scene, ensemble, settings, versions and machine.
     """
+
+    study: ClassVar[str] = "estimate"
+    endings: ClassVar[tuple[str, ...]] = ("json", "csv", "txt")
 
     of: str
     unit: str
@@ -58,6 +65,7 @@ class Estimated(Summarized):
     own_seconds: float | None = None
     rivals: Mapping[str, float] = field(default_factory=dict)
     messages: tuple[str, ...] = ()
+    recipe: Mapping[str, Any] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -96,11 +104,37 @@ class Estimated(Summarized):
         return "\n".join(f"{label:<{width}}  {text}" for label, (_, text) in zip(labels, rows, strict=True))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything but the provenance, in a form that JSON holds."""
-        names = [name for name in self.__dataclass_fields__ if name not in ("provenance", "settings")]
-        content = {name: getattr(self, name) for name in names}
-        content |= {name: list(content[name]) for name in ("interval", "bias_interval", "messages")}
-        return content | {"members": dict(self.members), "rivals": dict(self.rivals)}
+        names = [item.name for item in fields(self) if item.name not in ("provenance", "settings")]
+        content = {name: getattr(self, name) for name in names} | {"members": dict(self.members)}
+        return dict(finite_or_none(content | {"rivals": dict(self.rivals), "recipe": dict(self.recipe)}))
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        low, high = content["interval"]
+        ends = (-math.inf if low is None else low, math.inf if high is None else high)
+        settings = Setting.from_dict(content["recipe"]["setting"]).options()
+        numbers = {
+            name: with_missing_as(content[name], math.inf) for name in ("error", "sampling_error", "plain_seconds")
+        }
+        more = {"interval": ends, "bias_interval": tuple(with_missing_as(content["bias_interval"], math.inf))}
+        return cls(**content | numbers | more | {"messages": tuple(content["messages"]), "settings": settings})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        names = (
+            "of",
+            "unit",
+            "value",
+            "error",
+            "sampling_error",
+            "bias",
+            "setting",
+            "reference",
+            "estimator",
+            "seconds",
+        )
+        low, high = self.interval
+        yield {name: getattr(self, name) for name in names[:3]} | {"low": low, "high": high} | {
+            name: getattr(self, name) for name in names[3:]} | {"members": sum(self.members.values())}  # fmt: skip
 
 
 def _digits(value: float, half: float) -> int:

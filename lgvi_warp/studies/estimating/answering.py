@@ -15,12 +15,12 @@ from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.studies.estimating import bias as biases
 from lgvi_warp.studies.estimating.answer import Estimated
 from lgvi_warp.studies.estimating.bias import Bias
-from lgvi_warp.studies.estimating.choice import ROOM, Observed, Way, candidates, gains
+from lgvi_warp.studies.estimating.choice import ROOM, Observed, Way, candidates, gains, rounded
 from lgvi_warp.studies.estimating.chosen import Chosen, coarser_than, constant, finer, setting_of
-from lgvi_warp.studies.estimating.estimators import MeanEstimate, plain
-from lgvi_warp.studies.estimating.levels import Level, Runs, Setting, estimated
-from lgvi_warp.studies.estimating.pilot import FEW, SHARE, STAGES, Pilot, failing, observed, refuse_heavy
-from lgvi_warp.studies.estimating.target import Solved
+from lgvi_warp.studies.estimating.estimators import MeanEstimate
+from lgvi_warp.studies.estimating.levels import Level, Runs, Setting, design, estimated, samples_of
+from lgvi_warp.studies.estimating.pilot import FEW, SHARE, STAGES, Pilot, failing, observed
+from lgvi_warp.studies.estimating.target import Solved, Sought, quantile_of
 
 # More members in the pilot pay where they cost at most this part of the run.
 WORTH = 0.3
@@ -32,12 +32,12 @@ LOOKS = (*STAGES[1:], 4 * STAGES[-1])
 WORTH_A_KERNEL = 0.5
 # Runs that add members where the error told is beyond the one asked for, and how many in those that there are.
 ROUNDS, MOST_MORE = 2, 3.0
-# Noise of the pilot has indices from 0, that of the levels from here on, so many for each.
-INDICES = 2**27
+# Noise of the pilot has indices from 0, that of the levels from here on, so many for each; of rare strata so many for each.
+INDICES, STRATUM_INDICES = 2**27, 2**21
 # Members of a level at most.
 MOST = 2**26
-# Members that tell the bias where a pilot is not worth its cost: this part of the run's, at least so many.
-PART, LEAST = 16, 16
+# Where fewer members are beyond a quantile, its interval is between order statistics.
+FAR = 30
 
 
 def answered(
@@ -48,7 +48,9 @@ def answered(
     chosen = setting_of(pilot, ladders, fixed, own)
     report(0.1)
     if constant(pilot, chosen.setting):
-        return told(pilot, chosen, [], None, None, own, content)
+        return told(
+            pilot, chosen, [], [], None, one_run(pilot.runs, chosen.setting, pilot.grid(chosen.setting)), own, content
+        )
     while True:
         top = chosen.setting
         seen = looked(pilot, chosen, coarser_than(pilot, chosen, coarse))
@@ -61,9 +63,9 @@ def answered(
         if chosen.place + 1 == len(chosen.ladder.settings):
             raise failing(top, np.concatenate(levels[0].y))
         chosen = finer(pilot, chosen)
-    solved, part = enough(pilot, chosen, levels)
+    rounds, part = enough(pilot, chosen, levels)
     report(1.0)
-    return told(pilot, chosen, levels, (seen, ways, pilot_seconds), (solved, part), own, content)
+    return told(pilot, chosen, levels, rounds, (ways, pilot_seconds), part, own, content)
 
 
 def tried(
@@ -88,20 +90,17 @@ def tried(
 def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed:
     """What the settings have in common, of as many members as are worth their cost."""
     top, variance, only = chosen.setting, chosen.variance, pilot.estimator
-    few = only is None and pilot.plain_members(top, pilot.first) <= FEW
+    few = only is None and pilot.plain_members(top, pilot.first, unseen=True) <= FEW
     seen = observed(pilot, top, [] if few else in_single(pilot, top, coarser), pilot.first)
     seen = with_coarsest(pilot, seen, variance)
     if only is None and chosen.ladder.end == "apart" and gains(candidates(seen, variance)).get("sobol", 1.0) < CLEAR:
         return replace(seen, normals=seen.normals[:, :0])
-    if pilot.settled and only is not None and not only.startswith("levels"):
-        few = LOOKS[0] > SHARE * pilot.plain_members(top, pilot.first)
-        return seen if few else observed(pilot, top, [], LOOKS[0])
     for members in LOOKS:
         best = candidates(seen, variance, only)[0]
         kept = worth_more(seen, variance, only)
         more = 0.75 * members * sum(seen.costs[seen.settings.index(setting)] for setting in (top, *kept))
         more += (1 + len(kept)) * seen.call
-        within_share = pilot.runs.seconds + more <= pilot.most_seconds(top, pilot.first)
+        within_share = pilot.runs.counted + more <= pilot.most_seconds(top, pilot.first)
         if few or more > (WORTH if within_share else SHARE) * best.seconds:
             break
         seen = with_coarsest(pilot, observed(pilot, top, kept, members), variance)
@@ -160,7 +159,7 @@ def without(seen: Observed, failed: Setting) -> Observed:
 
 def levels_of(pilot: Pilot, seen: Observed, way: Way) -> list[Level]:
     """The levels of a way, each with points and noise of its own."""
-    levels, weight = [], 1.0
+    levels, weight = list[Level](), seen.weight
     for i, (place, members) in enumerate(zip(way.chain, way.members, strict=True)):
         if members > MOST:
             problem = f"would take {members:,} members and {way.seconds:.2g} s by the best way"
@@ -169,13 +168,20 @@ def levels_of(pilot: Pilot, seen: Observed, way: Way) -> list[Level]:
         coarse = seen.settings[way.chain[i + 1]] if i + 1 < len(way.chain) else None
         if coarse is None and pilot.target.tail < 1.0:
             # Fewer have none in the tail; the worst ones are skewed, and replicates have a 16th of them each.
-            members = max(members, pilot.first * (4 if pilot.target.kind == "cvar" else 1))
+            members = max(members, pilot.first * (4 if pilot.target.kind == "cvar" else 2))
         slope = way.slopes[i] if coarse is not None else 0.0
         name = f"estimate level {i} {way.kind}"
         levels.append(
-            Level(top, coarse, slope, weight, pilot.grid(top), way.kind, members, (i + 1) * INDICES, f"{name} {top}")
-        )
+            Level(top, coarse, slope, weight, pilot.grid(top), way.kind, members, (i + 1) * INDICES, f"{name} {top}",
+                  seen.reach if coarse is None else 0.0)
+        )  # fmt: skip
         weight *= slope
+    top, first = seen.settings[way.chain[0]], (len(levels) + 1) * INDICES
+    for k, each in enumerate(pilot.runs.strata[1:], 1):
+        members = rounded(way.kind, levels[0].members * each.probability / seen.weight, pilot.runs.dimensions)
+        name = f"estimate stratum {k} {way.kind} {top}"
+        levels.append(Level(top, None, 0.0, each.probability, pilot.grid(top), way.kind, members,
+                            first + k * STRATUM_INDICES, name, stratum=k))  # fmt: skip
     return levels
 
 
@@ -183,76 +189,153 @@ def run(runs: Runs, levels: Sequence[Level], report: Callable[[float], None]) ->
     """Run the levels' members; the setting of which some failed, None for none."""
     for i, level in enumerate(levels):
         level.grow(runs, level.members)
-        for setting, numbers in ((level.fine, level.y), (level.coarse, level.below)):
-            if setting is not None and np.isnan(numbers[-1]).any():
-                return setting
+        if (failed := level.failed()) is not None:
+            return failed
         report((i + 1) / len(levels))
     return None
 
 
-def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[Solved, MeanEstimate]:
+# The members that a round of a run added to each level, and the share of all that these are.
+Round = tuple[float, list[int]]
+
+
+def enough(pilot: Pilot, chosen: Chosen, levels: Sequence[Level]) -> tuple[list[Round], MeanEstimate]:
     """The estimate; where its error is beyond the one asked for, with what it takes, up to four times the members, twice.
 
-    The variance is then at least what the first one lets expect of so many members, over as much again: a stop by chance
-    must not tell too small an error.
+    Levels grow that have most of the variance.
     """
-    if pilot.target.kind in ("mean", "cvar"):
-        refuse_heavy(pilot.runs.question.label, np.concatenate(levels[0].y))
-    solved, part = estimated(levels, pilot.target)
+    target, runs, kind = pilot.target, pilot.runs, levels[0].kind
+    pilot.check_tail(chosen.setting, np.concatenate(levels[0].y))
+    at, part = estimated(levels, target)
+    rounds = [(0.0, [level.members for level in levels])]
     allowed = max(chosen.error**2 - chosen.bias.mean_square, 0.25 * chosen.error**2)
     # A quantile's density, and how many are beyond it, on which the error stands, are known by the same members.
-    least = 1.0 if pilot.target.kind in ("quantile", "cvar") else 0.0
+    least = 1.0 if target.kind in ("quantile", "cvar") else 0.0
     for _ in range(ROUNDS):
         if part.variance <= allowed:
             break
-        before, share = part.variance, min(max(ROOM[levels[0].kind] * part.variance / allowed - 1.0, least), MOST_MORE)
-        for level in levels:
-            level.grow(pilot.runs, level.more(share))
-            if any(np.isnan(numbers[-1]).any() for numbers in (level.y, level.below) if numbers):
+        share = min(max(ROOM[kind] * part.variance / allowed - 1.0, least), MOST_MORE)
+        much = [level.part(target, at).variance > 0.5 * allowed / len(levels) for level in levels]
+        counts = [level.more(share) if grows else 0 for level, grows in zip(levels, much, strict=True)]
+        at, part = grown(runs, target, levels, (share, counts), part)
+        rounds.append((share, counts))
+        pilot.check_tail(chosen.setting, np.concatenate(levels[0].y))
+    return rounds, part
+
+
+def grown(
+    runs: Runs, target: Sought, levels: Sequence[Level], more: Round, before: MeanEstimate | None
+) -> tuple[Solved, MeanEstimate]:
+    """Add a round of members, and estimate anew.
+
+    The variance is then at least what the one before lets expect of so many members, over as much again: a stop by chance
+    must not tell too small an error.
+    """
+    share, counts = more
+    for level, count in zip(levels, counts, strict=True):
+        if count:
+            level.grow(runs, count)
+            if level.failed() is not None:
                 raise failing(level.fine, level.y[-1])
-        solved, part = estimated(levels, pilot.target)
-        part = replace(part, variance=max(part.variance, before / (1.0 + share) ** 2))
-    return solved, part
+    at, part = estimated(levels, target)
+    least = 0.0 if before is None else before.variance / (1.0 + share) ** 2
+    return at, replace(part, variance=max(part.variance, least))
+
+
+def one_run(runs: Runs, setting: Setting, grid: float | None) -> MeanEstimate:
+    """The number that all members have where nothing varies."""
+    y = runs(setting, grid, design(runs.seed, "estimate pilot", runs.dimensions, 0, 1), np.arange(1))
+    return MeanEstimate(float(y[0]), 0.0, math.inf)
 
 
 def told(
-    pilot: Pilot, chosen: Chosen, levels: Sequence[Level], found: tuple[Observed, Sequence[Way], float] | None,
-    reached: tuple[Solved, MeanEstimate] | None, own: Setting | None, content: Mapping[str, Any],
+    pilot: Pilot, chosen: Chosen, levels: Sequence[Level], rounds: Sequence[Round],
+    found: tuple[Sequence[Way], float] | None, part: MeanEstimate, own: Setting | None, content: Mapping[str, Any],
 ) -> Estimated:  # fmt: skip
     """The answer in full."""
-    top, target, runs = chosen.setting, pilot.target, pilot.runs
-    question, messages = runs.question, list(pilot.messages)
-    if reached is None or found is None:
-        y = pilot.y(top, pilot.grid(top), pilot.first)
-        part, name, members, rivals, pilot_seconds = (
-            MeanEstimate(float(y[0]), 0.0, math.inf),
-            "one run",
-            {str(top): 1},
-            {},
-            0.0,
-        )
-        variance_of_one = 0.0
+    top, runs = chosen.setting, pilot.runs
+    messages = list(pilot.messages)
+    ways, pilot_seconds = found or ((), 0.0)
+    if found is None:
         messages.append("nothing varies and no noise acts: one run is the answer, with its bias alone")
-    else:
-        seen, ways, pilot_seconds = found
-        part, name, rivals = reached[1], ways[0].name, gains(ways)
-        members = {str(level.fine) + (f" less {level.coarse}" if level.coarse else ""): sum(map(len, level.y))
-                   for level in levels}  # fmt: skip
-        variance_of_one = plain(seen.z[0], seen.least).variance * len(seen.z[0])
-    low, high = biases.interval(part.value, part.half_width(0.95), chosen.bias)
+    if len(runs.strata) > 1:
+        messages.append(f"rare values of a Choice are sampled apart, as strata: {len(runs.strata) - 1}")
+    variance_of_one = pilot.variance(top, pilot.first) if found else 0.0
+    members = rounded("plain", variance_of_one / max(chosen.variance, 1e-300), 0) if found else 1
+    recipe = {
+        "of": runs.question.label, "estimator": ways[0].name if found else "one run", "seed": runs.seed,
+        "t1": content["t1"], "error": chosen.error, "setting": top.to_dict(), "grid": pilot.grid(top),
+        "levels": [level.to_dict() for level in levels], "rounds": [list(each) for each in rounds],
+        "bias": [chosen.bias.value, chosen.bias.half], "reference": chosen.reference, "plain_members": members,
+    }  # fmt: skip
+    cost = runs.measured_cost(top, pilot.grid(top))
+    own_seconds = None
+    if own is not None and found:
+        # The pace of the setting that was run, at the scene's own step.
+        own_seconds = rounded("plain", variance_of_one / max(chosen.error, 1e-300) ** 2, 0) * cost * top.h / own.h
+    return answer_of(runs, pilot.target, recipe, levels, part, content, pilot_seconds=pilot_seconds,
+                     own_seconds=own_seconds, rivals=gains(ways) if found else {}, messages=tuple(messages))  # fmt: skip
+
+
+def replayed(runs: Runs, target: Sought, recipe: Mapping[str, Any], content: Mapping[str, Any]) -> Estimated:
+    """The answer of a recipe: the same members of the same levels, without a pilot."""
+    levels = [Level.from_dict(each) for each in recipe["levels"]]
+    part = None if levels else one_run(runs, Setting.from_dict(recipe["setting"]), recipe["grid"])
+    for share, counts in recipe["rounds"]:
+        _, part = grown(runs, target, levels, (share, counts), part)
+    assert part is not None
+    message = "by a recipe: its members were run again; the bias is that of the recipe, for which no pilot was run"
+    return answer_of(runs, target, recipe, levels, part, content, pilot_seconds=0.0, messages=(message,))
+
+
+def answer_of(
+    runs: Runs, target: Sought, recipe: Mapping[str, Any], levels: Sequence[Level], part: MeanEstimate,
+    content: Mapping[str, Any], **more: Any,
+) -> Estimated:  # fmt: skip
+    """The answer by a recipe and the members that were run by it."""
+    top, bias = Setting.from_dict(recipe["setting"]), Bias(*recipe["bias"])
+    members: dict[str, int] = {}
+    for level in levels:
+        name = str(level.fine) + (f" less {level.coarse}" if level.coarse else "")
+        members[name] = members.get(name, 0) + sum(map(len, level.y))
+    low, high = biases.interval(part.value, part.half_width(0.95), bias)
     if target.kind == "probability":
-        low, high = within(part, low, high, chosen.bias, sum(members.values()))
-    plain_members = variance_of_one / max(chosen.variance, 1e-300)
-    cost = runs.cost(top, pilot.grid(top))
-    own_seconds = None if own is None else variance_of_one / max(chosen.error, 1e-300) ** 2 * cost * top.h / own.h
+        low, high = within(part, low, high, bias, sum(members.values()))
+    elif target.kind == "quantile" and part.variance > 0.0:
+        low, high = between_members(target, levels, part, low, high, bias)
     return Estimated(
-        of=question.label, unit=question.unit, value=part.value, interval=(low, high), error=chosen.error,
-        sampling_error=math.sqrt(part.variance), bias=chosen.bias.value,
-        bias_interval=(chosen.bias.value - chosen.bias.half, chosen.bias.value + chosen.bias.half),
-        setting=str(top), settings=top.options(), reference=chosen.reference, estimator=name, members=members,
-        seconds=runs.seconds, pilot_seconds=pilot_seconds, plain_seconds=plain_members * cost, own_seconds=own_seconds,
-        rivals=rivals, messages=tuple(messages), provenance=dict(content) | {"settings": top.options()},
+        of=runs.question.label, unit=runs.question.unit, value=part.value, interval=(low, high), error=recipe["error"],
+        sampling_error=math.sqrt(part.variance), bias=bias.value,
+        bias_interval=(bias.value - bias.half, bias.value + bias.half),
+        setting=str(top), settings=top.options(), reference=recipe["reference"], estimator=recipe["estimator"],
+        members=members or {str(top): 1}, seconds=runs.seconds,
+        plain_seconds=recipe["plain_members"] * runs.measured_cost(top, recipe["grid"]), recipe=recipe,
+        provenance=dict(content) | {"settings": top.options()}, **more,
     )  # fmt: skip
+
+
+def between_members(
+    target: Sought, levels: Sequence[Level], part: MeanEstimate, low: float, high: float, bias: Bias
+) -> tuple[float, float]:
+    """The interval of a quantile that few members are beyond: between the quantiles at the ends of its level's interval.
+
+    docs/theory/estimators.md, (E12). As `lw.statistics.Quantiles` has it. Without an end where less than one member is beyond.
+    """
+    samples = samples_of(levels)
+    level, at = target.level, target.solved(samples)
+    # As many independent members have the variance of the part that is below.
+    n = level * (1.0 - level) / (part.variance * at.density**2)
+    if not n * target.tail < FAR:
+        return low, high
+    from scipy.special import stdtrit
+
+    t = float(stdtrit(max(part.freedom, 1.0), 0.975))
+    below, above = (float(end) for end in intervals.wilson(np.array(level), np.array(n), 0.95, t))
+    ends = (-math.inf if n * below < 1.0 else quantile_of(samples, below),
+            math.inf if n * (1.0 - above) < 1.0 else quantile_of(samples, above))  # fmt: skip
+    low, _ = biases.interval(part.value, part.value - ends[0], bias)
+    _, high = biases.interval(part.value, ends[1] - part.value, bias)
+    return low, high
 
 
 def within(part: MeanEstimate, low: float, high: float, bias: Bias, members: int) -> tuple[float, float]:

@@ -6,13 +6,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from lgvi_warp.studies.estimating.bias import APART
 from lgvi_warp.studies.estimating.estimators import (
     REPLICATES,
+    UNSEEN,
     VarianceModel,
     best_numbers,
     regressed,
@@ -65,7 +66,7 @@ class Observed:
     z: (settings, n). normals: (n, d) of the members' numbers. least: smallest change of a contribution.
     costs: of a member alone [s]. pair: cost of a member of two settings, by their numbers [s]. settings: in the same order.
     at: the target, by which contributions were formed. alone: by the number of a setting, contributions of more members.
-    call: what a call takes by itself [s].
+    call: what a call takes by itself [s]. weight: of all contributions. reach: as of `Level`.
     """
 
     z: Sequence[np.ndarray]
@@ -77,6 +78,8 @@ class Observed:
     at: Solved
     alone: Mapping[int, np.ndarray] = field(default_factory=dict)
     call: float = 0.0
+    weight: float = 1.0
+    reach: float = 0.0
 
 
 def candidates(seen: Observed, variance: float, only: str | None = None) -> list[Way]:
@@ -108,14 +111,15 @@ def coupled(seen: Observed, count: int, asked: bool = False) -> list[tuple[int, 
 
 
 def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: float) -> Way:
-    slopes, spreads, weight = list[float](), list[VarianceModel](), 1.0
+    slopes, spreads, weight = list[float](), list[VarianceModel](), seen.weight
     for f, c in itertools.pairwise(chain):
         factor = slope(seen.z[f], seen.z[c])[0]
         spreads.append(_spread(seen, kind, weight * (seen.z[f] - factor * seen.z[c]), seen.pair(f, c), weight))
         slopes.append(factor)
         weight *= factor
     last = chain[-1]
-    spreads.append(_spread(seen, kind, weight * seen.alone.get(last, seen.z[last]), seen.costs[last], weight))
+    z = weight * seen.alone.get(last, seen.z[last])
+    spreads.append(_spread(seen, kind, z, seen.costs[last], weight, seen.reach))
     numbers = best_numbers(spreads, variance)
     dimensions = seen.normals.shape[1]
     members = tuple(
@@ -127,13 +131,15 @@ def _candidate(seen: Observed, kind: str, chain: tuple[int, ...], variance: floa
     return Way(kind, chain, tuple(slopes), members, seconds, left)
 
 
-def _spread(seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float) -> VarianceModel:
+def _spread(seen: Observed, kind: str, z: np.ndarray, cost: float, weight: float, reach: float = 0.0) -> VarianceModel:
     least = abs(weight) * seen.least
     if kind == "sobol":
-        return spread_of_replicates(z, cost, least)
-    if kind == "regression":
-        return VarianceModel(regressed(z, seen.normals, least).variance * len(z), cost)
-    return spread_of_plain(z, cost, least)
+        model = spread_of_replicates(z, cost, least)
+    elif kind == "regression":
+        model = VarianceModel(regressed(z, seen.normals, least).variance * len(z), cost)
+    else:
+        model = spread_of_plain(z, cost, least)
+    return replace(model, unseen=UNSEEN * max(least, abs(weight) * reach, float(np.std(z))))
 
 
 def rounded(kind: str, members: float, dimensions: int, power: float = 1.0) -> int:

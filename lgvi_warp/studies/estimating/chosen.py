@@ -78,7 +78,7 @@ def worth_another(pilot: Pilot, first: Chosen) -> bool:
     if first.bias.mean_square > first.error**2:
         return True
     best = candidates(observed(pilot, first.setting, [], pilot.first), first.variance)[0]
-    return pilot.runs.seconds <= ANOTHER * best.seconds
+    return pilot.runs.counted <= ANOTHER * best.seconds
 
 
 def seems_few(pilot: Pilot, steps: Sequence[Setting]) -> bool:
@@ -86,7 +86,7 @@ def seems_few(pilot: Pilot, steps: Sequence[Setting]) -> bool:
     for setting in steps:
         ladder = Ladder()
         if runs_at(pilot, setting, ladder):
-            return pilot.plain_members(setting, pilot.first) <= FEW
+            return pilot.plain_members(setting, pilot.first, unseen=True) <= FEW
     return False
 
 

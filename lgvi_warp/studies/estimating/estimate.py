@@ -29,9 +29,9 @@ from lgvi_warp.scene.settings import EnsembleSettings
 from lgvi_warp.studies.estimating import answering
 from lgvi_warp.studies.estimating.answer import Estimated
 from lgvi_warp.studies.estimating.choice import ESTIMATORS
-from lgvi_warp.studies.estimating.levels import Runs, Setting
+from lgvi_warp.studies.estimating.levels import Level, Runs, Setting
 from lgvi_warp.studies.estimating.pilot import Pilot
-from lgvi_warp.studies.estimating.question import question_of
+from lgvi_warp.studies.estimating.question import Question, question_of
 from lgvi_warp.studies.ladders import SHORT
 from lgvi_warp.studies.speed import void
 
@@ -55,6 +55,8 @@ def estimate(
     h: float | None = None,
     dtype: str | None = None,
     estimator: str | None = None,
+    recipe: Mapping[str, Any] | None = None,
+    heavy_tail: bool = False,
     seed: int | None = None,
     threads: int | None = None,
     executor: Any = "threads",
@@ -67,8 +69,11 @@ def estimate(
     and levels (paired differences of fine and coarse settings) would take. The cheapest is run with numbers of members that
     are fixed beforehand.
 
-    What is chosen follows costs as they are measured, so that two calls may choose differently. The same seed gives the same
-    bits where `h` and `estimator` are fixed, but for levels, whose numbers of members costs decide.
+    Choices follow counted costs: steps times the evaluations of forces of each. One seed gives one answer, to the bit, on any
+    number of threads. `found.recipe` holds what was chosen, so that the same members can be run again later.
+
+    No answer is surer than the effect of members that so few others do not show: of n, up to 3 / n may be odd. How odd, probes
+    far out in what varies tell, beside the spread. Rare branches of a Choice are strata of their own.
 
     Args:
         fleet: the ensemble, or a Scene with one. Its distributions are drawn from anew; members and sampling do not matter.
@@ -87,6 +92,9 @@ def estimate(
             by it.
         estimator: fixes the estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol". Default:
             the one that is predicted to cost least.
+        recipe: `found.recipe` of an answer: the same members are run again, without a pilot, and the error, the setting, the
+            estimator and the seed are those of the recipe. Fleet, `of`, `risk` and `cheaper` must be as they were.
+        heavy_tail: True tells a mean all the same whose variance seems to be infinite. Default False: it is refused.
         seed: of points and noise. Default: that of the ensemble.
         threads: threads of the runs. Default: as of `lw.solve`.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Of those that are no threads the
@@ -112,7 +120,7 @@ def estimate(
         True
     """
     faults = Faults()
-    if (error is None) == (relative_error is None):
+    if (error is None) == (relative_error is None) and (recipe is None or error is not None):
         faults.add("error", error, "and relative_error are both given, or none is", "give one of them")
     for name, value in (("error", error), ("relative_error", relative_error)):
         if value is not None:
@@ -126,26 +134,29 @@ def estimate(
     faults.raise_if_any()
     assert question is not None
     whole = drawn(ensemble_of(fleet))
+    fleets = [whole, *cheaper_fleets(whole, cheaper)]
+    if recipe is not None:
+        seed, t1 = recipe_of(recipe, question, len(fleets))
     t1 = whole.scene.run.duration if t1 is None else t1
     if t1 is None:
         raise refusal("t1", t1, "is missing", "give the end in seconds: t1=150.0 or [run] duration")
     faults.positive("t1", t1)
     faults.raise_if_any()
     seed = whole.seed if seed is None else int(EnsembleSettings(1, seed).seed)
-    fleets = [whole, *cheaper_fleets(whole, cheaper)]
     clock = time.process_time if executor == "threads" else time.perf_counter
     execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
     runs = Runs(fleets, question, float(t1), seed=seed, execution=execution, clock=clock)
+    content = {"scene": whole.scene.to_dict(), "ensemble": whole.to_dict(), "seed": seed, "t1": float(t1)}
+    content |= {"versions": machine.versions(), "machine": machine.describe()}
+    if recipe is not None:
+        return answering.replayed(runs, question.target, recipe, content)
     asked = error if error is not None else relative_error
     assert asked is not None
     steps = [spacing_of(each.scene, float(t1)) for each in fleets]
     ladders, noise = ladders_of(whole, float(t1), steps[0], None if method is None else [method], h, dtype)
     single = dtype is None and ladders[0][0].dtype == "float64"
-    fixed = h is not None and estimator is not None
-    pilot = Pilot(runs, question.target, noise, float(asked), error is None, single, estimator, settled=fixed)
+    pilot = Pilot(runs, question.target, noise, float(asked), error is None, single, estimator, heavy_tail=heavy_tail)
     coarse = [coarse_of(spacing, i, ladders[0][0]) for i, spacing in enumerate(steps) if i]
-    content = {"scene": whole.scene.to_dict(), "ensemble": whole.to_dict(), "seed": seed, "t1": float(t1)}
-    content |= {"versions": machine.versions(), "machine": machine.describe()}
     own = own_setting(whole, float(t1), ladders)
     report = callback(progress) or void
     try:
@@ -153,6 +164,33 @@ def estimate(
     except KeyboardInterrupt as stop:
         text = f"interrupted after {runs.seconds:.2g} s and {runs.members:,} members; there is no answer yet"
         raise KeyboardInterrupt(text) from stop
+
+
+def recipe_of(recipe: Mapping[str, Any], question: Question, scenes: int) -> tuple[int, float]:
+    """Seed and end time of a recipe; SceneError where it is none, or of another question."""
+    remedy = "give found.recipe of an answer to the same question"
+    try:
+        seed, t1, label = int(recipe["seed"]), float(recipe["t1"]), recipe["of"]
+        levels = [Level.from_dict(each) for each in recipe["levels"]]
+        settings = [
+            Setting.from_dict(recipe["setting"]),
+            *(s for each in levels for s in (each.fine, each.coarse) if s),
+        ]
+        counts = [
+            n for share, row in recipe["rounds"] for n in row if len(row) == len(levels) and share >= 0.0 and n >= 0
+        ]
+        if len(counts) != len(levels) * len(recipe["rounds"]) or sum(counts) > answering.MOST:
+            raise ValueError("rounds")
+        most = max(each.scene for each in settings)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, SceneError):
+            raise
+        raise refusal("recipe", recipe, "is no recipe of an answer", remedy) from None
+    if label != question.label or most >= scenes:
+        raise refusal(
+            "recipe", label, f"is of another question than {question.label}, or of more cheaper scenes", remedy
+        )
+    return seed, t1
 
 
 def own_setting(fleet: Ensemble, t1: float, ladders: Sequence[Sequence[Setting]]) -> Setting | None:

@@ -15,6 +15,10 @@ REPLICATES = 16
 STEEPEST = 2.0
 # A design whose variance is not smaller than that of independent members by this gains no more with more points.
 SMOOTH = 3.0
+# Of n members without an odd one up to 3 / n may be odd, with 95 %: 1.5 / n is a standard error of that share.
+UNSEEN = 1.5
+# The part of a variance that unseen members may take, and halvings of the factor of all numbers.
+UNSEEN_SHARE, HALVINGS = 0.25, 30
 # How much of the logarithm of a smaller gain is believed: its spread is 0.37 by 16 replicates, that of gains themselves 0.7.
 BELIEVED = 0.8
 
@@ -43,11 +47,10 @@ class MeanEstimate:
 def plain(y: np.ndarray, least: float = 0.0) -> MeanEstimate:
     """The mean of independent members (n,).
 
-    least: smallest change of a member's number other than none, 0 where numbers are continuous. Members that agree by chance
-        have no spread: the variance of one that changes by it among all is added.
+    least: change of a member's number that may be unseen: the variance that so many unseen members leave is added.
     """
     n = len(y)
-    return MeanEstimate(float(np.mean(y)), float(np.var(y, ddof=1)) / n + (least / n) ** 2, n - 1.0)
+    return MeanEstimate(float(np.mean(y)), float(np.var(y, ddof=1)) / n + (UNSEEN * least / n) ** 2, n - 1.0)
 
 
 def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) -> MeanEstimate:
@@ -58,7 +61,7 @@ def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) 
     least: as of `plain`.
     """
     means = y.reshape(-1, replicates).mean(axis=0)
-    variance = float(np.var(means, ddof=1)) / replicates + (least / len(y)) ** 2
+    variance = float(np.var(means, ddof=1)) / replicates + (UNSEEN * least / len(y)) ** 2
     return MeanEstimate(float(means.mean()), variance, replicates - 1.0)
 
 
@@ -70,12 +73,22 @@ def regressed(y: np.ndarray, normals: np.ndarray, least: float = 0.0) -> MeanEst
     least: as of `plain`.
     """
     n, d = normals.shape
-    columns = np.column_stack([np.ones(n), normals])
-    factors = np.linalg.lstsq(columns, y, rcond=None)[0]
+    factors, left = fitted(y, normals)
     freedom = n - d - 1.0
-    left = float(np.sum((y - columns @ factors) ** 2)) / freedom
-    # The spread of the mean of the normals about 0 adds d / n of it, to first order.
-    return MeanEstimate(float(factors[0]), left / n * (1.0 + d / n) + (least / n) ** 2, freedom)
+    # The spread of the mean of the normals about 0 adds d / (n - d - 2) of it.
+    variance = float(np.sum(left**2)) / freedom / n * (1.0 + d / max(n - d - 2.0, 1.0))
+    return MeanEstimate(float(factors[0]), variance + (UNSEEN * least / n) ** 2, freedom)
+
+
+def fitted(y: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Constant and slopes (d + 1,) of numbers (n,) by normals (n, d), and what they leave (n,).
+
+    The normal equations are well conditioned here. BLAS would start all threads of the machine for tall matrices.
+    """
+    columns = np.column_stack([np.ones(len(y)), normals])
+    gram = np.einsum("ni,nj->ij", columns, columns)
+    factors = np.linalg.solve(gram, np.einsum("ni,n->i", columns, y))
+    return factors, y - np.einsum("ni,i->n", columns, factors)
 
 
 def together(parts: Sequence[MeanEstimate]) -> MeanEstimate:
@@ -98,7 +111,7 @@ def slope(fine: np.ndarray, coarse: np.ndarray) -> tuple[float, float]:
     """
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of steps that are too long may be huge
         a, b = fine - fine.mean(), coarse - coarse.mean()
-        spread, other, shared = float(a @ a), float(b @ b), float(a @ b)
+        spread, other, shared = (float(np.einsum("n,n", x, z)) for x, z in ((a, a), (b, b), (a, b)))
     if not (spread > 0.0 and 0.0 < other < math.inf):
         return 0.0, 1.0
     factor = shared / other
@@ -107,15 +120,16 @@ def slope(fine: np.ndarray, coarse: np.ndarray) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class VarianceModel:
-    """How the variance of an estimate falls with the members: `of_one` n^-power; cost: of a member [s]."""
+    """The variance of an estimate by number of members: `of_one` n^-power + (unseen / n)^2; cost: of a member [s]."""
 
     of_one: float
     cost: float
     power: float = 1.0
+    unseen: float = 0.0
 
     def at(self, members: float) -> float:
         """The variance with so many members."""
-        return self.of_one * members**-self.power
+        return self.of_one * members**-self.power + (self.unseen / members) ** 2
 
 
 def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceModel:
@@ -142,6 +156,23 @@ def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replica
 
 
 def best_numbers(spreads: Sequence[VarianceModel], variance: float) -> np.ndarray:
+    """Numbers of members (levels,) that reach a variance of the sum; but for unseen members, for the least cost.
+
+    Where unseen members count, each level gets what makes them a part of the variance, and all grow alike until it is reached.
+    """
+    numbers, unseen = numbers_without_unseen(spreads, variance), np.array([each.unseen for each in spreads])
+    if not unseen.any() or not variance > 0.0:
+        return numbers
+    numbers = np.maximum(numbers, unseen * math.sqrt(len(spreads) / (UNSEEN_SHARE * variance)))
+    low, high = 0.5, 2.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        reached = sum(each.at(n * middle) for each, n in zip(spreads, numbers, strict=True)) <= variance
+        low, high = (low, middle) if reached else (middle, high)
+    return np.asarray(numbers * high)
+
+
+def numbers_without_unseen(spreads: Sequence[VarianceModel], variance: float) -> np.ndarray:
     """Numbers of members (levels,) that reach a variance of the sum for the least cost.
 
     docs/theory/estimators.md, (E22).
@@ -167,14 +198,16 @@ def best_numbers(spreads: Sequence[VarianceModel], variance: float) -> np.ndarra
     return numbers(brentq(over, -800.0, 800.0, xtol=1e-12))
 
 
-def tail_index(y: np.ndarray) -> float:
-    """The exponent by which the largest distances from the median fall off (Hill 1975); below 2 the variance is infinite.
+def tail_index(y: np.ndarray, part: int = 32) -> float:
+    """The exponent by which the largest distances from the median fall off; below 2 the variance is infinite.
 
-    Of the largest 32nd of the members, at least 16; infinite where these are all alike, or where members are too few.
+    Of the largest 32nd of the members, or another part, at least 16. Where a power law holds, i log(y_i / y_i+1) of the i-th
+    largest are exponential, with its inverse as mean (Renyi 1953). Their median does not see the gaps between clusters, as
+    members that stopped leave them. Infinite where these are all alike, or where members are too few.
     """
     far = np.sort(np.abs(y - np.median(y)))[::-1]
-    k = max(16, len(y) // 32)
+    k = max(16, len(y) // part)
     if len(y) < 4 * k or not far[k] > 0.0:
         return math.inf
-    mean = float(np.mean(np.log(far[:k] / far[k])))
-    return 1.0 / mean if mean > 0.0 else math.inf
+    middle = float(np.median(np.arange(1, k + 1) * np.log(far[:k] / far[1 : k + 1])))
+    return math.log(2.0) / middle if middle > 0.0 else math.inf

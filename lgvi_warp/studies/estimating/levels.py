@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -14,15 +14,22 @@ import numpy as np
 from lgvi_warp.calls.prepared import Prepared, prepare
 from lgvi_warp.common import machine
 from lgvi_warp.common.random import generator
+from lgvi_warp.methods.method import Method
 from lgvi_warp.sampling.designs.sequences import SOBOL_BITS, sobol_points
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies.comparison import drawn_every
 from lgvi_warp.studies.estimating.estimators import REPLICATES, MeanEstimate, plain, regressed, replicated, together
 from lgvi_warp.studies.estimating.question import Question
 from lgvi_warp.studies.estimating.target import Solved, Sought, Weighted
+from lgvi_warp.studies.estimating.unseen import strata_of
 
 # Members of one call for each thread, whose numbers stay in its cache, and threads that count.
 AT_ONCE, MOST_THREADS = 8192, 8
+# Counted time of a call by itself, and of an evaluation of the forces of a member, a draw of its noise [s]: about what a core
+# takes. Choices follow these, so that one seed gives one answer.
+CALL, EVALUATION, DRAW = 1e-3, 1e-8, 1e-8
+# What a step in single precision counts, and one of a cheaper scene.
+SINGLE, CHEAPER = 0.55, 0.5
 
 
 @dataclass(frozen=True)
@@ -48,11 +55,23 @@ class Setting:
         """Arguments of `lw.solve`."""
         return {"method": self.method, "h": self.h, "dtype": self.dtype}
 
+    def to_dict(self) -> dict[str, Any]:
+        """Convert it to plain values, for JSON."""
+        return asdict(self)  # a Method is a dict then
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Setting:
+        """Build it from `to_dict`."""
+        method = content["method"]
+        return cls(**{**content, "method": method if isinstance(method, str) else Method(**method)})
+
 
 class Runs:
     """Runs of one question in any setting, each prepared once.
 
     fleets: the user's ensemble, then the cheaper scenes' with the same variation.
+    strata: of the user's ensemble, the common one first.
+    counted: counted time of all calls so far, which is the same in every call of `lw.estimate` [s].
     seconds: processor time of all runs so far, prepared and called, without preparing the first run of each kernel, which
         loads or compiles it [s].
     execution: threads, executor and scheduler, as of `lw.prepare`.
@@ -62,7 +81,8 @@ class Runs:
         self, fleets: Sequence[Ensemble], question: Question, t1: float, *, seed: int,
         execution: Mapping[str, Any] | None = None, clock: Callable[[], float] = time.process_time,
     ):  # fmt: skip
-        self.question, self.seed, self.seconds = question, seed, 0.0
+        self.question, self.seed, self.seconds, self.counted = question, seed, 0.0, 0.0
+        self.strata = strata_of(fleets[0])
         self._fleets, self._t1, self._execution, self._clock = fleets, t1, execution or {}, clock
         self._prepared: dict[tuple[Setting, float | None], Prepared] = {}
         self._calls: list[Call] = []
@@ -89,10 +109,13 @@ class Runs:
             self._loaded.add(kernel)
         return self._prepared[key]
 
-    def __call__(self, setting: Setting, grid: float | None, points: np.ndarray, indices: np.ndarray) -> np.ndarray:
-        """The numbers of members (n,) at points (n, d), with the noise of these indices; NaN for those that failed."""
+    def __call__(
+        self, setting: Setting, grid: float | None, points: np.ndarray, indices: np.ndarray, stratum: int = 0
+    ) -> np.ndarray:
+        """The numbers of members (n,) at points (n, d) of a stratum, with noise of these indices; NaN where they failed."""
         run, n = self.prepared(setting, grid), len(points)
-        groups = []
+        groups, points = [], self.strata[stratum].placed(points)
+        self.counted += CALL + n * self.cost(setting, grid)
         for first in range(0, n, self._at_once):
             some = slice(first, first + self._at_once)
             begun = self._clock()
@@ -111,18 +134,18 @@ class Runs:
         return run.states(*many, indices=indices, seed=self.seed)
 
     @property
-    def call_seconds(self) -> float:
-        """Processor time that a call takes by itself [s]."""
-        kind = self._calls[0].setting.kind
-        like = [call for call in self._calls if call.setting.kind == kind]
-        return float(fitted(like, [call for call in self._calls if call.setting.kind != kind])[0])
-
-    @property
     def members(self) -> int:
         """How many members were run so far."""
         return sum(call.members for call in self._calls)
 
     def cost(self, setting: Setting, grid: float | None = None) -> float:
+        """Counted time of a member [s]: evaluations of forces, and draws of noise on a grid [s]."""
+        method = Method(setting.method) if isinstance(setting.method, str) else setting.method
+        each = method.gauss * 8 or (len(method.tableau.b) if method.tableau else len(method.stages))
+        one = EVALUATION * each * (SINGLE if setting.dtype != "float64" else 1.0) * (CHEAPER if setting.scene else 1.0)
+        return self._t1 * (one / setting.h + (0.0 if grid is None else DRAW / grid))
+
+    def measured_cost(self, setting: Setting, grid: float | None = None) -> float:
         """Processor time of a member in a large call [s], from all calls so far of its kind."""
         key = setting, grid, len(self._calls)
         if key not in self._costs:
@@ -190,6 +213,8 @@ class Level:
     grid: of the noise of both [s]; None for draws once a step.
     kind: "sobol", "plain" or "regression".
     members: number of members, fixed beforehand.
+    reach: how far the number of a member may be that none of few is like; at least their spread.
+    stratum: of which all members are.
     """
 
     fine: Setting
@@ -201,9 +226,22 @@ class Level:
     members: int
     first_index: int = 0
     name: str = ""
+    reach: float = 0.0
+    stratum: int = 0
     y: list[np.ndarray] = field(default_factory=list)
     below: list[np.ndarray] = field(default_factory=list)
     points: list[np.ndarray] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Convert how it is run to plain values, for JSON."""
+        own = {each.name: getattr(self, each.name) for each in fields(self)[:-3]}
+        return own | {"fine": self.fine.to_dict(), "coarse": self.coarse and self.coarse.to_dict()}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Level:
+        """Build it from `to_dict`."""
+        fine, coarse = Setting.from_dict(content["fine"]), content["coarse"] and Setting.from_dict(content["coarse"])
+        return cls(**{**content, "fine": fine, "coarse": coarse})
 
     def grow(self, runs: Runs, count: int) -> None:
         """Run so many more members."""
@@ -211,10 +249,17 @@ class Level:
         replicates = REPLICATES if self.kind == "sobol" else 0
         points = design(runs.seed, self.name, runs.dimensions, done, count, replicates)
         indices = self.first_index + np.arange(done, done + count)
-        self.y.append(runs(self.fine, self.grid, points, indices))
+        self.y.append(runs(self.fine, self.grid, points, indices, self.stratum))
         if self.coarse is not None:
-            self.below.append(runs(self.coarse, self.grid, points, indices))
+            self.below.append(runs(self.coarse, self.grid, points, indices, self.stratum))
         self.points.append(points if self.kind == "regression" else points[:, :0])
+
+    def failed(self) -> Setting | None:
+        """The setting at which members failed that were run last; None for none."""
+        for setting, numbers in ((self.fine, self.y), (self.coarse, self.below)):
+            if setting is not None and np.isnan(numbers[-1]).any():
+                return setting
+        return None
 
     def more(self, share: float) -> int:
         """A part of the members of the level so far, in whole replicates; all or three times that where balanced."""
@@ -233,6 +278,8 @@ class Level:
         z, least = target.contributions(np.concatenate(self.y), at), target.least(at)
         if self.below:
             z = z - self.slope * target.contributions(np.concatenate(self.below), at)
+        # No answer is surer than the effect of members that so many others do not show.
+        least = max(least, self.reach, float(np.std(z)))
         if self.kind == "sobol":
             return replicated(z, least).times(self.weight)
         if self.kind == "regression":
@@ -247,9 +294,21 @@ def normals(points: np.ndarray) -> np.ndarray:
     return np.asarray(ndtri(np.clip(points, 2.0**-53, 1.0 - 2.0**-53)))
 
 
+def cube(normals: np.ndarray) -> np.ndarray:
+    """Levels of standard normals."""
+    from scipy.special import ndtr
+
+    return np.asarray(ndtr(normals))
+
+
+def samples_of(levels: Sequence[Level]) -> list[Weighted]:
+    """The numbers of all levels, with their weights."""
+    return [sample for level in levels for sample in level.weighted()]
+
+
 def estimated(levels: Sequence[Level], target: Sought) -> tuple[Solved, MeanEstimate]:
     """The target from all levels, and the estimate of its error. docs/theory/estimators.md, (E20)."""
-    samples = [sample for level in levels for sample in level.weighted()]
+    samples = samples_of(levels)
     at = target.solved(samples)
     parts = together([level.part(target, at) for level in levels])
     # What regression takes away of a quantile's error is in the mean of the contributions.

@@ -89,7 +89,7 @@ def in_ladder(pilot: Pilot, ladder: Ladder) -> list[MeanSetting]:
         return []
     last, pairs, rest = ladder.settings[-1], ladder.halvings[-1].members, beyond(ladder.halvings, ladder.order)
     return [
-        MeanSetting(setting, bias, pilot.runs.cost(setting), last, pairs, rest)
+        MeanSetting(setting, bias, pilot.runs.measured_cost(setting), last, pairs, rest)
         for setting, bias in zip(ladder.settings, ladder.biases(), strict=True)
     ]
 
@@ -106,4 +106,4 @@ def in_single(pilot: Pilot, each: MeanSetting) -> MeanSetting | None:
     except SceneError:
         return None
     bias = Bias(each.bias.value + apart.value, each.bias.half + apart.half)
-    return MeanSetting(twin, bias, pilot.runs.cost(twin), each.reference, each.members, each.beyond)
+    return MeanSetting(twin, bias, pilot.runs.measured_cost(twin), each.reference, each.members, each.beyond)

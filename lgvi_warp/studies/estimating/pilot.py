@@ -19,14 +19,17 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.studies.estimating import bias as biases_of
 from lgvi_warp.studies.estimating.bias import AGREE, Bias, StepChange, difference
 from lgvi_warp.studies.estimating.choice import Observed
-from lgvi_warp.studies.estimating.estimators import REPLICATES, plain, tail_index
-from lgvi_warp.studies.estimating.levels import Runs, Setting, design, normals
-from lgvi_warp.studies.estimating.target import Solved, Sought
+from lgvi_warp.studies.estimating.estimators import REPLICATES, UNSEEN, plain, tail_index
+from lgvi_warp.studies.estimating.levels import CALL, Runs, Setting, cube, design, normals
+from lgvi_warp.studies.estimating.target import Solved, Sought, Weighted, mean_of
+from lgvi_warp.studies.estimating.unseen import probes, reach_of
 
 # Members of the first stage, and how many stages there are, each of four times the members of the one before.
 FIRST, STAGES = 64, (64, 256, 1024)
-# Larger first stages, for tails.
-TAIL_STAGES = (4096, 16384)
+# Larger first stages, for tails and for probabilities whose error is relative.
+TAIL_STAGES, HIT_STAGES = (4096, 16384), (4096, 16384, 65536)
+# Members of each rare stratum, enough for two of each replicate; and the indices of noise that a stratum has.
+OF_STRATUM, STRATUM_INDICES = 32, 2**20
 # MeanEstimate of plain Monte Carlo's predicted cost that the pilot may take.
 SHARE = 0.1
 # Where plain Monte Carlo needs at most so many members, a pilot is not worth its cost.
@@ -35,8 +38,9 @@ FEW = 10 * FIRST
 STALLED = 0.8
 # Conditions and quantiles are smoothed over this part of the numbers' spread to see how a step changes them.
 WIDTH = 0.2
-# A tail that falls off by a smaller power has no finite variance, with what is known of so many members.
-HEAVY, KNOWN = 1.5, 256
+# A tail that falls off by a smaller power has no finite variance, with what is known of so many members; where it seems so,
+# so many show whether it falls off faster farther out, in smaller parts of the largest.
+HEAVY, KNOWN, SURE, PARTS = 1.5, 256, 16384, (32, 128, 512)
 # Hits that a probability needs before its spread is known.
 HITS = 4
 
@@ -50,7 +54,8 @@ class Pilot:
     single: whether coarse levels may be in single precision.
     estimator: the only one that may be chosen; None for any.
     most: processor time that the pilot may take in any case [s].
-    settled: whether no cost that is measured may change the numbers of members.
+    heavy_tail: whether a mean is told all the same where its variance seems infinite.
+    least: members of the first stage that a rare condition asks for.
     """
 
     runs: Runs
@@ -61,26 +66,63 @@ class Pilot:
     single: bool = False
     estimator: str | None = None
     most: float = math.inf
-    settled: bool = False
-    numbers: dict[tuple[Setting, float | None], np.ndarray] = field(default_factory=dict)
+    heavy_tail: bool = False
+    least: int = 0
+    numbers: dict[tuple[Setting, float | None, int], np.ndarray] = field(default_factory=dict)
+    reaches: dict[Setting, float] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
 
     def grid(self, setting: Setting) -> float | None:
         """The grid of the noise of a setting alone, and of its pairs with coarser ones [s]."""
         return setting.h if self.noise == "grid" else None
 
-    def y(self, setting: Setting, grid: float | None, members: int) -> np.ndarray:
-        """The numbers of the first members (n,)."""
-        known = self.numbers.get((setting, grid), np.empty(0))
+    def y(self, setting: Setting, grid: float | None, members: int, stratum: int = 0) -> np.ndarray:
+        """The numbers of the first members of a stratum (n,)."""
+        known = self.numbers.get((setting, grid, stratum), np.empty(0))
         if len(known) < members:
-            points = design(self.runs.seed, "estimate pilot", self.runs.dimensions, len(known), members - len(known))
-            new = self.runs(setting, grid, points, np.arange(len(known), members))
-            known = self.numbers[setting, grid] = np.concatenate([known, new])
+            first, indices = len(known), stratum * STRATUM_INDICES + np.arange(len(known), members)
+            points = design(self.runs.seed, self.name(stratum), self.runs.dimensions, first, members - first)
+            new = self.runs(setting, grid, points, indices, stratum)
+            known = self.numbers[setting, grid, stratum] = np.concatenate([known, new])
         return known[:members]
+
+    def name(self, stratum: int = 0) -> str:
+        """Name of the points of a stratum."""
+        return f"estimate pilot {stratum}" if stratum else "estimate pilot"
+
+    def samples(self, setting: Setting, grid: float | None, members: int) -> list[Weighted]:
+        """The numbers of all strata, each with its probability."""
+        return [(each.probability, self.y(setting, grid, OF_STRATUM if k else members, k))
+                for k, each in enumerate(self.runs.strata)]  # fmt: skip
 
     def solved(self, setting: Setting, members: int) -> Solved:
         """The target by one setting."""
-        return self.target.solved([(1.0, self.y(setting, self.grid(setting), members))])
+        return self.target.solved(self.samples(setting, self.grid(setting), members))
+
+    def variance(self, setting: Setting, members: int) -> float:
+        """The variance of one member's contribution, of all strata together."""
+        at, samples = self.solved(setting, members), self.samples(setting, self.grid(setting), members)
+        least = self.target.least(at)
+        with np.errstate(over="ignore", invalid="ignore"):
+            if len(samples) == 1:
+                return plain(self.target.contributions(samples[0][1], at), least).variance * members
+            parts = [(p, self.target.contributions(y, at)) for p, y in samples]
+            mean = mean_of(parts, np.asarray)
+            return mean_of(parts, lambda z: (z - mean) ** 2) + (UNSEEN * least) ** 2 / members
+
+    def reach(self, setting: Setting) -> float:
+        """How far numbers may be that none of the pilot's members has, by probes far out: of means, and of parts of them."""
+        if self.target.kind not in ("mean", "cvar") or not self.runs.dimensions:
+            return 0.0
+        if setting not in self.reaches:
+            known = normals(design(self.runs.seed, self.name(), self.runs.dimensions, 0, FIRST))
+            far, grid = probes(self.runs.seed, known), self.grid(setting)
+            y = self.y(setting, grid, FIRST)
+            beyond = self.runs(setting, grid, cube(far), np.arange(len(far)) % FIRST)
+            at = self.solved(setting, self.first)
+            z, beyond = self.target.contributions(y, at), self.target.contributions(beyond, at)
+            self.reaches[setting] = reach_of(z, known, beyond, far)
+        return self.reaches[setting]
 
     @property
     def first(self) -> int:
@@ -88,7 +130,7 @@ class Pilot:
         tail = self.target.tail
         for members in (*STAGES, *TAIL_STAGES):
             if members * tail >= HITS:
-                return members
+                return max(members, self.least)
         problem = f"stands on {members * tail:.2g} of {members:,} members of the pilot, too few to know its error"
         remedy = "ask for a level nearer the middle, or for the probability of a limit by lw.rare_event"
         raise refusal("risk", self.runs.question.label, problem, remedy)
@@ -97,33 +139,56 @@ class Pilot:
         """The error asked for, in the unit of the statistic."""
         return self.error * abs(at.value) if self.relative else self.error
 
-    def plain_members(self, setting: Setting, members: int) -> float:
-        """How many members plain Monte Carlo needs."""
-        at = self.solved(setting, members)
-        z, error = self.target.contributions(self.y(setting, self.grid(setting), members), at), self.asked(at)
+    def plain_members(self, setting: Setting, members: int, *, unseen: bool = False) -> float:
+        """How many members plain Monte Carlo needs; unseen: with those that few members do not show."""
+        error, variance = self.asked(self.solved(setting, members)), self.variance(setting, members)
+        if not error * error > 0.0:
+            return math.inf if variance > 0.0 else 1.0
+        # n for which variance / n + (extra / n)^2 is the square of the error.
+        extra = UNSEEN * self.reach(setting) if unseen else 0.0
         with np.errstate(over="ignore", invalid="ignore"):
-            variance = plain(z, self.target.least(at)).variance * members
-        if error * error > 0.0:
-            return variance / (error * error)
-        return math.inf if variance > 0.0 else 1.0
+            half = 0.5 * np.float64(variance) / error**2
+            return float(half + np.hypot(half, extra / error))
 
     def most_seconds(self, setting: Setting, members: int) -> float:
         """What the pilot may cost [s]."""
-        return min(
-            SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting)), self.most
-        )
+        return SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting))
 
     def pair(self, coarse: Setting, fine: Setting, members: int) -> StepChange:
         """How much the target changes from one setting to a finer one."""
         grid = self.grid(fine)
-        below, above = self.y(coarse, grid, members), self.y(fine, grid, members)
-        at = self.target.solved([(1.0, above)])
+        below, above = (self.samples(setting, grid, members) for setting in (coarse, fine))
+        at = self.target.solved(above)
+        changes = [self._change(b, a, at) for (_, b), (_, a) in zip(below, above, strict=True)]
+        parts = [(each.probability, change) for each, change in zip(self.runs.strata, changes, strict=True)]
+        half = math.hypot(*(p * change.half for p, change in parts))
+        return replace(changes[0], value=sum(p * change.value for p, change in parts), half=half)
+
+    def _change(self, below: np.ndarray, above: np.ndarray, at: Solved) -> StepChange:
+        """How much the contributions of a stratum's members change."""
         spread = float(np.std(above[np.isfinite(above)])) if np.isfinite(above).any() else 0.0
         if self.target.smooth and spread > 0.0:
             width = WIDTH * spread
             return difference(self.target.smoothed(below, at, width), self.target.smoothed(above, at, width))
         coarser, finer = self.target.contributions(below, at), self.target.contributions(above, at)
         return difference(coarser, finer, self.target.least(at))
+
+    def check_tail(self, setting: Setting, y: np.ndarray) -> None:
+        """Refuse a mean whose variance seems infinite, unless it was asked for all the same; SceneError."""
+        if self.target.kind not in ("mean", "cvar") or len(y) < KNOWN or tail_index(y) >= HEAVY:
+            return
+        y = self.y(setting, self.grid(setting), max(len(y), SURE)) if len(y) < SURE else y
+        index = max(tail_index(y, part) for part in PARTS)
+        if not index < HEAVY:
+            return
+        problem = (
+            f"has no finite variance, as it seems: its tail falls off with the power {index:.2g} of {len(y)} members"
+        )
+        if not self.heavy_tail:
+            remedy = "ask for a quantile, risk=0.5, or a probability; heavy_tail=True tells the mean all the same"
+            raise refusal("of", self.runs.question.label, problem, remedy)
+        if not any("no finite variance" in message for message in self.messages):
+            self.messages.append(f"{self.runs.question.label} {problem}: its interval is not to be trusted")
 
 
 @dataclass
@@ -186,7 +251,7 @@ def at_once(pilot: Pilot, own: Setting) -> Ladder | None:
     ladder, half = Ladder(), replace(own, h=0.5 * own.h)
     if not runs_at(pilot, own, ladder):
         return None
-    members = pilot.plain_members(own, pilot.first)
+    members = pilot.plain_members(own, pilot.first, unseen=True)
     if members > FEW:
         return None
     some = REPLICATES * math.ceil(max(members, 1.0) / REPLICATES**2)
@@ -207,6 +272,8 @@ def runs_at(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
     except SceneError as error:
         ladder.refused[str(setting)] = error.faults[0]
         return False
+    rare = [pilot.y(setting, pilot.grid(setting), OF_STRATUM, k) for k in range(1, len(pilot.runs.strata))]
+    y = np.concatenate([y, *rare])
     if np.isnan(y).any():
         ladder.refused[str(setting)] = f"{int(np.isnan(y).sum())} of {len(y)} members fail, or have no finite number"
         return False
@@ -220,9 +287,10 @@ def _first_look(pilot: Pilot, setting: Setting) -> None:
     """Take more members at the coarsest step where a probability's hits are few and its error is relative."""
     if not (pilot.relative and pilot.target.kind == "probability"):
         return
-    for members in STAGES:
-        hits = float(pilot.target.counted(pilot.y(setting, pilot.grid(setting), members)).sum())
+    for members in (*STAGES, *HIT_STAGES):
+        hits = members * pilot.solved(setting, members).value
         if hits >= HITS:
+            pilot.least = max(pilot.least, members)
             return
     problem = f"was seen {hits:.0f} times among {members:,} members of the pilot, too seldom to fix their number"
     remedy = "use lw.rare_event, which finds rare events, or give error= in place of relative_error="
@@ -231,7 +299,7 @@ def _first_look(pilot: Pilot, setting: Setting) -> None:
 
 def _compared(pilot: Pilot, ladder: Ladder) -> StepChange:
     """The last halving, of as many members as it takes to know whether it is small, and as are worth their cost."""
-    for members in (n for n in (*STAGES, *TAIL_STAGES) if pilot.first <= n <= max(pilot.first, STAGES[-1])):
+    for members in (n for n in (*STAGES, *HIT_STAGES) if pilot.first <= n <= max(pilot.first, STAGES[-1])):
         found = pilot.pair(ladder.settings[-2], ladder.settings[-1], members)
         small = AGREE * pilot.asked(pilot.solved(ladder.settings[-1], pilot.first))
         known = found.half <= small or abs(found.value) > max(found.half, small)
@@ -247,11 +315,10 @@ def _stalls(ladder: Ladder, found: StepChange, small: float) -> bool:
 
 def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:
     """Whether three times as many pairs more would cost too much."""
-    if pilot.settled:
-        return 4.0 * members > SHARE * pilot.plain_members(ladder.settings[-2], pilot.first)
     last = ladder.settings[-1]
     more = 3.0 * members * 1.5 * pilot.runs.cost(last, pilot.grid(last))
-    return pilot.runs.seconds + more > pilot.most_seconds(ladder.settings[-2], pilot.first)
+    return (pilot.runs.counted + more > pilot.most_seconds(ladder.settings[-2], pilot.first)
+            or pilot.runs.seconds > pilot.most)  # fmt: skip
 
 
 def _ended(pilot: Pilot, ladder: Ladder) -> str:
@@ -278,9 +345,8 @@ def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: in
     kept = [i for i, values in enumerate(y) if not np.isnan(values).any()]
     if 0 not in kept:
         raise failing(top, y[0])
-    if pilot.target.kind in ("mean", "cvar"):
-        refuse_heavy(pilot.runs.question.label, y[0])
-    at = pilot.target.solved([(1.0, y[0])])
+    pilot.check_tail(top, y[0])
+    at = pilot.solved(top, members)
     for i in kept:
         pilot.y(settings[i], pilot.grid(settings[i]), pilot.first)  # which tells what it costs alone
 
@@ -288,7 +354,7 @@ def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: in
         # Both costs are known with the draws of the top step, which are as many or more.
         return pilot.runs.cost(settings[kept[f]], grid) + pilot.runs.cost(settings[kept[c]], grid)
 
-    points = design(pilot.runs.seed, "estimate pilot", pilot.runs.dimensions, 0, members)
+    points = design(pilot.runs.seed, pilot.name(), pilot.runs.dimensions, 0, members)
     return Observed(
         [pilot.target.contributions(y[i], at) for i in kept],
         normals(points),
@@ -297,7 +363,9 @@ def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: in
         pilot.target.least(at),
         [settings[i] for i in kept],
         at,
-        call=pilot.runs.call_seconds,
+        call=CALL,
+        weight=pilot.runs.strata[0].probability,
+        reach=pilot.reach(top),
     )
 
 
@@ -306,13 +374,3 @@ def failing(setting: Setting, y: np.ndarray) -> SceneError:
     count = int(np.isnan(y).sum())
     problem = f"{count} of {len(y)} members fail, or have no finite number"
     return refusal("setting", str(setting), problem, "mend what fails (lw.solve says which), or vary less")
-
-
-def refuse_heavy(label: str, y: np.ndarray) -> None:
-    """Refuse a statistic whose variance seems infinite; SceneError."""
-    index = tail_index(y)
-    if len(y) >= KNOWN and index < HEAVY:
-        problem = (
-            f"has no finite variance, as it seems: its tail falls off with the power {index:.2g} of {len(y)} members"
-        )
-        raise refusal("of", label, problem, "ask for a quantile, risk=0.5, or a probability")

@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Start
+from lgvi_warp.studies.files import Saved
 from lgvi_warp.studies.linear.bench import COORDINATES, Motion, MotionBench, calm, plant
 from lgvi_warp.studies.members import scene_of
 
@@ -30,7 +31,7 @@ ANGLES = ("roll", "pitch", "drift")
 
 
 @dataclass(frozen=True)
-class Trim:
+class Trim(Saved):
     """A steady motion, straight and level.
 
     Attributes:
@@ -43,6 +44,8 @@ class Trim:
         method: the method whose steps keep the motion.
         h: its step [s].
     """
+
+    study: ClassVar[str] = "trim"
 
     start: Start
     commands: Mapping[str, np.ndarray]
@@ -58,15 +61,26 @@ class Trim:
         return tuple(self.values)
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert the motion to plain values, for JSON.
-
-        Returns:
-            "start" as the section of a scene file, "commands" and "residual" as lists, "values", "fixed", "method" and "step".
-        """
+        # "start" as the section of a scene file; of the method what is no default.
         commands = {key: each.tolist() for key, each in self.commands.items()}
         found = {"start": self.start.to_dict(), "commands": commands, "values": dict(self.values)}
-        method = {"method": self.method.name, "step": self.h}
+        chosen = ((item.name, getattr(self.method, item.name), item.default) for item in fields(self.method)[1:])
+        options = {name: value for name, value, default in chosen if value != default and name != "reason"}
+        method = {"method": self.method.name, "step": self.h} | ({"method_options": options} if options else {})
         return {**found, "fixed": dict(self.fixed), "residual": self.residual.tolist(), **method}
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        commands = {key: np.array(each, np.float64) for key, each in content["commands"].items()}
+        method = Method(content["method"], **content.get("method_options", {}))
+        residual = np.array(content["residual"], np.float64)
+        return cls(Start(**content["start"]), commands, dict(content["values"]), dict(content["fixed"]), residual, method,
+                   float(content["step"]))  # fmt: skip
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        for kind, values in (("free", self.values), ("fixed", self.fixed)):
+            for name, value in values.items():
+                yield {"name": name, "value": float(value), "kind": kind}
 
     def __str__(self) -> str:
         units = {name: "rad" for name in ANGLES} | {"speed": "m/s"}

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,13 +20,14 @@ from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.studies.search.box import LEAST, POPULATION, SearchBox, search
 from lgvi_warp.studies.search.numbers import Numbers
 from lgvi_warp.studies.search.risk import risk_of
 
 
 @dataclass(frozen=True)
-class Tuned:
+class Tuned(Saved):
     """The numbers with the least risk that a search found.
 
     Attributes:
@@ -42,6 +44,8 @@ class Tuned:
         restarts: (r,), the least risk of each evolution.
         runs: number of members that were run.
     """
+
+    study: ClassVar[str] = "tune_gains"
 
     parameters: Mapping[str, float]
     before: Mapping[str, float]
@@ -60,6 +64,21 @@ class Tuned:
     def optimism(self) -> float:
         """How much less the risk seemed than it is of fresh members."""
         return self.fresh_cost - self.cost
+
+    def to_dict(self) -> dict[str, Any]:
+        return dict(finite_or_none({item.name: getattr(self, item.name) for item in fields(self)}))
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        # A risk that is not finite is of members that fail; without fresh members there is none.
+        costs = {name: with_missing_as(content[name], math.inf if content["fresh"] or name == "cost" else math.nan)
+                 for name in ("cost", "fresh_cost", "fresh_before")}  # fmt: skip
+        restarts = np.array(with_missing_as(content["restarts"], math.inf), np.float64)
+        return cls(**content | costs | {"restarts": restarts, "at_bounds": tuple(content["at_bounds"])})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        for name, value in self.parameters.items():
+            yield {"name": name, "value": value, "before": self.before[name], "at_bounds": name in self.at_bounds}
 
     def __str__(self) -> str:
         numbers = ", ".join(

@@ -42,6 +42,8 @@ MOST_SVG = 1_000_000
 MOST_PICTURES = 100_000_000
 # Rows of a table of a study that the report shows; its CSV file has all.
 MOST_ROWS = 200
+# Longest list, or text, that it shows of a study's settings.
+MOST_LISTED = 400
 # Pictures that lgvi-warp run writes.
 OF_A_RUN = ("fleet.png", "statistics.png")
 STYLE = """
@@ -99,7 +101,7 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
         run, studies = run_in(folder), studies_in(folder)
         if run is None and not studies:
             fault = "holds no run and no study"
-            remedy = f"give a folder that lgvi-warp run, {', '.join(STUDY_FILES)} wrote".replace("_", "-")
+            remedy = f"give a folder that lgvi-warp run wrote, or a study: {', '.join(STUDY_FILES)}".replace("_", "-")
             raise SceneError([f"{folder}: {fault}; {remedy}"])
         place, parts = folder.resolve().name, list[str]()
         if run is not None:
@@ -235,7 +237,7 @@ def _again(result: Result) -> str:
 def _of_study(path: Path) -> Iterator[str]:
     """The parts of a study's page but for its pictures: words, its table, and its settings."""
     with of_study(path):
-        short = {key: value for key, value in file_json(path).items() if not isinstance(value, list)}
+        short = {key: _shortened(value) for key, value in file_json(path).items() if not isinstance(value, list)}
     table_file = "table.csv" if path.stem == "sweep" else f"{path.stem}.csv"
     if path.stem == "sweep" and os.path.lexists(path.with_name("summary.md")):
         yield _section("Summary", _preformatted(file_text(inside(path.parent, "summary.md"), "text file")))
@@ -244,6 +246,15 @@ def _of_study(path: Path) -> Iterator[str]:
         more = f"The first {MOST_ROWS:,} of {len(rows):,} rows; {table_file} has all." if len(rows) > MOST_ROWS else ""
         yield _section("Table", _paragraph(more) + _table(head, rows[:MOST_ROWS]))
     yield _section("How it was made", _preformatted(json.dumps(short, indent=1)))
+
+
+def _shortened(value: Any) -> Any:
+    """The same without long lists and texts, as of times and of members, which the file itself has."""
+    if isinstance(value, dict):
+        return {key: _shortened(each) for key, each in value.items()}
+    if isinstance(value, list | str) and len(value) > MOST_LISTED:
+        return f"{len(value):,} entries"
+    return [_shortened(each) for each in value] if isinstance(value, list) else value
 
 
 def _pictures_in(folder: Path, has_run: bool) -> list[Path]:

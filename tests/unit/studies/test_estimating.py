@@ -2,6 +2,7 @@
 """Estimators, biases and choices on arrays, where the truth is known by formula: no vehicle is run."""
 
 import dataclasses
+import json
 import math
 
 import numpy as np
@@ -9,9 +10,9 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
-from lgvi_warp.studies.estimating import bias, choice, estimators
+from lgvi_warp.studies.estimating import bias, choice, estimators, pilot, unseen
 from lgvi_warp.studies.estimating.answer import Estimated
-from lgvi_warp.studies.estimating.levels import Call, Setting, design, member_cost, normals
+from lgvi_warp.studies.estimating.levels import Call, Level, Setting, design, member_cost, normals
 from lgvi_warp.studies.estimating.question import question_of
 from lgvi_warp.studies.estimating.target import Solved, Sought
 from tests.support.refusals import refused, says
@@ -133,7 +134,7 @@ def test_sobol_points_fall_faster_where_answers_are_smooth():
 
 def test_members_that_agree_by_chance_have_a_spread():
     none = estimators.replicated(np.zeros(256), least=1.0)
-    assert none.variance == 256.0**-2
+    assert none.variance == (1.5 / 256.0) ** 2
     assert estimators.replicated(np.zeros(256)).half_width(0.95) == 0.0
 
 
@@ -259,7 +260,8 @@ def test_numbers_reach_the_variance():
     factor = way.slopes[0]
     left = np.var(fine - factor * coarse, ddof=1) / way.members[0] + factor**2 * np.var(coarse, ddof=1) / way.members[1]
     assert left == pytest.approx(1e-4 / choice.ROOM["plain"], rel=0.05)
-    assert way.variance == pytest.approx(left)
+    unseen = np.hypot(np.std(fine - factor * coarse) / way.members[0], factor * np.std(coarse) / way.members[1])
+    assert way.variance == pytest.approx(left + (1.5 * unseen) ** 2)
 
 
 @pytest.mark.parametrize(
@@ -361,3 +363,111 @@ def test_an_answer_in_words():
     assert found.error_reached == math.hypot(0.062, 0.018)
     assert found.to_dict()["members"] == {"psi_x 0.025 less psi_x 0.2": 512, "psi_x 0.2": 8192}
     assert "pilot" in str(dataclasses.replace(found, seconds=0.0))
+
+
+@pytest.mark.parametrize("dimensions", [1, 6, 10])
+def test_a_regression_knows_its_own_variance(dimensions):
+    """The variance told is that of the values over 4,000 designs; of 88 members with 10 controls a seventh is theirs."""
+    rng, parts = np.random.default_rng(20), []
+    for _ in range(4000):
+        z = rng.normal(size=(8 * (dimensions + 1), dimensions))
+        parts.append(estimators.regressed(z.sum(axis=1) + rng.normal(size=len(z)), z))
+    seen = np.var([part.value for part in parts])
+    # A variance of 4,000 values is known to 2.2 %, here twice.
+    np.testing.assert_allclose(np.mean([part.variance for part in parts]), seen, rtol=0.05)
+
+
+def test_a_regression_of_one_variable_is_that_of_least_squares():
+    rng = np.random.default_rng(21)
+    z = rng.normal(size=(500, 4))
+    y = 3.0 + z @ (1.0, -2.0, 0.5, 0.0) + rng.normal(size=500)
+    truth = np.linalg.lstsq(np.column_stack([np.ones(500), z]), y, rcond=None)[0]
+    factors, left = estimators.fitted(y, z)
+    np.testing.assert_allclose(factors, truth, atol=1e-12)
+    assert np.abs(z.T @ left).max() < 1e-10
+
+
+def test_clusters_and_thin_tails_are_no_heavy_tails():
+    """1 in 100 stopped 172 m short; a lognormal and a cubed normal have a variance, and a Cauchy none, by 16,384 members."""
+    rng, n = np.random.default_rng(22), pilot.SURE
+    draws = {
+        "stopped": lambda: np.where(rng.random(n) < 0.01, 28.0, 200.0) + 0.5 * rng.normal(size=n),
+        "slowed": lambda: (
+            200.0 - np.where(rng.random(n) < 0.014, 172.0 * rng.random(n), 0.0) + 0.5 * rng.normal(size=n)
+        ),
+        "lognormal": lambda: np.exp(rng.normal(size=n)),
+        "cubed": lambda: rng.normal(size=n) ** 3,
+    }
+    for name, draw in draws.items():
+        for _ in range(20):
+            y = draw()
+            assert max(estimators.tail_index(y, part) for part in pilot.PARTS) > pilot.HEAVY, name
+    heavy = [
+        max(estimators.tail_index(y, part) for part in pilot.PARTS) < pilot.HEAVY for y in rng.standard_cauchy((40, n))
+    ]
+    assert np.mean(heavy) >= 0.8
+
+
+def test_rare_branches_are_strata():
+    """Of a Choice of 1 in 100, the odd level is a stratum; of two Choices the strata are parts of the whole."""
+    rare = lw.distributions.Choice([0.0] * 99 + [4.0])
+    vary = {"start.velocity[2]": rare, "start.position[0]": lw.distributions.Normal(std=1.0),
+            "start.position[1]": lw.distributions.Choice([0.0, 1.0, 2.0], weights=[90, 4, 6])}  # fmt: skip
+    fleet = lw.Ensemble(lw.Scene.named("sphere"), 1, 0, vary)
+    strata = unseen.strata_of(fleet)
+    np.testing.assert_allclose([each.probability for each in strata], [0.99 * 0.9, 0.01, 0.99 * 0.04, 0.99 * 0.06])
+    u = np.random.default_rng(23).random((1000, 3))
+    values = [(rare.quantile(x[:, 0], 0.0), vary["start.position[1]"].quantile(x[:, 2], 0.0))
+              for x in (each.placed(u) for each in strata)]  # fmt: skip
+    assert [set(first) for first, _ in values] == [{0.0}, {4.0}, {0.0}, {0.0}]
+    assert [set(second) for _, second in values] == [{0.0}, {0.0, 1.0, 2.0}, {1.0}, {2.0}]
+    np.testing.assert_array_equal(strata[1].placed(u)[:, 1], u[:, 1])
+
+
+@pytest.mark.parametrize(("count", "strata"), [(1, 1), (4, 1), (10, 6), (100, 51), (1000, 65)])
+def test_equal_branches_leave_a_common_half(count, strata):
+    fleet = lw.Ensemble(
+        lw.Scene.named("sphere"), 1, 0, {"start.position[0]": lw.distributions.Choice(np.arange(float(count)))}
+    )
+    found = unseen.strata_of(fleet)
+    assert len(found) == strata
+    assert sum(each.probability for each in found) == pytest.approx(1.0)
+    assert found[0].probability >= 0.5 - 1e-9
+
+
+def test_probes_see_what_regression_does_not():
+    rng = np.random.default_rng(24)
+    z = rng.normal(size=(64, 2))
+    far = unseen.probes(0, z)
+    linear = unseen.reach_of(z @ (1.0, 2.0), z, far @ (1.0, 2.0), far)
+    assert linear < 1e-12
+    y, beyond = (x @ (1.0, 2.0) - 50.0 * (x[:, 0] > 2.8) for x in (z, far))
+    assert unseen.reach_of(y, z, beyond, far) == pytest.approx(50.0, rel=0.3)
+    assert unseen.reach_of(y, z, np.full(len(far), np.nan), far) == 0.0
+
+
+def test_unseen_members_are_a_part_of_the_numbers():
+    """A model without a variance of its own needs n = unseen / error; with one, the sum of both is the variance asked for."""
+    alone = estimators.VarianceModel(0.0, 1.0, unseen=1.5)
+    (n,) = estimators.best_numbers([alone], 1e-4)
+    assert n == pytest.approx(150.0)
+    both = [estimators.VarianceModel(1.0, 1.0, unseen=30.0), estimators.VarianceModel(0.1, 10.0, unseen=3.0)]
+    numbers = estimators.best_numbers(both, 1e-3)
+    assert sum(each.at(n) for each, n in zip(both, numbers, strict=True)) == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_an_answer_is_read_back(tmp_path):
+    found = answer()
+    recipe = {"setting": Setting("psi_x", 0.025).to_dict(), "levels": [], "seed": 3}
+    found = dataclasses.replace(found, recipe=recipe, interval=(22.24, math.inf))
+    assert [path.name for path in found.save(tmp_path)] == ["estimate.json", "estimate.csv", "estimate.txt"]
+    again = Estimated.load(tmp_path / "estimate.json")
+    assert again == found
+    assert (tmp_path / "estimate.csv").read_text().splitlines()[0].startswith("of,unit,value,low,high,error")
+
+
+def test_a_level_of_a_method_with_options_is_read_back():
+    level = Level(Setting(lw.Method("psi_s", tolerance=1e-10), 0.1), Setting("psi_s", 0.2, "float32", 1), 0.9, -0.5, 0.1,
+                  "sobol", 64, 2**27, "name", 3.0, 2)  # fmt: skip
+    again = Level.from_dict(json.loads(json.dumps(level.to_dict())))
+    assert again == level

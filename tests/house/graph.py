@@ -19,8 +19,7 @@ FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 # The lowest first; those of one floor side by side: the contract of the linter is the only list of rooms.
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
 ROOMS = tuple(
-    tuple(name.removeprefix("lgvi_warp.") for name in floor.split(" | "))
-    for floor in reversed(CONTRACTS[0]["layers"])
+    tuple(name.removeprefix("lgvi_warp.") for name in floor.split(" | ")) for floor in reversed(CONTRACTS[0]["layers"])
 )
 
 

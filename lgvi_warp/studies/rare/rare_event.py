@@ -18,17 +18,23 @@ from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.rare.answer import RareEvent
+from lgvi_warp.studies.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
 from lgvi_warp.studies.rare.cheaper import cheaper_of, chosen_chain
-from lgvi_warp.studies.rare.event import RareCondition, condition_of
+from lgvi_warp.studies.rare.event import SURE, RareCondition, condition_of
 from lgvi_warp.studies.rare.limit import VehicleLimit
 from lgvi_warp.studies.rare.search import RareAnswer, RareSearch
 from lgvi_warp.studies.rare.split_search import SplitSearch
-from lgvi_warp.studies.rare.subset import NoProgress
+from lgvi_warp.studies.rare.subset import MOST_LEVELS, NoProgress
 from lgvi_warp.studies.rare.walk import VehicleWalk
 
 # What members of the scene's own setting are called.
 OWN = "the scene's own"
+ALL_LOST = (
+    "every failing member failed, or has a number that is not finite (NaN): the probability is of that; "
+    'failed="refuse" shows the first of them'
+)
 WAYS = ("chains", "splitting")
+ASK = 'ask for what is rare, as "peak depth above 12"'
 # The least error that can be asked, and the fewest members.
 LEAST_ERROR, FEWEST = 0.005, 10_000
 
@@ -112,8 +118,8 @@ def rare_event(
     }
     chain, notes = chosen_chain(own, others, seed) if others else (None, [])
     search = RareSearch(
-        own, own.d, relative_error, seed, most, weighted=not own.draws, chained=chain,
-        margin=chain.margin if chain else 0.0, report=report, notes=notes,
+        own.each, own.d, relative_error, seed, most, chained=chain, margin=chain.margin if chain else 0.0, report=report,
+        notes=notes, witness=own.tolerant,
     )  # fmt: skip
     try:
         found = search.answer()
@@ -122,7 +128,7 @@ def rare_event(
     if found.probability >= 1.0:
         lost = bool(np.isinf(found.limits).all())
         problem = f"happens for each of {found.members:,} members" + (", all of which failed" if lost else "")
-        remedy = "mend what fails" if lost else 'ask for what is rare, as {"peak depth": {"above": 12.0}}'
+        remedy = "mend what fails" if lost else ASK
         raise refusal("limit", condition.label, problem, remedy)
     return _told(found, own, others, condition, settings)
 
@@ -143,7 +149,7 @@ def _by_splitting(
         raise refusal("limit", condition.label, problem, remedy) from None
     if found.probability >= 1.0:
         problem = f"happens for each of {len(found.limits):,} members"
-        raise refusal("limit", condition.label, problem, 'ask for what is rare, as {"max(depth)": {"above": 12.0}}')
+        raise refusal("limit", condition.label, problem, ASK)
     paths = tuple((walk.times[points], keys) for points, keys in found.paths)
     answer = replace(_told(found, walk, {}, condition, settings), paths=paths)
     if answer.plain_members < walk.members:
@@ -170,11 +176,13 @@ def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
     """What is wrong where chains came no nearer to the event."""
     if stuck.kind == "steps":
         problem = "has the same value for most members, so that nothing says how near one is to the event"
-        remedy = (
-            'give a number that grows towards it: a distance, {"peak depth": {"above": 12.0}}, or the name of an event'
-        )
+        remedy = 'give a number that grows towards it: a distance, "peak depth above 12", or the name of an event'
         return refusal("limit", condition.label, problem, remedy)
-    problem = f"has a probability below 1e-15, or none; the largest limit that members reached is {stuck.largest:.4g}"
+    largest = "farthest from it" if stuck.largest <= -SURE else f"{stuck.largest:.4g}"
+    problem = (
+        f"was reached by no member within {MOST_LEVELS} levels, each a tenth of the one before, or levels ended at a largest "
+        f"limit: it never happens, or is rarer than some 1e-{MOST_LEVELS - 1}; the largest limit that members reached is {largest}"
+    )
     return refusal("limit", condition.label, problem, "move the bound, or widen what varies")
 
 
@@ -190,10 +198,18 @@ def _told(
     count = len(own.names)
     nearest = int(np.argmin((found.failing**2).sum(axis=1)))
     best = found.failing[nearest : nearest + 1]
-    mean = found.weights @ found.failing
-    noise: dict[str, list[float]] = {}
+    # With splitting, members of one start are related.
+    chains = found.chains if len(found.chains) else np.unique(found.failing, axis=0, return_inverse=True)[1].ravel()
+    parts = found.parts if len(found.parts) else chains % PARTS
+    moves = moves_of(found.failing[:, :count], found.weights, chains)
+    moved, size, spread, z = (dict(zip(own.names, map(float, column), strict=True)) for column in moves)
+    columns: dict[str, list[int]] = {}
     for source in own.sources:
-        noise.setdefault(source.of, []).extend(mean[count:][source.columns])
+        columns.setdefault(source.of, []).extend(np.arange(found.failing.shape[1])[count:][source.columns])
+    lost = float(found.weights[np.isinf(found.limits)].sum())
+    messages = [*found.notes, *[ALL_LOST] * (lost >= 1.0 - 1e-12)]
+    of_any = Chance(found.probability, *found.interval())
+    several = len(condition.names) == len(found.rows) > 1
     plain = (1.0 - found.probability) / (found.probability * max(found.spread, 1e-12) ** 2)
     return RareEvent(
         event=condition.label,
@@ -206,17 +222,26 @@ def _told(
         normals=found.failing[:, :count],
         draws=found.failing[:, count:],
         weights=found.weights,
-        failed_share=float(found.weights[np.isinf(found.limits)].sum()),
+        failed_share=lost,
         likeliest={name: value[0] for name, value in own.values(best).items()} if count else {},
         likeliest_draws=best[0, count:],
         distance=float(np.linalg.norm(best)),
-        moved=dict(zip(own.names, map(float, mean[:count]), strict=True)),
-        noise_moved={name: float(np.linalg.norm(values)) for name, values in noise.items()},
+        moved=moved,
+        moved_size=size,
+        moved_spread=spread,
+        moved_z=z,
+        noise_moved={
+            name: noise_score(found.failing[:, own_], found.weights, chains, parts) for name, own_ in columns.items()
+        },
+        by_condition=chances_of(condition.names, found.rows, found.weights, chains, of_any, found.spread)
+        if several
+        else {},
+        chains=chains,
         runs=found.runs,
         plain_members=plain,
         plain_seconds=plain * own.seconds / max(1, own.members),
         seconds=sum(each.seconds for each in limits.values()),
-        messages=found.notes,
+        messages=tuple(messages),
         provenance={
             "scene": own.fleet.scene.to_dict(),
             "ensemble": own.fleet.to_dict(),

@@ -47,8 +47,8 @@ class RareEvent(Saved):
         likeliest_draws: (k,), standard normals of its noise.
         distance: its distance from the middle, in standard deviations of all that varies.
         moved: by name, the mean of the failing members in standard deviations from the middle.
-        noise_moved: by term or sensor, a z-score of the failing members' draws: of their mean path, or of their sum of squares.
-            Noise that does not matter has one of about a standard normal; from 4.5 on it is no chance.
+        noise_moved: by term or sensor, a z-score of the failing members' draws: of their mean path or of their sum of squares.
+            That of noise which does not matter is about a standard normal number; from 4.5 on it is no chance.
         runs: the runs of subset simulation: thresholds and limits of each level; with splitting, scores of members: what their
             limit is expected to be at the end in what is not known of it, infinite where the event happened.
         plain_members: members that plain Monte Carlo would take for this error.
@@ -117,10 +117,8 @@ class RareEvent(Saved):
             numbers = ", ".join(f"{name} = {_short(value)}" for name, value in self.likeliest.items())
             noise = " and its noise" if len(self.likeliest_draws) or self.estimator == "splitting" else ""
             lines.append(f"likeliest   {numbers or 'the scene'}{noise}: {self.distance:.2f} sd from the middle")
-            columns = zip(
-                *(each.values() for each in (self.moved, self.moved_size, self.moved_spread, self.moved_z)), strict=True
-            )
-            moved = dict(zip(self.moved, columns, strict=False))
+            columns = [each.values() for each in (self.moved, self.moved_size, self.moved_spread, self.moved_z)]
+            moved = dict(zip(self.moved, zip(*columns, strict=False), strict=False))
             lines.append(f"moved       {moved_text(moved, self.noise_moved, MOST_MOVED)}")
         return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
 

@@ -126,6 +126,11 @@ def _bounded(function: Callable[..., Any]) -> Callable[..., Any]:
     return bounded
 
 
+def has_bound(text: str) -> bool:
+    """Whether a text names the bound of its quantity."""
+    return any(pattern.fullmatch(text) for pattern in (ABOVE_OR_BELOW, LESS, MORE))
+
+
 def _of_text(text: str, scene: Any) -> RareCondition:
     if event := next((event for event in scene.events if event.key == text), None):
         return _of_event(event)
@@ -138,7 +143,7 @@ def _of_text(text: str, scene: Any) -> RareCondition:
         )
         raise refusal("limit", text, problem, remedy)
     if found := SAID_OTHERWISE.fullmatch(text):
-        side = "above" if OVER.fullmatch(found[2]) else "below"
+        side = "above" if found[2] == "above" or OVER.fullmatch(found[2]) else "below"
         problem = "is no event in the words that are read"
         raise refusal("limit", text, problem, f'write "{found[1]} {side} {found[3] or "12.0"}"')
     if text.partition(" ")[0] in TYPES:

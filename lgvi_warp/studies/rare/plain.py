@@ -22,7 +22,7 @@ FEW = 50
 class PlainAnswer:
     """A share of members; spread: of its relative error; failing: (m, d), those that happen; limits: (m,), theirs.
 
-    rows: (k, m), the limits by each condition. bounds: the interval of 95 % of a count, where there are few of them; None otherwise.
+    rows: (k, m), the limits by each condition. bounds: the interval of 95 % of a count, where there are few; None otherwise.
     """
 
     probability: float

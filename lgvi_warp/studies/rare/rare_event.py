@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,7 +13,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.arguments import whole_number
 from lgvi_warp.common.errors import Faults, SceneError, refusal
-from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.progress import callback, shows_if_long, shows_progress
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
@@ -26,6 +27,7 @@ from lgvi_warp.studies.rare.search import RareAnswer, RareSearch
 from lgvi_warp.studies.rare.split_search import SplitSearch
 from lgvi_warp.studies.rare.subset import MOST_LEVELS, NoProgress
 from lgvi_warp.studies.rare.walk import VehicleWalk
+from lgvi_warp.studies.sweeps.setup import duration_text
 
 # What members of the scene's own setting are called.
 OWN = "the scene's own"
@@ -35,11 +37,16 @@ ALL_LOST = (
 )
 WAYS = ("chains", "splitting")
 ASK = 'ask for what is rare, as "peak depth above 12"'
+# Members of a level that chains take for an error of 10 %, levels of a search for 1e-5, and the most numbers of a level.
+LEVEL_MEMBERS, LEVELS, MOST_LEVEL_NUMBERS = 16_000, 5, 250_000_000
+# Draws from which on the cost is told before the first level, and members of the trial for it.
+MANY_DRAWS, TRIAL = 1000, 32
 # The least error that can be asked, and the fewest members.
 LEAST_ERROR, FEWEST = 0.005, 10_000
 
 
 @shows_progress
+@shows_if_long
 def rare_event(
     fleet: Scene | Ensemble,
     limit: OfInterest | Mapping[str, Any],
@@ -76,15 +83,16 @@ def rare_event(
         most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
         seed: Seed of all that is drawn; 0 by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            as far as that is known. None, the default, for nobody.
+            as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False for
+            nobody.
         **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
         The probability, its interval, what it took, and the members for which the event happens.
 
     Raises:
-        SceneError: If an argument is at fault; where the event never happens or always does; and where the limit takes so few
-            values that nothing says how near a member is.
+        SceneError: If an argument is at fault; where the event never happens or always does; where the limit takes so few
+            values that nothing says how near a member is; and where members have more draws of noise than chains can keep.
         FailedMembers: With failed="refuse", where members failed.
 
     Examples:
@@ -112,11 +120,13 @@ def rare_event(
     if by == "splitting":
         return _by_splitting(members, condition, float(relative_error), looks, failed, most, seed, report, settings)
     own = VehicleLimit(members, condition, settings, failed)
+    cost = expected_cost(own, relative_error)
     others = {
         each.name: VehicleLimit(each.fleet, condition, each.settings, failed)
         for each in cheaper_of(cheaper, members, settings)
     }
     chain, notes = chosen_chain(own, others, seed) if others else (None, [])
+    notes = [*cost, *notes]
     search = RareSearch(
         own.each, own.d, relative_error, seed, most, chained=chain, margin=chain.margin if chain else 0.0, report=report,
         notes=notes, witness=own.tolerant,
@@ -172,6 +182,39 @@ def check_asked(faults: Faults, relative_error: Any, most: Any) -> None:
         whole_number("most", most, FEWEST)
 
 
+def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
+    """What a search with many draws of noise will take, told on a terminal, too; nothing for few. Raises SceneError.
+
+    Refused are more numbers of a level than memory should hold.
+    """
+    level = LEVEL_MEMBERS * (0.1 / relative_error) ** 2
+    if level * own.d > MOST_LEVEL_NUMBERS:
+        problem = (
+            f"has {own.draws:,} draws of noise a member: chains keep some {level:,.0f} members at once, "
+            f"{8e-9 * level * own.d:,.1f} GB for each copy"
+        )
+        remedy = (
+            'give by="splitting", which takes no draws as numbers; run plain members, which bound the event by 3 / n; leave the '
+            "noise out, for chains over the numbers that vary alone, and draw it afresh for the members found; or ask for a "
+            "larger relative_error"
+        )
+        raise refusal("fleet", "...", problem, remedy)
+    if own.draws < MANY_DRAWS:
+        return []
+    trial = np.random.default_rng(0).standard_normal((TRIAL, own.d))
+    own.tolerant(trial)  # compiles
+    begin = own.seconds
+    own.tolerant(trial)
+    members = LEVELS * level
+    text = (
+        f"{own.draws:,} draws of noise a member; expected are some {members:,.0f} members at 1e-5, about "
+        f"{duration_text(members * (own.seconds - begin) / TRIAL)}"
+    )
+    if sys.stderr.isatty():
+        sys.stderr.write(f"{text}\n")
+    return [text]
+
+
 def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
     """What is wrong where chains came no nearer to the event."""
     if stuck.kind == "steps":
@@ -179,9 +222,11 @@ def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
         remedy = 'give a number that grows towards it: a distance, "peak depth above 12", or the name of an event'
         return refusal("limit", condition.label, problem, remedy)
     largest = "farthest from it" if stuck.largest <= -SURE else f"{stuck.largest:.4g}"
+    reached = "fewer than a tenth of the last level's members" if stuck.largest > 0.0 else "no member"
     problem = (
-        f"was reached by no member within {MOST_LEVELS} levels, each a tenth of the one before, or levels ended at a largest "
-        f"limit: it never happens, or is rarer than some 1e-{MOST_LEVELS - 1}; the largest limit that members reached is {largest}"
+        f"was reached by {reached} within {MOST_LEVELS} levels, each a tenth of the one before, or before the limit grew no "
+        f"more: it never happens, or is rarer than about 1e-{MOST_LEVELS - 2}; the largest limit that members reached is "
+        f"{largest}"
     )
     return refusal("limit", condition.label, problem, "move the bound, or widen what varies")
 

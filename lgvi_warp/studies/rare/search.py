@@ -49,8 +49,8 @@ LEAST = 1e-15
 # The least part of the second look's members that makes a failure mode which the chains passed by.
 LEAST_MISSED = 0.03
 BLIND = (
-    "weights and the second look for other failure modes tell nothing of {} normals, more than {}: a mode to which no level leads "
-    "is not seen, and n plain members without a failure bound it by 3 / n"
+    "weights and the second look for other failure modes have no power with {} normals, more than {}: a mode to which no "
+    "level leads is not seen; n plain members without such a failure bound it by 3 / n"
 )
 TAKES_MORE = "the error asked takes more than the {:,} members that may be run"
 
@@ -193,8 +193,8 @@ class RareSearch:
 
     limit: the one that the answer is of, (n, d) -> (n,) or (k, n); NaN is a member that failed, which counts as the event.
     chained: the one that first chains go by, itself by default. margin: how far from failure by `chained` a member of the
-    event may be. weighted: whether weights may be the answer. most: members that may be run. report: called with the fraction of the
-    work that is done. witness: the limit as the second look asks it, itself by default.
+    event may be. weighted: whether weights may be the answer. most: members that may be run. report: called with the
+    fraction of the work that is done. witness: the limit as the second look asks it, itself by default.
     """
 
     limit: Limit

@@ -19,8 +19,8 @@ Limit = Callable[[np.ndarray], np.ndarray]
 SHARE, ACCEPTANCE = 0.1, 0.44
 # The first scale of the chains' steps.
 FIRST_SCALE = 0.6
-# Most levels: what is rarer than 1e-15 is not looked for, since levels of the cube end at 1e-16.
-MOST_LEVELS = 15
+# Most levels: what is rarer than 1e-16 is not looked for, since levels of the cube end there.
+MOST_LEVELS = 17
 # A threshold that so large a part of a level's members reaches sorts nothing out.
 FLAT = 0.5
 # Fewest members that may make the next level, where all others have one value that is farthest from the event.

@@ -60,18 +60,29 @@ def rare(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -
     from lgvi_warp.studies.rare.rare_event import rare_event
 
     scene = load_scene(chosen)
+    _refuse_boundless(chosen.when, scene)
     cheaper = [_differing(text) for text in chosen.cheaper]
     out = folder(chosen, "_rare")
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     with progress_bar(chosen.quiet) as progress:
         found = (study or rare_event)(
             scene, chosen.when, relative_error=chosen.error, by=chosen.by, cheaper=cheaper, looks=chosen.looks,
-            failed=chosen.failed, most=chosen.most, seed=int(seed), threads=chosen.threads, progress=progress,
+            failed=chosen.failed, most=chosen.most, seed=int(seed), threads=chosen.threads, progress=progress or False,
         )  # fmt: skip
     with progress_bar(chosen.quiet, "writing"):
         written = Written(found.save(out))
         written.draw(draw or plots.rare, found, out / "rare.png")
     return finish(written, chosen, {"rare": found.to_dict()}, str(found))
+
+
+def _refuse_boundless(text: str, scene: Any) -> None:
+    """Refuse words that are no event, before anything compiles, and a quantity without a bound. Raises SceneError."""
+    from lgvi_warp.studies.rare.event import condition_of, has_bound
+
+    condition_of(text, scene)
+    words = text.strip()
+    if words not in {event.key for event in scene.events} and not has_bound(words):
+        raise refusal("--when", text, "is a quantity without a bound", f'write "{words} above 12.0"')
 
 
 def _differing(text: str) -> dict[str, Any]:

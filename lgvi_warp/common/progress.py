@@ -22,6 +22,8 @@ R = TypeVar("R")
 BAR = 24
 # Time between two looks at what takes long [s].
 TICK = 1.0
+# A call that is expected to take longer than this shows its progress on a terminal [s].
+LONG = 10.0
 
 
 class Progress:
@@ -146,6 +148,46 @@ def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
             return call(*args, **settings | {"progress": shown})  # type: ignore[arg-type]
         finally:
             shown.close()
+
+    return wrapper
+
+
+class LateBar:
+    """A bar that begins where a call turns out to take long: from its pace, or where that long is over."""
+
+    def __init__(self, begin: Callable[[], Progress | NotebookBar] = bar, clock: Callable[[], float] = time.perf_counter):
+        self._begin, self._clock, self._start = begin, clock, clock()
+        self._bar: Progress | NotebookBar | None = None
+
+    def __call__(self, fraction: float) -> None:
+        """Take the fraction done; show it where the whole takes long."""
+        passed = self._clock() - self._start
+        if self._bar is None and passed > 1.0 and passed > LONG * fraction:
+            self._bar = self._begin()
+        if self._bar is not None:
+            self._bar(fraction)
+
+    def close(self) -> None:
+        """End the bar, if it began."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+def shows_if_long(call: Callable[P, R]) -> Callable[P, R]:
+    """Let a function show its progress on a terminal where it takes long and nobody says otherwise; a decorator.
+
+    Returns: The same function, for which `progress=None` is that.
+    """
+
+    @functools.wraps(call)
+    def wrapper(*args: P.args, **settings: P.kwargs) -> R:
+        if settings.get("progress") is not None or not sys.stderr.isatty():
+            return call(*args, **settings)
+        late = LateBar()
+        try:
+            return call(*args, **settings | {"progress": late})  # type: ignore[arg-type]
+        finally:
+            late.close()
 
     return wrapper
 

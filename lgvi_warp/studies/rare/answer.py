@@ -11,11 +11,12 @@ import numpy as np
 
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.studies.files import Saved, finite_or_none
+from lgvi_warp.studies.rare.causes import Chance, moved_text
 from lgvi_warp.studies.rare.subset import SubsetRun
 from lgvi_warp.studies.sweeps.setup import duration_text
 
-# Numbers that are listed by how far the event moves them, and the least shift that is worth a line [sd].
-MOST_MOVED, LEAST_MOVED = 6, 0.3
+# Most numbers that are listed as moved by the event.
+MOST_MOVED = 6
 ESTIMATORS = {
     "importance": "weights of members drawn about the failing ones of chains",
     "subset": "subset simulation",
@@ -46,7 +47,8 @@ class RareEvent(Saved):
         likeliest_draws: (k,), standard normals of its noise.
         distance: its distance from the middle, in standard deviations of all that varies.
         moved: by name, the mean of the failing members in standard deviations from the middle.
-        noise_moved: by term or sensor, length of the mean of the failing members' normals.
+        noise_moved: by term or sensor, a z-score of the failing members' draws: of their mean path or of their sum of squares.
+            That of noise which does not matter is about a standard normal number; from 4.5 on it is no chance.
         runs: the runs of subset simulation: thresholds and limits of each level; with splitting, scores of members: what their
             limit is expected to be at the end in what is not known of it, infinite where the event happened.
         plain_members: members that plain Monte Carlo would take for this error.
@@ -56,6 +58,12 @@ class RareEvent(Saved):
         provenance: scene, what varies, settings, versions and machine.
         paths: with splitting, for each of the failing members (times (k + 1,) [s], indices (k,)): from one time to the next it
             has the noise of an index, by the seed of the call, as in `run.states(final, indices=, seed=)`.
+        moved_size: by name, the mean absolute value of the failing members in standard deviations; 0.80 of all members.
+        moved_spread: by name, the standard deviation of the failing members in that of all members.
+        moved_z: by name, the z-score farthest from 0 of these three against all members; from 4.5 on it is no chance.
+        by_condition: where the event is any of several conditions, (probability, lower, upper) of each alone by its words, and
+            of "any" and "all" of them; empty otherwise, and with splitting.
+        chains: (m,), the chain of each of the failing members, where those of one are related; different numbers elsewhere.
     """
 
     study: ClassVar[str] = "rare"
@@ -84,6 +92,11 @@ class RareEvent(Saved):
     messages: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
     paths: tuple[tuple[np.ndarray, np.ndarray], ...] = field(default=(), repr=False)
+    moved_size: Mapping[str, float] = field(default_factory=dict, repr=False)
+    moved_spread: Mapping[str, float] = field(default_factory=dict, repr=False)
+    moved_z: Mapping[str, float] = field(default_factory=dict, repr=False)
+    by_condition: Mapping[str, Chance] = field(default_factory=dict)
+    chains: np.ndarray = field(default_factory=lambda: np.zeros(0, int), repr=False)
 
     def __str__(self) -> str:
         low, high = self.interval
@@ -96,13 +109,17 @@ class RareEvent(Saved):
             f"members     {members}; {duration_text(self.seconds)}",
             f"plain       would take {self.plain_members:,.3g} members for this error, {duration_text(self.plain_seconds)}",
         ]
+        lines += [f"            {name}: {chance.probability:.3g} ({chance.lower:.3g} to {chance.upper:.3g})"
+                  for name, chance in self.by_condition.items() if name != "any"]  # fmt: skip
         if self.failed_share > 0.0:
             lines.append(f"failed      {self.failed_share:.1%} of the probability is of members that failed")
         if len(self.weights) and (self.moved or self.noise_moved):
             numbers = ", ".join(f"{name} = {_short(value)}" for name, value in self.likeliest.items())
             noise = " and its noise" if len(self.likeliest_draws) or self.estimator == "splitting" else ""
             lines.append(f"likeliest   {numbers or 'the scene'}{noise}: {self.distance:.2f} sd from the middle")
-            lines.append(f"moved       {_moved_text({**self.moved, **self.noise_moved})}")
+            columns = [each.values() for each in (self.moved, self.moved_size, self.moved_spread, self.moved_z)]
+            moved = dict(zip(self.moved, zip(*columns, strict=False), strict=False))
+            lines.append(f"moved       {moved_text(moved, self.noise_moved, MOST_MOVED)}")
         return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
 
     def to_dict(self) -> dict[str, Any]:
@@ -125,6 +142,9 @@ class RareEvent(Saved):
         table = None if failing is None else Table(values={name: np.array(each) for name, each in failing.items()})
         paths = tuple((np.array(times), np.array(keys, np.int64)) for times, keys in content.get("paths", ()))
         more = {"interval": tuple(content["interval"]), "messages": tuple(content["messages"]), "paths": paths}
+        chances = content.get("by_condition", {})
+        more["by_condition"] = {name: Chance(*map(float, each)) for name, each in chances.items()}
+        more["chains"] = np.array(content.get("chains", ()), int)
         return cls(**content | arrays | more | {"failing": table, "runs": runs})
 
     def rows(self) -> Iterator[dict[str, Any]]:
@@ -154,10 +174,3 @@ def _entries(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 def _short(value: Any) -> str:
     array = np.asarray(value)
     return f"{float(array):.5g}" if array.ndim == 0 else f"[{', '.join(f'{x:.4g}' for x in array.ravel()[:6])}]"
-
-
-def _moved_text(moved: Mapping[str, float]) -> str:
-    """Numbers by how far the event moves them, the furthest first."""
-    ranked = sorted(moved.items(), key=lambda item: -abs(item[1]))
-    told = [f"{name} {shift:+.1f} sd" for name, shift in ranked[:MOST_MOVED] if abs(shift) >= LEAST_MOVED]
-    return ", ".join(told) or "no number by itself: the event lies on several sides"

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import functools
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -29,6 +30,14 @@ EXAMPLE = 'give "max(depth) - 40.0", {"peak depth": {"above": 12.0}}, the name o
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 # "peak depth above 12", "max(depth) - 40.0" and "40.0 - max(depth)".
 ABOVE_OR_BELOW = re.compile(rf"(.+?)\s+(above|below)\s+({NUMBER})")
+# What others write for these words.
+OVER = re.compile(
+    r">=?|over|exceeds|exceeding|beyond|more than|greater than|at least|larger than|higher than|deeper than"
+)
+SAID_OTHERWISE = re.compile(
+    rf"(.+?)(?:\s+|\s*(?=[<>]))({OVER.pattern}|<=?|under|less than|smaller than|lower than|at most|shallower than|above|below)"
+    rf"(?:\s*({NUMBER})(?:\s*[a-zA-Z/]+)?)?"
+)
 LESS, MORE = re.compile(rf"(.*\S)\s*([+-])\s*({NUMBER[5:]})"), re.compile(rf"({NUMBER})\s*-\s*(\S.*)")
 
 
@@ -45,6 +54,11 @@ class RareCondition:
     limits: Mapping[str, tuple[float, float]]
     metrics: Mapping[str, Statistic] = field(default_factory=dict)
     statuses: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Conditions in words, each of which alone is the event, in the order of the limits; none where a status is, too."""
+        return () if self.statuses else tuple(_words(name, *ends) for name, ends in self.limits.items())
 
     def arguments(self, scene: Any, h: float | None = None) -> dict[str, Any]:
         """What `prepare` must know of it; h: step of the run [s], None for that of the scene."""
@@ -96,8 +110,25 @@ def condition_of(limit: Any, scene: Any) -> RareCondition:
         return _of_text(limit.strip(), scene)
     if isinstance(limit, Quantity) or callable(limit):
         (quantity,) = quantities(limit)
-        return RareCondition(f"{quantity.label} above 0", limit, {quantity.label: (0.0, np.inf)})
+        of = limit if isinstance(limit, Quantity) else _bounded(limit)
+        return RareCondition(f"{quantity.label} above 0", of, {quantity.label: (0.0, np.inf)})
     raise refusal("limit", limit, "is no event", EXAMPLE)
+
+
+def _bounded(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of a Result whose infinite numbers are the largest there are: NaN alone is of a member that failed."""
+
+    @functools.wraps(function)
+    def bounded(*arguments: Any) -> Any:
+        values = function(*arguments)
+        return np.clip(values, -SURE, SURE) if np.asarray(values).dtype.kind == "f" else values
+
+    return bounded
+
+
+def has_bound(text: str) -> bool:
+    """Whether a text names the bound of its quantity."""
+    return any(pattern.fullmatch(text) for pattern in (ABOVE_OR_BELOW, LESS, MORE))
 
 
 def _of_text(text: str, scene: Any) -> RareCondition:
@@ -111,6 +142,10 @@ def _of_text(text: str, scene: Any) -> RareCondition:
             'give the name of the event, "floor"',
         )
         raise refusal("limit", text, problem, remedy)
+    if found := SAID_OTHERWISE.fullmatch(text):
+        side = "above" if found[2] == "above" or OVER.fullmatch(found[2]) else "below"
+        problem = "is no event in the words that are read"
+        raise refusal("limit", text, problem, f'write "{found[1]} {side} {found[3] or "12.0"}"')
     if text.partition(" ")[0] in TYPES:
         raise refusal("limit", text, "is a metric without a bound", f'write "{text} above 12.0"')
     if found := LESS.fullmatch(text):

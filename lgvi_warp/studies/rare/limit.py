@@ -107,22 +107,32 @@ class VehicleLimit(Varying):
 
     def __call__(self, u: np.ndarray) -> np.ndarray:
         """The limits (n,) of members whose normals are u (n, d). docs/theory/rare_events.md, (B1)."""
-        at_once = max(1, MOST_NUMBERS // self.d)
-        parts = [self._limits(u[first : first + at_once]) for first in range(0, len(u), at_once)]
-        return np.concatenate(parts)
+        rows = self.each(u)
+        if self._spreads is None:
+            self._spreads = spreads_of(rows)
+        limits = limits_of(rows, self._spreads)
+        limits[np.isinf(rows[0])] = FAILED
+        return np.asarray(limits)
 
-    def _limits(self, u: np.ndarray) -> np.ndarray:
-        begin = time.perf_counter()
-        distances, lost = self.condition.distances(self._answers(u))
-        self.seconds += time.perf_counter() - begin
-        self.members += len(u)
+    def each(self, u: np.ndarray) -> np.ndarray:
+        """The limits (k, n) by each condition, in its own unit; members that fail have the limit `FAILED` by all."""
+        rows, lost = self._parts(u)
         if self._refuse:
             refuse_lost(lost)
-        if self._spreads is None:
-            self._spreads = spreads_of(distances)
-        limits = limits_of(distances, self._spreads)
-        limits[lost] = FAILED
-        return np.asarray(limits)
+        return np.where(lost, FAILED, rows)
+
+    def tolerant(self, u: np.ndarray) -> np.ndarray:
+        """As `each`, where members that fail are refused: such a member does not meet the event, and refuses nothing."""
+        rows, lost = self._parts(u)
+        return np.where(lost, -SURE if self._refuse else FAILED, rows)
+
+    def _parts(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Limits (k, n) and which members failed (n,), so many at once as memory holds."""
+        at_once, begin = max(1, MOST_NUMBERS // self.d), time.perf_counter()
+        parts = [self.condition.distances(self._answers(u[i : i + at_once])) for i in range(0, len(u), at_once)]
+        self.seconds += time.perf_counter() - begin
+        self.members += len(u)
+        return np.concatenate([rows for rows, _ in parts], axis=1), np.concatenate([lost for _, lost in parts])
 
     def _answers(self, u: np.ndarray) -> Any:
         """What the run returns of members with these normals."""

@@ -64,6 +64,12 @@ class Mixture:
         return Mixture(shares, np.concatenate([means] * 2), roots)
 
 
+def together(mixtures: Sequence[Mixture], shares: np.ndarray) -> Mixture:
+    """One mixture of several, with these shares (k,)."""
+    own = np.concatenate([share * each.shares for share, each in zip(shares, mixtures, strict=True)])
+    return Mixture(own, *(np.concatenate([getattr(each, name) for each in mixtures]) for name in ("means", "roots")))
+
+
 def _as_where_free(mean: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A part with mean 0 and variance 1 along axes on which the event tells nothing: few chains find these only roughly."""
     variances, axes = np.linalg.eigh(root @ root.T)
@@ -148,6 +154,7 @@ class WeightedMembers:
         limits: (m,), their limits.
         weights: (m,), of these; they sum to 1.
         members: number of members that were drawn.
+        rows: (k, m), the limits by each condition.
     """
 
     probability: float
@@ -158,20 +165,22 @@ class WeightedMembers:
     limits: np.ndarray
     weights: np.ndarray
     members: int
+    rows: np.ndarray
 
     @classmethod
     def of(cls, u: np.ndarray, limits: np.ndarray, mixture: Mixture) -> WeightedMembers:
-        """From points (n, d) drawn from a mixture, and their limits (n,). docs/theory/rare_events.md, (B8), (B10)."""
-        happens = limits > 0.0
-        failing, theirs = u[happens], limits[happens]
+        """From points (n, d) of a mixture, and their limits (k, n) or (n,). docs/theory/rare_events.md, (B8), (B10)."""
+        rows = np.atleast_2d(limits)
+        happens = (rows > 0.0).any(axis=0)
+        failing, rows, theirs = u[happens], rows[:, happens], rows[:, happens].max(axis=0, initial=-math.inf)
         n, weights = len(u), np.exp(log_weights(mixture, failing))
         total = float(weights.sum())
         if not total > 0.0:
-            return cls(0.0, math.inf, 0.0, 1.0, failing, theirs, weights, n)
+            return cls(0.0, math.inf, 0.0, 1.0, failing, theirs, weights, n, rows)
         mean, square = total / n, float((weights**2).sum())
         variance = max(0.0, square / n - mean**2) / max(1, n - 1)
         spread, largest = math.sqrt(variance) / mean, float(weights.max()) / total
-        return cls(mean, spread, total**2 / square, largest, failing, theirs, weights / total, n)
+        return cls(mean, spread, total**2 / square, largest, failing, theirs, weights / total, n, rows)
 
 
 def log_weights(mixture: Mixture, u: np.ndarray) -> np.ndarray:
@@ -186,14 +195,16 @@ def log_weights(mixture: Mixture, u: np.ndarray) -> np.ndarray:
 def doubts(
     weighted: WeightedMembers,
     mixture: Mixture,
-    probability: float,
+    probability: float | None,
     spread: float,
     failing: Sequence[np.ndarray],
     asked: float,
+    seen: np.ndarray | None = None,
 ) -> list[str]:
     """Why the weights are not the answer; empty where they are.
 
-    probability, spread: of the chains. failing: each run's failing members (m, d). asked: the relative error wanted.
+    probability, spread: of the chains; None where these did not arrive. failing: each run's failing members (m, d). asked: the
+    relative error wanted. seen: (m,), which of the weighted members lie where the chains went; None for all.
     """
     reasons = []
     if weighted.spread > asked:
@@ -203,8 +214,9 @@ def doubts(
     if weighted.largest > LARGEST:
         reasons.append(f"one weight is {weighted.largest:.1%} of all, more than {LARGEST:.0%}")
     both = math.hypot(spread, min(weighted.spread, 1.0))
-    if weighted.probability <= 0.0 or abs(math.log(weighted.probability / probability)) > AGREEMENT * both:
-        reasons.append(f"it gives {weighted.probability:.2e} where the chains give {probability:.2e}")
+    own = weighted.probability * (1.0 if seen is None else float(weighted.weights @ seen))
+    if own <= 0.0 or (probability is not None and abs(math.log(own / probability)) > AGREEMENT * both):
+        reasons.append(f"it gives {own:.2e} where the chains give {probability or 0.0:.2e}")
     elif (share := uncovered(weighted, mixture, failing)) > UNCOVERED:
         reasons.append(f"{share:.0%} of a run's failing members lie where the mixture hardly draws")
     return reasons

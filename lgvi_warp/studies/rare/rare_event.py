@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,29 +15,41 @@ from lgvi_warp.common import machine
 from lgvi_warp.common.arguments import whole_number
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.near import near_names
-from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.progress import callback, shows_if_long, shows_progress
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.rare.answer import RareEvent
+from lgvi_warp.studies.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
 from lgvi_warp.studies.rare.cheaper import cheaper_of, chosen_chain
-from lgvi_warp.studies.rare.event import RareCondition, condition_of
+from lgvi_warp.studies.rare.event import SURE, RareCondition, condition_of
 from lgvi_warp.studies.rare.limit import VehicleLimit
 from lgvi_warp.studies.rare.search import RareAnswer, RareSearch
 from lgvi_warp.studies.rare.split_search import SplitSearch
-from lgvi_warp.studies.rare.subset import NoProgress
+from lgvi_warp.studies.rare.subset import MOST_LEVELS, NoProgress
 from lgvi_warp.studies.rare.walk import VehicleWalk
+from lgvi_warp.studies.sweeps.setup import duration_text
 
 # What members of the scene's own setting are called.
 OWN = "the scene's own"
+ALL_LOST = (
+    "every failing member failed, or has a number that is not finite (NaN): the probability is of that; "
+    'failed="refuse" shows the first of them'
+)
 WAYS = ("chains", "splitting")
+ASK = 'ask for what is rare, as "peak depth above 12"'
+# Members of a level that chains take for an error of 10 %, levels of a search for 1e-5, and the most numbers of a level.
+LEVEL_MEMBERS, LEVELS, MOST_LEVEL_NUMBERS = 16_000, 5, 250_000_000
+# Draws from which on the cost is told before the first level, and members of the trial for it.
+MANY_DRAWS, TRIAL = 1000, 32
 # The least error that can be asked, and the fewest members.
 LEAST_ERROR, FEWEST = 0.005, 10_000
 
 
 @shows_progress
 @near_names(prepare)
+@shows_if_long
 def rare_event(
     fleet: Scene | Ensemble,
     limit: OfInterest | Mapping[str, Any],
@@ -73,15 +86,16 @@ def rare_event(
         most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
         seed: Seed of all that is drawn; 0 by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            as far as that is known. None, the default, for nobody.
+            as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False for
+            nobody.
         **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
         The probability, its interval, what it took, and the members for which the event happens.
 
     Raises:
-        SceneError: If an argument is at fault; where the event never happens or always does; and where the limit takes so few
-            values that nothing says how near a member is.
+        SceneError: If an argument is at fault; where the event never happens or always does; where the limit takes so few
+            values that nothing says how near a member is; and where members have more draws of noise than chains can keep.
         FailedMembers: With failed="refuse", where members failed.
 
     Examples:
@@ -109,14 +123,16 @@ def rare_event(
     if by == "splitting":
         return _by_splitting(members, condition, float(relative_error), looks, failed, most, seed, report, settings)
     own = VehicleLimit(members, condition, settings, failed)
+    cost = expected_cost(own, relative_error)
     others = {
         each.name: VehicleLimit(each.fleet, condition, each.settings, failed)
         for each in cheaper_of(cheaper, members, settings)
     }
     chain, notes = chosen_chain(own, others, seed) if others else (None, [])
+    notes = [*cost, *notes]
     search = RareSearch(
-        own, own.d, relative_error, seed, most, weighted=not own.draws, chained=chain,
-        margin=chain.margin if chain else 0.0, report=report, notes=notes,
+        own.each, own.d, relative_error, seed, most, chained=chain, margin=chain.margin if chain else 0.0, report=report,
+        notes=notes, witness=own.tolerant,
     )  # fmt: skip
     try:
         found = search.answer()
@@ -125,7 +141,7 @@ def rare_event(
     if found.probability >= 1.0:
         lost = bool(np.isinf(found.limits).all())
         problem = f"happens for each of {found.members:,} members" + (", all of which failed" if lost else "")
-        remedy = "mend what fails" if lost else 'ask for what is rare, as {"peak depth": {"above": 12.0}}'
+        remedy = "mend what fails" if lost else ASK
         raise refusal("limit", condition.label, problem, remedy)
     return _told(found, own, others, condition, settings)
 
@@ -146,7 +162,7 @@ def _by_splitting(
         raise refusal("limit", condition.label, problem, remedy) from None
     if found.probability >= 1.0:
         problem = f"happens for each of {len(found.limits):,} members"
-        raise refusal("limit", condition.label, problem, 'ask for what is rare, as {"max(depth)": {"above": 12.0}}')
+        raise refusal("limit", condition.label, problem, ASK)
     paths = tuple((walk.times[points], keys) for points, keys in found.paths)
     answer = replace(_told(found, walk, {}, condition, settings), paths=paths)
     if answer.plain_members < walk.members:
@@ -169,15 +185,52 @@ def check_asked(faults: Faults, relative_error: Any, most: Any) -> None:
         whole_number("most", most, FEWEST)
 
 
+def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
+    """What a search with many draws of noise will take, told on a terminal, too; nothing for few. Raises SceneError.
+
+    Refused are more numbers of a level than memory should hold.
+    """
+    level = LEVEL_MEMBERS * (0.1 / relative_error) ** 2
+    if level * own.d > MOST_LEVEL_NUMBERS:
+        problem = (
+            f"has {own.draws:,} draws of noise a member: chains keep some {level:,.0f} members at once, "
+            f"{8e-9 * level * own.d:,.1f} GB for each copy"
+        )
+        remedy = (
+            'give by="splitting", which takes no draws as numbers; run plain members, which bound the event by 3 / n; leave the '
+            "noise out, for chains over the numbers that vary alone, and draw it afresh for the members found; or ask for a "
+            "larger relative_error"
+        )
+        raise refusal("fleet", "...", problem, remedy)
+    if own.draws < MANY_DRAWS:
+        return []
+    trial = np.random.default_rng(0).standard_normal((TRIAL, own.d))
+    own.tolerant(trial)  # compiles
+    begin = own.seconds
+    own.tolerant(trial)
+    members = LEVELS * level
+    text = (
+        f"{own.draws:,} draws of noise a member; expected are some {members:,.0f} members at 1e-5, about "
+        f"{duration_text(members * (own.seconds - begin) / TRIAL)}"
+    )
+    if sys.stderr.isatty():
+        sys.stderr.write(f"{text}\n")
+    return [text]
+
+
 def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
     """What is wrong where chains came no nearer to the event."""
     if stuck.kind == "steps":
         problem = "has the same value for most members, so that nothing says how near one is to the event"
-        remedy = (
-            'give a number that grows towards it: a distance, {"peak depth": {"above": 12.0}}, or the name of an event'
-        )
+        remedy = 'give a number that grows towards it: a distance, "peak depth above 12", or the name of an event'
         return refusal("limit", condition.label, problem, remedy)
-    problem = f"has a probability below 1e-15, or none; the largest limit that members reached is {stuck.largest:.4g}"
+    largest = "farthest from it" if stuck.largest <= -SURE else f"{stuck.largest:.4g}"
+    reached = "fewer than a tenth of the last level's members" if stuck.largest > 0.0 else "no member"
+    problem = (
+        f"was reached by {reached} within {MOST_LEVELS} levels, each a tenth of the one before, or before the limit grew no "
+        f"more: it never happens, or is rarer than about 1e-{MOST_LEVELS - 2}; the largest limit that members reached is "
+        f"{largest}"
+    )
     return refusal("limit", condition.label, problem, "move the bound, or widen what varies")
 
 
@@ -193,10 +246,18 @@ def _told(
     count = len(own.names)
     nearest = int(np.argmin((found.failing**2).sum(axis=1)))
     best = found.failing[nearest : nearest + 1]
-    mean = found.weights @ found.failing
-    noise: dict[str, list[float]] = {}
+    # With splitting, members of one start are related.
+    chains = found.chains if len(found.chains) else np.unique(found.failing, axis=0, return_inverse=True)[1].ravel()
+    parts = found.parts if len(found.parts) else chains % PARTS
+    moves = moves_of(found.failing[:, :count], found.weights, chains)
+    moved, size, spread, z = (dict(zip(own.names, map(float, column), strict=True)) for column in moves)
+    columns: dict[str, list[int]] = {}
     for source in own.sources:
-        noise.setdefault(source.of, []).extend(mean[count:][source.columns])
+        columns.setdefault(source.of, []).extend(np.arange(found.failing.shape[1])[count:][source.columns])
+    lost = float(found.weights[np.isinf(found.limits)].sum())
+    messages = [*found.notes, *[ALL_LOST] * (lost >= 1.0 - 1e-12)]
+    of_any = Chance(found.probability, *found.interval())
+    several = len(condition.names) == len(found.rows) > 1
     plain = (1.0 - found.probability) / (found.probability * max(found.spread, 1e-12) ** 2)
     return RareEvent(
         event=condition.label,
@@ -209,17 +270,26 @@ def _told(
         normals=found.failing[:, :count],
         draws=found.failing[:, count:],
         weights=found.weights,
-        failed_share=float(found.weights[np.isinf(found.limits)].sum()),
+        failed_share=lost,
         likeliest={name: value[0] for name, value in own.values(best).items()} if count else {},
         likeliest_draws=best[0, count:],
         distance=float(np.linalg.norm(best)),
-        moved=dict(zip(own.names, map(float, mean[:count]), strict=True)),
-        noise_moved={name: float(np.linalg.norm(values)) for name, values in noise.items()},
+        moved=moved,
+        moved_size=size,
+        moved_spread=spread,
+        moved_z=z,
+        noise_moved={
+            name: noise_score(found.failing[:, own_], found.weights, chains, parts) for name, own_ in columns.items()
+        },
+        by_condition=chances_of(condition.names, found.rows, found.weights, chains, of_any, found.spread)
+        if several
+        else {},
+        chains=chains,
         runs=found.runs,
         plain_members=plain,
         plain_seconds=plain * own.seconds / max(1, own.members),
         seconds=sum(each.seconds for each in limits.values()),
-        messages=found.notes,
+        messages=tuple(messages),
         provenance={
             "scene": own.fleet.scene.to_dict(),
             "ensemble": own.fleet.to_dict(),

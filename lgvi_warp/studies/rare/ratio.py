@@ -11,8 +11,8 @@ import numpy as np
 
 from lgvi_warp.common.random import generator
 from lgvi_warp.studies.rare.answer import RareEvent
+from lgvi_warp.studies.rare.causes import RELATED
 from lgvi_warp.studies.rare.limit import VehicleLimit
-from lgvi_warp.studies.rare.search import RELATED
 
 # Most failing members of one event that are run in the other, and most of their normals; the fewest independent ones, in
 # effect, that happen in both.

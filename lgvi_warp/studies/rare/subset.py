@@ -19,10 +19,12 @@ Limit = Callable[[np.ndarray], np.ndarray]
 SHARE, ACCEPTANCE = 0.1, 0.44
 # The first scale of the chains' steps.
 FIRST_SCALE = 0.6
-# Most levels: what is rarer than 1e-15 is not looked for, since levels of the cube end at 1e-16.
-MOST_LEVELS = 15
+# Most levels: what is rarer than 1e-16 is not looked for, since levels of the cube end there.
+MOST_LEVELS = 17
 # A threshold that so large a part of a level's members reaches sorts nothing out.
 FLAT = 0.5
+# Fewest members that may make the next level, where all others have one value that is farthest from the event.
+FEWEST_SEEDS = 10
 
 
 class NoProgress(Exception):  # noqa: N818  (what happened, and no fault of the program)
@@ -69,6 +71,8 @@ class SubsetRun:
         size: number of members of a level.
         members: number of members that were run.
         failing_chains: (m,), the chain of each of the failing members.
+        parts: (m,), where several conditions make the event, one over the number of these that each failing member fulfils.
+        rows: (k, m), limits of the failing members by each condition; none where there is one.
     """
 
     probability: float
@@ -81,6 +85,13 @@ class SubsetRun:
     size: int
     members: int
     failing_chains: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    parts: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def share(self) -> float:
+        """Probability of the event, as far as it is that of this condition: members that several fulfil count in parts."""
+        return self.probability * (float(self.parts.mean()) if len(self.parts) else 1.0)
 
 
 @dataclass(eq=False)
@@ -107,10 +118,13 @@ class _Climber:
     def threshold(self) -> float:
         """The next threshold, that a tenth of the members reach. Raises NoProgress."""
         limits = self.level.limits
-        bound = min(0.0, float(np.partition(limits, -self.seeds)[-self.seeds]))
+        bound, farthest = min(0.0, float(np.partition(limits, -self.seeds)[-self.seeds])), -np.finfo(float).max
+        if bound <= farthest and (limits > farthest).sum() >= FEWEST_SEEDS:
+            # Most are farthest from the event, as the logarithm of 0 is: the others are the next level, though fewer.
+            bound = min(0.0, float(limits[limits > farthest].min()))
         reached, largest = (limits >= bound).mean(), float(limits.max())
-        if not math.isfinite(bound):
-            raise NoProgress("never", largest)
+        if bound <= farthest:
+            raise NoProgress("steps", largest)
         if reached > FLAT or bound <= self.level.threshold:
             # A value that many members have is a step; after more levels the limit has come to its largest value.
             steps = len(self.below) < 3 or bool((self.below[0].limits == bound).any())
@@ -123,7 +137,7 @@ class _Climber:
         """Begin chains at members that reach the next threshold."""
         level, bound = self.level, self.threshold()
         inside = np.flatnonzero(level.limits >= bound)
-        chosen = self.rng.permutation(inside)[: self.seeds]
+        chosen = np.resize(self.rng.permutation(inside), self.seeds)
         self._u, self._limits = [level.u[chosen]], [level.limits[chosen]]
         # Numbers that the event narrows get steps as narrow.
         self._widths = np.clip(level.u[inside].std(axis=0), 1e-3, 1.0)
@@ -191,7 +205,11 @@ def share_variance(happens: np.ndarray, chains: int) -> float:
 def first_levels(limit: Limit, d: int, size: int, generators: Sequence[np.random.Generator]) -> list[ChainLevel]:
     """Independent members of the first level of several runs, as one batch."""
     u = np.concatenate([rng.standard_normal((size, d)) for rng in generators])
-    limits = limit(u)
+    return levels_of(u, limit(u), size)
+
+
+def levels_of(u: np.ndarray, limits: np.ndarray, size: int) -> list[ChainLevel]:
+    """First levels of several runs from the members of all."""
     return [ChainLevel(u[i : i + size], limits[i : i + size], size) for i in range(0, len(u), size)]
 
 

@@ -130,7 +130,7 @@ class RareFailures:
             assert cell.fleet is not None
             try:
                 condition: Any = failing_of(self.success, self.setup.metrics, cell.fleet.scene)
-                found = rare_event(cell.fleet, condition, seed=self.setup.members.seed, progress=progress, **asked,
+                found = rare_event(cell.fleet, condition, seed=self.setup.members.seed, progress=progress or False, **asked,
                                    **self.setup.settings, **execution)  # fmt: skip
                 answer = RareFailure.of(found)
                 if lasting:

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers and noise that differ among failing members from all members, and the probability of each of several conditions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+# Times the spread that chains tell, since these begin at members that are related.
+RELATED = 1.2
+# A z-score from which a difference is no chance, and the least one that is worth a line: of a mean [sd], of a size or spread.
+SIGNIFICANT, LEAST_MEAN, LEAST_RATIO = 4.5, 0.3, 0.2
+# Mean absolute value of a standard normal.
+SIZE = math.sqrt(2.0 / math.pi)
+# Draws of a source up to which errors are told draw by draw; independent parts that mean paths are compared between.
+FEW_DRAWS, PARTS = 20, 4
+
+
+class Chance(NamedTuple):
+    """A probability, and the ends of its 95 % interval."""
+
+    probability: float
+    lower: float
+    upper: float
+
+
+class Moves(NamedTuple):
+    """Failing members compared with all: mean, mean absolute value and standard deviation [sd], and the largest z-score."""
+
+    mean: np.ndarray
+    size: np.ndarray
+    spread: np.ndarray
+    z: np.ndarray
+
+
+def mean_and_error(x: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Weighted mean of numbers (m, k), and its standard error where those of one chain are related. (E15)."""
+    mean = weights @ x
+    order, first = np.argsort(chains, kind="stable"), np.unique(np.sort(chains), return_index=True)[1]
+    away = np.add.reduceat((weights[:, None] * (x - mean))[order], first, axis=0)
+    return mean, np.sqrt((away**2).sum(axis=0))
+
+
+def moves_of(u: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> Moves:
+    """How the normals (m, k) of failing members differ from standard normals. docs/theory/rare_events.md, (B15)."""
+    tests = []
+    for x, nominal in ((u, 0.0), (np.abs(u), SIZE), (u**2, 1.0)):
+        mean, error = mean_and_error(x, weights, chains)
+        tests.append((mean - nominal) / np.maximum(RELATED * error, 1e-12))
+    z = np.stack(tests)
+    mean, size = weights @ u, weights @ np.abs(u)
+    spread = np.sqrt(np.maximum(weights @ u**2 - mean**2, 0.0))
+    return Moves(mean, size, spread, np.take_along_axis(z, np.abs(z).argmax(axis=0)[None], axis=0)[0])
+
+
+def noise_score(x: np.ndarray, weights: np.ndarray, chains: np.ndarray, parts: np.ndarray) -> float:
+    """A z-score of the draws (m, k) of a source: of their mean path, or of their sum of squares, whichever is larger.
+
+    docs/theory/rare_events.md, (B16).
+    """
+    k = x.shape[1]
+    mean, error = mean_and_error(np.column_stack([x, (x**2).sum(axis=1)]), weights, chains)
+    squares = float(mean[-1] - k) / max(RELATED * float(error[-1]), 1e-12)
+    if k <= FEW_DRAWS:
+        path = float(((mean[:-1] / np.maximum(RELATED * error[:-1], 1e-12)) ** 2).sum() - k) / math.sqrt(2.0 * k)
+        return max(path, abs(squares))
+    means = [weights[own] @ x[own] / weights[own].sum() for i in range(PARTS) if weights[own := parts == i].sum() > 0.0]
+    pairs = [(a @ b, (a @ a) * (b @ b)) for i, a in enumerate(means) for b in means[:i]]
+    path = float(sum(pair[0] for pair in pairs) / math.sqrt(max(sum(pair[1] for pair in pairs) / k, 1e-300)))
+    return max(path, abs(squares))
+
+
+def moved_text(moved: Mapping[str, Sequence[float]], noise: Mapping[str, float], most: int) -> str:
+    """What is significant, in words, the clearest first; moved: (mean, size, spread, z) by name. noise: z by name."""
+    said = [(abs(z), words) for name, (mean, size, spread, z) in moved.items()
+            if abs(z) >= SIGNIFICANT and (words := _words(name, mean, size, spread))]  # fmt: skip
+    said += [(z, f"{name} (z = {z:.0f})") for name, z in noise.items() if z >= SIGNIFICANT]
+    ranked = [words for _, words in sorted(said, key=lambda pair: -pair[0])]
+    return ", ".join(ranked[:most]) or "no number or noise beyond chance"
+
+
+def _words(name: str, mean: float, size: float, spread: float) -> str:
+    if abs(mean) >= max(LEAST_MEAN, 0.5 * size):
+        return f"{name} {mean:+.1f} sd"
+    if size >= (1.0 + LEAST_RATIO) * SIZE:
+        return f"{name} to both sides, {size:.1f} sd on average"
+    if size <= (1.0 - LEAST_RATIO) * SIZE or spread <= 1.0 - LEAST_RATIO:
+        return f"{name} near its middle, spread {spread:.1f} sd"
+    return f"{name} {mean:+.1f} sd" if abs(mean) >= LEAST_MEAN else ""
+
+
+def chances_of(
+    names: Iterable[str], rows: np.ndarray, weights: np.ndarray, chains: np.ndarray, of_any: Chance, spread: float
+) -> dict[str, Chance]:
+    """Probability of each condition alone, of any and of all, from the failing members' limits (k, m).
+
+    spread: of the relative error of the probability of any.
+    """
+    from scipy.special import ndtri
+
+    happens = rows > 0.0
+    events = {**dict(zip(names, happens, strict=True)), "any": None, "all": happens.all(axis=0)}
+    found = {}
+    for name, event in events.items():
+        if event is None:
+            found[name] = of_any
+            continue
+        share, error = (float(each[0]) for each in mean_and_error(event[:, None].astype(float), weights, chains))
+        total = mean_and_error(np.ones((len(weights), 1)), weights, chains)[0][0]
+        clusters = np.bincount(np.unique(chains, return_inverse=True)[1], weights)
+        count = float(total**2 / (clusters**2).sum()) / RELATED**2
+        # None or all of so many may be chance: three of them bound what is hidden.
+        hidden = min(1.0, 3.0 / count)
+        if not event.any():
+            found[name] = Chance(0.0, 0.0, hidden * of_any.upper)
+        elif event.all():
+            found[name] = Chance(of_any.probability, (1.0 - hidden) * of_any.lower, of_any.upper)
+        else:
+            away = float(ndtri(0.975)) * math.hypot(spread, RELATED * error / share)
+            p = of_any.probability * share
+            found[name] = Chance(p, p * math.exp(-away), min(of_any.upper, p * math.exp(away)))
+    return found

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A second look for ways to fail that chains did not see: it asks only whether members fail, and not how near they are to it.
+
+Members are drawn with all spreads enlarged; those that fail are carried back to the nominal spreads in stages (sequential
+importance sampling, Papaioannou, Papadimitriou & Straub 2016). No level leads, so that no level can lead past a failure mode.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+# (n, d) standard normals -> (n,): whether the event happens.
+Happens = Callable[[np.ndarray], np.ndarray]
+# Members that are drawn wide, particles of a stage, steps of each, and least part of these that weights are worth.
+FIRST, PARTICLES, MOVES, WORTH = 1000, 150, 2, 0.4
+# The enlarged spread: the distance of a half-space with the probability of the chains, over this; its least and largest value.
+WIDE_OF, LEAST_WIDE, MOST_WIDE = 1.6, 1.8, 4.0
+# First scale of steps, the acceptance that they are steered to, and most stages.
+SCALE, ACCEPTANCE, STAGES = 0.5, 0.44, 60
+# Times the spread that stages tell, since particles are related; more with more normals, from these on.
+RELATED, MANY = 1.3, 3.5
+# Members that nearness is measured from, and the part of each run's that are no nearer to the others.
+LANDMARKS, ODD = 1000, 0.01
+# Steps, and chains, by which few particles are made a group.
+GROWTH, GROWN = 6, 100
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """Members that fail, as the standard normals have them: u (m, d), about equally likely each; m = 0 where none was met.
+
+    probability: of the event, as the stages say it. spread: of its relative error, roughly.
+    """
+
+    u: np.ndarray
+    probability: float
+    spread: float
+
+
+class Surroundings:
+    """Where independent runs went: places are apart that are farther from their members than these are from another run.
+
+    runs: failing members (m, d) of each.
+    """
+
+    def __init__(self, runs: Sequence[np.ndarray], rng: np.random.Generator):
+        u, of = np.concatenate(runs), np.repeat(np.arange(len(runs)), [len(run) for run in runs])
+        chosen = rng.permutation(len(u))[:LANDMARKS]
+        self._u, of = u[chosen], of[chosen]
+        # Of a run that alone found a place, all are odd: the middle one of the runs tells.
+        odd = [np.quantile(_least(self._u[of == i], self._u[of != i]), 1.0 - ODD)
+               for i in range(len(runs)) if 0 < (of == i).sum() < len(of)]  # fmt: skip
+        self._reach = float(np.median(odd)) if odd else math.inf
+
+    def apart(self, u: np.ndarray) -> np.ndarray:
+        """Whether places (n, d) are apart: (n,)."""
+        return _least(u, self._u) > self._reach
+
+
+def _least(u: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """The distance of each place (n, d) to the nearest of others (m, d): (n,)."""
+    from scipy.spatial.distance import cdist
+
+    parts = [cdist(u[i : i + 1000], others).min(axis=1) for i in range(0, len(u), 1000)]
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def wide_of(probability: float) -> float:
+    """The enlarged spread at which some percent of the members fail, for a half-space of this probability."""
+    from scipy.special import ndtri
+
+    return float(np.clip(-ndtri(max(probability, 1e-300)) / WIDE_OF, LEAST_WIDE, MOST_WIDE))
+
+
+def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator) -> Witness:
+    """Failing members from draws that are `wide` times as wide in each direction. docs/theory/rare_events.md, (B13)."""
+    u = wide * rng.standard_normal((FIRST, d))
+    u = u[happens(u)]
+    if not len(u):
+        return Witness(u, 0.0, math.inf)
+    log_probability, variance = math.log(len(u) / FIRST), (1.0 - len(u) / FIRST) / len(u)
+    now, scale = wide, SCALE
+    for _ in range(STAGES):
+        if now <= 1.0:
+            break
+        squares = (u**2).sum(axis=1)
+        then = _next(now, squares)
+        logs = -0.5 * squares * (then**-2 - now**-2) + d * math.log(now / then)
+        weights = np.exp(logs - logs.max())
+        log_probability += float(logs.max()) + math.log(float(weights.mean()))
+        variance += float(weights.var() / weights.mean() ** 2) / len(u)
+        # Systematic: each particle as often as it weighs, but for one.
+        places = (np.arange(PARTICLES) + rng.random()) / PARTICLES
+        u = u[np.minimum(np.searchsorted(np.cumsum(weights) / weights.sum(), places), len(u) - 1)]
+        for _ in range(MOVES):
+            u, scale = moved(happens, u, then, scale, rng)
+        now = then
+    return Witness(u, math.exp(log_probability), RELATED * max(1.0, d / MANY) * math.sqrt(variance))
+
+
+def _next(now: float, squares: np.ndarray) -> float:
+    """The smallest spread, 1 at least, for which the weights of particles are worth enough of them, by bisection."""
+
+    def worth(then: float) -> float:
+        logs = -0.5 * squares * (then**-2 - now**-2)
+        weights = np.exp(logs - logs.max())
+        return float(weights.sum() ** 2 / (weights**2).sum()) / len(squares)
+
+    if worth(1.0) >= WORTH:
+        return 1.0
+    low, high = 1.0, now
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if worth(middle) >= WORTH else (middle, high)
+    return high if high < now else 1.0 + 0.9 * (now - 1.0)
+
+
+def moved(
+    happens: Happens, u: np.ndarray, spread: float, scale: float, rng: np.random.Generator
+) -> tuple[np.ndarray, float]:
+    """One step (B4) of failing members within the event, by the law of this spread; and the next scale."""
+    places = math.sqrt(1.0 - scale**2) * u + scale * spread * rng.standard_normal(u.shape)
+    accepted = happens(places)
+    factor = math.exp(float(accepted.mean()) - ACCEPTANCE)
+    return np.where(accepted[:, None], places, u), float(np.clip(scale * factor, 0.02, 0.95))
+
+
+def grown(happens: Happens, u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Failing members about those that there are (m, d): short chains, that a mixture can be fitted to."""
+    places, scale, kept = u[rng.permutation(GROWN) % len(u)], SCALE, []
+    for _ in range(GROWTH):
+        places, scale = moved(happens, places, 1.0, scale, rng)
+        kept.append(places)
+    return np.concatenate([u, *kept[GROWTH // 2 :]])

@@ -81,7 +81,7 @@ class SampleLayout:
     def noted_bits(self) -> int:
         """What ticks note, as bits (see noting.py): that of which something is saved, and all where the host is asked."""
         noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
-        return ALL_NOTES if self.choice.has_callback else sum({bit(signal.group, signal.row) for signal in noted})
+        return sum({bit(signal.group, signal.row) for signal in noted}) | ALL_NOTES * self.choice.has_callback
 
     @functools.cached_property
     def noted_rows(self) -> dict[str, range]:

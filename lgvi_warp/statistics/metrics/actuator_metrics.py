@@ -150,8 +150,8 @@ _SATURATED = Quantity("command", _saturated, "1", ("command",))
 
 
 def _power(samples: Fields, members: Members) -> np.ndarray:
-    """Size of the power (k, n) [W] of what the commands deliver of the demand, at the vehicle's motion over ground."""
-    w = samples["demand"].astype(np.float64, copy=False) - samples["unmet"]
+    """Size of the power (k, n) [W] of the actuators' wrench at the vehicle's motion over ground."""
+    w = samples["actuator_wrench"].astype(np.float64, copy=False)
     parts = (
         w[..., i] * samples[name][..., i % 3] for i, name in enumerate(["velocity"] * 3 + ["angular_velocity"] * 3)
     )
@@ -160,23 +160,24 @@ def _power(samples: Fields, members: Members) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class ActuatorEnergy(OfChannels):
-    """The integral over time of |power| that the delivered wrench gives to the motion [J]; then statistics of it.
+    """The integral over time of |power| that the actuators' wrench gives to the motion [J]; then statistics of it.
 
-    The power is (demand - unmet) . (velocity, angular velocity), by the trapezoidal rule between ticks: mechanical, without
-    the losses of motors and propellers. `ElectricalEnergy` has these, in a scene that accounts them.
+    The power is actuator_wrench . (velocity, angular velocity), by the trapezoidal rule between ticks: of the forces that the
+    actuators exert after faults, limits, lags and the loss by the advance speed, also those that the controller does not know.
+    It is mechanical, without the losses of motors and propellers. `ElectricalEnergy` has these, in a scene that accounts them.
 
     Args:
-        of: "demand", the default.
+        of: "actuator_wrench", the default.
         then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "energy"
     form: ClassVar[str] = "J"
-    default: ClassVar[str | None] = "demand"
+    default: ClassVar[str | None] = "actuator_wrench"
 
     def meant(self) -> Quantity:
-        if not among(self.of, ("demand",)):
-            raise refusal("energy.of", self.of, "is not the demand", "leave it out")
+        if not among(self.of, ("actuator_wrench",)):
+            raise refusal("energy.of", self.of, "is not the actuators' wrench", "leave it out")
         return _POWER
 
     def follow(self, state: State, ticks: Ticks) -> State:
@@ -184,7 +185,7 @@ class ActuatorEnergy(OfChannels):
         return {"sum": accumulated(state["sum"], ticks, mean * ticks.dt[:, None])}
 
 
-_POWER = Quantity("demand", _power, "W", ("velocity", "angular_velocity", "demand", "unmet"))
+_POWER = Quantity("actuator_wrench", _power, "W", ("velocity", "angular_velocity", "actuator_wrench"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -182,14 +182,14 @@ def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     controller = scene.controller
     if controller is None:
         return
-    missing = controller.unspanned
-    text = f"actuators cannot make {', '.join(missing)} as the laws ask: what is left is told back to them as not delivered"
-    yield "controller.allocation", np.array([bool(missing)]), lambda i: text
     for part, wish in controller.unread(scene.terms):
         yield f"{part.key}.{wish}", np.array([True]), lambda i, wish=wish: UNREAD.format(wish)  # type: ignore[misc]
     for keys, text in ((controller.idle, UNASKED), (controller.undriven(scene.terms), UNDRIVEN)):
         for key in keys:
             yield key, np.array([True]), lambda i, text=text: text  # type: ignore[misc]
+    missing = controller.unspanned
+    text = f"actuators cannot make {', '.join(missing)} as the laws ask: what is left is told back to them as not delivered"
+    yield "controller.allocation", np.array([bool(missing)]), lambda i: text
 
 
 def hulls(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:

@@ -99,12 +99,18 @@ def test_a_schedule_that_is_followed_late_keeps_the_order(method, name):
     # A channel that is late by a quarter of the step moves the vehicle by 1e-2 m and more.
     assert np.all(found[-1] < 3e-4), found
     kinds = iter(found.T)
-    orders = {kind: slope(steps, np.max([next(kinds) for _ in channels], axis=0)) for kind, channels in FOLLOWED.items()}
+    orders = {
+        kind: slope(steps, np.max([next(kinds) for _ in channels], axis=0)) for kind, channels in FOLLOWED.items()
+    }
     assert method == "rk4" or min(orders.values()) > 1.8, orders
 
 
 # One that is never reached, for each way of writing none: the device code has a lag, a limit, both, or none of them.
-UNREACHED = {"rate": {"rate_limit": 5.0}, "both": {"time_constant": 0.0, "rate_limit": 5.0}, "lag": {"time_constant": 0.4}}
+UNREACHED = {
+    "rate": {"rate_limit": 5.0},
+    "both": {"time_constant": 0.0, "rate_limit": 5.0},
+    "lag": {"time_constant": 0.4},
+}
 
 
 @pytest.mark.kernel
@@ -118,14 +124,18 @@ def test_a_limit_that_is_not_reached_changes_nothing(method, name, way):
     size = ACTUATORS["control_fins" if fins else name][0]
     following = {key: [value * size if key == "rate_limit" else value] for key, value in UNREACHED[way].items()}
     # Of a lag the limit of the rate is the one that is not reached.
-    plain, limited = ({"time_constant": [0.4]}, following | {"rate_limit": [5.0 * size]}) if way == "lag" else ({}, following)
+    plain, limited = (
+        ({"time_constant": [0.4]}, following | {"rate_limit": [5.0 * size]}) if way == "lag" else ({}, following)
+    )
     a, b = (lw.solve(scene(made(**more)), method, h=0.1, t1=T) for more in (plain, limited))
     np.testing.assert_allclose(a.position[-1], b.position[-1], rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(a.velocity[-1], b.velocity[-1], rtol=0.0, atol=1e-12)
 
 
 TURNING = {
-    "flow_angle": lambda: actuator("control_fins", flow_angle=True, position=[[-0.2, 0.0, 0.0]], rate_limit=[0.3 * 0.175]),
+    "flow_angle": lambda: actuator(
+        "control_fins", flow_angle=True, position=[[-0.2, 0.0, 0.0]], rate_limit=[0.3 * 0.175]
+    ),
     "moving_mass": lambda: lw.terms.MovingMass(
         mass=2.0, times=TIMES, places=np.array((0.02, 0.0, 0.05)) * COMMANDS[:, None], inertia=False
     ),
@@ -151,7 +161,9 @@ def test_what_turns_the_vehicle_keeps_the_order(method, name):
 @pytest.mark.slow_for("psi_x")
 @pytest.mark.parametrize("method", ["psi_s", "psi_x"])
 def test_float32_follows_as_float64_does(method):
-    a, b = (lw.solve(fleet("thrusters"), method, h=0.05, t1=T, dtype=dtype).position[-1] for dtype in ("float64", "float32"))
+    a, b = (
+        lw.solve(fleet("thrusters"), method, h=0.05, t1=T, dtype=dtype).position[-1] for dtype in ("float64", "float32")
+    )
     np.testing.assert_allclose(a, b, rtol=0.0, atol=5e-4)
 
 

@@ -62,9 +62,7 @@ def make_gather(spec, types, method, at_step, opened):
             monitor.ticks[start + j, c.packet] = c.memory[c.packet, monitor.signals[j]]
 
     @wp.func
-    def gather(
-        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real
-    ):
+    def gather(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real):
         if monitor.slots > 0:
             if wp.static(reports):
                 note_actuators(x, c, monitor, h, k, opening)
@@ -106,17 +104,22 @@ def make_exert(spec, method):
     View, Wrench, Damping = (
         view_struct(width, real, spec.shared_rows), wrench_struct(width, real), damping_struct(width, real)
     )  # fmt: skip
-    law, push, matrix = (superpose(spec.laws, role) for role in ("law of actuators", "push of actuators", "matrix of actuators"))
-    velocities, turned, moved = method.velocities_of_forces, "axes" in spec.parts, "origin" in spec.parts
+    law, push, matrix = (
+        superpose(spec.laws, role) for role in ("law of actuators", "push of actuators", "matrix of actuators")
+    )
+    velocities, turned, moved = method.velocities, "axes" in spec.parts, "origin" in spec.parts
 
     @wp.func
     def exert(x: Any, c: Any, monitor: Any, h: Any):
         view = look(View(), x, c, real(h))
         nu, Om = velocities(c.inertia, x.p, x.pi)
+        if wp.static(moved):
+            # From the origin of the state to that of the forces.
+            r = c.inertia.user_origin - c.inertia.user_origin_forces
+            nu = nu + cross(Om, r)
+            view.b = view.b + rotate(x, r)
         view.nu = nu
         view.Om = Om
-        if wp.static(moved):
-            view.b = view.b + rotate(x, c.inertia.user_origin - c.inertia.user_origin_forces)
         w = Wrench()
         if wp.static(law is not None):
             w = law(w, view, c.params)

@@ -21,7 +21,7 @@ BITS_OF_ROWS = {
     "reference": (7,) * 3 + (8,) * 9 + (9,) * 3 + (10,) * 3 + (11,) + (12,) + (13,) * 3,
     "exerted": (14,) * 6,
 }
-ALL_NOTES = (1 << 14) - 1
+ALL_NOTES = (1 << 15) - 1
 
 
 def bit(group, row):
@@ -29,8 +29,9 @@ def bit(group, row):
     return 1 << BITS_OF_ROWS[group][row]
 
 
-# The bits of what is measured and wanted.
-SEEN_NOTES = ALL_NOTES & ~bit("demand", 0)
+# The bits of what a tick notes whose host is asked, and of what is measured and wanted.
+ASKED_NOTES = ALL_NOTES & ~bit("exerted", 0)
+SEEN_NOTES = ASKED_NOTES & ~bit("demand", 0)
 MEASURED_ROW = NOTED["demand"]
 REFERENCE_ROW = MEASURED_ROW + NOTED["measured"]
 EXERTED_ROW = REFERENCE_ROW + NOTED["reference"]

@@ -44,6 +44,7 @@ class Distribution:
             "named": ("scipy", "histogram", "own"),
             "density": ("kernel_density",),
             "copula": ("copula",),
+            "factor": ("factor",),
             "derived": ("derived",),
             "openturns": ("openturns",),
         },

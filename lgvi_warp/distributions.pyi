@@ -9,6 +9,7 @@ from lgvi_warp.sampling.distributions.basic import Uniform as Uniform
 from lgvi_warp.sampling.distributions.copula import Copula as Copula
 from lgvi_warp.sampling.distributions.density import KernelDensity as KernelDensity
 from lgvi_warp.sampling.distributions.derived import Derived as Derived
+from lgvi_warp.sampling.distributions.factor import Factor as Factor
 from lgvi_warp.sampling.distributions.joint import CorrelatedNormal as CorrelatedNormal
 from lgvi_warp.sampling.distributions.joint import PhysicalInertia as PhysicalInertia
 from lgvi_warp.sampling.distributions.joint import PositiveDefinite as PositiveDefinite

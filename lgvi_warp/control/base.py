@@ -24,6 +24,18 @@ if TYPE_CHECKING:
 
 # What guidance may give, and laws may need.
 WISHES = ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
+# Those that say it all; the others say the same in other words.
+PLAIN_WISHES = ("depth", "position", "heading", "speed")
+# For each wish those by any of which a law brings it about.
+READ_BY = {
+    "depth": {"depth", "position"},
+    "position": {"position", "velocity", "heading"},
+    "heading": {"heading", "attitude"},
+    "speed": {"speed", "velocity", "position"},
+    "velocity": {"velocity", "position", "speed"},
+    "attitude": {"attitude", "heading"},
+    "angular_velocity": {"angular_velocity", "attitude", "heading"},
+}
 
 
 # What sensors read, and how many numbers each has.
@@ -267,6 +279,11 @@ class Guidance(Part):
     kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
         "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """The quantities of `gives` for which the user asked, so that some law should read them; by default all of them."""
+        return self.gives
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

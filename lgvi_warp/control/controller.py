@@ -16,7 +16,7 @@ from lgvi_warp.common.declared import positive, read, real
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.times import ROUND_OFF, whole_steps
 from lgvi_warp.control.altimeter import Altimeter
-from lgvi_warp.control.base import SECTIONS, Allocation, Bus, Part
+from lgvi_warp.control.base import PLAIN_WISHES, READ_BY, SECTIONS, WISHES, Allocation, Bus, Part
 from lgvi_warp.control.callback import Callback, CallbackCommands, refuse_second
 from lgvi_warp.control.delay import MOST_PERIODS, Delay
 from lgvi_warp.control.fault import Fault
@@ -256,6 +256,35 @@ class Controller:
         apart = np.eye(6) - effect @ np.linalg.pinv(effect, rcond=SPANNED)
         missed = self.asked * np.linalg.norm(apart, axis=0) > SPANNED
         return tuple(name for name, bad in zip(COMPONENTS, missed, strict=True) if bad)
+
+    def undriven(self, terms: Sequence[Term]) -> tuple[str, ...]:
+        """Keys of the terms that take commands, and get none: of no allocation, and of no command or schedule of their own."""
+        return tuple(
+            term.key for term in terms if term.channels and term.key not in self.actuators and not term.own_commands
+        )
+
+    def unread(self, terms: Sequence[Term]) -> tuple[tuple[Part, str], ...]:
+        """(guidance, quantity) for each wanted quantity that no law reads, in its own or in other words.
+
+        A speed is left out where no actuator could make it: a vehicle that something else drives.
+        """
+        read = set(WISHES if self.callback is not None else ()).union(*(law.needs for law in self.laws))
+        if not self.undriven(terms) and not any(np.any(np.abs(part.reach()[0]) > SPANNED) for part in self.allocation):
+            read |= {"speed"}
+        found: dict[str, Part] = {}
+        for part in self.guidance:
+            wanted = [wish for wish in READ_BY if wish in part.wanted]
+            for wish in wanted:
+                covered = wish not in PLAIN_WISHES and any(other in PLAIN_WISHES for other in wanted)
+                if not (covered or READ_BY[wish] & read):
+                    found[wish] = part
+        return tuple((part, wish) for wish, part in found.items())
+
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Keys of the actuators that make nothing of what laws ask for."""
+        parts = {part.to: part for part in self.allocation}
+        return tuple(key for key in self.actuators if not np.any(self.asked[:, None] * parts[key].reach()))
 
     def _check_laws(self, faults: Faults) -> None:
         """Add a fault for each law of whose demand the actuators can make nothing at all."""

@@ -53,6 +53,11 @@ class SetPoint(Guidance):
         heading = ("heading", "attitude", "angular_velocity") if upright else ()
         return (*position, *depth, *heading, *(("speed",) if self.speed is not None else ()))
 
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        # A position alone brings a heading that no one asked for.
+        return tuple(wish for wish in self.gives if wish != "heading" or self.heading is not None)
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # All numbers, and which of them are wanted; what is not stays as guidance before it wants it.
         position = numbers.get("position", np.zeros((1, 3)))

@@ -32,6 +32,7 @@ _OF_ACTUATORS = (
     Signal(Field("command", (1,), "1", "commands of the actuators, faults included, each in its own unit"), ""),
     Signal(Field("actuator", (1,), "1", "where the actuators are, after delay, fault, limit and lag"), "actuator"),
     Signal(Field("demand", (6,), "N, N m", "demanded wrench X Y Z K M N in body axes"), "demand"),
+    Signal(Field("exerted", (6,), "N, N m", "wrench that the actuators exert, X Y Z K M N in body axes"), "exerted"),
     Signal(Field("unmet", (6,), "N, N m", "demand that the actuators do not deliver, X Y Z K M N"), ""),
 )
 # Rows of a measurement and of a reference, as lgvi_kernels/advance/noting.py writes them.

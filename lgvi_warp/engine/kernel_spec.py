@@ -85,10 +85,11 @@ def _control(choice: KernelChoice, signals: tuple[str, ...]) -> Control | None:
     if choice.controller is None:
         return None
     parts = choice.parts_of_control
-    reports = any(SIGNALS[name].group == "actuator" for name in signals)
+    groups = {SIGNALS[name].group for name in signals}
     numbers = tuple(declared(part, module) for part, module in parts)
     headings = any(name.endswith("_heading") for name in signals)
-    return Control(tuple(module for _, module in parts), numbers, reports, choice.has_callback, headings)
+    shown = bool(groups & {"actuator", "exerted"}), "exerted" in groups
+    return Control(tuple(module for _, module in parts), numbers, *shown, choice.has_callback, headings)
 
 
 def _explicit(method: Method, choice: KernelChoice) -> Explicit | None:

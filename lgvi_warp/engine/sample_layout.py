@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
-from lgvi_kernels.advance.noting import ALL_NOTES, NOTED, bit
+from lgvi_kernels.advance.noting import ASKED_NOTES, NOTED, bit
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_warp.control.signals import ENERGY_USED, SIGNALS, row_of, saved_fields
 from lgvi_warp.engine.kernel_choice import KernelChoice
@@ -81,7 +81,7 @@ class SampleLayout:
     def noted_bits(self) -> int:
         """What ticks note, as bits (see noting.py): that of which something is saved, and all where the host is asked."""
         noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
-        return ALL_NOTES if self.choice.has_callback else sum({bit(signal.group, signal.row) for signal in noted})
+        return sum({bit(signal.group, signal.row) for signal in noted}) | ASKED_NOTES * self.choice.has_callback
 
     @functools.cached_property
     def noted_rows(self) -> dict[str, range]:

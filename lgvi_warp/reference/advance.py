@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from lgvi_warp.reference.paper import FORCED
 from lgvi_warp.reference.rotation import Solver, newton
-from lgvi_warp.reference.submaps import SUBMAPS, Body, State
+from lgvi_warp.reference.submaps import SUBMAPS, Body, K, State
 
 # (letter, coefficient) of each sub-map, the first applied first.
 Program = Sequence[tuple[str, float]]
@@ -19,9 +19,15 @@ def step(
 
     docs/theory/splitting.md, (S6), (S7), (S8), (S9).
     """
+    last = len(program) - 1
+    # Kicks at both ends of a step: what laws remember belongs to the time after the first, and before the last.
+    late = {0: 0.5, last: -0.5} if last and program[0][0] == program[last][0] == "K" else {}
     for g in stages:
-        for letter, coefficient in program:
-            x = (SUBMAPS | FORCED)[letter](x, body, coefficient * g * h, solve)
+        for i, (letter, coefficient) in enumerate(program):
+            if i in late:
+                x = K(x, body, coefficient * g * h, solve, late[i])
+            else:
+                x = (SUBMAPS | FORCED)[letter](x, body, coefficient * g * h, solve)
     return x
 
 

@@ -99,7 +99,11 @@ def saturation_share(t: np.ndarray, command: np.ndarray, limit: np.ndarray) -> f
     return float(np.sum(held * np.diff(t)) / (t[-1] - t[0]))
 
 
-def energy(t: np.ndarray, wrench: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray) -> float:
-    """The integral of |power| [J] of a delivered wrench (k, 6) [N, N m]; velocities (k, 3) [m/s], [rad/s]; body axes."""
-    power = np.sum(wrench[:, :3] * velocity, axis=1) + np.sum(wrench[:, 3:] * angular_velocity, axis=1)
-    return float(np.trapezoid(np.abs(power), t))
+def energy(
+    t: np.ndarray, wrench: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray, held: bool = False
+) -> float:
+    """The integral of |power| [J] of a wrench (k, 6) [N, N m], held between ticks or not; velocities (k, 3) [m/s], [rad/s]."""
+    twist = np.hstack([velocity, angular_velocity])
+    first = np.sum(wrench[:-1] * twist[:-1], axis=1)
+    last = np.sum((wrench[:-1] if held else wrench[1:]) * twist[1:], axis=1)
+    return float(np.sum(0.5 * (np.abs(first) + np.abs(last)) * np.diff(t)))

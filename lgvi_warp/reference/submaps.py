@@ -134,9 +134,9 @@ def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]
     return body.excess * a, cross(body.excess_lever, a)
 
 
-def remembered(x: State, body: Body, h: float, second: bool) -> State:
-    """What the laws remember, half a kick later."""
-    views = look(x, body, h)
+def remembered(x: State, body: Body, h: float, second: bool, late: float = 0.0) -> State:
+    """What the laws remember, half a kick later; late: see K."""
+    views = look(replace(x, t=x.t + late * h), body, h)
     memory = tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True))
     return recorded(x, body, views, memory)
 
@@ -230,14 +230,15 @@ def kicked(x: State, h: float, wrench: tuple[Array, Array]) -> State:
     return replace(x, p=x.p + h * wrench[0], pi=x.pi + h * wrench[1])
 
 
-def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
+def K(x: State, body: Body, h: float, solve: Solver = newton, late: float = 0.0) -> State:
     """The potential's part of eq. (13), (14), (19), (20), p <- p + h f(b, R), pi <- pi + h mU(b, R), and the other laws.
 
     docs/theory/splitting.md, (S5), (S15).
 
-    Half of what the laws remember and of the water's drift, half the kick, drag, and the other halves: order 2.
+    Half of what the laws remember and of the water's drift, half the kick, drag, and the other halves: order 2. late: how much
+    later than the kick the middle of the time is that laws remember, in lengths of the kick.
     """
-    x = remembered(x, body, h, second=False)
+    x = remembered(x, body, h, second=False, late=late)
     b = x.b
     x = replace(x, b=b + 0.5 * h * water(look(x, body, h), body).velocity)
     views = look(x, body, h)
@@ -252,7 +253,7 @@ def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     middle = replace(x, p=0.5 * (before.p + x.p), pi=0.5 * (before.pi + x.pi))
     x = replace(x, used=x.used + h * power(middle, body, h))
     # Laws remember where the kick was, half way with the water.
-    return replace(remembered(x, body, h, second=True), b=b + h * flow.velocity)
+    return replace(remembered(x, body, h, second=True, late=late), b=b + h * flow.velocity)
 
 
 SUBMAPS = {"Ab": Ab, "Ap": Ap, "T": T, "D": D, "K": K}

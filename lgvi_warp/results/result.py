@@ -69,8 +69,8 @@ class Result(Summarized):
         samples: Arrays of the fields that were kept, by name. Each is also an attribute: position (k, n, 3) [m, inertial],
             attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
             Signals of a controller, where SaveAt(fields=...) names them, are those after the look at each time: command and
-            actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand and unmet (k, n, 6) [N,
-            N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth, _heading;
+            actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand, unmet and
+            exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth, _heading;
             reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed. Of a filter
             (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k, n, 6), nees, nis and nis_count
             (k, n), innovation and innovation_sigma (k, n, 12). So is energy_used (k, n) [J], of a scene that accounts it.
@@ -205,7 +205,7 @@ class Result(Summarized):
         return self._kept("angular_velocity")
 
     energy_used = _Signal()
-    command, actuator, demand, unmet = _Signal(), _Signal(), _Signal(), _Signal()
+    command, actuator, demand, unmet, exerted = _Signal(), _Signal(), _Signal(), _Signal(), _Signal()
     measured_position, measured_attitude, measured_velocity = _Signal(), _Signal(), _Signal()
     measured_water_velocity, measured_angular_velocity = _Signal(), _Signal()
     measured_depth, measured_heading = _Signal(), _Signal()

@@ -77,6 +77,10 @@ LARGE = ("an inertia of {:.4g} kg m2 is beyond the {:.4g} kg m2 that the mass al
 DRIVES = "{} is {{:.4g}}, and pushes the vehicle on as it moves: drag and damping are below 0, a sign?"
 TWICE = "brakes the hull across the flow where {} does: its drag counts twice"
 
+UNREAD = "no law of the controller reads the wanted {0}. Add one that does, or it has no effect"
+UNDRIVEN = "no allocation, schedule or command drives it. Name it in controller.allocation, or give it a command"
+UNASKED = "no law asks for a force or a moment that it makes, so it stays at rest. Add a law that does"
+
 
 def _text(template: str, *numbers: np.ndarray) -> Callable[[int], str]:
     """The text of each member, from its numbers."""
@@ -178,8 +182,16 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
 
 
 def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for components of a force or a moment that a controller asks for, and its actuators cannot make."""
-    missing = () if scene.controller is None else scene.controller.unspanned
+    """Look for components that actuators cannot make, wanted quantities that no law reads, and actuators that nothing drives."""
+    controller = scene.controller
+    if controller is None:
+        return
+    for part, wish in controller.unread(scene.terms):
+        yield f"{part.key}.{wish}", np.array([True]), lambda i, wish=wish: UNREAD.format(wish)  # type: ignore[misc]
+    for keys, text in ((controller.idle, UNASKED), (controller.undriven(scene.terms), UNDRIVEN)):
+        for key in keys:
+            yield key, np.array([True]), lambda i, text=text: text  # type: ignore[misc]
+    missing = controller.unspanned
     text = f"actuators cannot make {', '.join(missing)} as the laws ask: what is left is told back to them as not delivered"
     yield "controller.allocation", np.array([bool(missing)]), lambda i: text
 

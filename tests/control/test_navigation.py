@@ -86,6 +86,21 @@ def test_a_log_and_a_gyroscope_without_a_filter_are_the_twins():
     assert np.array_equal(seen[200:249, :, 12:15], seen[201:250, :, 12:15])
 
 
+@pytest.mark.parametrize(
+    "lost",
+    [{"silent_from": 0.0, "silent_to": 5.0}, {"dropout": 1.0}, {"floor": "ground", "greatest_range": 2.0}],
+    ids=["silent", "lost", "out of range"],
+)
+def test_a_log_tells_no_velocity_before_its_first_lock(lost):
+    listed, truth = [lw.control.DVL(noise=0.01, **lost)], voyage(100)
+    scene = over(lw.events.Floor(name="ground", depth=40.0), listed, 2) if "floor" in lost else fleet(listed, 2)
+    seen = measured(scene, truth, H)[:, :, 12:15]
+    first = round(lost.get("silent_to", 1e6) / H)
+    assert np.all(seen[:first] == 0.0)
+    assert np.abs(truth[:first, :, 12:15]).max() > 0.1
+    assert np.abs(seen[first:] - truth[first:101, :, 12:15]).max(initial=0.0) < 0.1
+
+
 @pytest.mark.slow
 def test_sensors_without_errors_measure_the_truth():
     truth = voyage(100)

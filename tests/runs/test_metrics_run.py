@@ -18,7 +18,7 @@ from tests.conftest import ROOT
 
 pytestmark = pytest.mark.kernel
 
-FIELDS = ("position", "attitude", "velocity", "angular_velocity", "command", "actuator", "demand", "unmet")
+FIELDS = ("position", "attitude", "velocity", "angular_velocity", "command", "actuator", "demand", "unmet", "exerted")
 FIELDS += tuple(f"reference_{name}" for name in ("depth", "heading", "speed", "position", "velocity", "attitude"))
 FIELDS += tuple(f"measured_{name}" for name in ("depth", "water_velocity"))
 T1, TICK = 12.0, 0.1
@@ -116,8 +116,7 @@ def by_twin(paths, limit):
         numbers["effort command[1]"] = twin.effort(t, s["command"][:k, m, 1:2])
         numbers["travel"] = twin.travel(t, s["actuator"][:k, m])
         numbers["saturation_share"] = twin.saturation_share(t, s["command"][:k, m], limit)
-        wrench = (s["demand"] - s["unmet"])[:k, m]
-        numbers["energy"] = twin.energy(t, wrench, s["velocity"][:k, m], s["angular_velocity"][:k, m])
+        numbers["energy"] = twin.energy(t, s["exerted"][:k, m], s["velocity"][:k, m], s["angular_velocity"][:k, m])
         numbers["time_to_failure"] = end
         numbers["deepest"] = np.max(y["depth"][:k, m])
         for name, value in numbers.items():

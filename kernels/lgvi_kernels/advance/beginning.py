@@ -87,7 +87,7 @@ def make_opening(spec):
     opened, begin = stepping.opened, watching.begin
     real, looking, controlled = spec.real, bool(spec.warning_rows) or spec.energy, spec.control is not None
     asked, reports = controlled and spec.control.asked, controlled and spec.control.reports
-    note_actuators = make_note_actuators(spec, types, stepping.at_step)
+    note_actuators = make_note_actuators(spec, types, stepping.method, stepping.at_step, opened)
     _, _, first_signals = make_signals(types)
 
     @wp.func(inline=True)
@@ -113,7 +113,7 @@ def make_opening(spec):
         if wp.static(controlled):
             if begins > 0:
                 if wp.static(reports):
-                    note_actuators(x, c, h, k0)
+                    note_actuators(x, c, monitor, h, k0, opening)
                 first_signals(c, monitor, frozen)
                 if monitor.slots > 0:
                     if begins != wp.static(STARTS) and k0 == monitor.first_tick * monitor.every:

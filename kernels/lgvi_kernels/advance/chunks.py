@@ -46,7 +46,7 @@ def make_sampled(spec):
     at_step, opened, controlled = stepping.at_step, stepping.opened, spec.control is not None
     reports = controlled and spec.control.reports
     sample = make_sample(Lane, spec.compensated, stepping.method, superpose(spec.laws, "flow") is not None, spec.still)
-    note_actuators = make_note_actuators(spec, types, at_step)
+    note_actuators = make_note_actuators(spec, types, stepping.method, at_step, opened)
     _, sample_signals, _ = make_signals(types)
 
     @wp.func(inline=False)
@@ -59,7 +59,7 @@ def make_sampled(spec):
         sample(out, c.packet, first, columns, y, c, real(h), monitor, frozen)
         if wp.static(spec.signalled):
             if wp.static(reports):
-                note_actuators(x, c, h, k)
+                note_actuators(x, c, monitor, h, k, opening)
             sample_signals(out, first + numbers, c, monitor, frozen)
 
     return sampled
@@ -117,7 +117,8 @@ def make_chunks(spec):
         spec.checked or spec.watched,
     )
     reports = spec.control is not None and spec.checked and spec.control.reports
-    note_actuators, (_, show, rest) = make_note_actuators(spec, types, stepping.at_step), make_resting(spec)
+    note_actuators = make_note_actuators(spec, types, stepping.method, stepping.at_step, stepping.opened)
+    _, show, rest = make_resting(spec)
     begun, (read, write, _) = make_begun(spec), make_rows(Lane, State, spec.paced, spec.compensated)
 
     @wp.func(inline=True)
@@ -145,7 +146,7 @@ def make_chunks(spec):
                 n = 1
                 if wp.static(reports):
                     # Where a lane fails in this step, its actuators are those of the step's start.
-                    note_actuators(x, c, h, k)
+                    note_actuators(x, c, monitor, h, k, opening)
             n = chunk(x, frozen, suspects, c, monitor, k, n, singles, last, h, stage_h, lead_h, first_h, opening, state,
                       status, failed_step, failed_size)  # fmt: skip
             k += n

@@ -46,8 +46,8 @@ def make_feed(spec, types, method, at_step, opened):
     State, Constants, Monitor = types.State, types.Constants, types.Monitor
     Reference, truth = reference_struct(spec.lanes, spec.real), make_truth(spec, types, method)
     plain, noted = (make_seen(spec, types, method, truth, at_step, opened, notes) for notes in (False, True))
-    acted, gather = make_acted(spec, types), make_gather(spec, types, at_step)
-    keep_motion = make_keep_motion(spec, types, method, truth, at_step, opened)
+    acted, gather = make_acted(spec, types), make_gather(spec, types, method, at_step, opened)
+    keep_motion, real = make_keep_motion(spec, types, method, truth, at_step, opened), spec.real
 
     # Not inlined, and before the tick itself: what is noted costs the tick no register, and no bit.
     @wp.func(inline=False)
@@ -72,7 +72,7 @@ def make_feed(spec, types, method, at_step, opened):
             note(x, c, monitor, k, h, opening)
         y, r = plain(x, c, monitor, k, h, opening)
         acted(x, y, r, c, monitor)
-        gather(x, c, monitor, k, h)
+        gather(x, c, monitor, k, h, opening)
 
     @wp.func(inline=False)
     def ask(
@@ -82,7 +82,7 @@ def make_feed(spec, types, method, at_step, opened):
         if monitor.slots > 0:
             keep_motion(x, c, monitor, k, h, opening)
         y, r = noted(x, c, monitor, k, h, opening)
-        gather(x, c, monitor, k, h)
+        gather(x, c, monitor, k, h, opening)
 
     @wp.func(inline=False)
     def respond(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64):
@@ -90,7 +90,7 @@ def make_feed(spec, types, method, at_step, opened):
         y = measured_of(truth(x, c, monitor, k, h), c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
         r = wanted_of(Reference(), c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW))
         acted(x, y, r, c, monitor)
-        gather(x, c, monitor, k, h)
+        gather(x, c, monitor, k, h, real(0.0))
 
     @wp.func(inline=False)
     def recall(
@@ -98,7 +98,7 @@ def make_feed(spec, types, method, at_step, opened):
     ):
         """Gather the motion at this tick, and what the memory has of it."""
         keep_motion(x, c, monitor, k, h, opening)
-        gather(x, c, monitor, k, h)
+        gather(x, c, monitor, k, h, opening)
 
     return (ask, respond, recall) if spec.control.asked else (feed, method.step, recall)
 

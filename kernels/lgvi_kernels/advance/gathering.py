@@ -6,8 +6,12 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, mul, positive, sub  # noqa: F401
+from lgvi_kernels.advance.noting import EXERTED_ROW, put3
+from lgvi_kernels.lanes.arithmetic import add, cross, mul, positive, sub  # noqa: F401
+from lgvi_kernels.lanes.matrix3 import apply
+from lgvi_kernels.lanes.state import damping_struct, view_struct, wrench_struct
 from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.dissipation import damped_force, damped_torque
 from lgvi_kernels.maps.submaps import look, rotate
 
 
@@ -44,10 +48,10 @@ def make_gather_motion(compensated, moved):
     return gather_motion
 
 
-def make_gather(spec, types, at_step):
-    """(x, c, monitor, k, h): write the signals after a tick, where something is gathered at all of them."""
+def make_gather(spec, types, method, at_step, opened):
+    """(x, c, monitor, k, h, opening): write the signals after a tick, where something is gathered at all of them."""
     State, Constants, Monitor, reports = types.State, types.Constants, types.Monitor, spec.control.reports
-    note_actuators = make_note_actuators(spec, types, at_step)
+    note_actuators, real = make_note_actuators(spec, types, method, at_step, opened), spec.real
 
     @wp.func(inline=False)
     def gather_signals(c: wp.ref[Constants], monitor: wp.ref[Monitor], tick: int):
@@ -58,28 +62,82 @@ def make_gather(spec, types, at_step):
             monitor.ticks[start + j, c.packet] = c.memory[c.packet, monitor.signals[j]]
 
     @wp.func
-    def gather(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64):
+    def gather(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real):
         if monitor.slots > 0:
             if wp.static(reports):
-                note_actuators(x, c, h, k)
+                note_actuators(x, c, monitor, h, k, opening)
             gather_signals(c, monitor, k // monitor.every)
 
     return gather
 
 
 @functools.cache
-def make_note_actuators(spec, types, at_step):
-    """(x, c, h, k): the actuators write where they are into the bus (role `report` of their laws); nothing where none does."""
-    State, Constants, View, real = types.State, types.Constants, types.View, spec.real
-    report = superpose(spec.laws, "report")
+def make_note_actuators(spec, types, method, at_step, opened):
+    """(x, c, monitor, h, k, opening): the actuators write where they are into the bus (role `report` of their laws).
+
+    Where it is saved also the wrench that they exert, at the motion x without the lead of its step.
+    """
+    State, Constants, Monitor, View, real = types.State, types.Constants, types.Monitor, types.View, spec.real
+    report, exert = superpose(spec.laws, "report"), make_exert(spec, method)
+    exerts = spec.control is not None and spec.control.exerts and report is not None
+    momentum = method.momentum
 
     @wp.func(inline=False)
-    def note_actuators(x: wp.ref[State], c: wp.ref[Constants], h: wp.float64, k: int):
+    def note_actuators(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], h: wp.float64, k: int, opening: real
+    ):
         if wp.static(report is not None):
             view = look(View(), at_step(x, k, h), c, real(h))
             view = report(view, view, c.params)
+        if wp.static(exerts):
+            z = opened(at_step(x, k, h), c, -opening)
+            if wp.static(momentum is not None):
+                z.p = momentum(z)
+            exert(z, c, monitor, h)
 
     return note_actuators
+
+
+def make_exert(spec, method):
+    """(x, c, monitor, h): note the wrench of the actuators that report, in the user's axes and about his origin."""
+    width, real = spec.lanes, spec.real
+    View, Wrench, Damping = (
+        view_struct(width, real, spec.shared_rows), wrench_struct(width, real), damping_struct(width, real)
+    )  # fmt: skip
+    law, push, matrix = (
+        superpose(spec.laws, role) for role in ("law of actuators", "push of actuators", "matrix of actuators")
+    )
+    velocities, turned, moved = method.velocities, "axes" in spec.parts, "origin" in spec.parts
+
+    @wp.func
+    def exert(x: Any, c: Any, monitor: Any, h: Any):
+        view = look(View(), x, c, real(h))
+        nu, Om = velocities(c.inertia, x.p, x.pi)
+        if wp.static(moved):
+            # From the origin of the state to that of the forces.
+            r = c.inertia.user_origin - c.inertia.user_origin_forces
+            nu = nu + cross(Om, r)
+            view.b = view.b + rotate(x, r)
+        view.nu = nu
+        view.Om = Om
+        w = Wrench()
+        if wp.static(law is not None):
+            w = law(w, view, c.params)
+        if wp.static(push is not None):
+            w = push(w, view, c.params)
+        if wp.static(matrix is not None):
+            D = matrix(Damping(), view, c.params)
+            w.force = w.force - damped_force(D, nu, Om)
+            w.torque = w.torque - damped_torque(D, nu, Om)
+        if wp.static(moved):
+            w.torque = w.torque - cross(c.inertia.user_origin_forces, w.force)
+        if wp.static(turned):
+            w.force = apply(c.inertia.axes, w.force)
+            w.torque = apply(c.inertia.axes, w.torque)
+        put3(c.memory, c.packet, monitor.bus + wp.static(EXERTED_ROW), w.force)
+        put3(c.memory, c.packet, monitor.bus + wp.static(EXERTED_ROW + 3), w.torque)
+
+    return exert
 
 
 @functools.cache

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A method's step, made of its sub-maps and the scene's laws: which law acts in which map, and how velocities follow."""
 
+import functools
 from typing import Any, NamedTuple
 
 import warp as wp
@@ -229,7 +230,10 @@ def make_method(spec):
     }
     if "K" in used:
         kick_account = make_kick_account(laws, velocities_of_forces) if spec.accounted else None
-        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E, V, kick_account)
+        make_kick = functools.partial(
+            make_K, View, Wrench, Flow, law, evolve, flow, varies, shifted, E, V, kick_account
+        )
+        letters["K"] = make_kick()
     if "W" in used:
         letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
     if "modified" in spec.parts:
@@ -265,6 +269,8 @@ def make_method(spec):
         account = make_map_account(View, laws, velocities_of_forces) if spec.accounted else None
         letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages, account)
     maps = maps_of(spec, letters)
+    if evolve is not None and len(maps) > 1 and spec.maps[0][0] == spec.maps[-1][0] == "K":
+        maps = ((make_kick(0.5), maps[0][1]), *maps[1:-1], (make_kick(-0.5), maps[-1][1]))
     step = fold_pair(maps) if spec.paired else fold(maps)
     # Without a lead, step stands in its place, and is called nowhere.
     lead = letters[spec.lead[0]] if spec.lead else step

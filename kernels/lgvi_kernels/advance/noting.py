@@ -10,16 +10,18 @@ from lgvi_kernels.lanes.functions import arctangent2
 
 # What each tick notes in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
 # position, attitude row by row, velocities over ground and through the water, angular velocity, heading; the reference:
-# position, attitude, velocity, angular velocity, heading, speed, angular acceleration.
-NOTED = {"demand": 6, "measured": 22, "reference": 23}
+# position, attitude, velocity, angular velocity, heading, speed, angular acceleration; and the wrench of the actuators, which
+# is noted with where they are (see gathering.py).
+NOTED = {"demand": 6, "measured": 22, "reference": 23, "exerted": 6}
 # Each of these vectors where any of it is saved, or the host is asked: bits of a number of the launch say so, so that what is
 # saved changes no code, and with it no bit. For each row of what is noted, the number of its bit.
 BITS_OF_ROWS = {
     "demand": (0,) * 6,
     "measured": (1,) * 3 + (2,) * 9 + (3,) * 3 + (4,) * 3 + (5,) * 3 + (6,),
     "reference": (7,) * 3 + (8,) * 9 + (9,) * 3 + (10,) * 3 + (11,) + (12,) + (13,) * 3,
+    "exerted": (14,) * 6,
 }
-ALL_NOTES = (1 << 14) - 1
+ALL_NOTES = (1 << 15) - 1
 
 
 def bit(group, row):
@@ -27,10 +29,12 @@ def bit(group, row):
     return 1 << BITS_OF_ROWS[group][row]
 
 
-# The bits of what is measured and wanted.
-SEEN_NOTES = ALL_NOTES & ~bit("demand", 0)
+# The bits of what a tick notes whose host is asked, and of what is measured and wanted.
+ASKED_NOTES = ALL_NOTES & ~bit("exerted", 0)
+SEEN_NOTES = ASKED_NOTES & ~bit("demand", 0)
 MEASURED_ROW = NOTED["demand"]
 REFERENCE_ROW = MEASURED_ROW + NOTED["measured"]
+EXERTED_ROW = REFERENCE_ROW + NOTED["reference"]
 
 
 @wp.func

@@ -24,6 +24,7 @@ class Control(NamedTuple):
     parts: tuple  # modules: sensors, guidance, laws, allocation, then what commands pass on their way
     numbers: tuple  # the declared numbers of each part (see params_of)
     reports: bool = False  # samples show where actuators are
+    exerts: bool = False  # or the wrench that they exert
     asked: bool = False  # a function of the host answers each tick, between launches; such a kernel has no lead
     headings: bool = False  # the headings among what is noted are computed: others read attitudes
 

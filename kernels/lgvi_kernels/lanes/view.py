@@ -147,13 +147,13 @@ def command(view: Any, first: int, count: int, limit: Any, t: Any):
 
 
 @wp.func
-def middle_of_half(view: Any):
-    """The time in the middle of this half of a kick, for laws that remember; view.t is the middle of the whole kick."""
-    quarter = view.h.dtype(0.25) * view.h
-    t = view.t - quarter
+def end_of_half(view: Any):
+    """(time, length) of the end of this half of a kick, for laws that remember; view.t is the middle of the whole kick."""
+    half = view.h.dtype(0.5) * view.h
+    t = view.t
     if view.second > 0:
-        t = view.t + quarter
-    return t
+        t = view.t + half
+    return t, half
 
 
 def make_pursuit(solved):

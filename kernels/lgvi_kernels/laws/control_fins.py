@@ -32,20 +32,6 @@ schedule, commanded = make_commanded(ROWS, LIMIT)
 
 
 @wp.func
-def evolve(state: Any, view: Any, p: Any):
-    """|deflection'| <= rate: towards the command over half a kick, the command that of the middle of that half."""
-    if p.limited > 0:
-        t = middle_of_half(view)
-        half = view.h.dtype(0.5) * view.h
-        for i in range(p.count):
-            angle = remembered(view, p.memory + i)
-            change = commanded(view, p, i, t) - angle
-            largest = half * row1(view, p.first + wp.static(ROWS) * i + wp.static(RATE))
-            remember(view, p.memory + i, angle + clamp(change, -largest, largest))
-    return state
-
-
-@wp.func
 def turned_towards(angle: Any, start: Any, end: Any, length: Any, rate: Any):
     """Along a straight command: at the rate until the fin meets it, then with it, or after it where it is faster."""
     unity = ones(angle)
@@ -63,7 +49,7 @@ turning = make_pursuit(turned_towards)
 
 
 @wp.func
-def turn_to_command(state: Any, view: Any, p: Any):
+def follow(state: Any, view: Any, p: Any):
     """|deflection'| <= rate: towards the command, piece by piece, from view.h before to view.t."""
     if p.limited > 0:
         for i in range(p.count):
@@ -75,7 +61,13 @@ def turn_to_command(state: Any, view: Any, p: Any):
     return state
 
 
-follow = turn_to_command
+@wp.func
+def evolve(state: Any, view: Any, p: Any):
+    """The same over the half of a kick that ends in its middle, or begins there."""
+    t, half = end_of_half(view)
+    view.t = t
+    view.h = half
+    return follow(state, view, p)
 
 
 @wp.func

@@ -12,7 +12,7 @@ import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import any_positive, element, entry_of, set_element
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.driven import Driven, approached, left_after
+from lgvi_kernels.laws.driven import Driven
 
 
 @wp.func
@@ -121,44 +121,6 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
         return n
 
     @wp.func(inline=outline)
-    def approach(table: Any, entry: int, memory: Any, packet: int, p: Any, t: Any, time: Any):
-        """Let all channels go towards their commands of the time t for a time; those that do not lag are there at once."""
-        unity = ones(time)
-        zero = unity - unity
-        left = zero
-        places = p.work
-        if wp.static(moves):
-            places = p.memory
-        if wp.static(lags and not limited):
-            left = left_after(time, entry_of(time, table, entry, p.first + wp.static(lag), 0))
-        row = p.first + wp.static(rows) * p.count
-        since = zero
-        waiting = unity
-        for j in range(p.knots + 2):
-            ended = t * unity - entry_of(time, table, entry, row, 0)
-            # Above 0 in those lanes that are in this piece.
-            here = positive(-ended, waiting, zero)
-            if any_positive(here):
-                part = clamp(since * entry_of(time, table, entry, row, 1), zero, unity)
-                for i in range(p.count):
-                    at = p.first + wp.static(rows) * i
-                    value = row + wp.static(PIECE) + 2 * i
-                    u = fused(part, entry_of(time, table, entry, value, 1), entry_of(time, table, entry, value, 0))
-                    n = element(memory, packet, places + i, 0)
-                    after = u
-                    if wp.static(limited):
-                        lag_here = entry_of(time, table, entry, at, wp.static(lag))
-                        after = approached(n, u, time, lag_here, entry_of(time, table, entry, at, wp.static(rate)))
-                    elif wp.static(lags):
-                        if p.alike == 0:
-                            left = left_after(time, entry_of(time, table, entry, at, wp.static(lag)))
-                        after = fused(left, n - u, u)
-                    set_element(memory, packet, places + i, 0, positive(here, after, n))
-            waiting = waiting - here
-            since = ended
-            row += wp.static(PIECE) + 2 * p.count
-
-    @wp.func(inline=outline)
     def walk(table: Any, entry: int, memory: Any, packet: int, p: Any, t: Any, time: Any):
         """Let all channels follow their commands, exactly, over a time that ends at t."""
         unity = ones(time)
@@ -204,11 +166,11 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
 
     @wp.func
     def evolve(state: Any, view: Any, p: Any):
-        """Over half a kick, towards the command of the middle of that half."""
+        """Exactly, over the half of a kick that ends in its middle, or begins there."""
         if wp.static(moves):
             if p.moving > 0:
-                half = view.h.dtype(0.5) * view.h * ones(view.b.x)
-                approach(view.table, view.entry, view.memory, view.packet, p, middle_of_half(view), half)
+                t, half = end_of_half(view)
+                walk(view.table, view.entry, view.memory, view.packet, p, t, half * ones(view.b.x))
         return state
 
     @wp.func
@@ -222,7 +184,25 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
     @wp.func
     def look_up(view: Any, p: Any):
         """Let `found` know the commands of all channels at view.t."""
-        approach(view.table, view.entry, view.memory, view.packet, p, view.t, ones(view.b.x))
+        like = view.b.x
+        unity = ones(like)
+        zero = unity - unity
+        row = p.first + wp.static(rows) * p.count
+        since = zero
+        waiting = unity
+        for j in range(p.knots + 2):
+            ended = view.t * unity - row1(view, row)
+            # Above 0 in those lanes that are in this piece.
+            here = positive(-ended, waiting, zero)
+            if any_positive(here):
+                part = clamp(since * row1(view, row + 1), zero, unity)
+                for i in range(p.count):
+                    value = row + wp.static(PIECE) + 2 * i
+                    u = fused(part, row1(view, value + 1), row1(view, value))
+                    remember(view, p.work + i, positive(here, u, remembered(view, p.work + i)))
+            waiting = waiting - here
+            since = ended
+            row += wp.static(PIECE) + 2 * p.count
 
     @wp.func
     def found(view: Any, p: Any, i: int):

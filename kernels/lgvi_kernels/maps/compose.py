@@ -12,13 +12,18 @@ from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.tick import delayed_key, held_key
 from lgvi_kernels.maps.bounded import bounds_struct
 
+# The end of a role that only laws play which a controller drives.
+OF_ACTUATORS = " of actuators"
+
 
 def plays(law, role):
     """The function of a law's module for this role, or None.
 
     A role is the name of a function: "law", "damping", "flow", "evolve", "distance". "potential" and "force" are those of
-    "law" that follow from a potential, and those that do not; "matrix" is "damping" of a law that has no "push".
+    "law" that follow from a potential, and those that do not; "matrix" is "damping" of a law that has no "push"; "law of actuators" and so on: of laws that report where they are.
     """
+    if role.endswith(OF_ACTUATORS):
+        return plays(law, role.removesuffix(OF_ACTUATORS)) if hasattr(law, "report") else None
     if role == "matrix":
         return None if hasattr(law, "push") else getattr(law, "damping", None)
     if role in ("potential", "force"):

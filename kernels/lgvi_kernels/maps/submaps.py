@@ -149,7 +149,7 @@ def make_at_user_origin(shifted):
     return at_user_origin
 
 
-def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V, account=None):
+def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V, account=None, late=0.0):
     """The kick by these laws, each of them None where a scene has none.
 
     docs/theory/integrator.md, (13), (14), (20), (21); docs/theory/splitting.md, (S5).
@@ -157,7 +157,8 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V, ac
     law: forces from position and time; evolve: laws that remember, half before and half after; flow: the water carries
     the vehicle, half before and half after, and where it varies in space or time also pushes it; shifted: the origin of
     the forces is not the user's; E: exact flow of drag, or V: velocity-dependent laws, between two half kicks. Order 2.
-    account: the energy used (see accounting.make_kick_account).
+    account: the energy used (see accounting.make_kick_account). late: how much later than the kick the middle of the time is that
+    laws remember, in lengths of the kick: half of one for a kick that opens the step, less a half for one that closes it.
     """
     drifts, damped, forced = flow is not None, E is not None or V is not None, law is not None or flow_varies
     at_user_origin = make_at_user_origin(shifted)
@@ -173,7 +174,12 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V, ac
             pi = x.pi
         if wp.static(evolve is not None):
             # The view stands for the sum that folded laws hand on (see compose.superpose): these add nothing to it.
+            if wp.static(late != 0.0):
+                t = view.t
+                view.t = t + h.dtype(wp.static(late)) * h
             view = evolve(view, view, c.params)
+            if wp.static(late != 0.0):
+                view.t = t
         if wp.static(drifts):
             start = x
             water = flow(Flow(), at_user_origin(view, x, c), c.params)
@@ -210,6 +216,8 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V, ac
             account(x, c, h, view, p, pi)
         if wp.static(evolve is not None):
             view.second = 1
+            if wp.static(late != 0.0):
+                view.t = t + h.dtype(wp.static(late)) * h
             view = evolve(view, view, c.params)
         return x
 

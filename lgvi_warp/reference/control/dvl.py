@@ -37,8 +37,8 @@ class DVL(Part):
     seed0 = seed1 = channel = 0
 
     def begin(self) -> None:
-        """No reading yet."""
-        self.last: Array | None = None
+        """No reading yet: a velocity of 0."""
+        self.last: Array = np.zeros(3)
 
     def locked(self, y: Measurement, directions: Array) -> Any:
         """Which beams (4,) have an echo from the floor at this tick."""
@@ -64,7 +64,6 @@ class DVL(Part):
         if self.handed is not None:
             self.handed[self.key] = {"along": along, "fresh": kept}
             return y
-        if kept.sum() >= 3 or self.last is None:
-            chosen = np.ones(4, bool) if self.last is None else kept
-            self.last = np.linalg.lstsq(directions[chosen], along[chosen], rcond=None)[0]
+        if kept.sum() >= 3:
+            self.last = np.linalg.lstsq(directions[kept], along[kept], rcond=None)[0]
         return replace(y, velocity=self.last)

@@ -2,6 +2,7 @@
 """Actuators that follow commands: of a schedule or of a controller, within a limit, with a lag and at a limited rate."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -42,9 +43,9 @@ class Following(Law):
         return view.memory if self.moves else self.commanded(view.t)
 
     def evolve(self, view: View, second: bool) -> Array:
-        """Over half a kick, towards the command of the middle of the half."""
-        u = self.commanded(view.t + (0.25 if second else -0.25) * view.h)
-        return self._moved(view.memory, 0.5 * view.h, u, u)
+        """As follow, over the half of a kick that ends in its middle, or begins there."""
+        half = 0.5 * view.h
+        return self.follow(replace(view, t=view.t + second * half, h=half))
 
     def follow(self, view: View) -> Array:
         """Along each straight piece of the command within the view.h before view.t.

@@ -45,6 +45,7 @@ class Distribution:
             "named": ("scipy", "histogram", "own"),
             "density": ("kernel_density",),
             "copula": ("copula",),
+            "factor": ("factor",),
             "derived": ("derived",),
             "openturns": ("openturns",),
         },

@@ -297,13 +297,14 @@ def from_dict(key: str, content: Any) -> Distribution:
         faults.keys(key, [kind], [*(name for name in KINDS if name not in IN_MEMORY), *SCIPY])
     elif not isinstance(values, Mapping):
         faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
-    elif not foreign:
+    elif not foreign and kind != "factor":
         faults.keys(f"{key}.{kind}", values, [item.name for item in fields(KINDS[kind])])
     faults.raise_if_any()
     if foreign:
         return ScipyDistribution.from_table(key, kind, values)
     try:
-        distribution: Distribution = KINDS[kind](**values)
+        # What stands in a factor is its distribution.
+        distribution: Distribution = KINDS[kind](values) if kind == "factor" else KINDS[kind](**values)
         return distribution
     except SceneError as error:
         raise error.prefixed(f"{key}: ") from None

@@ -149,42 +149,53 @@ class SaturationShare(OfChannels):
 _SATURATED = Quantity("command", _saturated, "1", ("command",))
 
 
-def _power(samples: Fields, members: Members) -> np.ndarray:
-    """Size of the power (k, n) [W] of what the commands deliver of the demand, at the vehicle's motion over ground."""
-    w = samples["demand"].astype(np.float64, copy=False) - samples["unmet"]
-    parts = (
-        w[..., i] * samples[name][..., i % 3] for i, name in enumerate(["velocity"] * 3 + ["angular_velocity"] * 3)
-    )
-    return np.abs(sum(parts))
+def _wrench_and_twist(samples: Fields, members: Members) -> np.ndarray:
+    """The actuators' wrench and the vehicle's motion over ground (k, n, 12), and whether the former is held between ticks."""
+    names = ("exerted", "velocity", "angular_velocity")
+    columns = [samples[name].astype(np.float64, copy=False) for name in names]
+    slow = any(term.memory for term in samples.controller.actuators.values())
+    held = (members.parameters["controller.delay"] == 0.0) & (not slow)
+    flags = np.broadcast_to(held.astype(np.float64)[:, None], (*columns[0].shape[:2], 1))
+    return np.concatenate([*columns, flags], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
 class ActuatorEnergy(OfChannels):
-    """The integral over time of |power| that the delivered wrench gives to the motion [J]; then statistics of it.
+    """The integral over time of |power| that the actuators' wrench gives to the motion [J]; then statistics of it.
 
-    The power is (demand - unmet) . (velocity, angular velocity), by the trapezoidal rule between ticks: mechanical, without
-    the losses of motors and propellers. `ElectricalEnergy` has these, in a scene that accounts them.
+    The power is exerted . (velocity, angular velocity): of the forces that the actuators exert after limits, lags, the loss by
+    the advance speed, and faults, known to the controller or not. Between ticks it follows by the trapezoidal rule; without
+    lags, limited rates and delays with the wrench of the first of them, which holds until the next one. It is mechanical,
+    without the losses of motors and propellers. `ElectricalEnergy` has these, in a scene that accounts them.
 
     Args:
-        of: "demand", the default.
+        of: "exerted", the default.
         then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "energy"
     form: ClassVar[str] = "J"
-    default: ClassVar[str | None] = "demand"
+    default: ClassVar[str | None] = "exerted"
 
     def meant(self) -> Quantity:
-        if not among(self.of, ("demand",)):
-            raise refusal("energy.of", self.of, "is not the demand", "leave it out")
+        if not among(self.of, ("exerted",)):
+            raise refusal("energy.of", self.of, "is not the actuators' wrench", "leave it out")
         return _POWER
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        mean = 0.5 * (ticks.before[:, 0] + ticks.x[:, 0])
-        return {"sum": accumulated(state["sum"], ticks, mean * ticks.dt[:, None])}
+        before, after = ticks.before, ticks.x
+        last = np.where(after[:, 12:] > 0.0, before[:, :6], after[:, :6])
+        powers = [np.abs((w * v).sum(axis=1)) for w, v in ((before[:, :6], before[:, 6:12]), (last, after[:, 6:12]))]
+        return {"sum": accumulated(state["sum"], ticks, 0.5 * (powers[0] + powers[1]) * ticks.dt[:, None])}
 
 
-_POWER = Quantity("demand", _power, "W", ("velocity", "angular_velocity", "demand", "unmet"))
+_POWER = Quantity(
+    "exerted",
+    _wrench_and_twist,
+    "W",
+    ("velocity", "angular_velocity", "exerted"),
+    tuple(f"exerted {i}" for i in range(13)),
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -366,3 +366,94 @@ def test_check_refuses_what_run_refuses(tmp_path, capsys):
 def test_check_of_a_scene_without_a_step_looks_at_the_rest(tmp_path, capsys):
     assert main(["check", written(tmp_path, PLAIN.split("[run]")[0])]) == 0
     assert "run.step and run.duration: not given" in capsys.readouterr().out
+
+
+WAYPOINTS = {"points": [[0.0, 0.0, 5.0], [100.0, 0.0, 5.0]], "speed": 1.5, "look_ahead": 10.0, "radius": 5.0}
+DEPTH, HEADING, SPEED = (
+    lw.control.DepthPID(kp=0.1, kp_pitch=5.0),
+    lw.control.HeadingPID(kp=1.0),
+    lw.control.SpeedPID(kp=10.0),
+)
+TO_FINS, TO_PROPELLER = (
+    lw.control.PseudoInverse(to="control_fins"),
+    lw.control.PseudoInverse(to="thrusters", name="ahead"),
+)
+NO_LAW, NOT_DRIVEN, NOT_ASKED = "no law of the controller reads the wanted {}", "no allocation, schedule", "no law asks"
+
+
+def looped(guidance, laws, allocation, **sections):
+    """What is said of a LAUV under a controller, or of another vehicle."""
+    controller = lw.Controller(period=0.1, guidance=guidance, laws=laws, allocation=allocation)
+    name = sections.pop("name", "lauv")
+    start = {"velocity": [1.0, 0.0, 0.0], "position": [0.0, 0.0, 5.0]}
+    return said(lw.Scene.named(name, start=start, controller=controller, **sections))
+
+
+class Yaw(lw.laws.ControlLaw):
+    """A law of a user's own, which reads the attitude."""
+
+    type = "yaw_of_mine"
+    needs, demands, device = ("attitude",), ("N",), None
+
+
+class Course(lw.laws.Guidance):
+    """Guidance of a user's own."""
+
+    type = "course_of_mine"
+    device = None
+
+    @property
+    def gives(self):
+        return ("heading", "attitude", "speed")
+
+
+PATH = lw.control.Waypoints(**WAYPOINTS)
+BOTH = [TO_FINS, TO_PROPELLER]
+SET = lw.control.SetPoint
+LOOPS = {
+    "all read": ([PATH], [DEPTH, HEADING, SPEED], BOTH, []),
+    "no law of speed": ([PATH], [DEPTH, HEADING], [TO_FINS], [("waypoints.speed", NO_LAW), ("thrusters", NOT_DRIVEN)]),
+    "allocated": ([PATH], [DEPTH, HEADING], BOTH, [("waypoints.speed", NO_LAW), ("thrusters", NOT_ASKED)]),
+    "no law of depth": ([PATH], [HEADING, SPEED], BOTH, [("waypoints.depth", NO_LAW)]),
+    "a set point": ([SET(depth=5.0, heading=0.1, speed=1.0)], [DEPTH, SPEED], BOTH, [("set_point.heading", NO_LAW)]),
+    "a place": ([SET(position=[1.0, 2.0, 3.0])], [DEPTH], [TO_FINS],
+                [("set_point.position", NO_LAW), ("thrusters", NOT_DRIVEN)]),
+    "of my own": ([Course()], [Yaw()], BOTH, [("course_of_mine.speed", NO_LAW), ("thrusters", NOT_ASKED)]),
+    "a function": ([PATH], [lw.control.Callback(lambda t, y, r, members: None)], BOTH, []),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_what_no_law_reads_and_nothing_drives_is_said(name):
+    guidance, laws, allocation, expected = LOOPS[name]
+    found = [text for text in looped(guidance, laws, allocation) if not text.startswith("controller.")]
+    assert len(found) == len(expected), found
+    for (key, text), message in zip(expected, found, strict=True):
+        assert message.startswith(f"{key}: {text.format(key.rpartition('.')[2])}")
+
+
+def test_a_vehicle_that_something_else_drives_ahead_is_told_no_speed():
+    # A REMUS has a constant thrust, and fins alone that take commands.
+    assert not [text for text in looped([PATH], [DEPTH, HEADING], [TO_FINS], name="remus_100") if "wanted" in text]
+
+
+@pytest.mark.parametrize("push", [{"command": [100.0]}, {"times": [0.0, 9.0], "command_schedule": [[0.0], [100.0]]}])
+def test_a_propeller_with_a_command_or_a_schedule_of_its_own_is_driven(push):
+    table = lw.Scene.named("lauv").to_dict()
+    for term in table["terms"]:
+        if term["type"] == "thrusters":
+            del term["command"]
+            term |= push
+    controller = lw.Controller(period=0.1, guidance=[PATH], laws=[DEPTH, HEADING], allocation=[TO_FINS])
+    driven = lw.Scene.from_dict(table | {"controller": controller.to_dict(), "start": {"position": [0.0, 0.0, 5.0]}})
+    assert not [text for text in said(driven) if not text.startswith("controller.")]
+
+
+def loops_of(folder):
+    return [pytest.param(path, id=path.stem) for path in sorted((ROOT / "examples" / folder).glob("*.toml"))]
+
+
+@pytest.mark.parametrize("path", loops_of("scenes"))
+def test_of_shipped_scenes_no_loop_leaves_anything_unread(path):
+    controller, terms = (scene := lw.Scene.load(path)).controller, scene.terms
+    assert (controller.unread(terms), controller.idle, controller.undriven(terms)) == ((), (), ())

@@ -114,7 +114,7 @@ def made(features):
 
     @wp.func
     def measure(y: Any, p: Any):
-        """Hand the beams on, or let y have the velocity that follows from three of them or four; else the last one."""
+        """Hand the beams on, or let y have the velocity that follows from three of them or four; else the last one, first 0."""
         unity = ones(y.position.x)
         zero = unity - unity
         v = y.velocity + cross(y.angular_velocity, p.place)
@@ -144,9 +144,6 @@ def made(features):
             remember(y, at + i, along)
             remember(y, at + 4 + i, fresh)
         if wp.static(not handed):
-            if y.step == y.start:
-                for j in range(4):
-                    remember(y, at + 4 + j, unity)
             solution, enough = solved(y, p, at)
             held = positive(enough, solution, remembered3(y, p.memory))
             remember3(y, p.memory, held)

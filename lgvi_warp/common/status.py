@@ -123,7 +123,7 @@ class StatusArray(np.ndarray):
 
 
 class Warnings(IntFlag):
-    """Signs that the step, the precision or a member's numbers do not suit its motion, as bits.
+    """Signs that the step, the precision, a controller's iterations or a member's numbers do not suit its motion, as bits.
 
     A warning stops nothing. Of two warnings, the higher bit is the more serious.
 
@@ -145,6 +145,7 @@ class Warnings(IntFlag):
     MUNK_UNSTABLE = 128
     RESTORING_UNSTABLE = 256
     ENERGY = 512
+    CONTROL_NOT_CONVERGED = 1024
 
     @classmethod
     def _missing_(cls, value: object) -> Any:
@@ -183,6 +184,8 @@ _WARNING_TEXT = {
     "passed the measured limit of stability; shorten the step",
     Warnings.ENERGY: "the total energy grew by more than half of the energy available, although no force of the scene "
     "supplies any; shorten the step",
+    Warnings.CONTROL_NOT_CONVERGED: "iterations of a law or an allocation ended before they had converged, so that commands "
+    'are not those asked for; give it more iterations (the signal "unconverged" counts them)',
 }
 
 _WARNING_VALUE = {
@@ -196,6 +199,7 @@ _WARNING_VALUE = {
     Warnings.MUNK_UNSTABLE: "h w",
     Warnings.RESTORING_UNSTABLE: "h sqrt(B|r|/J)",
     Warnings.ENERGY: "energy created over the energy available",
+    Warnings.CONTROL_NOT_CONVERGED: "solutions that had not converged",
 }
 
 

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lgvi_warp.common.status import Status, stop_time, stopped
+from lgvi_warp.common.status import Status, Warnings, stop_time, stopped
 from lgvi_warp.methods.limits import too_large
 from lgvi_warp.methods.method import Method
 
@@ -54,6 +55,26 @@ def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...
     return (
         f"{some}{int(begun.argmax())}) and count as stopped at t = 0; start them before it, or leave the event out",
     )
+
+
+def remarks_on(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    """List what the fields of members (n,), by name, tell of how they ran."""
+    return begun_beyond(fields["status"], fields["failure_time"]) + unconverged(
+        *(fields[name] for name in ("warnings", "warning_time", "warning_value"))
+    )
+
+
+def unconverged(warnings: np.ndarray, time: np.ndarray, value: np.ndarray) -> tuple[str, ...]:
+    """Tell of members at whose ticks iterations of the controller had not converged.
+
+    warnings, time, value: Bits of each member, when the most serious one was first seen [s], and its value, (n,).
+    """
+    of = np.flatnonzero(np.asarray(warnings) & int(Warnings.CONTROL_NOT_CONVERGED))
+    if not len(of):
+        return ()
+    first = int(of[np.asarray(time)[of].argmin()])
+    times = f"{int(np.asarray(value)[of].max()):,} times at most, first in member {first} at {time[first]:g} s"
+    return (f"{len(of):,} of {len(warnings):,} members ({times}): {Warnings.CONTROL_NOT_CONVERGED.text}",)
 
 
 def failure_text(result: Result) -> str:

@@ -291,6 +291,9 @@ def made(features):
             at = channels + wp.static(ROWS) * k
             t = remembered(y, p.commands + k) * row1(y, at + wp.static(EFFORTS) + 6)
             remember(y, p.commands + k, clamp(t, lowest(y, at, zero), highest(y, at, zero)))
+        # A lane leaves nothing behind that others made it calculate.
+        for i in range(8 * p.count + wp.static(VECTORS + MATRICES)):
+            remember(y, p.work + i, zero)
 
     @wp.func
     def allocate_within(w: Any, y: Any, p: Any):

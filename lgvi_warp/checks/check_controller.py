@@ -298,6 +298,8 @@ def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
         row = bus.handed.get(bench.part.key, 0)
         may[row : row + bench.part.handed_rows * bench.part.is_handed] = True
         may[bus.belief : bus.belief + bench.part.belief_rows] = True
+    if bench.part.iterates:
+        may[bus.unconverged : bus.unconverged + 2] = True
     changed = (here.memory != before) & ~(np.isnan(here.memory) & np.isnan(before)) & ~may
     rows = sorted(set(np.flatnonzero(changed.any(axis=0)).tolist()))
     written = ", ".join(f"p.memory + {row - first}" for row in rows[:3])

@@ -123,7 +123,7 @@ class StatusArray(np.ndarray):
 
 
 class Warnings(IntFlag):
-    """Signs that the step, the precision, a member's numbers or the water do not suit its motion, as bits.
+    """Signs that the step, the precision, a controller's iterations, a member's numbers or the water do not suit its motion, as bits.
 
     A warning stops nothing. Of two warnings, the higher bit is the more serious.
 
@@ -145,7 +145,8 @@ class Warnings(IntFlag):
     MUNK_UNSTABLE = 128
     RESTORING_UNSTABLE = 256
     ENERGY = 512
-    ABOVE_SURFACE = 1024
+    CONTROL_NOT_CONVERGED = 1024
+    ABOVE_SURFACE = 2048
 
     @classmethod
     def _missing_(cls, value: object) -> Any:
@@ -184,6 +185,8 @@ _WARNING_TEXT = {
     "passed the measured limit of stability; shorten the step",
     Warnings.ENERGY: "the total energy grew by more than half of the energy available, although no force of the scene "
     "supplies any; shorten the step",
+    Warnings.CONTROL_NOT_CONVERGED: "iterations of a law or an allocation ended before they had converged, so that commands "
+    'are not those asked for; give it more iterations (the signal "unconverged" counts them)',
     Warnings.ABOVE_SURFACE: "the member rose more than 0.1 m above the mean surface, where the model knows no air; stop "
     "it there by the event surface, or let it float by the term surface_buoyancy",
 }
@@ -199,6 +202,7 @@ _WARNING_VALUE = {
     Warnings.MUNK_UNSTABLE: "h w",
     Warnings.RESTORING_UNSTABLE: "h sqrt(B|r|/J)",
     Warnings.ENERGY: "energy created over the energy available",
+    Warnings.CONTROL_NOT_CONVERGED: "solutions that had not converged",
     Warnings.ABOVE_SURFACE: "height above the mean surface [m]",
 }
 

@@ -56,6 +56,8 @@ class Bus(NamedTuple):
     handed: First rows of what sensors hand to an estimator, by their keys; belief: first row of what the estimator believes.
     acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and the
         row of the step from which the former act. period: Time between two ticks [s]. ranges: Row of each altimeter's reading.
+    unconverged: Row of the number of solutions by iterations that had not converged at their tick; the row behind it holds the
+        time of the first one, a period later [s]. -1 where no part iterates.
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -69,6 +71,7 @@ class Bus(NamedTuple):
     ranges: Mapping[str, int] = MappingProxyType({})
     handed: Mapping[str, int] = MappingProxyType({})
     belief: int = -1
+    unconverged: int = -1
 
     @property
     def channels(self) -> int:
@@ -84,11 +87,12 @@ class Bus(NamedTuple):
         altimeters: Sequence[str] = (),
         handed: Mapping[str, int] = MappingProxyType({}),
         belief: int = 0,
+        iterates: bool = False,
     ) -> Bus:
         """The bus of some actuators, with a time between two ticks [s].
 
         channels: Commands of each. answers: Rows for answers of the host. altimeters: Their keys. handed: Rows that sensors
-            hand to an estimator, by their keys; belief: rows of what it believes.
+            hand to an estimator, by their keys; belief: rows of what it believes. iterates: Whether a part does.
         """
         commands, row = {}, 0
         for key, count in channels.items():
@@ -101,9 +105,10 @@ class Bus(NamedTuple):
             handing[key] = end
             end += count
         places: dict[str, Any] = {
-            "answer": rows, "ranges": ranges, "handed": handing, "belief": end if belief else -1
+            "answer": rows, "ranges": ranges, "handed": handing, "belief": end if belief else -1,
+            "unconverged": end + belief if iterates else -1,
         }  # fmt: skip
-        return cls(commands, row, row + 6, 2 * row + 6, end + belief, period=period, **places)
+        return cls(commands, row, row + 6, 2 * row + 6, end + belief + 2 * iterates, period=period, **places)
 
     def values_of(self, key: str) -> dict[str, Any]:
         """What the device code of an actuator reads."""
@@ -132,6 +137,8 @@ class Part(Term):
     # What its device code may have, in this order, and what that of a run has.
     every_feature: ClassVar[tuple[str, ...]] = ()
     chosen: ClassVar[tuple[str, ...]] = ()
+    # Whether it solves a problem by iterations, and counts the ticks at which these have not converged.
+    iterates: ClassVar[bool] = False
     # Where it finds the numbers of others; set for a part of a scene.
     bus: ClassVar[Bus]
 

@@ -9,20 +9,23 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.declared import whole
-from lgvi_warp.control.base import rest_rows
+from lgvi_warp.control.base import ROUND_OFF, rest_rows
 from lgvi_warp.control.efforts import EffortAllocation, pseudo_inverse
+from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
+
+# Scratch rows of lgvi_kernels.laws.control.bounded_least_squares, beside 8 a channel.
+WORK = 138
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BoundedLeastSquares(EffortAllocation):
     """Commands for efforts within their limits whose wrench is nearest to the demand (Johansen & Fossen 2013, section 2.2).
 
-    Where the efforts of `PseudoInverse` are within the limits, they are taken to the last digit. Else, in each round, every
-    effort in turn moves to where the error is least, and then all that are not at a limit are solved for again, up to the
-    first limit. The error is the sum of (priority times component)^2, moments divided by the mean lever arm of the channels.
-    Without sweeps it is the redistributed pseudo-inverse: each round only solves again for the efforts that are not at a
-    limit. Channels that are known to be lost make nothing, however many they are.
+    The error is the sum of (priority times component)^2, moments divided by the mean lever arm of the channels. Where the
+    efforts of least error without limits are within the limits, they are taken; they are those of `PseudoInverse` where the
+    channels make every component by itself. Else an active-set method finds the efforts of least error, to round-off.
+    Channels that are known to be lost make nothing, however many they are.
 
     Args:
         to: Key of the term that takes the commands.
@@ -30,8 +33,8 @@ class BoundedLeastSquares(EffortAllocation):
         speed: Speed ahead [m/s] at which fins are judged; 1 by default.
         priorities: How much an error in X, Y, Z, K, M, N counts, (6,), above 0; 1 by default. [1, 1, 1, 10, 10, 10] makes
             moments before forces.
-        rounds: How often free channels are solved for; 4 by default.
-        sweeps: How often every effort moves in turn before each of these; 2 by default, 0: not at all.
+        iterations: Largest number of steps of the active-set method at a tick; 100 by default. A run says in its messages where
+            a tick had not converged.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -39,41 +42,57 @@ class BoundedLeastSquares(EffortAllocation):
         >>> law = lw.control.PosePID(kp=[50.0] * 3, kd=[80.0] * 3, kr=[10.0] * 3, kw=[8.0] * 3, feedforward="restoring")
         >>> hold = lw.control.SetPoint(position=[0.0, 0.0, 5.0], heading=0.0)
         >>> controller = lw.Controller(period=0.1, guidance=[hold], laws=[law], allocation=[allocation])
-        >>> lw.Scene.named("bluerov2_heavy", controller=controller).controller.parts[-1].rounds
-        4
+        >>> lw.Scene.named("bluerov2_heavy", controller=controller).controller.parts[-1].iterations
+        100
     """
 
     type: ClassVar[str] = "bounded_least_squares"
 
+    iterates: ClassVar[bool] = True
+
     priorities: Any = number((6,), "1", (1.0,) * 6, above=0.0)
-    rounds: int = whole(1, "is no number of rounds", "give 1 or more", default=4)
-    sweeps: int = whole(0, "is no number of sweeps", "give 0 or more", default=2)
+    iterations: int = whole(1, "is no number of iterations", "give 1 or more", default=100)
 
     def device_in(self, aligned: bool) -> str:
-        return f"bounded_least_squares:{self.curve_word}{'' if self.sweeps else ',redistributes'}"
+        return f"bounded_least_squares:{self.curve_word}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # The pseudo-inverse's lines; each channel's numbers, its effect by priorities, 1 / weight and 1 / its square.
+        # The solution without limits, lines and priorities in their order; each channel's numbers and its scaled column.
         B, weights = self.effect_and_weights(numbers, context)
-        lines = pseudo_inverse(B, weights, ())
         force, moment = (np.square(B[:, half]).sum(axis=(1, 2)) for half in (slice(0, 3), slice(3, 6)))
-        arm = np.sqrt(np.where((force > 0.0) & (moment > 0.0), moment / np.where(force > 0.0, force, 1.0), 1.0))
-        priorities = numbers["priorities"] / np.where(np.arange(6) < 3, 1.0, arm[:, None])
-        scaled = np.swapaxes(priorities[..., None] * B, -1, -2)
-        square = np.square(scaled).sum(axis=-1, keepdims=True)
-        step = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
-        channels = self.channel_rows(B, context, scaled, 1.0 / weights[..., None], step)
-        rows = [rest_rows(B @ lines), self.asked * priorities, *(x.reshape(len(x), -1) for x in (lines, channels))]
+        both = (force > 0.0) & (moment > 0.0)
+        arm = np.sqrt(np.where(both, moment, 1.0) / np.where(both, force, 1.0))
+        B, weights, arm, priorities = repeated(B, weights, arm, numbers["priorities"])
+        root = 1.0 / np.sqrt(weights)
+        units = np.where(np.arange(6) < 3, 1.0, 1.0 / arm[:, None])
+        lines = self._solution(B, weights, units * priorities)
+        order = np.argsort(-priorities, axis=1, kind="stable")
+        sizes = np.take_along_axis(priorities, order, axis=1)
+        of_demand = units[:, :, None] * np.eye(6)
+        of_demand, scaled = (np.take_along_axis(x, order[:, :, None], axis=1) for x in (of_demand, of_demand @ B))
+        scaled = np.where(np.abs(scaled) < ROUND_OFF * np.abs(scaled).max(axis=(1, 2), keepdims=True), 0.0, scaled)
+        columns = np.swapaxes(scaled * root[:, None, :], -1, -2)
+        channels = self.channel_rows(B, context, columns, root[..., None])
+        rows = [rest_rows(B @ lines), of_demand, sizes, sizes**-2, arm, lines, channels]
         actuator_numbers = context.own(self.actuator)
         curves, size = self.curves(actuator_numbers)
         first, count = self.bus.commands[self.to]
+        flat = [x.reshape(len(x), -1) for x in rows]
         words = {
             "commands": first,
             "count": count,
-            "shared": sum(block.shape[1] for block in rows),
+            "shared": sum(block.shape[1] for block in flat),
             "size": size,
             **self.kind_of_curves(actuator_numbers),
-            "rounds": self.rounds,
-            "sweeps": self.sweeps,
+            "iterations": self.iterations,
+            "unconverged": self.bus.unconverged,
         }
-        return Packed(words, side_by_side(*rows, curves))
+        return Packed(words, side_by_side(*flat, curves), work=WORK + 8 * count)
+
+    def _solution(self, B: np.ndarray, weights: np.ndarray, priorities: np.ndarray) -> np.ndarray:
+        """The efforts (n, channels, 6) of least error without limits: the pseudo-inverse, of prioritised rows that depend."""
+        lines = pseudo_inverse(B, weights, ())
+        reached = np.einsum("nij,nji->ni", B, lines) > 1.0 - 1e-6
+        spans = np.all(reached | ~np.any(B, axis=2), axis=1)
+        weighted = pseudo_inverse(priorities[..., None] * B, weights, ()) * priorities[:, None, :]
+        return np.where(spans[:, None, None], lines, weighted)

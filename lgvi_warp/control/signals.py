@@ -35,6 +35,9 @@ _OF_ACTUATORS = (
     Signal(Field("exerted", (6,), "N, N m", "wrench that the actuators exert, X Y Z K M N in body axes"), "exerted"),
     Signal(Field("unmet", (6,), "N, N m", "demand that the actuators do not deliver, X Y Z K M N"), ""),
 )
+# That of parts which solve a problem by iterations.
+UNCONVERGED = "unconverged"
+_OF_ITERATIONS = Field(UNCONVERGED, (), "1", "solutions by iterations that had not converged at their tick, since the start")
 # Rows of a measurement and of a reference, as lgvi_kernels/advance/noting.py writes them.
 _VECTORS = {"position": 0, "attitude": 3}
 _MEASURED = _VECTORS | {"velocity": 12, "water_velocity": 15, "angular_velocity": 18, "depth": 2, "heading": 21}
@@ -93,6 +96,7 @@ SIGNALS: dict[str, Signal] = {
         *_noted("measured", "measured", _KINDS, _MEASURED),
         *_noted("reference", "wanted", _REFERENCE, _WANTED),
         *_OF_ESTIMATOR,
+        Signal(_OF_ITERATIONS, UNCONVERGED),
         Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""),
     )
 }
@@ -116,14 +120,30 @@ def saved_fields(controller: Controller | None, accounted: bool = False) -> dict
         fields[ENERGY_USED] = SIGNALS[ENERGY_USED].field
     if controller is None or controller.bus is None:
         return fields
-    tells = controller.bus.belief >= 0
+    absent = _absent_groups(controller)
     signals = {
         name: signal.field
         for name, signal in SIGNALS.items()
-        if name != ENERGY_USED and (tells or signal.group != ESTIMATE)
+        if name != ENERGY_USED and signal.group not in absent
     }
     channels = sum(count for _, count in controller.bus.commands.values())
     return fields | signals | {name: replace(signals[name], shape=(channels,)) for name in CHANNELS}
+
+
+# Groups of signals that only some controllers have: what a scene lacks that has not, and the remedy.
+_SOME = {
+    ESTIMATE: (
+        "is told by a filter, which this scene has not, or which does not report",
+        'give [[controller.sensors]] type = "error_state_filter" with report = true',
+    ),
+    UNCONVERGED: ("is told by parts that iterate, which this controller has not", "leave it out"),
+}
+
+
+def _absent_groups(controller: Controller) -> set[str]:
+    """The groups of signals that a wired controller has not."""
+    rows = {ESTIMATE: controller.bus.belief, UNCONVERGED: controller.bus.unconverged}
+    return {group for group, row in rows.items() if row < 0}
 
 
 def has_shape(name: str, shape: tuple[int, ...]) -> bool:
@@ -138,7 +158,7 @@ def row_of(name: str, bus: Bus, noted: Mapping[str, int]) -> int:
     signal = SIGNALS[name]
     if signal.group == ESTIMATE:
         return bus.belief + signal.row
-    firsts = {"command": 0, "unmet": bus.unmet, "actuator": bus.report}
+    firsts = {"command": 0, "unmet": bus.unmet, "actuator": bus.report, UNCONVERGED: bus.unconverged}
     return firsts[name] if name in firsts else noted[signal.group] + signal.row
 
 
@@ -164,8 +184,8 @@ def check_signals(faults: Faults, key: str, names: Iterable[str], scene: Any) ->
             problem = "is a signal of a controller, which this scene has not"
             faults.add(key, name, problem, "give [controller], or leave it out")
     controller = scene.controller
-    tells = controller is not None and controller.bus is not None and controller.bus.belief >= 0
-    for name in ordered(names) if controller is not None and not tells else ():
-        if name in SIGNALS and SIGNALS[name].group == ESTIMATE:
-            remedy = 'give [[controller.sensors]] type = "error_state_filter" with report = true'
-            faults.add(key, name, "is told by a filter, which this scene has not, or which does not report", remedy)
+    wired = controller is not None and controller.bus is not None
+    absent = _absent_groups(controller) if wired else set(_SOME)
+    for name in ordered(names) if controller is not None else ():
+        if name in SIGNALS and SIGNALS[name].group in absent:
+            faults.add(key, name, *_SOME[SIGNALS[name].group])

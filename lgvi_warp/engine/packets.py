@@ -427,15 +427,31 @@ class Packets:
         step = np.zeros(len(bits), np.int64)
         value = value if len(value) else np.full(len(bits), np.nan)
         if not self.plan.spec.warning_rows:
-            return bits, step, value
+            return self._with_unconverged(bits, step, value)
         monitor = self.monitor
         noted = self._of_members(monitor.warned, np.uint16)
         # The kernel's warning is more serious if its highest bit is above all bits of the start.
         later = (noted & ~bits) > bits
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
-        bits = bits | noted
-        return self._with_departed(bits, step, value) if leaves_rotations(self.plan.method) else (bits, step, value)
+        found = bits | noted, step, value
+        return self._with_unconverged(*(self._with_departed(*found) if leaves_rotations(self.plan.method) else found))
+
+    def _with_unconverged(
+        self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same with a warning of the members at whose ticks iterations had not converged."""
+        controller, h, m = self.plan.kernel_choice.controller, self.plan.grid.h, len(bits)
+        if controller is None or controller.bus.unconverged < 0 or self.plan.checks == "none":
+            return bits, step, value
+        rows = self._values(self.laws.memory.view[:, controller.bus.unconverged :][:, :2])
+        count, later = rows.transpose(1, 0, 2).reshape(2, -1)[:, :m].astype(np.float64)
+        first = np.rint(later / h).astype(np.int64) - controller.every(h)
+        # Ticks of a member that ended go on, at rest.
+        own = np.where(self._status[:m] == 0, np.inf, (self._failed_step[:m] - first) // controller.every(h) + 1)
+        seen = (count > 0.0) & (own > 0)
+        bits = bits | np.uint16(Warnings.CONTROL_NOT_CONVERGED) * seen
+        return bits, np.where(seen, first, step), np.where(seen, np.minimum(count, own), value)
 
     def _warned_at_start(self) -> tuple[np.ndarray, np.ndarray]:
         """(bits, value) of the warnings at the start; no value where there are none."""

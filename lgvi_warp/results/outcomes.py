@@ -40,13 +40,6 @@ def outcome_text(result: Result, code: Status) -> str:
     return f"{many} (first: member {first} at {stop_time(result)[first]:g} s{value}): {text}"
 
 
-def on_members(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
-    """Tell of members that rose above the surface, and of those that an event stopped before their first step."""
-    return above_surface(fields["warnings"], fields["warning_value"]) + begun_beyond(
-        fields["status"], fields["failure_time"]
-    )
-
-
 def above_surface(warnings: np.ndarray, value: np.ndarray) -> tuple[str, ...]:
     """Count the members that rose above the surface without a term or an event for it.
 
@@ -82,6 +75,30 @@ def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...
     return (
         f"{some}{int(begun.argmax())}) and count as stopped at t = 0; start them before it, or leave the event out",
     )
+
+
+def remarks_on(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    """List what the fields of members (n,), by name, tell of how they ran."""
+    warned = [fields[name] for name in ("warnings", "warning_time", "warning_value")]
+    begun = begun_beyond(fields["status"], fields["failure_time"])
+    return above_surface(warned[0], warned[2]) + begun + unconverged(*warned)
+
+
+def unconverged(warnings: np.ndarray, time: np.ndarray, value: np.ndarray) -> tuple[str, ...]:
+    """Tell of members at whose ticks iterations of the controller had not converged.
+
+    warnings, time, value: Bits of each member, when the most serious one was first seen [s], and its value, (n,).
+    """
+    bits, bit = np.asarray(warnings), int(Warnings.CONTROL_NOT_CONVERGED)
+    count = int(np.count_nonzero(bits & bit))
+    if not count:
+        return ()
+    # Time and value are those of the most serious warning.
+    of, times = np.flatnonzero((bits & bit) & (bits < 2 * bit)), ""
+    if len(of):
+        first = int(of[np.asarray(time)[of].argmin()])
+        times = f" ({int(np.asarray(value)[of].max()):,} times at most, first in member {first} at {time[first]:g} s)"
+    return (f"{count:,} of {len(bits):,} members{times}: {Warnings.CONTROL_NOT_CONVERGED.text}",)
 
 
 def failure_text(result: Result) -> str:

@@ -26,7 +26,7 @@ from lgvi_warp.engine.work import Work
 from lgvi_warp.results import member_fields
 from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
 from lgvi_warp.results.final import final_of
-from lgvi_warp.results.outcomes import failure_text, on_members
+from lgvi_warp.results.outcomes import failure_text, remarks_on
 from lgvi_warp.results.provenance import at_end, messages, provenance_but_scene, when_read
 from lgvi_warp.results.result import Result
 from lgvi_warp.sampling.final import Final
@@ -192,7 +192,7 @@ class _Gathered:
             parameters=DrawnParameters(plan.ensemble, n),
             starts=DrawnStarts(plan.ensemble, n),
             weights=plan.ensemble.weights(0, n),
-            messages=texts + remarks + on_the_way + on_members(of_members),
+            messages=texts + remarks + on_the_way + remarks_on(of_members),
             provenance=when_read(at_end(content, of_members, n, plan.ensemble.members)),
             terms=tuple(scene.terms),
             statistics=estimates,

@@ -20,7 +20,7 @@ from lgvi_warp.control.controller import terms_of
 from lgvi_warp.control.signals import IN_FILES
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.physics.terms.base import Term
-from lgvi_warp.results.outcomes import on_members
+from lgvi_warp.results.outcomes import remarks_on
 from lgvi_warp.results.provenance import at_end
 from lgvi_warp.results.result import END_TIME, Result
 from lgvi_warp.scene.functions import functions_of, identities
@@ -222,7 +222,7 @@ def result_of(
         samples=Arrays(group, fields, 1, at),
         **Result.per_member(small),
         parameters=parameters,
-        messages=messages + remarks + on_members(small),
+        messages=messages + remarks + remarks_on(small),
         provenance=provenance,
         statistics=estimates,
         terms=of_scene,

@@ -18,7 +18,7 @@ STATES = ("position[2]", "velocity[2]", "angular_velocity[1]")
 NUMBERS = dict(
     A=np.array([[1.0, T, 0.0], [0.0, 0.95, 0.01], [0.0, 0.02, 0.9]]),
     B=np.array([[T * T / 40.0, 0.0], [T / 20.0, 0.001], [0.0, T / 5.0]]),
-    Q=np.array([3.0, 0.1, 0.2]), R=np.array([1e-4, 1e-3]), limit=np.array([5.0, 2.0]), horizon=6, iterations=15,
+    Q=np.array([3.0, 0.1, 0.2]), R=np.array([1e-4, 1e-3]), limit=np.array([5.0, 2.0]), horizon=6,
 )  # fmt: skip
 NAMES = dict(states=STATES, inputs=("Z", "M"), tracked=("position[2]", "angular_velocity[1]"))
 RATES = dict(rate_limit=np.array([20.0, 10.0]))
@@ -106,51 +106,78 @@ def cases(part, count=60, seed=1):
         yield rng.normal(size=3) * (1.0, 0.5, 0.5), 0.02 * rng.normal(size=3), rng.uniform(-0.9, 0.9, 2)
 
 
-@pytest.mark.parametrize("rated", [False, True])
-def test_problems_are_solved_within_the_bound_of_the_iteration(rated):
-    """ADMM is Douglas & Rachford's iteration of t = v + (what is beyond): no step takes it farther from its fixed point.
-
-    Without rates it contracts by (1 + c) / 2 a step, c = max |rho - e| / (rho + e) over the eigenvalues e of H (Giselsson &
-    Boyd 2017); with rates |v - v*|^2 <= rho / least(e) |t0 - t*|^2 / sqrt(k), from the sum over steps of |t' - t|^2 and of 2
-    least(e) / rho |v - v*|^2, which is at most |t0 - t*|^2 (He & Yuan 2015).
-    """
+@pytest.mark.parametrize("more", [{}, RATES, RATES | {"horizon": 20}, RATES | {"R": np.array([1e-7, 1e-6])}])
+def test_problems_are_solved(more):
+    """To 1e-6 of the limits, in the default iterations and in a third of them; the gap ends at 1e-12 of the slope."""
     saturated = 0
-    for iterations in (5, 60):
-        part = twin(iterations=iterations, **(RATES if rated else {}))
-        change = T * RATES["rate_limit"] / part.limit if rated else None
-        for x, d, before in cases(part, 8 if rated else 60):
+    for iterations in (50, 18):
+        part = twin(**(more | {"iterations": iterations}))
+        change = T * RATES["rate_limit"] / part.limit if "rate_limit" in more else None
+        for x, d, before in cases(part, 30):
             H, f = problem(part, x, d)
             true = exact(H, f, before, change)
-            best = -np.linalg.solve(H, f)
-            if np.abs(true - best).max() < 1e-9:
-                continue
-            saturated += 1
-            e = np.linalg.eigvalsh(H)
-            rho = np.sqrt(e[0] * e[-1])
-            part.begin()
+            saturated += np.abs(true + np.linalg.solve(H, f)).max() > 1e-6
             found = part.solved(H, f, before, change).ravel()
-            if not rated:
-                # t* = v* - (H v* + f) / rho: what pushes v* against its limits.
-                start = np.linalg.norm(true - (H @ true + f) / rho)
-                c = np.max(np.abs(rho - e) / (rho + e))
-                bound = ((1.0 + c) / 2.0) ** iterations * start
-                assert np.linalg.norm(found - true) <= bound + 1e-9
-            else:
-                # As far as t has come after 3,000 steps: the fixed point, to what is left of the distance to the exact inputs.
-                long = twin(iterations=3_000, **RATES)
-                long.solved(H, f, before, change)
-                star = np.linalg.norm(np.concatenate([long.t.ravel(), long.t_change.ravel()]))
-                bound = np.sqrt(rho / e[0]) * star * iterations**-0.25
-                left = np.linalg.norm(np.clip(long.t, -1.0, 1.0).ravel() - true)
-                assert left < 1e-5
-                assert np.linalg.norm(found - true) <= bound + star * iterations**-0.5 + 1e-9
-            if iterations == 60 and not rated:
-                assert np.abs(found - true).max() < 0.02
+            assert np.abs(found - true)[:2].max() < 1e-6
+            cost, least = (v @ H @ v / 2.0 + f @ v for v in (found, true))
+            assert cost - least < 1e-9 * (abs(least) + np.abs(f).max())
     assert saturated > 10
 
 
+def rushing(iterations, dtype="float64"):
+    """A body whose law has a long horizon, a small cost of inputs and rate limits; its depths and demands, and the result."""
+    part = lw.control.LinearMPC(states=["position[2]", "velocity[2]"], inputs=["Z"], A=RUSH["A"], B=RUSH["B"], Q=RUSH["Q"],
+                                R=RUSH["R"], limit=[40.0], rate_limit=[60.0], disturbance_time=np.inf, horizon=20,
+                                iterations=iterations)  # fmt: skip
+    loop = lw.Controller(period=T, guidance=[lw.control.SetPoint(depth=12.0)], laws=[part])
+    body = lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0), added_mass=(0, 0, 0), buoyancy=200.0, center_of_buoyancy=(0, 0, 0))
+    terms = [lw.terms.ControlWrench(limit=1e6), lw.terms.Drag(linear=(5, 8, 9.0, 2, 3, 4.0))]
+    scene = lw.Scene(body, lw.Environment(gravity=10.0), terms, lw.Start(position=(0, 0, 5.0)), loop)
+    save = lw.SaveAt(every=T, fields=("position", "demand", "unconverged"))
+    return lw.solve(scene, "rk4", h=0.02, t1=8.0, dtype=dtype, save=save)
+
+
+DECAY = np.exp(-9.0 / 20.0 * T)
+GAIN = (1.0 - DECAY) / 9.0
+RUSH = dict(A=np.array([[1.0, 20.0 * GAIN], [0.0, DECAY]]), B=np.array([[(T - 20.0 * GAIN) / 9.0], [GAIN]]),
+            Q=np.array([40.0, 0.0]), R=np.array([1e-4]))  # fmt: skip
+
+
+def test_a_loop_with_rate_limits_is_that_of_exact_problems():
+    """Depths and demands of OSQP's kind of problem, solved by Lawson & Hanson's method at each tick: an overshoot of 0.428 m."""
+    part = linear_mpc.LinearMPC(states=["position[2]", "velocity[2]"], inputs=["Z"], limit=np.array([40.0]), horizon=20, **RUSH)
+    x, u, depths, demands = np.array([-7.0, 0.0]), np.zeros(1), [], []
+    for _ in range(81):
+        H, f = problem(part, x, np.zeros(2))
+        u = exact(H, f, u, np.array([0.15]))[:1]
+        depths, demands = [*depths, x[0]], [*demands, 40.0 * u[0]]
+        x = RUSH["A"] @ x + RUSH["B"] @ (40.0 * u)
+    assert max(depths) == pytest.approx(0.428, abs=1e-3)
+    result = rushing(50)
+    np.testing.assert_allclose(result.samples["demand"][:, 0, 2], demands, atol=1e-4)
+    np.testing.assert_allclose(result.position[:, 0, 2] - 12.0, depths, atol=1e-5)
+    assert not result.warnings.any()
+    assert result.samples["unconverged"][-1, 0] == 0.0
+    # Of float32 the demand is right to a part of 1e-2: the overshoot to 1 %.
+    assert (rushing(50, "float32").position[:, 0, 2] - 12.0).max() == pytest.approx(max(depths), rel=0.01)
+
+
+def test_too_few_iterations_are_told():
+    result = rushing(3)
+    count = result.samples["unconverged"][:, 0]
+    assert result.warnings.counts() == {"control_not_converged": 1}
+    assert result.warning_time[0] == 0.0
+    # From the first tick on, where the body is far from its depth; the count grows by 1 a tick at most.
+    assert count[0] == 1.0
+    assert set(np.diff(count)) == {0.0, 1.0}
+    assert result.warning_value[0] == count[-1] > 20
+    (message,) = (text for text in result.messages if "had converged" in text)
+    assert f"1 of 1 members ({count[-1]:.0f} times at most, first in member 0 at 0 s)" in message
+    assert lw.Warnings.CONTROL_NOT_CONVERGED.text in message
+
+
 def test_within_the_limits_it_is_the_regulator_of_a_finite_horizon():
-    """Riccati's difference equation, backward from P: to round-off, whatever the number of iterations."""
+    """Riccati's difference equation, backward from P: to round-off."""
     P = np.diag([5.0, 2.0, 1.0]) + 0.1
     part = twin(limit=np.array([1e3, 1e3]), P=P, iterations=1, horizon=20)
     own = law(limit=np.array([1e3, 1e3]), P=P, iterations=1, horizon=20)
@@ -272,7 +299,7 @@ def test_remus_goes_to_its_depth_by_fins_at_their_limit():
     M, delivered = (result.samples["demand"] - share * result.samples["unmet"] for share in (0.0, 1.0))
     M, delivered = M[:, 0, 4], delivered[:, 0, 4]
     assert result.status[0] == lw.Status.OK
-    # At its limit, up to what the iterations leave.
+    # At its limit.
     assert 1.99 < np.abs(M).max() <= 2.0 + 1e-9
     # From what acted over the last period.
     assert np.abs(M[1:] - delivered[:-1]).max() <= 10.0 * T + 1e-9

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Allocation within the limits of the actuators."""
+"""Allocation within the limits of the actuators, by a primal active set."""
 
 from typing import Any
 
@@ -9,37 +9,37 @@ from lgvi_warp.reference.control import cannot
 from lgvi_warp.reference.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.reference.rotation import Array
 
-# What is added to the matrix of free channels, and the error that counts as none, as parts of that of all, and of the demand.
-RIDGE, DELIVERED = 1e-3, 1e-3
-# An effort is at a limit where it is so near, as a part of the range.
-AT_LIMIT = 1e-5
+# A line depends on others below this part of its size. No error, no slope, and no step beyond a limit, are below these parts of
+# the demand, the steepest slope and the range; nothing is told back below the last part of the demand.
+DEPENDENT, NONE, FLAT, BESIDE, TOLD = 1e-9, 1e-12, 1e-9, 1e-13, 1e-10
 
 
 class BoundedLeastSquares(PseudoInverse):
     """Numbers as those of `lw.control.BoundedLeastSquares`; effect, losses and the actuator as of `PseudoInverse`."""
 
     priorities = np.ones(6)
-    rounds, sweeps = 4, 2
+    iterations = 100
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
-        """Efforts of least sum (priority (B t - B B^+ w))^2 within the limits; left are (I - B B^+) w and what they lack."""
+        """Efforts t of least sum (priority (B t - w))^2 within the limits; left is w - B t."""
         actuator, B = actuators[self.to], self.effect
-        cheap = 1.0 / (np.ones(B.shape[1]) if self.weights is None else np.asarray(self.weights))
-        inverse = np.diag(np.sqrt(cheap)) @ np.linalg.pinv(B @ np.diag(np.sqrt(cheap)), rcond=1e-10)
-        low, high = self.limits(actuator)
+        root = 1.0 / np.sqrt(np.ones(B.shape[1]) if self.weights is None else np.asarray(self.weights))
         arm = np.sqrt(np.square(B[3:]).sum() / np.square(B[:3]).sum()) if B[:3].any() and B[3:].any() else 1.0
-        priorities = self.priorities / np.repeat([1.0, arm], 3)
-        A, wanted = np.diag(priorities) @ B, inverse @ w
+        units, priorities = np.repeat([1.0, 1.0 / arm], 3), np.asarray(self.priorities, float)
+        S = units * priorities
+        lines = root[:, None] * np.linalg.pinv(S[:, None] * B * root, rcond=1e-10) * S
+        wanted = lines @ w
+        low, high = self.limits(actuator)
         t = np.clip(wanted, low, high)
         if np.any(t != wanted):
-            for _ in range(self.rounds):
-                for i in np.tile(np.arange(len(t)), self.sweeps):
-                    t[i] = np.clip(t[i] + A[:, i] @ A @ (wanted - t) / (A[:, i] @ A[:, i]), low[i], high[i])
-                t = self.solved(A, cheap, wanted, t, low, high)
+            order = np.argsort(-priorities, kind="stable")
+            A = (units[:, None] * B * root)[order]
+            A[np.abs(A) < 1e-12 * np.abs(A).max()] = 0.0
+            x = nearest(A, (units * w)[order], priorities[order], t / root, low / root, high / root, self.iterations)
+            t = np.clip(root * x, low, high)
         actuator.command = np.clip(actuator.command_for(t), -actuator.limit, actuator.limit)
-        asked, lacking = np.any(B != 0.0, axis=1), B @ (wanted - t)
-        enough = DELIVERED * np.linalg.norm(asked * priorities * w)
-        return np.asarray(cannot(B @ inverse) @ w + np.where(np.abs(priorities * lacking) > enough, lacking, 0.0))
+        left = cannot(B @ lines) @ w + B @ (wanted - t)
+        return np.asarray(np.where(np.abs(units * left) > TOLD * np.linalg.norm(units * w), left, 0.0))
 
     def limits(self, actuator: Any) -> tuple[Array, Array]:
         """The efforts at full command astern and ahead; 0 of a channel that is known to be lost."""
@@ -49,17 +49,50 @@ class BoundedLeastSquares(PseudoInverse):
         low[lost] = high[lost] = 0.0
         return low, high
 
-    def solved(self, A: Array, cheap: Array, wanted: Array, t: Array, low: Array, high: Array) -> Array:
-        """The least change of the efforts between their limits that makes the error least, up to the first limit."""
-        near = AT_LIMIT * (high - low)
-        free = (t > low + near) & (t < high - near)
-        ridge = RIDGE / 6.0 * np.sum(cheap * np.square(A).sum(axis=0)) * np.eye(6)
-        change = np.where(
-            free, cheap * (A.T @ np.linalg.solve((A * cheap * free) @ A.T + ridge, A @ (wanted - t))), 0.0
-        )
-        length = 1.0
-        if self.sweeps:
-            room = np.where(change > 0.0, high - t, t - low)
-            size = np.abs(change)
-            length = np.min(np.where(size > room, room / np.where(size > room, size, 1.0), 1.0))
-        return np.clip(t + length * change, low, high)
+
+def nearest(A: Array, b: Array, s: Array, x: Array, low: Array, high: Array, iterations: int) -> Array:
+    """x of least sum s^2 (A x - b)^2 within limits, s falling, from x on, by so many steps at most."""
+    state = np.where(x >= high, 1, np.where(x <= low, -1, 0))
+    for _ in range(iterations):
+        goal, slopes = free_solution(A, b, s, np.where(state == 0, 0.0, x), state == 0)
+        goal = np.where(state == 0, goal, x)
+        step = goal - x
+        room, size = np.where(step > 0.0, high - x, x - low), np.abs(step)
+        over = size > room + BESIDE * (high - low)
+        ratio = np.where(over, room / np.where(over, size, 1.0), 1.0)
+        first = int(ratio.argmin())
+        x = np.clip(x + ratio[first] * step, low, high)
+        if over.any():
+            state[first] = 1 if step[first] > 0.0 else -1
+            x[first] = high[first] if step[first] > 0.0 else low[first]
+            continue
+        gain = -state * (slopes @ A)
+        gain[(gain <= FLAT * np.abs(A).sum(axis=0) * np.abs(slopes).max()) | (high <= low)] = 0.0
+        if not gain.any():
+            break
+        state[gain.argmax()] = 0
+    return x
+
+
+def free_solution(A: Array, b: Array, s: Array, held: Array, free: Array) -> tuple[Array, Array]:
+    """The smallest x of free channels of least error, and s^2 times that error, which is beside the lines of these."""
+    L, Q, kept = np.zeros((6, 6)), A * free, np.zeros(6, bool)
+    for i in range(6):
+        size = Q[i] @ Q[i]
+        for j in range(i):
+            L[i, j] = Q[i] @ Q[j]
+            Q[i] -= L[i, j] * Q[j]
+        left = Q[i] @ Q[i]
+        kept[i] = left > DEPENDENT**2 * size
+        L[i, i] = np.sqrt(left)
+        Q[i] = Q[i] / L[i, i] if kept[i] else 0.0
+    lost, K = ~kept, L[np.ix_(kept, kept)]
+    r = b - A @ held
+    E = np.linalg.solve(K.T, L[np.ix_(lost, kept)].T).T
+    beside = r[lost] - E @ r[kept]
+    beside[np.abs(beside) <= NONE * np.abs(b).max()] = 0.0
+    scaled = s[lost, None] * E / s[kept]
+    slopes = np.zeros(6)
+    slopes[lost] = s[lost] * np.linalg.solve(np.eye(lost.sum()) + scaled @ scaled.T, s[lost] * beside)
+    slopes[kept] = -E.T @ slopes[lost]
+    return Q[kept].T @ np.linalg.solve(K, r[kept] - slopes[kept] / s[kept] ** 2), slopes

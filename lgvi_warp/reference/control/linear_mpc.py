@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear model predictive control: a problem of all inputs of a horizon, by ADMM."""
+"""Linear model predictive control: a problem of all inputs of a horizon, by an interior-point method."""
 
 from typing import Any
 
@@ -16,13 +16,12 @@ class LinearMPC(Part):
     """Numbers as those of `lw.control.LinearMPC`."""
 
     P = rate_limit = tracked = None
-    disturbance_time, horizon, iterations = 5.0, 10, 30
+    disturbance_time, horizon, iterations = 5.0, 10, 50
 
     def begin(self) -> None:
         """Nothing is known of the last tick."""
         n, m = np.shape(self.B)
         self.begun, self.x, self.u, self.d = False, np.zeros(n), np.zeros(m), np.zeros(n)
-        self.t, self.t_change = np.zeros((self.horizon, m)), np.zeros((self.horizon, m))
 
     def steady_state(self, d: Array) -> tuple[Array, Array]:
         """x_s and u_s with x_s = A x_s + B u_s + d and no error of what is tracked."""
@@ -52,31 +51,19 @@ class LinearMPC(Part):
         return H, f
 
     def solved(self, H: Array, f: Array, before: Array, change: Array | None) -> Array:
-        """The inputs (horizon, m), as parts of their limits, after the iterations; before: the last; change: their limits."""
+        """The best inputs (horizon, m), as parts of their limits; before: the last; change: their limits."""
         size, m = len(f), len(before)
-        best = -np.linalg.solve(H, f).reshape(-1, m)
-        moves = np.diff(best, axis=0, prepend=before[None])
-        if np.all(np.abs(best) <= 1.0) and (change is None or np.all(np.abs(moves) <= change)):
-            self.t, self.t_change = best, moves
-            return best
-        D = np.eye(size) - np.eye(size, k=-m)
-        since = np.concatenate([before, np.zeros(size - m)])
-        eigenvalues = np.linalg.eigvalsh(H)
-        rho = np.sqrt(eigenvalues[0] * eigenvalues[-1])
-        M = H + rho * (np.eye(size) if change is None else np.eye(size) + D.T @ D)
-        for _ in range(self.iterations):
-            z = np.clip(self.t, -1.0, 1.0)
-            w = self.t - z
-            pull = rho * (z - w).ravel()
-            if change is not None:
-                z_change = np.clip(self.t_change, -change, change)
-                w_change = self.t_change - z_change
-                pull = pull + rho * D.T @ ((z_change - w_change).ravel() + since)
-            v = np.linalg.solve(M, pull - f)
-            self.t = v.reshape(-1, m) + w
-            if change is not None:
-                self.t_change = (D @ v - since).reshape(-1, m) + w_change
-        return np.clip(self.t, -1.0, 1.0)
+        best = -np.linalg.solve(H, f)
+        C, middle, half = np.eye(size), np.zeros(size), np.ones(size)
+        if change is not None:
+            before = np.clip(before, -1.0 - 0.999 * change, 1.0 + 0.999 * change)
+            C = np.concatenate([C, np.eye(size) - np.eye(size, k=-m)])
+            middle = np.concatenate([middle, before, np.zeros(size - m)])
+            half = np.concatenate([half, np.tile(change, self.horizon)])
+        if np.all(np.abs(C @ best - middle) <= half):
+            return best.reshape(-1, m)
+        both, ends = np.concatenate([C, -C]), np.concatenate([half + middle, half - middle])
+        return interior(H, f, both, ends, np.concatenate([half, half]), self.iterations).reshape(-1, m)
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """The first of the best inputs."""
@@ -90,15 +77,36 @@ class LinearMPC(Part):
             lacking = x - (self.A @ self.x + self.B @ u + self.d)
             self.d = self.d + (1.0 - np.exp(-y.period / self.disturbance_time)) * lacking
         H, f = self.problem(x, self.d)
-        for t in (self.t, self.t_change):
-            t[:-1] = t[1:].copy()
         before = u / limit
         change = None if self.rate_limit is None else y.period * np.asarray(self.rate_limit) / limit
         scale = np.tile(limit, self.horizon)
         first = self.solved(scale[:, None] * H * scale, scale * f, before, change)[0]
         if change is not None:
+            before = np.clip(before, -1.0 - 0.999 * change, 1.0 + 0.999 * change)
             first = np.clip(first, before - change, before + change)
         self.begun, self.x, self.u = True, x, limit * np.clip(first, -1.0, 1.0)
         made: Any = np.zeros(6)
         made[places] = self.u
         return np.asarray(w + made)
+
+
+def interior(H: Array, f: Array, C: Array, d: Array, slacks: Array, iterations: int) -> Array:
+    """v of least v H v / 2 + f v with C v <= d, by Mehrotra's predictor and corrector from v = 0 and these slacks on."""
+    v, s, size = np.zeros(len(f)), slacks.copy(), max(H[0, 0], np.abs(f).max())
+    multipliers = np.full(len(d), size)
+    for _ in range(iterations):
+        off, slope, gap = C @ v + s - d, H @ v + f + C.T @ multipliers, s @ multipliers / len(d)
+        if gap <= 1e-12 * size and np.abs(off).max() <= 1e-9 and np.abs(slope).max() <= 1e-9 * size:
+            break
+        K, c = H + C.T @ ((multipliers / s)[:, None] * C), s * multipliers
+        for corrects in (False, True):
+            move = np.linalg.solve(K, -slope - C.T @ ((multipliers * off - c) / s))
+            ds = -off - C @ move
+            dm = -(c + multipliers * ds) / s
+            most = max(1.0, np.max(-ds / s), np.max(-dm / multipliers))
+            if not corrects:
+                ahead = (s + ds / most) @ (multipliers + dm / most) / len(d)
+                c = c + ds * dm - (ahead / gap) ** 3 * gap
+        length = min(1.0, 0.99 / most)
+        v, s, multipliers = v + length * move, s + length * ds, multipliers + length * dm
+    return np.asarray(v)

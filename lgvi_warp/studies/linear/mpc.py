@@ -24,7 +24,7 @@ def mpc(
     *,
     rate_limit: Any = None,
     horizon: int = 10,
-    iterations: int = 30,
+    iterations: int = 50,
     disturbance_time: float = 5.0,
     tracked: Sequence[str] | None = None,
     name: str = "",
@@ -41,7 +41,7 @@ def mpc(
         limit: Largest inputs (m,) [N, N m].
         rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default none.
         horizon: Number of periods, 1 to 20; 10 by default.
-        iterations: Iterations at a tick; 30 by default.
+        iterations: Largest number of iterations at a tick; 50 by default.
         disturbance_time: Time over which the disturbance is filtered [s]; infinite: none is estimated. 5 by default.
         tracked: Names of the states whose errors are to vanish; by default the first, as many as inputs.
         name: Name of the part; by default its type.

@@ -8,52 +8,46 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.lanes.arithmetic import any_positive
-from lgvi_kernels.lanes.rotations import solve3
 from lgvi_kernels.law import *
+from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
 from lgvi_kernels.laws.control.efforts import ROWS as effort_rows
 from lgvi_kernels.laws.control.efforts import make_command_for
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
 
-# Rows of rest.py, priorities of the components (6), the lines (6) of the pseudo-inverse, one a channel; then of each channel
-# those of efforts.py, its wrench by priorities a (6), 1 / weight, and 1 / a.a.
+# Rows: those of rest.py; in the order of priority, the lines (6) of the components of the demand over the arm, their priorities
+# (6) and 1 / these^2 (6); the arm; the lines (6) of the solution without limits, one a channel. Then of each channel those of
+# efforts.py, its column (6) in that order times the root of 1 / weight, and this root.
+LINES_OF_DEMAND = rest_rows
+PRIORITIES = LINES_OF_DEMAND + 36
+ARM = PRIORITIES + 12
+SOLUTION = ARM + 1
 EFFORTS = effort_rows
-ROWS = EFFORTS + 8
-REST = rest_rows
-# What is added to the matrix of free channels, as a part of that of all: they may span less than six components.
-LEAST = 1e-3
-# An effort is at a limit where it is so near, as a part of the range.
-AT_LIMIT = 1e-5
-# A component of the error below this part of the demand is none: anti-windup looks at its sign.
-DELIVERED = 1e-3
+ROWS = EFFORTS + 7
+# Scratch rows: the state of each channel (1, -1: at its limit ahead, astern; 0: free) and its goal; the demand, its error b, z, c
+# and the slopes, 6 each; the matrices L, E and M; orthonormal lines of the channels (6, channels).
+VECTORS, MATRICES = 30, 108
 
 
 @functools.cache
 def params(width, real):
-    """Params: first rows of the table and of the commands; count; shared: rows before the curves; size: of a curve.
+    """Params: first rows of the table, of the commands and of the scratch; count; shared: rows before the curves.
 
-    sided: whether polynomials astern are others than those ahead; rounds, and sweeps in each.
+    size: of a curve; sided: whether polynomials astern are others than those ahead; iterations: at most; unconverged: row.
     """
-    words = ("first", "commands", "count", "shared", "size", "sided", "odd", "rounds", "sweeps")
+    words = ("first", "commands", "count", "shared", "size", "sided", "odd", "work", "iterations", "unconverged")
     return struct("BoundedLeastSquares", **dict.fromkeys(words, wp.int32))
 
 
 @wp.func
-def by_priority(y: Any, row: int, v: Any):
-    """A vector times the priorities of its components."""
-    s = row3(y, row)
-    return vec3(s.x * v.x, s.y * v.y, s.z * v.z)
-
-
-@wp.func
-def beyond3(v: Any, size: Any, enough: Any):
+def beyond3(v: Any, enough: Any):
     """The components of v whose size is beyond what is enough; 0 for the others."""
     zero = enough - enough
     return vec3(
-        positive(absolute(size.x) - enough, v.x, zero),
-        positive(absolute(size.y) - enough, v.y, zero),
-        positive(absolute(size.z) - enough, v.z, zero),
+        positive(absolute(v.x) - enough, v.x, zero),
+        positive(absolute(v.y) - enough, v.y, zero),
+        positive(absolute(v.z) - enough, v.z, zero),
     )
 
 
@@ -70,158 +64,255 @@ def highest(y: Any, at: int, zero: Any):
 
 
 @wp.func
-def free_channel(y: Any, t: Any, low: Any, high: Any, zero: Any):
-    """1 where an effort is between its limits, else 0."""
-    unity = ones(t)
-    # A step up to a limit ends beside it by round-off.
-    near = y.h.dtype(wp.static(AT_LIMIT)) * (high - low)
-    return positive(high - near - t, positive(t - low - near, unity, zero), zero)
+def less_products(y: Any, a: int, b: int, count: int, total: Any):
+    """total less the sum of products of rows of the memory."""
+    for j in range(count):
+        total = total - remembered(y, a + j) * remembered(y, b + j)
+    return total
 
 
 @wp.func
-def solve_blocks(
-    p0: Any, p1: Any, p2: Any, q0: Any, q1: Any, q2: Any, r0: Any, r1: Any, r2: Any, force: Any, torque: Any
-):
-    """(x, z) with [[P, Q], [Q^T, R]] (x; z) = (force; torque), P and R symmetric, by their rows."""
-    x = solve3(p0, p1, p2, force)
-    # Columns of P^-1 Q.
-    a = solve3(p0, p1, p2, vec3(q0.x, q1.x, q2.x))
-    b = solve3(p0, p1, p2, vec3(q0.y, q1.y, q2.y))
-    c = solve3(p0, p1, p2, vec3(q0.z, q1.z, q2.z))
-    qa = vec3(q0.x, q1.x, q2.x)
-    qb = vec3(q0.y, q1.y, q2.y)
-    qc = vec3(q0.z, q1.z, q2.z)
-    s0 = r0 - vec3(dot(qa, a), dot(qa, b), dot(qa, c))
-    s1 = r1 - vec3(dot(qb, a), dot(qb, b), dot(qb, c))
-    s2 = r2 - vec3(dot(qc, a), dot(qc, b), dot(qc, c))
-    z = solve3(s0, s1, s2, torque - vec3(dot(qa, x), dot(qb, x), dot(qc, x)))
-    return x - (z.x * a + z.y * b + z.z * c), z
+def solve_triangle(y: Any, L: int, count: int, b: int, z: int):
+    """z with L z = b; the diagonal of L holds inverses, 0 in the lines that are left out."""
+    for i in range(count):
+        remember(y, z + i, remembered(y, L + 6 * i + i) * less_products(y, L + 6 * i, z, i, remembered(y, b + i)))
+
+
+@wp.func
+def column(y: Any, p: Any, channels: int, i: int, row: int):
+    """A component of the scaled column of a channel."""
+    return row1(y, channels + wp.static(ROWS) * i + wp.static(EFFORTS) + row)
+
+
+@wp.func(inline=False)
+def orthogonalise(y: Any, p: Any, channels: int, six: int, L: int, lines: int, zero: Any):
+    """The lines of the free channels' columns = L (orthonormal lines), by Gram & Schmidt; L has inverses on its diagonal.
+
+    A line that depends on those of higher priority has an inverse of 0. Weighted rows need no scaling: each line has its own
+    error, however large the priorities are.
+    """
+    unity = ones(zero)
+    dependent = by_digits(y, y.h.dtype(1e-9), y.h.dtype(3e-4))
+    for i in range(six):
+        line = lines + i * p.count
+        size = zero
+        for k in range(p.count):
+            state = remembered(y, p.work + k)
+            a = positive(absolute(state), zero, column(y, p, channels, k, i))
+            size = size + a * a
+            remember(y, line + k, a)
+        for j in range(i):
+            other = lines + j * p.count
+            c = zero - less_products(y, line, other, p.count, zero)
+            remember(y, L + 6 * i + j, c)
+            for k in range(p.count):
+                remember(y, line + k, remembered(y, line + k) - c * remembered(y, other + k))
+        left = zero - less_products(y, line, line, p.count, zero)
+        inverse = positive(left - (dependent * dependent) * size, unity / root(positive(left, left, unity)), zero)
+        remember(y, L + 6 * i + i, inverse)
+        for k in range(p.count):
+            remember(y, line + k, inverse * remembered(y, line + k))
+
+
+@wp.func(inline=False)
+def errors(y: Any, p: Any, six: int, L: int, b: int, noise: Any, zero: Any):
+    """y = S^2 r of the least sum of squares of S r, r = b - L z: what b has beside the span of L, weighted by S.
+
+    Lines that depend on others of higher priority have the multiples E of these: r of the former is c = b - E b less what the
+    latter give in, and (I + K K^T) v = S c, K = S E S^-1, is a well-conditioned problem.
+    """
+    unity = ones(zero)
+    z = b + 6
+    c = b + 12
+    slopes = b + 18
+    E = L + 36
+    M = L + 72
+    priority = p.first + wp.static(PRIORITIES)
+    solve_triangle(y, L, six, b, z)
+    for i in range(six):
+        kept = remembered(y, L + 7 * i)
+        rest_of = less_products(y, L + 6 * i, z, i, remembered(y, b + i))
+        rest_of = positive(kept, zero, positive(absolute(rest_of) - noise, rest_of, zero))
+        remember(y, c + i, row1(y, priority + i) * rest_of)
+        for m in range(i):
+            j = i - 1 - m
+            e = remembered(y, L + 6 * i + j)
+            for k in range(j + 1, i):
+                e = e - remembered(y, E + 6 * i + k) * remembered(y, L + 6 * k + j)
+            remember(y, E + 6 * i + j, positive(kept, zero, e * remembered(y, L + 7 * j)))
+    # M = I + K K^T, and its Cholesky factor in its place, with inverses on the diagonal.
+    for i in range(six):
+        s = row1(y, priority + i)
+        for j in range(i + 1):
+            entry = zero
+            for k in range(j):
+                product = remembered(y, E + 6 * i + k) * remembered(y, E + 6 * j + k)
+                entry = entry + product * row1(y, priority + 6 + k)
+            entry = (s * row1(y, priority + j)) * entry
+            if i == j:
+                entry = root(less_products(y, M + 6 * i, M + 6 * i, i, unity + entry))
+                remember(y, M + 7 * i, unity / entry)
+            else:
+                remember(y, M + 6 * i + j, remembered(y, M + 7 * j) * less_products(y, M + 6 * i, M + 6 * j, j, entry))
+    solve_triangle(y, M, six, c, slopes)
+    for m in range(six):
+        i = six - 1 - m
+        v = remembered(y, slopes + i)
+        for k in range(i + 1, six):
+            v = v - remembered(y, M + 6 * k + i) * remembered(y, slopes + k)
+        remember(y, slopes + i, v * remembered(y, M + 7 * i))
+    for i in range(six):
+        remember(y, slopes + i, row1(y, priority + i) * remembered(y, slopes + i))
+    for j in range(six):
+        total = remembered(y, slopes + j)
+        for i in range(j + 1, six):
+            total = total - remembered(y, E + 6 * i + j) * remembered(y, slopes + i)
+        remember(y, slopes + j, total)
+
+
+@wp.func(inline=False)
+def iterate(y: Any, p: Any, channels: int, six: int, demand: int, busy: Any):
+    """A step of the active set towards the least error of the free channels, up to the first limit; else one is freed.
+
+    Returns: above 0 in the lanes that have not found the least error.
+    """
+    unity = ones(busy)
+    zero = unity - unity
+    goals = p.work + p.count
+    b = demand + 6
+    L = demand + wp.static(VECTORS)
+    lines = L + wp.static(MATRICES)
+    orthogonalise(y, p, channels, six, L, lines, zero)
+    noise = zero
+    for i in range(six):
+        r = remembered(y, demand + i)
+        noise = greatest(noise, absolute(r))
+        for k in range(p.count):
+            held = positive(absolute(remembered(y, p.work + k)), remembered(y, p.commands + k), zero)
+            r = r - column(y, p, channels, k, i) * held
+        remember(y, b + i, r)
+    errors(y, p, six, L, b, by_digits(y, y.h.dtype(1e-12), y.h.dtype(2e-6)) * noise, zero)
+    steepest = zero
+    for i in range(six):
+        slope = remembered(y, b + 18 + i)
+        steepest = greatest(steepest, absolute(slope))
+        given = slope * row1(y, p.first + wp.static(PRIORITIES + 6) + i)
+        given = positive(remembered(y, L + 7 * i), given, zero)
+        remember(y, b + i, remembered(y, b + i) - given)
+    solve_triangle(y, L, six, b, b + 6)
+    beside = by_digits(y, y.h.dtype(1e-13), y.h.dtype(2e-6))
+    length = unity
+    first = zero - unity
+    for k in range(p.count):
+        at = channels + wp.static(ROWS) * k
+        scale = row1(y, at + wp.static(EFFORTS) + 6)
+        low = lowest(y, at, zero) / scale
+        high = highest(y, at, zero) / scale
+        x = remembered(y, p.commands + k)
+        goal = zero
+        for i in range(six):
+            goal = goal + remembered(y, lines + i * p.count + k) * remembered(y, b + 6 + i)
+        goal = positive(absolute(remembered(y, p.work + k)), x, goal)
+        remember(y, goals + k, goal)
+        # Beyond the limit by round-off is at the limit.
+        size = absolute(goal - x)
+        room = positive(goal - x, high - x, x - low)
+        over = size - room - beside * (high - low)
+        ratio = positive(over, room / positive(size, size, unity), unity)
+        nearer = positive(over, length - ratio, zero)
+        first = positive(nearer, y.h.dtype(k) * unity, first)
+        length = positive(nearer, ratio, length)
+    blocked = first + y.h.dtype(0.5) * unity
+    flat = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
+    worst = zero
+    freed = zero - unity
+    for k in range(p.count):
+        at = channels + wp.static(ROWS) * k
+        scale = row1(y, at + wp.static(EFFORTS) + 6)
+        low = lowest(y, at, zero) / scale
+        high = highest(y, at, zero) / scale
+        x = remembered(y, p.commands + k)
+        goal = remembered(y, goals + k)
+        moved = clamp(x + length * (goal - x), low, high)
+        here = y.h.dtype(0.5) * unity - absolute(first - y.h.dtype(k) * unity)
+        end = positive(goal - x, high, low)
+        moved = positive(here, end, moved)
+        state = remembered(y, p.work + k)
+        found = positive(here, positive(goal - x, unity, zero - unity), state)
+        remember(y, p.commands + k, positive(busy, moved, x))
+        remember(y, p.work + k, positive(busy, found, state))
+        slope = zero
+        steep = zero
+        for i in range(six):
+            a = column(y, p, channels, k, i)
+            slope = slope + a * remembered(y, b + 18 + i)
+            steep = steep + absolute(a)
+        gain = zero - state * slope
+        gain = positive(high - low, gain - flat * (steep * steepest), zero)
+        freed = positive(gain - worst, y.h.dtype(k) * unity, freed)
+        worst = greatest(worst, gain)
+    # Where no limit was met, the channel of the steepest slope away from its limit is freed.
+    free = positive(blocked, zero, positive(worst, busy, zero))
+    for k in range(p.count):
+        here = y.h.dtype(0.5) * unity - absolute(freed - y.h.dtype(k) * unity)
+        here = positive(free, here, zero)
+        remember(y, p.work + k, positive(here, zero, remembered(y, p.work + k)))
+    return positive(blocked, busy, free)
 
 
 @functools.cache
 def made(features):
-    """The allocation for efforts as of efforts.py, which sweeps before each solution, or "redistributes" alone."""
-    command_for, sweeping = make_command_for(features), "redistributes" not in features
+    """The allocation for efforts as of efforts.py."""
+    command_for = make_command_for(features)
 
-    @wp.func
-    def sweep(y: Any, p: Any, channels: int, r: Any, clipped: Any):
-        """Move each effort in turn to where the error is least; r: the error, by priorities."""
-        zero = clipped - clipped
-        for i in range(p.count):
-            at = channels + wp.static(ROWS) * i
-            a = row3(y, at + wp.static(EFFORTS))
-            m = row3(y, at + wp.static(EFFORTS) + 3)
-            old = remembered(y, p.commands + i)
-            t = old + (dot(a, r.force) + dot(m, r.torque)) * row1(y, at + wp.static(EFFORTS) + 7)
-            t = positive(clipped, clamp(t, lowest(y, at, zero), highest(y, at, zero)), old)
-            r.force = r.force - (t - old) * a
-            r.torque = r.torque - (t - old) * m
-            remember(y, p.commands + i, t)
-        return r
-
-    @wp.func
-    def free_solution(y: Any, p: Any, channels: int, r: Any, zero: Any):
-        """(x, z): efforts of free channels change by (a.x + m.z) / weight, the least change that makes r, if one does."""
-        none = vec3(zero, zero, zero)
-        p0 = none
-        p1 = none
-        p2 = none
-        q0 = none
-        q1 = none
-        q2 = none
-        r0 = none
-        r1 = none
-        r2 = none
-        total = zero
-        for i in range(p.count):
-            at = channels + wp.static(ROWS) * i
-            t = remembered(y, p.commands + i)
-            a = row3(y, at + wp.static(EFFORTS))
-            m = row3(y, at + wp.static(EFFORTS) + 3)
-            cheap = row1(y, at + wp.static(EFFORTS) + 6) * ones(zero)
-            total = total + cheap * (dot(a, a) + dot(m, m))
-            share = cheap * free_channel(y, t, lowest(y, at, zero), highest(y, at, zero), zero)
-            fa = share * a
-            fm = share * m
-            p0 = p0 + fa.x * a
-            p1 = p1 + fa.y * a
-            p2 = p2 + fa.z * a
-            q0 = q0 + fa.x * m
-            q1 = q1 + fa.y * m
-            q2 = q2 + fa.z * m
-            r0 = r0 + fm.x * m
-            r1 = r1 + fm.y * m
-            r2 = r2 + fm.z * m
-        ridge = y.h.dtype(wp.static(LEAST / 6.0)) * total
-        p0.x = p0.x + ridge
-        p1.y = p1.y + ridge
-        p2.z = p2.z + ridge
-        r0.x = r0.x + ridge
-        r1.y = r1.y + ridge
-        r2.z = r2.z + ridge
-        return solve_blocks(p0, p1, p2, q0, q1, q2, r0, r1, r2, r.force, r.torque)
-
-    @wp.func
-    def change_of(y: Any, at: int, t: Any, x: Any, z: Any, zero: Any):
-        """How the solution changes an effort."""
-        a = row3(y, at + wp.static(EFFORTS))
-        m = row3(y, at + wp.static(EFFORTS) + 3)
-        share = free_channel(y, t, lowest(y, at, zero), highest(y, at, zero), zero)
-        return share * row1(y, at + wp.static(EFFORTS) + 6) * (dot(a, x) + dot(m, z))
-
-    @wp.func
-    def solve_again(y: Any, p: Any, channels: int, r: Any, clipped: Any):
-        """Change the efforts of channels that are not at a limit, up to the first limit, or each up to its own."""
-        zero = clipped - clipped
+    @wp.func(inline=False)
+    def solve_within(w: Any, y: Any, p: Any, channels: int, clipped: Any):
+        """The efforts of least error, in the lanes where some effort of the fast solution was cut off."""
         unity = ones(clipped)
-        x, z = free_solution(y, p, channels, r, zero)
-        length = unity
-        if wp.static(sweeping):
-            for i in range(p.count):
-                at = channels + wp.static(ROWS) * i
-                t = remembered(y, p.commands + i)
-                change = change_of(y, at, t, x, z, zero)
-                room = positive(change, highest(y, at, zero) - t, t - lowest(y, at, zero))
-                size = absolute(change)
-                # room / size where that is below 1.
-                length = positive(size * length - room, room / positive(size, size, unity), length)
-        for i in range(p.count):
-            at = channels + wp.static(ROWS) * i
-            old = remembered(y, p.commands + i)
-            t = old + length * change_of(y, at, old, x, z, zero)
-            t = positive(clipped, clamp(t, lowest(y, at, zero), highest(y, at, zero)), old)
-            r.force = r.force - (t - old) * row3(y, at + wp.static(EFFORTS))
-            r.torque = r.torque - (t - old) * row3(y, at + wp.static(EFFORTS) + 3)
-            remember(y, p.commands + i, t)
-        return r
+        zero = unity - unity
+        # Not a constant: loops over it stay loops.
+        six = int(6)
+        demand = p.work + 2 * p.count
+        for i in range(six):
+            line = p.first + wp.static(LINES_OF_DEMAND) + 6 * i
+            remember(y, demand + i, dot(row3(y, line), w.force) + dot(row3(y, line + 3), w.torque))
+        for k in range(p.count):
+            at = channels + wp.static(ROWS) * k
+            t = remembered(y, p.commands + k)
+            inside = positive(t - lowest(y, at, zero), zero, zero - unity)
+            remember(y, p.work + k, positive(highest(y, at, zero) - t, inside, unity))
+            remember(y, p.commands + k, t / row1(y, at + wp.static(EFFORTS) + 6))
+        busy = clipped
+        for _ in range(p.iterations):
+            if any_positive(busy):
+                busy = iterate(y, p, channels, six, demand, busy)
+        count_unconverged(y, p.unconverged, busy)
+        for k in range(p.count):
+            at = channels + wp.static(ROWS) * k
+            t = remembered(y, p.commands + k) * row1(y, at + wp.static(EFFORTS) + 6)
+            remember(y, p.commands + k, clamp(t, lowest(y, at, zero), highest(y, at, zero)))
+        # A lane leaves nothing behind that others made it calculate.
+        for i in range(8 * p.count + wp.static(VECTORS + MATRICES)):
+            remember(y, p.work + i, zero)
 
     @wp.func
     def allocate_within(w: Any, y: Any, p: Any):
         """Efforts t of least sum (priority (w - B t))^2 within the limits; undelivered is what they do not make of w."""
         undelivered = rest(w, y, p.first)
-        lines = p.first + wp.static(REST + 6)
+        lines = p.first + wp.static(SOLUTION)
         channels = lines + 6 * p.count
         unity = ones(y.position.x)
         zero = unity - unity
-        # The pseudo-inverse's efforts, each up to its limit: where none is cut off they stay, to the last digit.
-        r = w
-        r.force = vec3(zero, zero, zero)
-        r.torque = r.force
+        # Those of least error without limits, each up to its own: where none is cut off they stay, to the last digit.
         clipped = zero
         for i in range(p.count):
             at = channels + wp.static(ROWS) * i
             effort = dot(row3(y, lines + 6 * i), w.force) + dot(row3(y, lines + 6 * i + 3), w.torque)
             t = clamp(effort, lowest(y, at, zero), highest(y, at, zero))
             clipped = greatest(clipped, absolute(effort - t))
-            r.force = r.force + (effort - t) * row3(y, at + wp.static(EFFORTS))
-            r.torque = r.torque + (effort - t) * row3(y, at + wp.static(EFFORTS) + 3)
             remember(y, p.commands + i, t)
         if any_positive(clipped):
-            for _ in range(p.rounds):
-                if wp.static(sweeping):
-                    for _k in range(p.sweeps):
-                        r = sweep(y, p, channels, r, clipped)
-                r = solve_again(y, p, channels, r, clipped)
+            solve_within(w, y, p, channels, clipped)
         lacking = vec3(zero, zero, zero)
         turning = lacking
         for i in range(p.count):
@@ -229,18 +320,19 @@ def made(features):
             effort = dot(row3(y, lines + 6 * i), w.force) + dot(row3(y, lines + 6 * i + 3), w.torque)
             # What is no number stays so, and the tick sees it.
             t = remembered(y, p.commands + i) + (effort - effort)
+            t = positive(clipped, t, effort)
             lacking = lacking + (effort - t) * row3(y, at)
             turning = turning + (effort - t) * row3(y, at + 3)
             c = positive(t, row1(y, at + 7), row1(y, at + 8))
             # A side without thrust has the coefficient 0, and gets no command.
             remember(y, p.commands + i, positive(c, t / positive(c, c, unity), t))
         command_for(y, p, channels, wp.static(ROWS))
-        first = p.first + wp.static(REST)
-        wanted = by_priority(y, first, w.force)
-        turned = by_priority(y, first + 3, w.torque)
-        enough = y.h.dtype(wp.static(DELIVERED)) * root(dot(wanted, wanted) + dot(turned, turned))
-        undelivered.force = undelivered.force + beyond3(lacking, by_priority(y, first, lacking), enough)
-        undelivered.torque = undelivered.torque + beyond3(turning, by_priority(y, first + 3, turning), enough)
+        # Components below round-off of the demand count as delivered: anti-windup looks at their sign.
+        arm = row1(y, p.first + wp.static(ARM))
+        size = root(dot(w.force, w.force) + dot(w.torque, w.torque) / (arm * arm))
+        enough = by_digits(y, y.h.dtype(1e-10), y.h.dtype(5e-5)) * size
+        undelivered.force = beyond3(undelivered.force + lacking, enough)
+        undelivered.torque = beyond3(undelivered.torque + turning, arm * enough)
         return undelivered
 
     return device(__name__, features, params=params, allocate=allocate_within)

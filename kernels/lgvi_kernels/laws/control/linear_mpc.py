@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model predictive control: the best inputs over a horizon within their limits, by a fixed number of iterations of ADMM."""
+"""Model predictive control: the best inputs over a horizon within their limits, by an interior-point method."""
 
 import functools
 from typing import Any
@@ -8,6 +8,7 @@ import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.law import *
+from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
 from lgvi_kernels.laws.control.integral import remember3, remembered3
 from lgvi_kernels.laws.control.pose_error import attitude_error, rate_error, velocity_error
 
@@ -16,10 +17,12 @@ SEEN = 12
 DEMAND = 6
 
 # Rows of the table, with n states, m inputs and k = horizon m: places of the states, of the inputs; A, B; limits of inputs and
-# of their changes (as parts of these), m each; the best inputs without limits (k, 2 n) of state and disturbance; what they are
-# in an iteration, (k, 2 n); and what an iteration does (k, k).
-# Rows of the memory: whether it has begun; the state (n), the inputs (m) and the disturbance (n); t of each input (k), and of
-# each change (k).
+# of their changes (as parts of these), m each; the best inputs without limits (k, 2 n) of state and disturbance; the slope of
+# the cost, (k, 2 n); and its matrix, line by line up to the diagonal.
+# Rows of the memory: whether it has begun; the state (n), the inputs (m) and the disturbance (n).
+# Constraints |C v - middle| <= half are the k inputs, then where `rated` their k changes. Each has eight scratch rows: the
+# slacks above and below, their multipliers, 1 / the slacks, and what a step is to make of slack times multiplier.
+OF_EACH = 8
 
 
 @functools.cache
@@ -28,7 +31,7 @@ def params(width, real):
 
     rated: whether changes of inputs have limits.
     """
-    words = ("first", "memory", "work", "unmet", "states", "inputs", "horizon", "iterations", "rated")
+    words = ("first", "memory", "work", "unmet", "states", "inputs", "horizon", "iterations", "rated", "unconverged")
     return struct("LinearMPC", gain=lane(width, real), **dict.fromkeys(words, wp.int32))
 
 
@@ -56,19 +59,6 @@ def times(y: Any, row: int, at: int, count: int, total: Any):
 
 
 @wp.func
-def reflected(t: Any, limit: Any):
-    """2 z - t, z being t within its limit."""
-    z = clamp(t, -limit, limit)
-    return z + z - t
-
-
-@wp.func
-def beyond(t: Any, limit: Any):
-    """What of t is beyond its limit."""
-    return t - clamp(t, -limit, limit)
-
-
-@wp.func
 def estimate(y: Any, p: Any, x: int, matrices: int):
     """The disturbance d: what the model of a period lacks, by a filter of first order."""
     n = p.states
@@ -83,57 +73,255 @@ def estimate(y: Any, p: Any, x: int, matrices: int):
         remember(y, last + n + m + i, d + begun * (p.gain * lacking))
 
 
+@wp.func
+def half(y: Any, p: Any, limits: int, j: int, unity: Any):
+    """Half of the width of a constraint."""
+    k = p.horizon * p.inputs
+    width = unity
+    if j >= k:
+        width = row1(y, limits + p.inputs + j % p.inputs) * unity
+    return width
+
+
+@wp.func
+def constrained(y: Any, p: Any, v: int, before: int, j: int):
+    """C v of a constraint; rows `before` hold the inputs before the first, or, of a step, 0."""
+    k = p.horizon * p.inputs
+    i = j
+    if j >= k:
+        i = j - k
+    value = remembered(y, v + i)
+    if j >= k:
+        if i < p.inputs:
+            value = value - remembered(y, before + i)
+        else:
+            value = value - remembered(y, v + i - p.inputs)
+    return value
+
+
+@wp.func
+def spread(y: Any, p: Any, to: int, j: int, value: Any):
+    """Add C^T times a number of a constraint to rows of inputs."""
+    k = p.horizon * p.inputs
+    i = j
+    if j >= k:
+        i = j - k
+    remember(y, to + i, remembered(y, to + i) + value)
+    if j >= k:
+        if i >= p.inputs:
+            remember(y, to + i - p.inputs, remembered(y, to + i - p.inputs) - value)
+
+
+@wp.func
+def entry(i: int, j: int):
+    """The place of a number of a symmetric matrix, j <= i, line by line."""
+    return (i * (i + 1)) // 2 + j
+
+
 @wp.func(inline=False)
-def iterate(y: Any, p: Any, limits: int, does: int, t: int, fixed: int, rhs: int, before: int):
-    """One iteration: v = W (2 z - t) + fixed, the part of v that stays, and t = v + t - z."""
-    m = p.inputs
-    k = p.horizon * m
-    unity = ones(remembered(y, t))
+def factor(y: Any, p: Any, cost: int, each: int, L: int, zero: Any):
+    """The Cholesky factor of H + C^T diag(multipliers / slacks) C, with inverses on its diagonal."""
+    k = p.horizon * p.inputs
+    unity = ones(zero)
     for i in range(k):
-        q = reflected(remembered(y, t + i), unity)
-        if p.rated > 0:
-            limit = row1(y, limits + m + i % m)
-            q = q + reflected(remembered(y, t + k + i), limit)
-            if i < m:
-                q = q + remembered(y, before + i)
-            if i + m < k:
-                q = q - reflected(remembered(y, t + k + i + m), limit)
-        remember(y, rhs + i, q)
-    for i in range(k):
-        v = times(y, does + i * k, rhs, k, remembered(y, fixed + i))
-        old = remembered(y, t + i)
-        remember(y, t + i, v + beyond(old, unity))
-        if p.rated > 0:
-            change = v
-            if i < m:
-                change = v - remembered(y, before + i)
+        for j in range(i + 1):
+            total = row1(y, cost + entry(i, j)) * unity
+            if i == j:
+                total = total + weight(y, each, i)
+                if p.rated > 0:
+                    total = total + weight(y, each, k + i)
+                    if i + p.inputs < k:
+                        total = total + weight(y, each, k + i + p.inputs)
+            if p.rated > 0:
+                if i - j == p.inputs:
+                    total = total - weight(y, each, k + i)
+            least_pivot = by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * absolute(total)
+            for q in range(j):
+                total = total - remembered(y, L + entry(i, q)) * remembered(y, L + entry(j, q))
+            if i == j:
+                total = unity / root(positive(total - least_pivot, total, least_pivot))
             else:
-                change = v - remembered(y, rhs + k + i - m)
-            remember(y, rhs + k + i, v)
-            limit = row1(y, limits + m + i % m)
-            remember(y, t + k + i, change + beyond(remembered(y, t + k + i), limit))
+                total = total * remembered(y, L + entry(j, j))
+            remember(y, L + entry(i, j), total)
+
+
+@wp.func
+def weight(y: Any, each: int, j: int):
+    """Multipliers over slacks of a constraint."""
+    at = each + wp.static(OF_EACH) * j
+    return remembered(y, at + 2) * remembered(y, at + 4) + remembered(y, at + 3) * remembered(y, at + 5)
+
+
+@wp.func
+def missed(y: Any, p: Any, limits: int, at: int, v: int, before: int, j: int, unity: Any):
+    """How far the slacks of a constraint are from what its inputs leave, above and below."""
+    width = half(y, p, limits, j, unity)
+    value = constrained(y, p, v, before, j)
+    return value + remembered(y, at) - width, remembered(y, at + 1) - value - width
+
+
+@wp.func
+def moves(y: Any, at: int, r1: Any, r2: Any, change: Any):
+    """How slacks and multipliers of a constraint change in a step that changes C v so."""
+    d1 = -r1 - change
+    d2 = change - r2
+    m1 = -(remembered(y, at + 6) + remembered(y, at + 2) * d1) * remembered(y, at + 4)
+    m2 = -(remembered(y, at + 7) + remembered(y, at + 3) * d2) * remembered(y, at + 5)
+    return d1, d2, m1, m2
+
+
+@wp.func
+def advance(y: Any, row: int, length: Any, change: Any):
+    """Change a number by a step, in the lanes that make one."""
+    old = remembered(y, row)
+    remember(y, row, positive(length, old + length * change, old))
+
+
+@wp.func(inline=False)
+def step(y: Any, p: Any, limits: int, v: int, slope: int, to: int, each: int, L: int, before: int, none: int, zero: Any):
+    """Newton's step of the inputs; 1 / its largest length that keeps slacks and multipliers above 0, at least 1."""
+    unity = ones(zero)
+    k = p.horizon * p.inputs
+    count = k + p.rated * k
+    for i in range(k):
+        remember(y, to + i, -remembered(y, slope + i))
+    for j in range(count):
+        at = each + wp.static(OF_EACH) * j
+        r1, r2 = missed(y, p, limits, at, v, before, j, unity)
+        a = (remembered(y, at + 2) * r1 - remembered(y, at + 6)) * remembered(y, at + 4)
+        b = (remembered(y, at + 3) * r2 - remembered(y, at + 7)) * remembered(y, at + 5)
+        spread(y, p, to, j, b - a)
+    for i in range(k):
+        total = remembered(y, to + i)
+        for q in range(i):
+            total = total - remembered(y, L + entry(i, q)) * remembered(y, to + q)
+        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+    for m in range(k):
+        i = k - 1 - m
+        total = remembered(y, to + i)
+        for q in range(i + 1, k):
+            total = total - remembered(y, L + entry(q, i)) * remembered(y, to + q)
+        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+    most = unity
+    for j in range(count):
+        at = each + wp.static(OF_EACH) * j
+        r1, r2 = missed(y, p, limits, at, v, before, j, unity)
+        d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
+        most = greatest(most, greatest(-d1 * remembered(y, at + 4), -d2 * remembered(y, at + 5)))
+        most = greatest(most, greatest(-m1 / remembered(y, at + 2), -m2 / remembered(y, at + 3)))
+    return most
+
+
+@wp.func(inline=False)
+def begin(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, zero: Any):
+    """Inputs of 0, slacks of half the width, and multipliers of one size, which is returned."""
+    unity = ones(zero)
+    k = p.horizon * p.inputs
+    size = row1(y, cost) * unity
+    for i in range(k):
+        size = greatest(size, absolute(remembered(y, f + i)))
+        remember(y, v + i, zero)
+    for j in range(k + p.rated * k):
+        at = each + wp.static(OF_EACH) * j
+        width = half(y, p, limits, j, unity)
+        remember(y, at, width)
+        remember(y, at + 1, width)
+        remember(y, at + 2, size)
+        remember(y, at + 3, size)
+    return size
+
+
+@wp.func(inline=False)
+def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, L: int, before: int, none: int, size: Any,
+            busy: Any):  # fmt: skip
+    """A step of Mehrotra's predictor and corrector, in the lanes above 0; returns those that have not converged before it."""
+    unity = ones(busy)
+    zero = unity - unity
+    k = p.horizon * p.inputs
+    count = k + p.rated * k
+    slope = f + k
+    to = slope + k
+    gap = zero
+    off = zero
+    for i in range(k):
+        total = remembered(y, f + i)
+        for j in range(k):
+            total = total + row1(y, cost + entry(wp.max(i, j), wp.min(i, j))) * remembered(y, v + j)
+        remember(y, slope + i, total)
+    for j in range(count):
+        at = each + wp.static(OF_EACH) * j
+        spread(y, p, slope, j, remembered(y, at + 2) - remembered(y, at + 3))
+        r1, r2 = missed(y, p, limits, at, v, before, j, unity)
+        off = greatest(off, greatest(absolute(r1), absolute(r2)))
+        for q in range(2):
+            product = remembered(y, at + q) * remembered(y, at + 2 + q)
+            gap = gap + product
+            remember(y, at + 4 + q, unity / remembered(y, at + q))
+            remember(y, at + 6 + q, product)
+    gap = (y.h.dtype(0.5) / y.h.dtype(count)) * gap
+    steep = zero
+    for i in range(k):
+        steep = greatest(steep, absolute(remembered(y, slope + i)))
+    rest = greatest(gap - by_digits(y, y.h.dtype(1e-12), y.h.dtype(2e-6)) * size, zero)
+    close = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
+    rest = greatest(rest, greatest(off - close * unity, steep - close * size))
+    busy = positive(rest, busy, zero)
+    if any_positive(busy):
+        factor(y, p, cost, each, L, zero)
+        length = unity / step(y, p, limits, v, slope, to, each, L, before, none, zero)
+        ahead = zero
+        for j in range(count):
+            at = each + wp.static(OF_EACH) * j
+            r1, r2 = missed(y, p, limits, at, v, before, j, unity)
+            d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
+            ahead = ahead + (remembered(y, at) + length * d1) * (remembered(y, at + 2) + length * m1)
+            ahead = ahead + (remembered(y, at + 1) + length * d2) * (remembered(y, at + 3) + length * m2)
+            remember(y, at + 6, remembered(y, at + 6) + d1 * m1)
+            remember(y, at + 7, remembered(y, at + 7) + d2 * m2)
+        share = (y.h.dtype(0.5) / y.h.dtype(count)) * ahead / gap
+        aim = share * share * share * gap
+        for j in range(count):
+            at = each + wp.static(OF_EACH) * j
+            remember(y, at + 6, remembered(y, at + 6) - aim)
+            remember(y, at + 7, remembered(y, at + 7) - aim)
+        most = step(y, p, limits, v, slope, to, each, L, before, none, zero)
+        length = positive(busy, least(unity, y.h.dtype(0.99) / most), zero)
+        for j in range(count):
+            at = each + wp.static(OF_EACH) * j
+            r1, r2 = missed(y, p, limits, at, v, before, j, unity)
+            d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
+            advance(y, at, length, d1)
+            advance(y, at + 1, length, d2)
+            advance(y, at + 2, length, m1)
+            advance(y, at + 3, length, m2)
+        for i in range(k):
+            advance(y, v + i, length, remembered(y, to + i))
+    return busy
 
 
 @wp.func
 def control(w: Any, r: Any, y: Any, p: Any):
-    """State, disturbance, the best inputs without limits and, where these do not keep them, ADMM; then the first of them."""
+    """State, disturbance, the best inputs without limits and, where these do not keep them, those within; then the first."""
     n = p.states
     m = p.inputs
     k = p.horizon * m
     matrices = p.first + n + m
     limits = matrices + n * n + n * m
     free = limits + 2 * m
-    fixed_of = free + 2 * n * k
-    does = fixed_of + 2 * n * k
-    # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; v, fixed, rhs, and v again.
+    slope_of = free + 2 * n * k
+    cost = slope_of + 2 * n * k
+    # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f, slope
+    # and step of iterations, and m zeros; the constraints; the factor.
     demand = p.work + wp.static(SEEN)
     x = demand + wp.static(DEMAND)
     before = x + 2 * n
-    v = before + m
-    fixed = v + k
-    rhs = fixed + k
+    best_of = before + m
+    v = best_of + k
+    f = v + k
+    none = f + 3 * k
+    each = none + m
+    L = each + wp.static(OF_EACH) * (k + p.rated * k)
     last = p.memory + 1
-    t = last + 2 * n + m
     unity = ones(w.force.x)
     zero = unity - unity
     see(r, y, p.work)
@@ -143,7 +331,12 @@ def control(w: Any, r: Any, y: Any, p: Any):
         # What was not delivered of the last demand did not act.
         u = remembered(y, last + n + i) - remembered(y, p.unmet + place(y, p.first + n + i))
         remember(y, last + n + i, u)
-        remember(y, before + i, u / row1(y, limits + i))
+        u = u / row1(y, limits + i)
+        if p.rated > 0:
+            # From beyond the limits they go back at once.
+            most = unity + y.h.dtype(0.999) * row1(y, limits + m + i) * unity
+            u = clamp(u, -most, most)
+        remember(y, before + i, u)
     estimate(y, p, x, matrices)
     for i in range(n):
         remember(y, x + n + i, remembered(y, last + n + m + i))
@@ -151,42 +344,33 @@ def control(w: Any, r: Any, y: Any, p: Any):
     over = -unity
     for i in range(k):
         best = times(y, free + 2 * n * i, x, 2 * n, zero)
-        remember(y, v + i, best)
+        remember(y, best_of + i, best)
         over = greatest(over, absolute(best) - unity)
         if p.rated > 0:
             change = best
             if i < m:
                 change = best - remembered(y, before + i)
             else:
-                change = best - remembered(y, v + i - m)
+                change = best - remembered(y, best_of + i - m)
             over = greatest(over, absolute(change) - row1(y, limits + m + i % m))
-    # From where the last tick ended, a period later.
-    for i in range(k - m):
-        remember(y, t + i, remembered(y, t + i + m))
-        if p.rated > 0:
-            remember(y, t + k + i, remembered(y, t + k + i + m))
     if any_positive(over):
         for i in range(k):
-            remember(y, fixed + i, times(y, fixed_of + 2 * n * i, x, 2 * n, zero))
+            remember(y, f + i, times(y, slope_of + 2 * n * i, x, 2 * n, zero))
+        size = begin(y, p, limits, v, f, cost, each, zero)
+        busy = positive(over, unity, zero)
         for _ in range(p.iterations):
-            iterate(y, p, limits, does, t, fixed, rhs, before)
-    # A lane leaves nothing behind that others made it calculate.
-    for i in range(3 * k):
-        remember(y, fixed + i, zero)
-    for i in range(k):
-        best = remembered(y, v + i)
-        remember(y, t + i, positive(over, remembered(y, t + i), best))
-        if p.rated > 0:
-            change = best
-            if i < m:
-                change = best - remembered(y, before + i)
-            else:
-                change = best - remembered(y, v + i - m)
-            remember(y, t + k + i, positive(over, remembered(y, t + k + i), change))
+            if any_positive(busy):
+                busy = iterate(y, p, limits, v, f, cost, each, L, before, none, size, busy)
+        count_unconverged(y, p.unconverged, busy)
+        for i in range(m):
+            remember(y, best_of + i, positive(over, remembered(y, v + i), remembered(y, best_of + i)))
+        # A lane leaves nothing behind that others made it calculate.
+        for i in range(L + entry(k, 0) - v):
+            remember(y, v + i, zero)
     for i in range(wp.static(DEMAND)):
         remember(y, demand + i, zero)
     for i in range(m):
-        u = remembered(y, t + i)
+        u = remembered(y, best_of + i)
         if p.rated > 0:
             step = row1(y, limits + m + i)
             last_u = remembered(y, before + i)

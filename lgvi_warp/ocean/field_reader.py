@@ -14,7 +14,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.ocean import cf
-from lgvi_warp.ocean.data_sets import opened
+from lgvi_warp.ocean.data_sets import data_set
 from lgvi_warp.ocean.field_data import FieldData, FieldNumbers, FieldRequest, checked
 from lgvi_warp.ocean.holes import filled
 from lgvi_warp.ocean.places import LocalPlane
@@ -40,17 +40,17 @@ def read_field(source: Any, request: FieldRequest, *, outside: str, around: Any 
     faults.raise_if_any()
     assert place is not None
     request = dataclasses.replace(request, **values)
-    ds = opened(source)
-    plane = LocalPlane(*map(float, request.origin))
-    components = _components(ds, request, plane)
-    region = _region(components[0].placed, request, place, outside)
-    components = [component.within(region) for component in components]
-    spacing = request.spacing if request.spacing is not None else _fine_spacing(components[0].placed, region)
-    target = _regular(region, spacing)
-    window, seconds, more = _times(components, request)
-    _check_memory(components[0].placed.grid.scenarios, len(seconds), target)
-    reader = _FieldReader(components, target, request.fill)
-    velocities, times, error = reader.read(window, seconds)
+    with data_set(source) as ds:
+        plane = LocalPlane(*map(float, request.origin))
+        components = _components(ds, request, plane)
+        region = _region(components[0].placed, request, place, outside)
+        components = [component.within(region) for component in components]
+        spacing = request.spacing if request.spacing is not None else _fine_spacing(components[0].placed, region)
+        target = _regular(region, spacing)
+        window, seconds, more = _times(components, request)
+        _check_memory(components[0].placed.grid.scenarios, len(seconds), target)
+        reader = _FieldReader(components, target, request.fill)
+        velocities, times, error = reader.read(window, seconds)
     if request.checksum not in (None, reader.checksum):
         raise refusal("checksum", request.checksum, f"is not that of what is read, {reader.checksum}",
                       "leave it out to take this file")  # fmt: skip

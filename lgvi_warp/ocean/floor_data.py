@@ -26,7 +26,9 @@ MOST_NODES = 4_000_000
 
 
 class DepthSource(Protocol):
-    """Depths of a data set in the plane of a scene."""
+    """Depths of a data set in the plane of a scene. positive: whether its numbers grow "up" or "down"."""
+
+    positive: str
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
         """Which places [m] have data around them."""
@@ -74,7 +76,8 @@ def read_floor(file: Any, request: FloorRequest) -> FloorNumbers:
     depth = filled(depth[None], (float(target.spacing[0]), float(target.spacing[1])), request.fill)[0]
     if np.all(depth < 0.0):
         problem = f"makes all of the floor dry land, {-depth.max():.4g} to {-depth.min():.4g} m above the sea"
-        raise refusal("positive", request.positive, problem, "give positive = 'down' if the numbers are depths")
+        other, meaning = ("down", "depths") if source.positive == "up" else ("up", "elevations")
+        raise refusal("positive", source.positive, problem, f"give positive = {other!r} if the numbers are {meaning}")
     return FloorNumbers(depth, target.origin[:2], target.spacing[:2])
 
 
@@ -101,8 +104,15 @@ class _Gridded:
         if grid.depth is not None or grid.scenarios > 1:
             raise refusal("variable", name, "has levels or scenarios, which a floor has not", "name another variable")
         self.placed = Placed(_cut(grid, plane, region), plane)
-        usual = "up" if quantity.sign < 0.0 else "down"
-        self.sign = -1.0 if request.positive not in ("", usual) else 1.0
+        said = str(ds[name].attrs.get("positive", "")).strip().lower()
+        # As `cf.gridded` has taken the numbers, to make depths of them.
+        usual = "up" if quantity is cf.ELEVATION or said == "up" else "down"
+        known = name in {cf.variable_name(ds[[name]], either) for either in (cf.FLOOR_DEPTH, cf.ELEVATION)}
+        self.positive = request.positive or (said if said in ("up", "down") else usual if known else "")
+        if not self.positive:
+            raise refusal("variable", name, "says neither by standard_name nor by positive whether it is a depth",
+                          "give positive = 'up' for elevations, 'down' for depths")  # fmt: skip
+        self.sign = 1.0 if self.positive == usual else -1.0
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
         return self.placed.contains(north, east)

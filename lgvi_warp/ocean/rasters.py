@@ -39,7 +39,8 @@ class Raster:
     """The first band of a GeoTIFF, open, in the plane of a scene; only the part that is asked for is read."""
 
     def __init__(self, path: str, plane: LocalPlane, positive: str, file: Any):
-        self.path, self.plane, self.sign, self.file = path, plane, 1.0 if positive == "down" else -1.0, file
+        self.path, self.plane, self.positive, self.file = path, plane, positive, file
+        self.sign = 1.0 if positive == "down" else -1.0
         self.affine, self.shape = file.transform, (file.height, file.width)
         if file.crs is None:
             raise refusal(

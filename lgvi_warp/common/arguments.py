@@ -40,6 +40,10 @@ def path_of(key: str, value: Any) -> Path:
         raise refusal(key, value, "is no path", PATH)
     if "\0" in text or not text:
         raise refusal(key, value, "holds a null character" if text else "is empty", PATH)
+    try:
+        os.fsencode(text)
+    except UnicodeEncodeError:
+        raise refusal(key, value, "holds a character that no name of a file can hold", PATH) from None
     return Path(text)
 
 

@@ -22,7 +22,7 @@ from lgvi_warp.common.errors import NothingToDraw, SceneError
 # read one or two megabytes a second of TOML, and a tenth of that of YAML. A table may hold millions of numbers; arrays are
 # read as long as the file is.
 MOST_BYTES = {"scene file": 1 << 20, "YAML file": 128 << 10, "CSV file": 512 << 20, "JSON file": safe_files.MOST_JSON,
-              "NumPy file": sys.maxsize, "GeoTIFF file": sys.maxsize}  # fmt: skip
+              "NumPy file": sys.maxsize, "data set": sys.maxsize}  # fmt: skip
 MOST_OTHERS = 16 << 20
 PATHS = {"scene file": "give the path of a TOML file", "CSV file": "give the path of a CSV file"}
 OTHER_PATHS = "give the path of a file, or its text"
@@ -56,7 +56,7 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
     remedy, most = PATHS.get(kind, OTHER_PATHS), MOST_BYTES.get(kind, MOST_OTHERS)
     try:
         with opened(path, kind) as file:
-            content = io.BufferedReader(file).read(most + 1)  # type: ignore[type-var]
+            content = _first(file, most + 1)
     except (OSError, ValueError, TypeError, OverflowError) as error:
         if isinstance(error, UnreadableError):
             raise
@@ -64,6 +64,12 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
     if len(content) > most:
         raise UnreadableError("never ends", remedy)
     return content
+
+
+def _first(file: BinaryIO, most: int) -> bytes:
+    """Read so many bytes at most of an open file."""
+    with io.BufferedReader(file) as buffered:  # type: ignore[type-var]
+        return buffered.read(most)
 
 
 def _refuse(stat: os.stat_result, kind: str) -> None:
@@ -111,7 +117,7 @@ def file_text(path: str | os.PathLike[str], kind: str) -> str:
 def file_json(path: str | os.PathLike[str]) -> Any:
     """Read a JSON file."""
     with opened(path, "JSON file") as file:
-        return safe_files.parsed(text_of(io.BufferedReader(file).read(safe_files.MOST_JSON)))  # type: ignore[type-var]
+        return safe_files.parsed(text_of(_first(file, safe_files.MOST_JSON)))
 
 
 @contextlib.contextmanager

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,8 @@ DOWNWARD = ("depth", "sea_floor_depth_below_sea_surface")
 UPWARD = ("height", "altitude", "height_above_mean_sea_level", "height_above_geoid")
 DEPTHS = ("depth", "depthu", "depthv", "deptht", "depthw", "lev", "level", "z", "s_rho", "height")
 TIMES = ("time", "ocean_time", "time_counter", "mt")
+# Nodes of a grid whose places are read whole.
+MOST_PLACES = 1 << 26
 SCENARIOS = ("realization", "member", "ensemble", "number", "scenario")
 
 
@@ -45,8 +48,10 @@ def axes_of(ds: Any, name: str) -> Axes:
     """The axes of a variable of an xarray Dataset."""
     variable = ds[name]
     coordinates = {str(c): ds[c] for c in ds.variables if c != name and set(ds[c].dims) <= set(variable.dims)}
-    latitude = _place(name, coordinates, *LATITUDE, LATITUDES, "latitude")
-    longitude = _place(name, coordinates, *LONGITUDE, LONGITUDES, "longitude")
+    # CF 1.11, section 5; xarray keeps what it has read of the attribute.
+    named = str(variable.attrs.get("coordinates", variable.encoding.get("coordinates", ""))).split()
+    latitude = _place(name, coordinates, named, *LATITUDE, LATITUDES, "latitude")
+    longitude = _place(name, coordinates, named, *LONGITUDE, LONGITUDES, "longitude")
     y, x = _horizontal(name, latitude, longitude)
     dims: dict[str, Hashable] = {"y": y, "x": x}
     others = [dim for dim in variable.dims if dim not in (y, x)]
@@ -71,17 +76,24 @@ def _word(coordinate: Any, attribute: str) -> str:
     return str(coordinate.attrs.get(attribute, "")).strip().lower()
 
 
-def _place(name: str, coordinates: Mapping[str, Any], standard: Any, units: Any, names: Any, meaning: str) -> Any:
-    """The coordinate that is the latitude or the longitude of a variable."""
+def _place(
+    name: str, coordinates: Mapping[str, Any], named: list[str], standard: Any, units: Any, names: Any, meaning: str
+) -> Any:
+    """The coordinate that is the latitude or the longitude of a variable: of those that it names itself, else of all."""
     tests: tuple[Callable[[str, Any], bool], ...] = (
         lambda _, c: _word(c, "standard_name") in standard,
         lambda _, c: _word(c, "units") in units,
         lambda word, _: word.lower() in names,
     )
-    for fits in tests:
-        for word, coordinate in coordinates.items():
-            if coordinate.ndim in (1, 2) and fits(word, coordinate):
-                return coordinate
+    own = {word: coordinates[word] for word in named if word in coordinates}
+    for offered, fits in itertools.product((own, coordinates), tests):
+        found = {word: c for word, c in offered.items() if c.ndim in (1, 2) and fits(word, c)}
+        first, *others = found.values() or [None]
+        if any(first.dims == c.dims and not np.array_equal(first.values, c.values) for c in others):
+            raise refusal(f"{name}.coordinates", brief(sorted(found)), f"are all its {meaning}",
+                          "name one in the variable's attribute coordinates")  # fmt: skip
+        if first is not None:
+            return first
     raise refusal(f"{name}.coordinates", brief(sorted(coordinates)), f"have no {meaning}",
                   f"write the attribute standard_name = {meaning!r} of a coordinate along its dimensions")  # fmt: skip
 
@@ -118,7 +130,12 @@ def _is_scenario(dim: str, c: Any) -> bool:
 
 def _degrees(name: str, coordinate: Any, most: float) -> np.ndarray:
     """The numbers of a latitude or a longitude [deg]."""
-    where, values = f"{name}.{coordinate.name}", np.asarray(coordinate.values, dtype=np.float64)
+    where = f"{name}.{coordinate.name}"
+    if coordinate.size > MOST_PLACES:
+        raise refusal(
+            where, coordinate.shape, f"has more than {MOST_PLACES:,} places", "cut the region out, by ds.isel"
+        )
+    values = np.asarray(coordinate.values, dtype=np.float64)
     if _word(coordinate, "units").startswith("rad"):
         values = np.rad2deg(values)
     if not np.isfinite(values).all():

@@ -19,6 +19,9 @@ from lgvi_warp.ocean.units import factor
 # The dimensions of a variable in the order in which its values come.
 ORDER = ("scenario", "time", "depth", "y", "x")
 
+# An interval of longitude so many times the median is no cell: the data have an edge on both sides of it.
+MOST_OF_STEP = 3.0
+
 
 @dataclass(frozen=True)
 class OceanQuantity:
@@ -243,14 +246,33 @@ def _places(name: str, axes: Axes, variable: Any, about: float) -> tuple[np.ndar
         return axes.latitude, _about(axes.longitude, about), (variable,)
     order = _rising(f"{name}.{y}", axes.latitude, "deg")
     variable, latitude = variable.isel({y: order}), axes.latitude[order]
-    order = _rising(f"{name}.{x}", axes.longitude, "deg")
-    variable, longitude = variable.isel({x: order}), axes.longitude[order]
+    longitude = axes.longitude
+    if np.any(np.diff(longitude) > 0.0) and np.any(np.diff(longitude) < 0.0):
+        # It jumps by a whole turn.
+        longitude = np.unwrap(longitude, period=360.0)
+    order = _rising(f"{name}.{x}", longitude, "deg")
+    variable, longitude = variable.isel({x: order}), longitude[order]
     # A column that closes the circle is the first one again.
     once = int(np.count_nonzero(longitude < longitude[0] + 360.0 - 1e-6))
     variable, longitude = variable.isel({x: slice(0, once)}), _about(longitude[:once], about)
     seam = int(np.argmin(longitude))
-    parts = [part for part in (slice(seam, once), slice(0, seam)) if part.start < part.stop]
-    return latitude, np.roll(longitude, -seam), tuple(variable.isel({x: part}) for part in parts)
+    longitude = np.roll(longitude, -seam)
+    first, stop = _block(longitude, about)
+    parts = [
+        slice(max(seam + first, seam), min(seam + stop, once)),
+        slice(max(seam + first - once, 0), seam + stop - once),
+    ]
+    pieces = tuple(variable.isel({x: part}) for part in parts if part.start < part.stop)
+    return latitude, longitude[first:stop], pieces
+
+
+def _block(longitude: np.ndarray, about: float) -> tuple[int, int]:
+    """First and one past the last of the rising longitudes about a meridian, or next to it, without a gap between them."""
+    steps = np.diff(longitude)
+    gaps = np.flatnonzero(steps > MOST_OF_STEP * np.median(steps)) + 1 if len(steps) else steps.astype(int)
+    ends = [0, *gaps.tolist(), len(longitude)]
+    blocks = list(zip(ends, ends[1:]))
+    return min(blocks, key=lambda block: np.abs(longitude[block[0] : block[1]] - about).min())
 
 
 def _about(longitude: np.ndarray, about: float) -> np.ndarray:

@@ -13,6 +13,9 @@ from lgvi_warp.common.declared import array, declared, read, word
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.ocean.holes import FILLS
 
+# Part of the velocities' rms from which on a change by the regular grid is told.
+MUCH = 0.05
+
 
 @dataclass(frozen=True, eq=False)
 class FieldRequest:
@@ -57,6 +60,8 @@ class FieldData:
         error: Largest change of a velocity at the data's own nodes and times, by the regular grid [m/s].
         last: The last time that was read [s].
         more: Whether the data has later ones.
+        speed: Root mean square of the velocities [m/s].
+        gap: Begin and end [s] of the longest time without a field, where it is more than twice the usual one; else None.
     """
 
     file: str | None
@@ -67,17 +72,29 @@ class FieldData:
     error: float
     last: float
     more: bool
+    speed: float
+    gap: tuple[float, float] | None
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Sentences on values that were missing."""
-        if not self.missing:
-            return ()
-        part = 100.0 * self.missing / self.values
-        how = {"zero": "taken for 0", "nearest": "filled with the nearest value"}[self.request.fill]
-        return (
-            f"{self.missing:,} of {self.values:,} values ({part:.2g} %), on land or below the sea floor, are missing: {how}",
-        )
+        """Sentences on values that were missing, and on what the regular grid changes."""
+        sentences = []
+        if self.missing:
+            part = 100.0 * self.missing / self.values
+            how = {"zero": "taken for 0", "nearest": "filled with the nearest value"}[self.request.fill]
+            amount = f"{self.missing:,} of {self.values:,} values ({part:.2g} %)"
+            sentences.append(f"{amount}, on land or below the sea floor, are missing: {how}")
+        if self.gap is not None:
+            begin, end = (f"{t / 3600.0:.4g}" for t in self.gap)
+            sentences.append(
+                f"the data have no field from {begin} to {end} h: the current goes straight from one to the other"
+            )
+        if self.error > MUCH * self.speed:
+            part = f"{100.0 * self.error / self.speed:.2g} % of the rms" if self.speed else "of no current"
+            sentences.append(
+                f"the regular grid changes a velocity by up to {self.error:.3g} m/s, {part}: give a finer spacing"
+            )
+        return tuple(sentences)
 
     def table(self) -> dict[str, Any]:
         """What reads the same numbers again, as keys of a scene file."""

@@ -14,7 +14,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.ocean import cf
-from lgvi_warp.ocean.data_sets import opened
+from lgvi_warp.ocean.data_sets import data_set
 from lgvi_warp.ocean.field_data import FieldData, FieldNumbers, FieldRequest, checked
 from lgvi_warp.ocean.holes import filled
 from lgvi_warp.ocean.places import LocalPlane
@@ -26,6 +26,10 @@ MOST_LEVELS = 100
 PAIRS = ((("east", cf.EASTWARD), ("north", cf.NORTHWARD)), (("x", cf.ALONG_X), ("y", cf.ALONG_Y)))
 # Intervals of time that differ by less than this part are equal.
 EQUAL_TIMES = 1e-6
+# An interval of time so many times the median is a gap. Parts of the least interval, at most, of which all are multiples.
+MOST_OF_TIME, MOST_PARTS = 2.0, 4
+# Part of the velocities' rms that a grid may change them by without being made finer; numbers that a finer one may have.
+LITTLE, MOST_FINE = 0.02, 2e7
 
 
 def read_field(source: Any, request: FieldRequest, *, outside: str, around: Any = (0.0, 0.0, 0.0)) -> FieldNumbers:
@@ -40,17 +44,20 @@ def read_field(source: Any, request: FieldRequest, *, outside: str, around: Any 
     faults.raise_if_any()
     assert place is not None
     request = dataclasses.replace(request, **values)
-    ds = opened(source)
-    plane = LocalPlane(*map(float, request.origin))
-    components = _components(ds, request, plane)
-    region = _region(components[0].placed, request, place, outside)
-    components = [component.within(region) for component in components]
-    spacing = request.spacing if request.spacing is not None else _fine_spacing(components[0].placed, region)
-    target = _regular(region, spacing)
-    window, seconds, more = _times(components, request)
-    _check_memory(components[0].placed.grid.scenarios, len(seconds), target)
-    reader = _FieldReader(components, target, request.fill)
-    velocities, times, error = reader.read(window, seconds)
+    with data_set(source) as ds:
+        plane = LocalPlane(*map(float, request.origin))
+        components = _components(ds, request, plane)
+        region = _region(components[0].placed, request, place, outside)
+        components = [component.within(region) for component in components]
+        window, seconds, more = _times(components, request)
+        count = _steps_of_time(seconds)
+        spacing = request.spacing if request.spacing is not None else _fine_spacing(components[0].placed, region)
+        target = _regular(region, spacing)
+        _check_memory(components[0].placed.grid.scenarios, count + 1, target)
+        if request.spacing is None and not components[0].placed.grid.rectilinear:
+            target = _refined(components, target, request.fill, window, count)
+        reader = _FieldReader(components, target, request.fill)
+        velocities, times, error = reader.read(window, seconds, count)
     if request.checksum not in (None, reader.checksum):
         raise refusal("checksum", request.checksum, f"is not that of what is read, {reader.checksum}",
                       "leave it out to take this file")  # fmt: skip
@@ -65,7 +72,8 @@ def read_field(source: Any, request: FieldRequest, *, outside: str, around: Any 
         "checksum": reader.checksum,
     }
     data = FieldData(file, dataclasses.replace(request, **settled), velocities.shape[:5], reader.missing, reader.count,
-                     error, float(seconds[-1]), more)  # fmt: skip
+                     error, float(seconds[-1]), more, float(np.sqrt(np.mean(np.sum(velocities**2, axis=-1)))),
+                     _gap(seconds))  # fmt: skip
     return FieldNumbers(velocities, target.origin, target.spacing, times, data)
 
 
@@ -226,6 +234,23 @@ def _check_memory(scenarios: int, times: int, target: Regular) -> None:
                       "give a smaller region, a shorter duration, or a wider spacing")  # fmt: skip
 
 
+def _refined(components: list[_Component], target: Regular, fill: str, window: range, count: int) -> Regular:
+    """The grid with half the spacing in the plane, again and again, until it changes its first, middle and last field little.
+
+    Of a turned grid no node is one of the new ones: what is lost at each falls in proportion to the spacing.
+    """
+    most = MOST_FINE / (components[0].placed.grid.scenarios * (count + 1.0))
+    while True:
+        reader = _FieldReader(components, target, fill)
+        fields = [reader.field(0, window[i]) for i in sorted({0, len(window) // 2, len(window) - 1})]
+        rms = np.sqrt(max(np.mean(np.sum(velocities**2, axis=-1)) for velocities, _ in fields))
+        finer = _regular(np.stack([target.origin, target.origin + target.spacing * (np.array(target.counts) - 1.0)], axis=1),
+                         target.spacing * [0.5, 0.5, 1.0])  # fmt: skip
+        if max(error for _, error in fields) <= LITTLE * rms or np.prod(finer.counts, dtype=float) > most:
+            return target
+        target = finer
+
+
 class _FieldReader:
     """Reads field by field. missing, count: values without a number, and all; checksum: of what is read."""
 
@@ -233,12 +258,16 @@ class _FieldReader:
         self.components, self.target, self.fill = components, target, fill
         self.onto = [Onto(component.placed, target) for component in components]
         self.along = [directions(component.placed, component.along) for component in components]
+        # Components at the same nodes change together; of others the largest changes add up at worst.
+        self.group = [
+            next(i for i, other in enumerate(components) if _same_nodes(component, other)) for component in components
+        ]
         self.missing = self.count = self.checksum = 0
         for component in components:
             grid = component.placed.grid
             self._note(grid.latitude, grid.longitude, np.zeros(0) if grid.depth is None else grid.depth)
 
-    def read(self, window: range, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray | None, float]:
+    def read(self, window: range, seconds: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray | None, float]:
         """Velocities (s, t, x, y, z, 3), their first time and the time between two of them [s], and the largest change."""
         self._note(seconds)
         scenarios = self.components[0].placed.grid.scenarios
@@ -246,17 +275,17 @@ class _FieldReader:
         error = 0.0
         for scenario in range(scenarios):
             for number, time in enumerate(window):
-                velocities[scenario, number], change = self._field(scenario, time)
+                velocities[scenario, number], change = self.field(scenario, time)
                 error = max(error, change)
         if len(window) == 1:
             return velocities, None, error
-        times, velocities, change = _in_equal_steps(seconds, velocities)
+        times, velocities, change = _in_equal_steps(seconds, velocities, count)
         return velocities, times, error + change
 
-    def _field(self, scenario: int, time: int) -> tuple[np.ndarray, float]:
+    def field(self, scenario: int, time: int) -> tuple[np.ndarray, float]:
         """Velocities (x, y, z, 3) of one field, and the largest change."""
-        total, error = np.zeros((*self.target.counts, 3)), 0.0
-        for component, onto, along in zip(self.components, self.onto, self.along, strict=True):
+        total, changes = np.zeros((*self.target.counts, 3)), {}
+        for group, component, onto, along in zip(self.group, self.components, self.onto, self.along, strict=True):
             grid = component.placed.grid
             field = grid.values(scenario, time)
             self._note(field)
@@ -268,9 +297,10 @@ class _FieldReader:
             for axis in np.flatnonzero(np.any(along, axis=(0, 1))):
                 part = field * along[..., axis]
                 regular = onto(part, depths)
-                error = max(error, onto.change(part, regular, depths))
+                change = changes.setdefault(group, [0.0, 0.0, 0.0])
+                change[axis] = change[axis] + onto.change(part, regular, depths)
                 total[..., axis] += regular
-        return total, error
+        return total, sum(_largest(change) for change in changes.values())
 
     def _whole(self, grid: cf.Gridded, field: np.ndarray, time: int) -> np.ndarray:
         """The field without holes, which are counted."""
@@ -291,19 +321,56 @@ class _FieldReader:
             self.checksum = zlib.crc32(np.ascontiguousarray(values, dtype="<f8").tobytes(), self.checksum)
 
 
-def _in_equal_steps(seconds: np.ndarray, velocities: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """First time and step [s], velocities at these times, and by how much they change those at times of the data.
+def _same_nodes(one: _Component, other: _Component) -> bool:
+    """Whether two components stand at the same nodes."""
+    first, second = one.placed.grid, other.placed.grid
+    same = (np.array_equal(first.latitude, second.latitude), np.array_equal(first.longitude, second.longitude),
+            np.array_equal(*(np.zeros(0) if x.depth is None else x.depth for x in (first, second))))  # fmt: skip
+    return all(same) and first.shape == second.shape
 
-    Times at unequal intervals become as many as the least interval asks for, but not more than four times as many.
+
+def _largest(change: list[Any]) -> float:
+    """Largest length of vectors of three parts, each an array (n,) or 0."""
+    return float(np.sqrt(np.max(sum(np.square(part) for part in change), initial=0.0)))
+
+
+def _gap(seconds: np.ndarray) -> tuple[float, float] | None:
+    """Begin and end [s] of the longest time without a field, where it is more than twice the usual one."""
+    steps = np.diff(seconds)
+    if not len(steps) or steps.max() <= MOST_OF_TIME * np.median(steps) * (1.0 + EQUAL_TIMES):
+        return None
+    at = int(np.argmax(steps))
+    return float(seconds[at]), float(seconds[at + 1])
+
+
+def _steps_of_time(seconds: np.ndarray) -> int:
+    """How many equal steps the times become: so many that each time of the data is one of them, where there are such.
+
+    Else as many as the least interval asks for, up to four times as many as the data have; a gap would smear them then.
     """
     steps = np.diff(seconds)
-    if np.ptp(steps) <= EQUAL_TIMES * steps[0]:
-        return np.array([seconds[0], (seconds[-1] - seconds[0]) / len(steps)]), velocities, 0.0
-    count = int(min(np.ceil((seconds[-1] - seconds[0]) / steps.min() - 1e-9), 4 * len(steps)))
+    if not len(steps):
+        return 0
+    least = steps.min()
+    for part in range(1, MOST_PARTS + 1):
+        at = (seconds - seconds[0]) * part / least
+        count = int(np.round(at[-1]))
+        if np.abs(at * (count / at[-1]) - np.round(at)).max() <= EQUAL_TIMES * part:
+            return count
+    if (gap := _gap(seconds)) is not None:
+        raise refusal("duration", f"{gap[0]:g} to {gap[1]:g} s", "is a gap between times that are no multiples of one interval",
+                      "give a shorter duration or a later start, or interpolate the data in time, by ds.interp")  # fmt: skip
+    return int(min(np.ceil((seconds[-1] - seconds[0]) / least - 1e-9), 4 * len(steps)))
+
+
+def _in_equal_steps(seconds: np.ndarray, velocities: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """First time and step [s], velocities at these times, and by how much they change those at times of the data."""
     step = (seconds[-1] - seconds[0]) / count
+    if count == len(seconds) - 1 and np.ptp(np.diff(seconds)) <= EQUAL_TIMES * step:
+        return np.array([seconds[0], step]), velocities, 0.0
     equal = _at_times(velocities, np.interp(seconds[0] + step * np.arange(count + 1), seconds, np.arange(len(seconds))))
     back = _at_times(equal, (seconds - seconds[0]) / step)
-    return np.array([seconds[0], step]), equal, float(np.abs(back - velocities).max())
+    return np.array([seconds[0], step]), equal, float(np.linalg.norm(back - velocities, axis=-1).max())
 
 
 def _at_times(velocities: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -12,11 +14,11 @@ import numpy as np
 from lgvi_warp.common.declared import read
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.ocean import cf
-from lgvi_warp.ocean.data_sets import opened, regular_file
+from lgvi_warp.ocean.data_sets import data_set, regular_file
 from lgvi_warp.ocean.floor_request import FloorRequest
 from lgvi_warp.ocean.holes import filled
 from lgvi_warp.ocean.places import LocalPlane
-from lgvi_warp.ocean.rasters import Raster, is_raster
+from lgvi_warp.ocean.rasters import is_raster, open_raster
 from lgvi_warp.ocean.regrid import MARGIN, Onto, Placed, Regular, edge_of
 
 # Nodes that a floor has at most: a scene holds them all.
@@ -24,7 +26,9 @@ MOST_NODES = 4_000_000
 
 
 class DepthSource(Protocol):
-    """Depths of a data set in the plane of a scene."""
+    """Depths of a data set in the plane of a scene. positive: whether its numbers grow "up" or "down"."""
+
+    positive: str
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
         """Which places [m] have data around them."""
@@ -60,9 +64,9 @@ def read_floor(file: Any, request: FloorRequest) -> FloorNumbers:
     if spacing is not None and np.any(spacing <= 0.0):
         faults.add("spacing", spacing, "is not positive", "give numbers above 0 [m]")
     faults.raise_if_any()
-    source = _source(file, request, LocalPlane(*map(float, values["origin"])), region)
-    target = _target(source, region, source.spacing() if spacing is None else spacing)
-    depth = source.depths(target)
+    with _source(file, request, LocalPlane(*map(float, values["origin"])), region) as source:
+        target = _target(source, region, source.spacing() if spacing is None else spacing)
+        depth = source.depths(target)
     holes = int(np.count_nonzero(np.isnan(depth)))
     if holes == depth.size:
         raise refusal("region", "the file", "has no value there", "give a region in the water")
@@ -72,31 +76,43 @@ def read_floor(file: Any, request: FloorRequest) -> FloorNumbers:
     depth = filled(depth[None], (float(target.spacing[0]), float(target.spacing[1])), request.fill)[0]
     if np.all(depth < 0.0):
         problem = f"makes all of the floor dry land, {-depth.max():.4g} to {-depth.min():.4g} m above the sea"
-        raise refusal("positive", request.positive, problem, "give positive = 'down' if the numbers are depths")
+        other, meaning = ("down", "depths") if source.positive == "up" else ("up", "elevations")
+        raise refusal("positive", source.positive, problem, f"give positive = {other!r} if the numbers are {meaning}")
     return FloorNumbers(depth, target.origin[:2], target.spacing[:2])
 
 
-def _source(file: Any, request: FloorRequest, plane: LocalPlane, region: np.ndarray | None) -> DepthSource:
+@contextlib.contextmanager
+def _source(file: Any, request: FloorRequest, plane: LocalPlane, region: np.ndarray | None) -> Iterator[DepthSource]:
     """What the file holds."""
-    if isinstance(file, str | os.PathLike) and is_raster(path := regular_file(file, "file")):
-        if request.variable is not None:
-            raise refusal("variable", request.variable, "is asked of a raster, which has none", "leave it out")
-        return Raster(path, plane, request.positive or "up")
-    return _Gridded(file, request, plane, region)
+    with contextlib.ExitStack() as stack:
+        if isinstance(file, str | os.PathLike):
+            path, held = stack.enter_context(regular_file(file, "file"))
+            if is_raster(held):
+                if request.variable is not None:
+                    raise refusal("variable", request.variable, "is asked of a raster, which has none", "leave it out")
+                yield stack.enter_context(open_raster(path, held, plane, request.positive or "up"))
+                return
+        yield _Gridded(stack.enter_context(data_set(file)), request, plane, region)
 
 
 class _Gridded:
     """A variable of a data set in the CF conventions."""
 
-    def __init__(self, file: Any, request: FloorRequest, plane: LocalPlane, region: np.ndarray | None):
-        ds = opened(file)
+    def __init__(self, ds: Any, request: FloorRequest, plane: LocalPlane, region: np.ndarray | None):
         quantity, name = _variable(ds, request.variable)
         grid = cf.gridded(ds, quantity, name, plane.longitude)
         if grid.depth is not None or grid.scenarios > 1:
             raise refusal("variable", name, "has levels or scenarios, which a floor has not", "name another variable")
         self.placed = Placed(_cut(grid, plane, region), plane)
-        usual = "up" if quantity.sign < 0.0 else "down"
-        self.sign = -1.0 if request.positive not in ("", usual) else 1.0
+        said = str(ds[name].attrs.get("positive", "")).strip().lower()
+        # As `cf.gridded` has taken the numbers, to make depths of them.
+        usual = "up" if quantity is cf.ELEVATION or said == "up" else "down"
+        known = name in {cf.variable_name(ds[[name]], either) for either in (cf.FLOOR_DEPTH, cf.ELEVATION)}
+        self.positive = request.positive or (said if said in ("up", "down") else usual if known else "")
+        if not self.positive:
+            raise refusal("variable", name, "says neither by standard_name nor by positive whether it is a depth",
+                          "give positive = 'up' for elevations, 'down' for depths")  # fmt: skip
+        self.sign = 1.0 if self.positive == usual else -1.0
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
         return self.placed.contains(north, east)

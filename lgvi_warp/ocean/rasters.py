@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+import contextlib
+from collections.abc import Iterator
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from lgvi_warp.common import machine
 from lgvi_warp.common.errors import MissingExtra, SceneError, refusal
-from lgvi_warp.common.reading import opened
 from lgvi_warp.ocean.places import LocalPlane
 from lgvi_warp.ocean.regrid import Regular, edge_of
 
@@ -18,40 +20,53 @@ MAGIC = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 ROUND_OFF = 1e-6
 # Rows and columns that differ by less than this part from east and north count as along them.
 TURNED = 0.1
+# Words of a reference system that stand before the name of a file.
+NAMES_A_FILE = ("PARAMETERFILE", "GRIDS=", "EXTENSION[")
 
 
-def is_raster(path: str) -> bool:
-    """Whether a file begins as a TIFF."""
-    with opened(path, "GeoTIFF file") as file:
-        return file.read(4) in MAGIC
+# Neither sidecars (.msk, .ovr, .aux.xml) nor folders are looked at; the file is open, so that its name leads nowhere.
+OPTIONS = {"GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR", "GDAL_PAM_ENABLED": "NO"}
+
+
+def is_raster(file: BinaryIO) -> bool:
+    """Whether an open file begins as a TIFF."""
+    begin = file.read(4)
+    file.seek(0)
+    return begin in MAGIC
 
 
 class Raster:
-    """The first band of a GeoTIFF in the plane of a scene; only the part that is asked for is read."""
+    """The first band of a GeoTIFF, open, in the plane of a scene; only the part that is asked for is read."""
 
-    def __init__(self, path: str, plane: LocalPlane, positive: str):
-        self.path, self.plane, self.sign = path, plane, 1.0 if positive == "down" else -1.0
-        library = _rasterio()
-        try:
-            with library.open(path, driver="GTiff") as file:
-                self.crs, self.affine, self.shape = file.crs, file.transform, (file.height, file.width)
-        except library.errors.RasterioError as error:
-            raise _damaged(path, error) from error
-        if self.crs is None:
+    def __init__(self, path: str, plane: LocalPlane, positive: str, file: Any):
+        self.path, self.plane, self.positive, self.file = path, plane, positive, file
+        self.sign = 1.0 if positive == "down" else -1.0
+        self.affine, self.shape = file.transform, (file.height, file.width)
+        if file.crs is None:
             raise refusal(
                 "file", path, "says no coordinate reference system", "write it, by gdal_edit.py -a_srs EPSG:4326"
             )
-        if self.affine.determinant == 0.0 or min(self.shape) < 2:
-            raise refusal("file", path, f"has no grid of pixels, {self.shape}", "give a GeoTIFF with a geotransform")
+        with np.errstate(all="ignore"):
+            grid = min(self.shape) > 1 and self.affine.determinant != 0.0
+            if not (grid and np.isfinite([*self.affine, self.affine.determinant, *~self.affine]).all()):
+                raise refusal(
+                    "file", path, f"has no grid of pixels, {self.shape}", "give a GeoTIFF with a geotransform"
+                )
+        self.transformer, self.geographic = self._transformer(file.crs)
+        if not (np.isfinite(self.bounds()).all() and np.all(self.spacing() > 0.0)):
+            raise refusal(
+                "file", path, "lies at no place of the Earth", "mend its geotransform, by gdal_edit.py -a_ullr"
+            )
 
     def pixels(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the row and of the column of places [m], with parts, from the middle of the first pixel on."""
         latitude, longitude = self.plane.geodetic(north, east)
-        x, y = self._transformer.transform(longitude, latitude)
-        if self.crs.is_geographic:
+        x, y = self.transformer.transform(longitude, latitude)
+        if self.geographic:
             # The same meridian within the raster, which may count from 0 to 360.
             middle, _ = _applied(self.affine, 0.5 * self.shape[1], 0.5 * self.shape[0])
-            x = (np.asarray(x) - middle + 180.0) % 360.0 - 180.0 + middle
+            with np.errstate(invalid="ignore"):
+                x = (np.asarray(x) - middle + 180.0) % 360.0 - 180.0 + middle
         column, row = _applied(~self.affine, x, y)
         return np.asarray(row - 0.5), np.asarray(column - 0.5)
 
@@ -65,6 +80,9 @@ class Raster:
     def bounds(self) -> np.ndarray:
         """Least and largest north and east, (2, 2) [m]."""
         north, east = self._places(*edge_of(np.array([[0.0, self.shape[0] - 1.0], [0.0, self.shape[1] - 1.0]])))
+        known = np.isfinite(north) & np.isfinite(east)
+        # A projection may not reach the corners.
+        north, east = (np.append(x[known], [] if known.any() else np.nan) for x in (north, east))
         return np.array([[north.min(), north.max()], [east.min(), east.max()]])
 
     def spacing(self) -> np.ndarray:
@@ -91,26 +109,43 @@ class Raster:
         return self.sign * total
 
     def _values(self, window: Any) -> np.ndarray:
-        library = _rasterio()
-        try:
-            with library.open(self.path, driver="GTiff") as file:
-                read = file.read(1, window=window, masked=True)
-                scale, offset = file.scales[0], file.offsets[0]
-        except library.errors.RasterioError as error:
-            raise _damaged(self.path, error) from error
+        rows, columns = (int(high - low) for low, high in window)
+        available = machine.memory_bytes()
+        if available is not None and 32.0 * rows * columns > available:
+            raise refusal(
+                "region", f"{rows:,} x {columns:,}", "are more pixels than the memory holds", "give a smaller one"
+            )
+        with _damage(self.path):
+            read = self.file.read(1, window=window, masked=True)
+            scale, offset = self.file.scales[0], self.file.offsets[0]
         return np.asarray(np.ma.filled(read.astype(np.float64), np.nan)) * scale + offset
 
     def _places(self, row: np.ndarray, column: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """North and east [m] of numbers of rows and columns with parts."""
         x, y = _applied(self.affine, column + 0.5, row + 0.5)
-        longitude, latitude = self._transformer.transform(x, y, direction="INVERSE")
-        return self.plane.local(latitude, longitude)
+        longitude, latitude = self.transformer.transform(x, y, direction="INVERSE")
+        north, east = self.plane.local(latitude, longitude)
+        known = np.isfinite(north) & np.isfinite(east)
+        return np.where(known, north, np.nan), np.where(known, east, np.nan)
 
-    @property
-    def _transformer(self) -> Any:
+    def _transformer(self, crs: Any) -> tuple[Any, bool]:
+        """From longitude and latitude [deg] to the raster's x and y, and whether those are degrees too."""
         from pyproj import CRS, Transformer
+        from pyproj.exceptions import ProjError
 
-        return Transformer.from_crs(CRS.from_epsg(4326), CRS.from_wkt(self.crs.to_wkt()), always_xy=True)
+        try:
+            text = crs.to_wkt(version="WKT2_2019")
+            # A shift by a grid names the file that holds it.
+            named = any(word in text.upper().replace("GRIDS=@NULL", "") for word in NAMES_A_FILE)
+            system = CRS.from_wkt(text)
+            system = system.sub_crs_list[0] if system.is_compound else system
+            if not named and (system.is_geographic or system.is_projected):
+                return Transformer.from_crs(CRS.from_epsg(4326), system.to_2d(), always_xy=True), system.is_geographic
+            problem = "names a file of its own" if named else f"is a {system.type_name.lower()}"
+        except (ProjError, ValueError) as error:  # rasterio's errors of such systems are ValueErrors
+            problem = f"is not understood, {' '.join(str(error).split())[:100]}"
+        raise refusal("file", self.path, f"has a coordinate reference system that {problem}",
+                      "write one with latitudes and longitudes or with a projection, by gdalwarp -t_srs EPSG:4326")  # fmt: skip
 
 
 def _applied(affine: Any, column: Any, row: Any) -> tuple[Any, Any]:
@@ -118,17 +153,28 @@ def _applied(affine: Any, column: Any, row: Any) -> tuple[Any, Any]:
     return affine.a * column + affine.b * row + affine.c, affine.d * column + affine.e * row + affine.f
 
 
-def _rasterio() -> Any:
+@contextlib.contextmanager
+def open_raster(path: str, file: BinaryIO, plane: LocalPlane, positive: str) -> Iterator[Raster]:
+    """Open the raster of an open file, which stays so."""
     try:
         import rasterio
-        import rasterio.errors
     except ImportError as error:
         raise MissingExtra("rasters of the sea floor", "rasterio", "ocean") from error
-    return rasterio
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(rasterio.Env(**OPTIONS))
+        with _damage(path):
+            source = stack.enter_context(rasterio.open(file, driver="GTiff"))
+        yield Raster(path, plane, positive, source)
 
 
-def _damaged(path: str, error: Exception) -> SceneError:
-    reason = " ".join(str(error).split())[:200] or type(error).__name__
-    return SceneError(
-        [f"file = {path}: is damaged, or no GeoTIFF: {reason}; give the path of a GeoTIFF or NetCDF file"]
-    )
+@contextlib.contextmanager
+def _damage(path: str) -> Iterator[None]:
+    """Turn what the library makes of a damaged file into a fault."""
+    from rasterio.errors import RasterioError
+
+    try:
+        yield
+    except (RasterioError, ValueError, MemoryError) as error:
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        remedy = "give the path of a GeoTIFF or NetCDF file"
+        raise SceneError([f"file = {path}: is damaged, or no GeoTIFF: {reason}; {remedy}"]) from error

@@ -110,8 +110,8 @@ class Onto:
         level = _along_first(field, self.levels) if depths is None else at_depths(field, depths, self.target.nodes(2))
         return np.moveaxis(_in_plane(level, self.rows, self.columns), 0, -1)
 
-    def change(self, field: np.ndarray, regular: np.ndarray, depths: np.ndarray | None = None) -> float:
-        """Largest difference at the data's own nodes within the regular grid, between the data and what became of it."""
+    def change(self, field: np.ndarray, regular: np.ndarray, depths: np.ndarray | None = None) -> np.ndarray:
+        """Differences (n,) at the data's own nodes within the regular grid, between the data and what became of it."""
         from scipy.ndimage import map_coordinates
 
         if depths is None:
@@ -124,7 +124,7 @@ class Onto:
             [(x > -1e-9) & (x < n - 1 + 1e-9) for x, n in zip(at, self.target.counts, strict=True)]
         )
         own = map_coordinates(regular, [x[inside] for x in at], order=1, mode="nearest")
-        return float(np.max(np.abs(own - field[inside]), initial=0.0))
+        return np.asarray(own - field[inside])
 
 
 def directions(placed: Placed, along: str) -> np.ndarray:

@@ -219,7 +219,7 @@ def driving(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 def remarks(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Pass on what terms say of their own numbers."""
-    for term in scene.terms:
+    for term in (*scene.terms, *scene.events):
         for text in term.remarks:
             yield term.key, np.array([True]), lambda i, text=text: text  # type: ignore[misc]
 

@@ -12,7 +12,7 @@ import lgvi_warp as lw
 from tests.conftest import ROOT
 
 HEAVY = {
-    "scipy", "warp", "matplotlib", "rerun", "xarray", "pandas", "zarr", "distributed", "dask", "netCDF4", "pyarrow",
+    "scipy", "warp", "matplotlib", "rerun", "xarray", "pandas", "zarr", "distributed", "dask", "h5py", "netCDF4", "pyarrow",
     "SALib", "gymnasium", "tqdm", "control", "stable_baselines3", "torch", "fmpy",
 }  # fmt: skip
 PRINT = "; import sys, json; print(json.dumps(sorted(sys.modules)))"

@@ -112,6 +112,13 @@ class Floor(Event):
         at = {"depth": numbers.depth, "origin": numbers.origin, "spacing": numbers.spacing}
         return cls(**at, clearance=clearance, name=name)
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        depth = np.asarray(self.depth)
+        dry = float(np.mean(depth < 0.0))
+        told = depth.ndim == 2 and dry > 0.5
+        return (f"{100.0 * dry:.0f} % of the floor lies above the sea: its sign may be wrong",) if told else ()
+
     @classmethod
     def of_file(cls) -> Any:
         """What a table with the key `file` may have, a class with fields.

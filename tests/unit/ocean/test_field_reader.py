@@ -390,3 +390,121 @@ def test_a_library_that_is_missing(monkeypatch, library, extra):
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(ImportError, match=extra):
         read(ds)
+
+
+def at_nodes(field, north, east, depth, time):
+    """Velocities (n, 3) of a field at places and times, by another interpolation."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    axes = [
+        o + d * np.arange(n) for o, d, n in zip(field.origin, field.spacing, field.velocities.shape[2:5], strict=True)
+    ]
+    axes.insert(0, field.times[0] + field.times[1] * np.arange(field.velocities.shape[1]))
+    keep = [i for i, axis in enumerate(axes) if len(axis) > 1]
+    table = field.velocities[0][tuple(slice(None) if i in keep else 0 for i in range(4))]
+    places = np.stack(np.broadcast_arrays(time, north, east, depth), axis=-1).reshape(-1, 4)[:, keep]
+    return RegularGridInterpolator([axes[i] for i in keep], table, bounds_error=False)(places)
+
+
+def own_places(cell=0.05):
+    """u and v on one pair of dimensions, each at its own places, by the attribute coordinates."""
+    lat, lon = np.meshgrid(41.0 + 0.1 * np.arange(11), -71.0 + 0.1 * np.arange(11), indexing="ij")
+    places = {"u": (lat, lon + cell), "v": (lat + cell, lon)}
+    variables, coordinates = {}, {}
+    for (letter, (a, o)), along in zip(places.items(), ("x", "y"), strict=True):
+        known = {
+            "units": "m/s",
+            "standard_name": f"sea_water_{along}_velocity",
+            "coordinates": f"lat_{letter} lon_{letter}",
+        }
+        speed = 0.2 + (o + 70.5) + 0.5 * (a - 41.5) if letter == "u" else -0.1 + (a - 41.5) + 0.7 * (o + 70.5)
+        variables[f"vel_{letter}"] = (("y", "x"), speed, known)
+        for word, values, unit in (("lat", a, "north"), ("lon", o, "east")):
+            coordinates[f"{word}_{letter}"] = (("y", "x"), values, {"units": f"degrees_{unit}"})
+    return xr.Dataset(variables, coordinates)
+
+
+@pytest.mark.parametrize("stored", [False, True])
+def test_each_variable_stands_at_the_places_that_it_names(stored, tmp_path):
+    ds = own_places()
+    if stored:
+        for variable in ds.data_vars.values():
+            variable.encoding["coordinates"] = variable.attrs.pop("coordinates")
+        ds.to_netcdf(tmp_path / "a.nc")
+    wanted = {"region": [[-2e4, 2e4]] * 2 + [[0, 0]], "spacing": [5e3, 5e3, 1.0]}
+    field = lw.terms.CurrentField.from_dataset(tmp_path / "a.nc" if stored else ds, ORIGIN, **wanted)
+    # The turn of the grid's axes from node to node is 1e-3.
+    np.testing.assert_allclose(field.velocities[0, 0, 4, 4, 0], [-0.1, 0.2, 0.0], atol=1e-3)
+
+
+def test_places_that_nobody_names_are_refused():
+    ds = own_places()
+    del ds.vel_v.attrs["coordinates"]
+    with pytest.raises(lw.SceneError, match=r"vel_v.coordinates = .*: are all its latitude; name one"):
+        lw.terms.CurrentField.from_dataset(ds, ORIGIN)
+
+
+TIDE = lambda lat, lon, z, t: 0.5 * np.cos(2.0 * np.pi * t / 3600.0 / 12.42) + 0.0 * (lat + lon + z)  # noqa: E731
+
+
+@pytest.mark.parametrize("hours", [np.r_[0:5, 245:250], np.r_[0:3, 4:6, 9:12], np.array([0.0, 0.5, 2.0, 4.0])])
+def test_a_gap_in_time_changes_no_field_and_is_told(hours):
+    field = read(data.cmems(data.still, TIDE, hours=hours.astype(float)))
+    for hour in hours:
+        np.testing.assert_allclose(
+            at_nodes(field, 0.0, 0.0, 0.0, 3600.0 * hour)[0], [TIDE(0, 0, 0, 3600.0 * hour), 0, 0], atol=1e-6
+        )
+    assert any("the data have no field from" in text for text in field.remarks) == (np.ptp(hours) > 5)
+    # A run that ends before it knows nothing of it.
+    assert read(data.cmems(data.still, TIDE, hours=hours.astype(float)), duration=1800.0).remarks == ()
+
+
+def test_a_gap_between_times_that_have_no_common_interval_is_refused():
+    with pytest.raises(lw.SceneError, match="is a gap between times .* by ds.interp"):
+        read(data.cmems(data.still, TIDE, hours=[0.0, 1.0, 2.1234567, 3.0, 100.7654321]))
+
+
+@pytest.mark.parametrize("angle", [0.3, 0.7])
+def test_a_turned_grid_loses_little_and_the_change_is_the_largest(angle):
+    wave = lambda north, east, z, t: (  # noqa: E731
+        0.2 * np.sin(north / 9e3) * np.cos(east / 8e3) + 0.0 * (z + t),
+        0.2 * np.cos(north / 1e4 + 1.0) + 0.0 * (east + z + t),
+    )
+    ds = turned_data(wave, along=True, angle=angle).isel(ocean_time=slice(0, 2), depth=[0])
+    for more, most in (({}, 0.02), ({"spacing": [9e3, 9e3, 1.0]}, 1.0)):
+        field = read(ds, region=[[-3e4, 3e4]] * 2 + [[0.0, 0.0]], **more)
+        lat, lon = ds.lat_rho.values, ds.lon_rho.values
+        north, east = PLANE.local(lat, lon)
+        own = np.stack([*wave(north, east, 0.0, 0.0), 0.0 * north], axis=-1).reshape(-1, 3)
+        change = np.linalg.norm(at_nodes(field, north, east, 0.0, 0.0) - own, axis=-1)
+        assert np.nanmax(change) <= field.data.error * (1.0 + 1e-9)
+        assert np.nanmax(change) >= 0.99 * field.data.error
+        assert field.data.error <= most * field.data.speed
+        assert any("give a finer spacing" in text for text in field.remarks) == (
+            field.data.error > 0.05 * field.data.speed
+        )
+    assert field.remarks
+
+
+def far_sides(order):
+    """Data on both sides of the date line, in their own order or sorted."""
+    lon = np.r_[170.0:180.0:0.25, -180.0:-170.0:0.25]
+    return data.cmems(lambda lat, lon, z, t: 0.3 + 0.0 * (lat + z + t + lon), data.still, lon=np.sort(lon) if order else lon,
+                      lat=np.linspace(-1.0, 1.0, 9), hours=[0])  # fmt: skip
+
+
+@pytest.mark.parametrize("order", [True, False])
+def test_data_about_the_date_line_end_where_they_end(order):
+    region = [[-5e3, 5e3]] * 2 + [[0, 0]]
+    with pytest.raises(lw.SceneError, match="is not within the data"):
+        lw.terms.CurrentField.from_dataset(far_sides(order), (0.0, 0.0), region=region)
+    for longitude in (179.9, 180.0, -180.0, -179.9, -175.0):
+        field = lw.terms.CurrentField.from_dataset(far_sides(order), (0.0, longitude), region=region)
+        np.testing.assert_allclose(np.linalg.norm(field.velocities, axis=-1), 0.3)
+
+
+@pytest.mark.parametrize("turns", [-360.0, 0.0, 360.0])
+def test_longitudes_of_any_turn(turns):
+    same = read(data.cmems(EAST, NORTH))
+    field = read(data.cmems(EAST, NORTH, lon=data.LONGITUDE + turns))
+    np.testing.assert_allclose(field.velocities, same.velocities, atol=1e-9)

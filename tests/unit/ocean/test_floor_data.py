@@ -10,6 +10,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 import lgvi_warp as lw
 from lgvi_warp.ocean.places import LocalPlane
+from lgvi_warp.scene import plausibility
 from tests.conftest import ROOT
 
 xr = pytest.importorskip("xarray")
@@ -139,6 +140,43 @@ def test_integers_with_scale_and_without_a_value(tmp_path):
     zero = lw.events.Floor.from_file(tmp_path / "floor.tif", ORIGIN, **whole, fill="zero")
     assert near.depth.min() > 15.0
     assert 0 < np.count_nonzero(zero.depth == 0.0) <= 6
+
+
+def band(**attributes):
+    """Elevations of a variable without a name or an attribute that says so, as GDAL writes it."""
+    return gebco().rename(elevation="Band1").assign(Band1=(("lat", "lon"), -DEPTH, {"units": "m"} | attributes))
+
+
+@pytest.mark.parametrize(("attributes", "asked", "sign"), [
+    ({}, "up", 1), ({}, "down", -1), ({"positive": "up"}, "", 1), ({"positive": "down"}, "", -1),
+    ({"positive": "down"}, "up", 1), ({"positive": "up"}, "up", 1), ({"standard_name": "altitude"}, "", 1),
+    ({"standard_name": "altitude", "positive": "down"}, "", -1), ({"standard_name": "sea_floor_depth", "positive": "up"}, "", 1),
+])  # fmt: skip
+def test_a_variable_is_a_depth_or_an_elevation_by_what_says_so(attributes, asked, sign):
+    known = {"variable": "Band1", "region": REGION}
+    depth = lw.events.Floor.from_file(gebco(), ORIGIN, region=REGION).depth
+    if sign > 0:
+        np.testing.assert_array_equal(
+            lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=asked, **known).depth, depth
+        )
+    else:
+        with pytest.raises(lw.SceneError, match="dry land, .*; give positive = 'up' if the numbers are elevations"):
+            lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=asked, **known)
+
+
+def test_a_variable_that_nothing_explains_needs_a_word():
+    with pytest.raises(lw.SceneError, match="variable = 'Band1': says neither .*; give positive = 'up' for elevations"):
+        lw.events.Floor.from_file(band(), ORIGIN, variable="Band1")
+
+
+def test_a_floor_that_is_mostly_dry_is_told():
+    wet = lw.events.Floor(depth=[[5.0, -1.0], [5.0, -1.0]], spacing=[10.0, 10.0])
+    dry = lw.events.Floor(depth=[[5.0, -1.0], [-5.0, -1.0]], spacing=[10.0, 10.0])
+    assert wet.remarks == ()
+    (text,) = dry.remarks
+    assert text == "75 % of the floor lies above the sea: its sign may be wrong"
+    scene = lw.Scene.named("sphere", start={"position": [0.0, 0.0, -9.0]}, events=[dry])
+    assert text in str(plausibility.of_ensemble(lw.Ensemble(scene)))
 
 
 def test_all_of_a_file_is_read_where_no_region_is_told():

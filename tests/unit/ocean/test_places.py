@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Places on the Earth against geodesics of the ellipsoid."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
-from lgvi_warp.ocean.places import LocalPlane
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.ocean.places import LocalPlane, check_places
 
 pyproj = pytest.importorskip("pyproj")
 WOODS_HOLE = LocalPlane(41.5, -70.6)
@@ -39,3 +42,13 @@ def test_true_north_away_from_the_origin():
     first, second = WOODS_HOLE.local(41.6, -70.5), WOODS_HOLE.local(41.60001, -70.5)
     seen = np.arctan2(second[1] - first[1], second[0] - first[0])
     assert WOODS_HOLE.convergence(41.6, -70.5) == pytest.approx(seen, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("longitude", "good"), [(-180.0, True), (-180.5, False), (-360.0, False), (360.0, True), (360.5, False)]
+)
+def test_longitudes_that_are_on_a_map(longitude, good):
+    faults = Faults()
+    check_places(faults, "at", np.array([[10.0, longitude]]))
+    with contextlib.nullcontext() if good else pytest.raises(SceneError, match="is no longitude; give -180 to 360"):
+        faults.raise_if_any()

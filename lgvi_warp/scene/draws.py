@@ -158,6 +158,11 @@ class Draws:
             return None
         return self.weights[slice(first, stop) if self.places is None else self.places[first:stop]]
 
+    def levels_of(self, first: int, stop: int) -> Mapping[str, np.ndarray]:
+        """Levels in (0, 1) that distributions draw members first to stop - 1 from, (stop - first, size) by key."""
+        members = np.arange(first, stop) if self.places is None else self.places[first:stop]
+        return self.sampling.draw(self.space, members) if self.variations else {}
+
     def members_of(
         self,
         values: dict[str, np.ndarray],

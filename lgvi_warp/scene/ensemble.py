@@ -294,6 +294,18 @@ class Ensemble(Summarized):
         """
         return self._values(first, stop, start=False)
 
+    def levels(self, first: int, stop: int) -> Mapping[str, np.ndarray]:
+        """Return the levels in (0, 1) from which distributions draw some members' numbers.
+
+        Args:
+            first: Position of the first member.
+            stop: Position after the last member.
+
+        Returns:
+            Levels (stop - first, size) by key of what varies, as `space` has them.
+        """
+        return self._draws.levels_of(first, stop)
+
     def numbers(self, first: int, stop: int) -> dict[str, np.ndarray]:
         """Return all numbers of some members, those of the start too.
 

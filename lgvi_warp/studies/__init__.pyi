@@ -4,6 +4,7 @@
 from lgvi_warp.calls.predict import Prediction as Prediction
 from lgvi_warp.sampling.final import Final as Final
 from lgvi_warp.studies.assimilation.answer import Assimilated as Assimilated
+from lgvi_warp.studies.assimilation.innovations import InnovationTest as InnovationTest
 from lgvi_warp.studies.assimilation.series import Series as Series
 from lgvi_warp.studies.comparison import Candidate as Candidate
 from lgvi_warp.studies.derivatives.answer import Derivatives as Derivatives

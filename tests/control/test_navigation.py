@@ -560,7 +560,8 @@ def test_check_controller_covers_the_parts():
         assert lw.laws.check_controller(part).ok
 
 
-def test_the_page_has_all_keys_and_its_blocks_run(capsys):
+def test_the_page_has_all_keys_and_its_blocks_run(capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
     page = "docs/controllers/navigation.md"
     text = (ROOT / page).read_text()
     for kind in (lw.control.IMU, lw.control.DVL, lw.control.ErrorStateFilter):
@@ -569,9 +570,8 @@ def test_the_page_has_all_keys_and_its_blocks_run(capsys):
     base = remus(listed)
     assert base.parameters()["gps.deepest"] == 0.3
     assert base.controller.sensors[-1].uses["delayed_fix"] == "usbl"
-    fleet = lw.Ensemble(remus(parts(("depth",), **ON_BOARD)), 200, seed=1)
     (code,) = blocks(page, "python")
-    exec(code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.05, threads=1'), {"lw": lw, "fleet": fleet})
+    exec(code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.05, threads=1'), {})
     assert "Consistency of 200 filters at 2 times" in capsys.readouterr().out
 
 

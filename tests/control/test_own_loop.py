@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
 from benchmarks import foreign_remus as remus
-from tests.support.pages import blocks, snippets
+from tests.support.pages import blocks, reader, snippets
 
 OWN_LOOP, LEARNING = "docs/controllers/bring_your_own_loop.md", "docs/controllers/learn_depth_keeping.md"
 
@@ -70,21 +70,13 @@ def test_the_script_prints_what_the_page_says(capsys):
 @pytest.mark.slow
 def test_snippets_of_learning(tmp_path, monkeypatch):
     pytest.importorskip("stable_baselines3")
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(reader(tmp_path))
     environment, learner, policy = blocks(LEARNING, "python")
-    planes = lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
-    laws = [lw.control.DepthPID(kp=0.1, kp_pitch=5.0, kd_pitch=2.0), lw.control.HeadingPID(kp=1.0, kd=2.0)]
-    wanted = lw.control.SetPoint(depth=10.0, heading=0.5)
-    controller = lw.Controller(period=0.1, guidance=[wanted], laws=laws, allocation=[planes])
-    scene = lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
-    names = {"lw": lw, "np": np, "fleet": lw.Ensemble(scene, 32, 1)}
-    exec(environment, names)
+    exec(environment, names := {})
     exec(learner.replace("200_000", "4096"), names)
     assert names["learner"].num_timesteps == 4096
-    rng, shapes = np.random.default_rng(0), {"W": (3, 4), "b": (3,), "W1": (1, 3), "b1": (1,)}
-    names |= {name: rng.normal(size=shape) for name, shape in shapes.items()}
-    mean, deviation, x = rng.normal(size=4), rng.uniform(1.0, 2.0, 4), rng.normal(size=4)
-    exec(policy, names | {"mean": mean, "deviation": deviation})
+    exec(policy, names)
+    mean, deviation, x = names["mean"], names["deviation"], np.random.default_rng(0).normal(size=4)
     with np.load("policy.npz") as file:
         seen = names["W"] @ ((x - mean) / deviation) + names["b"]
         assert np.allclose(file["weights_0"] @ x + file["biases_0"], seen, rtol=0.0, atol=1e-13)

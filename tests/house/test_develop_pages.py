@@ -13,13 +13,14 @@ from tests.support.pages import blocks
 
 
 @pytest.mark.parametrize("page", ["add_a_method.md", "add_a_statistic.md", "add_a_sampling.md"])
-def test_example(page, scene, monkeypatch):
+def test_example(page, monkeypatch):
+    monkeypatch.chdir(ROOT)
     for table in (method.PROGRAMS, method.ORDERS, limits.MUNK, limits.RESTORING):
         monkeypatch.setitem(table, "psi_k", None)  # what the example of a method adds goes with the test
     for owner, name in ((base, "TYPES"), (Sampling, "kinds")):
         monkeypatch.setattr(owner, name, dict(getattr(owner, name)))
     (example,) = blocks(f"docs/develop/{page}", "python")
-    exec(example, names := {"scene": scene})
+    exec(example, names := {})
     assert len(names) > 4, "the example defines what the page adds"
 
 

@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every fenced snippet of README and docs is run by a test: here, or in the file that the table names."""
+"""Every page's Python runs as printed, block by block, in a fresh interpreter; each other snippet is run by a test.
 
-import shutil
+The quick suite looks at names: each is bound on the page before it is used, and those of the package exist.
+"""
+
+import inspect
+import os
+import subprocess
+import sys
 import tomllib
 
-import matplotlib
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
 from tests.conftest import ROOT
-from tests.support.pages import FENCE, blocks, snippets
+from tests.support.pages import FENCE, blocks, chains, missing_names, reader, snippets
 
-matplotlib.use("Agg")
 DOCS = ROOT / "docs"
 # A test -> the pages whose snippets it runs. The pages of terms and those below are run here.
 OF_TESTS = {
@@ -41,12 +45,22 @@ OF_TESTS = {
 ELSEWHERE = {page: test for test, pages in OF_TESTS.items() for page in pages.split()}
 TERMS = [f"docs/guide/terms/{path.name}" for path in sorted((DOCS / "guide" / "terms").glob("[a-z]*.md"))]
 PARTS = ["docs/controllers/guidance.md", "docs/controllers/laws.md"]
-OF_A_RESULT = ["docs/guide/pictures.md", "docs/guide/recordings.md"]
 SCRIPT_NAMES = (
     "assimilation choose_method_and_step compare_with_your_simulator current energy_used exports geodetic_places going_on "
     "named_vehicles notebooks resume tangents your_vehicle"
 )
 SCRIPTS = [f"docs/guide/{name}.md" for name in SCRIPT_NAMES.split()]
+PYTHON = sorted(
+    str(page.relative_to(ROOT)) for page in [ROOT / "README.md", *DOCS.rglob("*.md")] if "```python" in page.read_text()
+)
+# Pages that read a file of the reader's own, open a window or need a library of an extra, and the test that runs them.
+NOT_ALONE = {
+    "docs/gallery.md": "house/test_gallery.py",  # each snippet is a file
+    "docs/guide/vehicles.md": "house/test_docs.py",  # model.sdf
+    "docs/guide/sea_floor.md": "unit/ocean/test_floor_data.py",  # gebco.nc
+    "docs/guide/recordings.md": "house/test_page_code.py",  # a viewer
+    "docs/controllers/learn_depth_keeping.md": "control/test_own_loop.py",  # stable_baselines3
+}
 
 
 def test_each_page_with_code_has_its_test():
@@ -57,8 +71,9 @@ def test_each_page_with_code_has_its_test():
         for page in pages
         if any(found[1] != "math" for found in FENCE.finditer(page.read_text()))
     }
-    run_here = {*TERMS, *PARTS, *OF_A_RESULT, *SCRIPTS}
+    run_here = {*TERMS, *PARTS, *SCRIPTS, *PYTHON}
     assert with_code - {"docs/guide/terms/README.md"} == ELSEWHERE.keys() | run_here
+    assert NOT_ALONE.keys() <= set(PYTHON)
     for page, test in ELSEWHERE.items():
         text = (ROOT / "tests" / test).read_text().replace("glob", "")
         assert page.rpartition("/")[2].partition(".")[0] in text, page
@@ -97,31 +112,56 @@ def test_parts_of_controllers_fit_a_vehicle(page, tmp_path, monkeypatch):
         assert lw.Scene.from_dict(scene.to_dict()).to_dict() == scene.to_dict()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", SCRIPTS)
-def test_a_script_prints_what_its_page_says(page, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "examples").mkdir()
-    shutil.copy(ROOT / "examples" / "paper.toml", tmp_path / "examples")
-    ((_, code, expected),) = snippets(page, "python")
-    exec(code, {"__name__": "__main__"})
-    assert capsys.readouterr().out == expected
+@pytest.mark.parametrize("page", PYTHON)
+def test_python_of_a_page_has_its_names(page):
+    codes = blocks(page, "python")
+    own = {"docs/gallery.md": "__file__"}.get(page)
+    assert {number: names for number, names in missing_names(codes).items() if names != {own}} == {}
+    for names in (chain for code in codes for chain in chains(code)):
+        value = lw
+        for name in names:
+            assert hasattr(value, name), f"lw.{'.'.join(names)}"
+            value = getattr(value, name)
+            if not inspect.ismodule(value):
+                break
+
+
+def run_alone(page, folder):
+    """What a page's blocks print, run in order in a fresh interpreter in a folder that has the examples."""
+    parts = [
+        f"exec(compile({code!r}, '{page}, block {i}', 'exec'), names)" for i, code in enumerate(blocks(page, "python"))
+    ]
+    (folder / "page.py").write_text("\n".join(["names = {'__name__': '__main__'}", *parts]))
+    environment = {**os.environ, "MPLBACKEND": "Agg", "PYTHONPATH": str(ROOT)}
+    ran = subprocess.run([sys.executable, "page.py"], cwd=folder, env=environment, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr[-2000:]
+    return ran.stdout
 
 
 @pytest.mark.slow
-def test_pictures_and_recordings_of_a_result(scene, tmp_path, monkeypatch):
+@pytest.mark.parametrize("page", [page for page in PYTHON if page not in NOT_ALONE])
+def test_python_of_a_page_runs_alone(page, tmp_path):
+    printed = run_alone(page, reader(tmp_path))
+    if page in SCRIPTS:
+        ((_, _, expected),) = snippets(page, "python")
+        assert printed == expected
+
+
+def test_names_that_a_page_lacks_are_found():
+    assert missing_names(["x = a\nfor i in x: print(i)", "def f(y): return y + x + z"]) == {0: {"a"}, 1: {"z"}}
+    assert ["distributions", "Normal"] in chains("lw.distributions.Normal(std=other.lw)")
+
+
+@pytest.mark.slow
+def test_recordings_but_for_a_viewer(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shown = []
     monkeypatch.setattr(lw, "show", lambda *arguments, **named: shown.append(arguments))
     record, streamed = lw.record, []
     # A viewer that is open is not there: what would go to it is noted.
     monkeypatch.setattr(lw, "record", lambda *a, to=None, **k: streamed.append(to) if to else record(*a, **k))
-    fleet = lw.Ensemble(scene, 20, seed=1, vary={"start.angular_velocity": lw.distributions.Normal(std=0.1)})
-    names = {"lw": lw, "fleet": fleet, "result": lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=0.5))}
-    names |= {"a": names["result"], "b": names["result"]}
-    for page in OF_A_RESULT:
-        for code in blocks(page, "python"):
-            exec(code, names)
-    written = {path.name for path in tmp_path.iterdir()}
-    assert {"speed.pdf", "fleet.svg", "fleet.rrd", "both.rrd"} <= written
+    names = {}
+    for code in blocks("docs/guide/recordings.md", "python"):
+        exec(code, names)
+    assert {"fleet.rrd", "both.rrd"} <= {path.name for path in tmp_path.iterdir()}
     assert len(shown) == len(streamed) == 1

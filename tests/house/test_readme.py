@@ -59,6 +59,6 @@ def test_the_first_example(tmp_path, monkeypatch, capsys):
 
 def test_the_methods_of_the_guide():
     code = blocks("docs/guide/methods.md", "python")[0]
-    methods = [eval(line, {"lw": lw}) for line in code.splitlines()]
+    methods = [eval(line, {"lw": lw}) for line in code.splitlines() if line.startswith("lw.")]
     assert [method.name for method in methods] == ["psi_s", "psi", "rk8"]
     assert methods[2].adaptive

@@ -73,9 +73,15 @@ def test_particles():
     counts = np.bincount(places, minlength=len(w))
     assert np.all(np.abs(counts - len(w) * w) < 1.0 + 1e-9)
     spread = filters.jittered(x[:, places], 0.9, rng)
+    # Liu & West (2001): each is drawn about a x + (1 - a) mean, with a = (3 d - 1) / (2 d), here 17 / 18.
+    slope = np.cov(x[0, places], spread[0])[0, 1] / x[0, places].var()
+    assert slope == pytest.approx(17.0 / 18.0, abs=4.0 * np.sqrt((1.0 - (17.0 / 18.0) ** 2) / x.shape[1]))
     assert spread.mean() == pytest.approx(0.8, abs=0.01)
     assert spread.var() == pytest.approx(0.2, rel=0.05)
-    assert filters.effective_number(np.full(10, 0.1)) == pytest.approx(10.0)
+    assert filters.effective_number(np.full(10, 0.1), np.arange(10)) == pytest.approx(10.0)
+    # Copies of one member count once: three of them and seven others weigh 0.3 and 0.1 each.
+    copies = np.array([4, 4, 4, 0, 1, 2, 3, 5, 6, 7])
+    assert filters.effective_number(np.full(10, 0.1), copies) == pytest.approx(1.0 / (0.3**2 + 7.0 * 0.1**2))
     assert filters.normalised(np.full(3, -np.inf)).tolist() == pytest.approx([1 / 3] * 3)
 
 
@@ -236,7 +242,7 @@ def test_what_is_refused():
             fleet, lw.studies.Series("position", [1.0], [1.0], 0.1), h=0.05
         ),
         "no member is near": lambda: lw.assimilate(
-            fleet, lw.studies.Series("position[0]", [1.0], [1e200], 1e-3), filter="particles", h=0.05
+            fleet, lw.studies.Series("position[0]", [1.0], [1e200], 1e-3), filter="particles", h=0.05, gate=None
         ),
     }.items():
         with pytest.raises(lw.SceneError, match=re.escape(message)):

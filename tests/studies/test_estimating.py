@@ -176,7 +176,7 @@ def test_members_that_two_steps_leave_apart():
 
 def test_the_page():
     """The snippets of docs/guide/least_cost.md."""
-    known = {"lw": lw}
+    known = {}
     for code in blocks("docs/guide/least_cost.md", "python"):
         exec(code, known)
     found, fleet = known["found"], known["fleet"]

@@ -3,7 +3,6 @@
 
 import random
 
-import numpy as np
 import pytest
 
 import lgvi_warp as lw
@@ -21,10 +20,9 @@ METRICS, GUIDE = "docs/controllers/metrics.md", "docs/guide/is_my_controller_rob
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [METRICS, GUIDE])
-def test_python(page):
-    scene = lw.Scene.load(SCENE)
-    fleet = lw.Ensemble(scene, 50, seed=1, vary=scene.ensemble_settings.vary)
-    names = {"lw": lw, "np": np, "scene": scene, "fleet": fleet}
+def test_python(page, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    names = {}
     for text in blocks(page, "python"):
         exec(text, names)
     assert "found" in names or names["metric"].unit == "rad"

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fenced snippets of the pages."""
 
+import ast
+import builtins
 import re
+import shutil
 from typing import NamedTuple
 
 from tests.conftest import ROOT
@@ -32,3 +35,41 @@ def snippets(page, language):
 def blocks(page, language):
     """The code alone."""
     return [one.code for one in snippets(page, language)]
+
+
+def reader(folder):
+    """The folder, with what a reader has beside a script: `examples` of the source tree."""
+    shutil.copytree(ROOT / "examples", folder / "examples")
+    return folder
+
+
+def missing_names(codes):
+    """Names that blocks of code use and that neither they nor blocks before them have bound, by the block's number."""
+    bound, missing = {*dir(builtins), "__name__"}, {}
+    for number, code in enumerate(codes):
+        nodes = list(ast.walk(ast.parse(code)))
+        for node in nodes:
+            if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+                bound.add(node.id)
+            elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+                bound.add(node.name)
+            elif isinstance(node, ast.arg):
+                bound.add(node.arg)
+            elif isinstance(node, ast.Import | ast.ImportFrom):
+                bound |= {(alias.asname or alias.name).split(".")[0] for alias in node.names}
+        if wanting := {node.id for node in nodes if isinstance(node, ast.Name)} - bound:
+            missing[number] = wanting
+    return missing
+
+
+def chains(code):
+    """Chains of attributes of `lw` in code, such as ["distributions", "Normal"]."""
+    found = []
+    for node in ast.walk(ast.parse(code)):
+        names = []
+        while isinstance(node, ast.Attribute):
+            names.append(node.attr)
+            node = node.value
+        if names and isinstance(node, ast.Name) and node.id == "lw":
+            found.append(names[::-1])
+    return found

@@ -11,9 +11,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from lgvi_warp.common import summaries
+from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.sampling.final import NUMBERS, Final
+from lgvi_warp.studies.assimilation.innovations import InnovationTest, tested
 from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
 
 
@@ -28,7 +30,14 @@ class Assimilated(Summarized, Saved):
         std: Standard deviations of the same; of the attitude (k, 3) [rad], about the body's axes.
         innovations: By name of the series, values less predictions (k, m); NaN where it has none.
         innovation_std: What they should be, (k, m): root of the spread of the predictions and the instrument's variance.
-        effective: Effective number of members before resampling, (k,); with Kalman filters their number.
+        whitened: Innovations over the root of their covariance, (k, m), by name of the series.
+        left_out: By name of the series, the times at which the gate left it out, (k,), True or False.
+        log_likelihood: Logarithm of the probability density of all measured values, each given those before it; without those
+            that the gate left out. Scenes that follow the same series may be compared by it.
+        inflation: Factor on the covariance of the members before each measurement, (k,).
+        effective: Effective number of members before resampling, (k,), where copies of one member count once; with Kalman
+            filters their number.
+        ancestors: Number of members of the beginning from which those after each measurement come, (k,).
         final: Where the members are at the end, from which a run can go on.
         parameters: The learned numbers of the members at the end, by name, (n, ...), as
             `run.states(final, parameters=parameters)` takes them.
@@ -45,7 +54,12 @@ class Assimilated(Summarized, Saved):
     std: Mapping[str, np.ndarray]
     innovations: Mapping[str, np.ndarray]
     innovation_std: Mapping[str, np.ndarray]
+    whitened: Mapping[str, np.ndarray]
+    left_out: Mapping[str, np.ndarray]
+    log_likelihood: float
+    inflation: np.ndarray
     effective: np.ndarray
+    ancestors: np.ndarray
     final: Final
     parameters: Mapping[str, np.ndarray]
     weights: np.ndarray
@@ -59,8 +73,12 @@ class Assimilated(Summarized, Saved):
         for name in self.parameters:
             rows.append((name, f"{_text(self.mean[name][-1])} +- {_text(self.std[name][-1])}"))
         rows.append(("position", f"{_text(self.mean['position'][-1])} +- {_text(self.std['position'][-1])} m"))
-        for name, ratio in self.consistency().items():
-            rows.append((f"innovations of {name}", f"{ratio:.2f} of what their spread should be"))
+        for name, test in self.consistency().items():
+            text = f"{test.ratio:.2f} of what their spread should be, {test.verdict}"
+            rows.append((f"innovations of {name}", text))
+        rows.append(("log-likelihood", f"{self.log_likelihood:.2f}"))
+        if (self.inflation != 1.0).any():
+            rows.append(("inflation", f"{self.inflation[-1]:.3g} at the end, of the covariance"))
         rows.append(("effective", f"{self.effective[-1]:,.0f} of {self.final.members:,} members at the end"))
         rows += [("message", text) for text in self.messages]
         return f"Assimilation of {len(self.time):,} times to {self.time[-1]:g} s", rows
@@ -83,6 +101,7 @@ class Assimilated(Summarized, Saved):
                 read[item.name] = _array(content[item.name])
             elif item.type == "Mapping[str, np.ndarray]":
                 read[item.name] = {name: _array(rows) for name, rows in content[item.name].items()}
+        read["left_out"] = {name: rows != 0.0 for name, rows in read["left_out"].items()}
         read["final"] = Final.from_arrays(arrays, ends, parameters)
         return cls(**read | {"messages": tuple(content["messages"])})
 
@@ -95,17 +114,32 @@ class Assimilated(Summarized, Saved):
                        for name, rows in columns.items() for i, value in enumerate(rows[k])}  # fmt: skip
             yield {"time": float(time), "effective": float(self.effective[k])} | entries
 
-    def consistency(self) -> dict[str, float]:
-        """Compare innovations with their spread.
+    def consistency(self, level: float = 0.95) -> dict[str, InnovationTest]:
+        """Compare innovations with what those of a right filter are: normal, of their own spread, independent in time.
+
+        Args:
+            level: Probability that all of a right filter's numbers are inside their bands, in (0, 1); 0.95 by default.
 
         Returns:
-            By name of the series, the root mean square of innovations over the deviation that they should have: near 1 where
-            members and instruments are as sure as they should be, above 1 where they are too sure.
+            By name of the series, root mean square, mean and correlation of the innovations with bands, and a verdict.
+
+        Raises:
+            SceneError: If the level is not in (0, 1).
         """
-        return {
-            name: float(np.sqrt(np.nanmean((apart / self.innovation_std[name]) ** 2)))
-            for name, apart in self.innovations.items()
-        }
+        faults = Faults()
+        chance = faults.number("level", level)
+        if chance is not None and not 0.0 < chance < 1.0:
+            faults.add("level", level, "is no probability between 0 and 1", "give 0.95, say")
+        faults.raise_if_any()
+        tests = {}
+        for name, apart in self.innovations.items():
+            used = np.isfinite(self.whitened[name]) & ~self.left_out[name][:, None]
+            normalised, whitened = (
+                np.where(used, each, np.nan) for each in (apart / self.innovation_std[name], self.whitened[name])
+            )
+            left_out = int((np.isfinite(apart) & self.left_out[name][:, None]).sum())
+            tests[name] = tested(normalised, whitened, left_out, float(level))
+        return tests
 
     def table(self) -> Table:
         """The learned numbers of the members as a design, whose runs begin with them.

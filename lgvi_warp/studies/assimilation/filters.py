@@ -43,10 +43,51 @@ def enkf(
 
 
 def log_likelihood(predicted: np.ndarray, measured: np.ndarray, std: np.ndarray) -> np.ndarray:
-    """Logarithm of the density of the measurements given each member, (n,), but for a constant; -inf where it is not known."""
+    """Logarithm of the density of the measurements given each member, (n,); -inf where it is not known."""
     with np.errstate(over="ignore", invalid="ignore"):
         total = -0.5 * np.sum(((measured[:, None] - predicted) / std[:, None]) ** 2, axis=0)
-    return np.where(np.isfinite(total), total, -np.inf)
+    constant = -np.sum(np.log(std)) - 0.5 * len(std) * np.log(2.0 * np.pi)
+    return np.where(np.isfinite(total), total + constant, -np.inf)
+
+
+def innovation(
+    predicted: np.ndarray, measured: np.ndarray, std: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Innovation (m,) and its covariance (m, m): the members' own, of weights (n,) with the sum 1, and the instrument's."""
+    counted = weights > 0.0
+    w, Y = weights[counted], predicted[:, counted]
+    apart = Y - (Y @ w)[:, None]
+    # Divided by 1 - sum w^2, which is (n - 1) / n of n equal weights.
+    return measured - Y @ w, (apart * w) @ apart.T / max(1.0 - w @ w, 1.0 / len(weights)) + np.diag(std * std)
+
+
+def whitened(apart: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Innovation (m,) over the root of its covariance, the sum of its squares, and the logarithm of its normal density."""
+    root = np.linalg.cholesky(covariance)
+    z = np.linalg.solve(root, apart)
+    with np.errstate(over="ignore"):
+        total = float(z @ z)
+    return z, total, float(-0.5 * total - np.log(np.diag(root)).sum() - 0.5 * len(z) * np.log(2.0 * np.pi))
+
+
+def estimated_inflation(
+    factor: float, predicted: np.ndarray, measured: np.ndarray, std: np.ndarray, variance: float
+) -> float:
+    """Factor on the members' covariance after one more measurement, at least 1.
+
+    Innovations say what it should be, with a variance of their own; a Kalman filter of one number weighs that against the
+    factor so far. Source: Miyoshi (2011), Mon. Wea. Rev. 139, equations 6 to 9, after Anderson (2009), Tellus 61A; the
+    statistics of innovations are those of Desroziers et al. (2005).
+
+    factor: the one that the members already have. variance: of what is known of the factor.
+    """
+    count = len(measured)
+    spread = float(np.sum(predicted.var(axis=1, ddof=1) / std**2))
+    apart = float(np.sum(((measured - predicted.mean(axis=1)) / std) ** 2))
+    if spread <= 0.0:
+        return factor
+    observed, doubt = factor * (apart - count) / spread, 2.0 / count * (factor * (spread + count) / spread) ** 2
+    return max(1.0, float((doubt * factor + variance * observed) / (doubt + variance)))
 
 
 def normalised(log_weights: np.ndarray) -> np.ndarray:
@@ -58,9 +99,12 @@ def normalised(log_weights: np.ndarray) -> np.ndarray:
     return np.asarray(weights / weights.sum())
 
 
-def effective_number(weights: np.ndarray) -> float:
-    """1 / sum w^2 of weights (n,) with the sum 1: as many members of equal weight would say as much (Kish 1965)."""
-    return float(1.0 / np.sum(weights * weights))
+def effective_number(weights: np.ndarray, origins: np.ndarray) -> float:
+    """1 / sum w^2 of weights (n,) with the sum 1: as many members of equal weight would say as much (Kish 1965).
+
+    origins: whole numbers (n,), the same for copies of one member, which count once, with the sum of their weights.
+    """
+    return float(1.0 / np.sum(np.bincount(origins, weights) ** 2))
 
 
 def resampled(weights: np.ndarray, rng: np.random.Generator) -> np.ndarray:

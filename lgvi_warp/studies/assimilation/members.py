@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.notation import matrix_from_rotation_vector
-from lgvi_warp.scene.variations import Target
 
 VECTORS = ("position", "velocity", "angular_velocity")
 
@@ -46,24 +44,3 @@ def states_of(ensemble: np.ndarray, centre: np.ndarray) -> tuple[dict[str, np.nd
     U, _, V = np.linalg.svd(attitude)
     states["attitude"] = U @ V
     return states, ensemble[12:]
-
-
-def learned_rows(targets: Sequence[Target], parameters: Mapping[str, np.ndarray], members: int) -> np.ndarray:
-    """The numbers to learn, (p, n), out of the members' parameters by name."""
-    rows = [np.empty((0, members))]
-    for target in targets:
-        values = np.broadcast_to(parameters[target.name], (members, *parameters[target.name].shape[1:]))
-        rows.append(np.stack([np.asarray(target.of(value), float).reshape(-1) for value in values], axis=1))
-    return np.concatenate(rows)
-
-
-def as_columns(targets: Sequence[Target], rows: np.ndarray, parameters: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """The numbers to learn by label, (n, ...), as `run.states` takes them."""
-    columns: dict[str, Any] = {}
-    first = 0
-    for target in targets:
-        shape = np.shape(target.of(parameters[target.name][0]))
-        count = int(np.prod(shape, dtype=int))
-        columns[target.label] = rows[first : first + count].T.reshape(-1, *shape)
-        first += count
-    return columns

@@ -138,7 +138,7 @@ APART = {"Indices", "Saved", "Policy"}
 # Classes of which a run makes one, and a study.
 OF_RUNS = {"Result", "Final", "Prepared", "Sweep", "Outputs", "ScalarModel"}
 OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned", "StabilityMap", "SobolIndices",
-              "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff", "RareEvent", "Assimilated",
+              "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff", "RareEvent", "Assimilated", "InnovationTest",
               "Estimated", "Derivatives"}  # fmt: skip
 
 
@@ -286,6 +286,7 @@ def test_what_studies_give():
         "RareEvent": lw.rare_event(lw.Ensemble(SPHERE, 1, 0, vary), "depth - 3.0", **short),
         "Tradeoff": lw.tradeoff(lw.Ensemble(SPHERE, 16, 0, vary), t1=1.0, methods=["psi_s"], members=16, seconds=2.0),
     }  # fmt: skip
+    found["InnovationTest"] = found["Assimilated"].consistency()["depth"]
     assert found.keys() >= OF_STUDIES
     for name, value in found.items():
         for way in WAYS.values():

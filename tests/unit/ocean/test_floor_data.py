@@ -268,7 +268,7 @@ def test_the_page_does_what_it_says(tmp_path, monkeypatch):
     assert (len(python), len(toml)) == (2, 2)
     gebco().to_netcdf(tmp_path / "gebco.nc")
     monkeypatch.chdir(tmp_path)
-    names = {"lw": lw, "np": np}
+    names = {}
     for code in python:
         exec(code, names)
     assert names["floor"].depth.shape[0] > 10

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.control.dvl import DVL
 from lgvi_warp.control.error_state_filter import ErrorStateFilter
 from lgvi_warp.control.imu import IMU
@@ -29,6 +30,7 @@ from lgvi_warp.studies.members import scene_of
 INPUTS = ("commands", "wrench")
 
 
+@explained
 @dataclass(frozen=True)
 class LinearModel:
     """x' = A x + B u after a period, y = C x + D u: deviations from a motion.

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics import notation
@@ -28,6 +29,7 @@ GUESSES = (0.0, 0.05, 0.5)
 ANGLES = ("roll", "pitch", "drift")
 
 
+@explained
 @dataclass(frozen=True)
 class Trim:
     """A steady motion, straight and level.

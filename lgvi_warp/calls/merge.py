@@ -11,7 +11,7 @@ from pathlib import Path
 from lgvi_warp.calls.resume import resume
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import safe_files, scratch
-from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.arguments import flag, listed, path_of
 from lgvi_warp.common.errors import MembersFailed, SceneError, refusal
 from lgvi_warp.engine.block import Block
 from lgvi_warp.store.block_files import marker
@@ -52,6 +52,7 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
         >>> lw.open_run("all.zarr").members
         512
     """
+    target, overwrite = path_of("out", out), flag("overwrite", overwrite)
     parts = [Folder(folder_of(path)) for path in listed("paths", paths, "stores")]
     if not parts:
         raise refusal("paths", paths, "names no store", "give the stores to merge")
@@ -61,7 +62,6 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
         if mismatches or further.recipe != first.recipe:
             remedy = "these are parts of different runs; merge parts of one run"
             raise SceneError(f"{text}: {remedy}" for text in mismatches or ["another recipe"])
-    target = Path(out)
     if target.suffix != ".zarr":
         if os.path.lexists(target) and not target.is_dir():
             raise SceneError([f"{target}: is a file; give a folder"])

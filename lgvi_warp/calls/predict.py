@@ -19,6 +19,7 @@ from lgvi_warp.calls.sizes import Sizes, sizes, with_ends
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.near import near_names
 from lgvi_warp.engine.block import Block, blocks, parts
 from lgvi_warp.engine.executors.threads import Threads
@@ -47,6 +48,7 @@ TRIAL_SECONDS = 0.3
 PROBE_BYTES, SYNCS = 64_000_000, 4
 
 
+@explained
 @dataclass(frozen=True)
 class Prediction:
     """Time, memory and disk space that a run will take.

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.executors.base import Executor
@@ -65,4 +66,4 @@ def resume(
     """
     folder = Folder(folder_of(path))
     request = request_of(folder, fleet, statistics, executor_of(executor, threads, scheduler))
-    return resume_stored(folder, request, callback(progress), force, keepers)
+    return resume_stored(folder, request, callback(progress), force, listed("keepers", keepers, "keepers"))

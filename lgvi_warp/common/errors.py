@@ -63,7 +63,7 @@ class SceneError(ValueError):
         Returns:
             A new error; this one is not changed.
         """
-        return SceneError((prefix + fault for fault in self.faults), self.more)
+        return SceneError((f"{prefix}{fault}" for fault in self.faults), self.more)
 
 
 def refusal(key: str, value: Any, problem: str, remedy: str) -> SceneError:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.explained import explained
+
 # Most lines of a text, most characters of a line, and most entries of an array that are written out.
 LINES, WIDTH, ENTRIES = 20, 96, 6
 
@@ -17,6 +19,10 @@ Rows = Sequence[tuple[str, str]]
 
 class Summarized:
     """An object that shows itself as a title and rows of (label, text)."""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        explained(cls)
 
     def summary_rows(self) -> tuple[str, Rows]:
         """The title, and rows of (label, text), that describe the object."""

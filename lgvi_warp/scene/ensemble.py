@@ -502,6 +502,8 @@ class Ensemble(Summarized):
             SceneError: If a member is unphysical.
         """
         pairs = [(target, columns[target.label]) for target, _ in self._draws.columns]
+        if not pairs:
+            raise refusal("columns", sorted(map(str, columns)), "are of no table", "make the ensemble of a table")
         ensemble = copy.copy(self)
         ensemble._draws, ensemble._indices = self._draws.with_columns(pairs), None
         ensemble.final, ensemble.start_time = None, 0.0

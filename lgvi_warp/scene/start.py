@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import datetime
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ import numpy as np
 
 from lgvi_warp.common.declared import array, positive, read, real
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import PLACE_UNIT, TABLE
 
@@ -26,6 +28,7 @@ PLACES = ("position", "geodetic")
 NAMES = (*PLACES, *ATTITUDES, *VELOCITIES, "angular_velocity")
 
 
+@explained
 @dataclass(frozen=True)
 class Environment:
     """Gravity and density of the water around the vehicle, and where and when on the Earth it is.
@@ -173,6 +176,7 @@ def _moment(text: Any) -> np.datetime64 | None:
     return np.datetime64(moment, "us")
 
 
+@explained
 @dataclass(frozen=True, eq=False)
 class Start:
     """The state at t = 0.
@@ -256,6 +260,9 @@ class Start:
         Returns:
             A new start.
         """
+        faults = Faults()
+        faults.keys("start", fields, [item.name for item in dataclasses.fields(self) if item.init])
+        faults.raise_if_any()
         alike = {name for names in (PLACES, ATTITUDES, VELOCITIES) if fields.keys() & set(names) for name in names}
         return replace(self, **(dict.fromkeys(alike) | dict(fields)))
 

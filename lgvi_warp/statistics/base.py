@@ -19,6 +19,7 @@ import numpy as np
 from lgvi_warp.common import registry
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.real_numbers import settle, settles_first
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates import intervals
@@ -88,6 +89,7 @@ class RowGatherer(Gatherer):
         return {key: joined.get(key, first[key]) for key in first}
 
 
+@explained
 @dataclass(frozen=True, eq=False)
 class Statistic:
     """A statistic over members at every sample time. Abstract.
@@ -134,6 +136,8 @@ class Statistic:
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         settles_first(cls)
+        if cls.__module__.startswith(__package__.partition(".")[0]):
+            explained(cls)
         registry.add(TYPES, cls)
 
     def __post_init__(self) -> None:

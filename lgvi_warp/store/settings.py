@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.declared import read, real, word
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.explained import explained
 from lgvi_warp.control.signals import SAVED
 from lgvi_warp.store.arrays import whole_array
 from lgvi_warp.store.layout import MEMBER, parameter_units
@@ -26,6 +27,7 @@ CHUNK_BYTES = 10_000_000
 EXISTING = ("refuse", "resume", "overwrite")
 
 
+@explained
 @dataclass(frozen=True)
 class Store:
     """Folder and settings of a run that is written to disk as a zarr store.

@@ -16,6 +16,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import among
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.files import write_text
 from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_json
 from lgvi_warp.common.tables import write_csv
@@ -71,6 +72,10 @@ class Saved(ABC):
         study: name of the study, and of its files.
         endings: of its files, in the order in which they are written; "txt" is what `str` tells.
     """
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        explained(cls)
 
     study: ClassVar[str]
     endings: ClassVar[tuple[str, ...]] = ("json", "csv")

@@ -140,3 +140,43 @@ def odd_calls_within(scene, result, folder, studies):
                 # A function of the user's may raise what it likes; nothing is drawn where nothing is odd.
                 if not (callable(odd) or (odd is None and parameter.default is None)):
                     yield f"{label}({parameter.name}=ODD[{i}])", function, {**given, parameter.name: odd}
+
+
+def methods_of(thing):
+    """(name, bound function) of the public methods of an object that this package defines."""
+    for name in dir(type(thing)):
+        static = inspect.getattr_static(type(thing), name)
+        is_method = inspect.isfunction(static) or isinstance(static, classmethod | staticmethod)
+        if is_method and not name.startswith("_"):
+            bound = getattr(thing, name)
+            home = inspect.getmodule(inspect.unwrap(getattr(bound, "__func__", bound)))
+            if home is not None and home.__name__.startswith(f"{lw.__name__}."):
+                yield name, bound
+
+
+def odd_calls_of_objects(things, by_name):
+    """(label, function, arguments): every public method of each object, with one odd argument; things: by a label."""
+    for label, thing in things.items():
+        for name, function in methods_of(thing):
+            known = [
+                p
+                for p in inspect.signature(function).parameters.values()
+                if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)
+            ]
+            given = {p.name: by_name.get(p.name) for p in known if p.default is p.empty}
+            for parameter in known:
+                for i, odd in enumerate(ODD):
+                    if not callable(odd):  # a function of the user's may raise what it likes
+                        yield f"{label}.{name}({parameter.name}=ODD[{i}])", function, {**given, parameter.name: odd}
+
+
+def odd_calls_of_functions(functions):
+    """(label, function, arguments): functions by name, each with good arguments and one odd one."""
+    for name, (function, given) in functions.items():
+        for parameter in inspect.signature(function).parameters.values():
+            for i, odd in enumerate(ODD):
+                if parameter.kind in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL) or callable(odd):
+                    continue
+                # None is what leaves an argument out, and would be a long study.
+                if odd is not None or parameter.default is not None:
+                    yield f"{name}({parameter.name}=ODD[{i}])", function, {**given, parameter.name: odd}

@@ -17,6 +17,7 @@ from lgvi_warp.common import names, registry
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.declared import read
 from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.real_numbers import settle, settles_first
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.notation import repeated
@@ -160,6 +161,7 @@ def _number_fields(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
     return tuple(item for item in dataclasses.fields(kind) if "shape" in item.metadata)
 
 
+@explained
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Term:
     """A force, a moment or a motion of the water that a scene names.
@@ -221,6 +223,8 @@ class Term:
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         settles_first(cls)
+        if cls.__module__.startswith(__package__.partition(".")[0]):
+            explained(cls)
         cls.device = cls.device or cls.type
         registry.add(cls.kinds, cls)
 
@@ -373,6 +377,9 @@ class Term:
         Raises:
             SceneError: Where a value is wrong.
         """
+        faults = Faults()
+        faults.keys(self.key, fields, [item.name for item in dataclasses.fields(self) if item.init])
+        faults.raise_if_any()
         return dataclasses.replace(self, **fields)
 
     def check(self, faults: Faults) -> None:
@@ -721,15 +728,18 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
         >>> lw.laws.knots(depths, speeds).round(3).tolist()
         [[0.5, 0.0, 0.1, -0.2, 10.0, 0.05, -0.3]]
     """
-    faults = Faults()
+    faults, arrays = Faults(), dict[str, Any]()
     for key, value, size in (("at", at, 2), ("values", values, 3)):
-        found = faults.real(key, value)
+        arrays[key] = found = faults.real(key, value)
         if found is not None and (found.ndim != size or found.size == 0):
             faults.add(key, value, f"has shape {found.shape}", f"give numbers of {size} dimensions, two knots or more")
     if not isinstance(steps, bool | np.bool_):
         faults.add("steps", steps, "is neither True nor False", "say whether values hold up to the next knot")
     faults.raise_if_any()
-    at, values = repeated(np.asarray(at, dtype=float), np.asarray(values, dtype=float))
+    at, values = arrays.values()
+    if len(at) != len(values) and 1 not in (len(at), len(values)):
+        raise refusal("values", values, f"are of {len(values)} members", f"give 1, or {len(at)}")
+    at, values = repeated(at, values)
     if at.shape[1] != values.shape[1]:
         raise refusal("values", values, f"are at {values.shape[1]} knots", f"give {at.shape[1]}, one for each place")
     inverse = np.full((len(at), at.shape[1] - 1), STEEP) if steps else 1.0 / np.diff(at, axis=1)

@@ -213,7 +213,9 @@ class Floor(Event):
             return numbers["depth"], numbers["origin"], 1.0 / numbers["spacing"]
         return numbers["depth"][:, None, None], np.zeros((1, 2)), np.ones((1, 2))
 
-    def depth_at(self, north: Any, east: Any, numbers: Numbers | None = None) -> np.ndarray:
+    def depth_at(
+        self, north: np.ndarray | float, east: np.ndarray | float, numbers: Numbers | None = None
+    ) -> np.ndarray:
         """The depth of the floor at places.
 
         Args:

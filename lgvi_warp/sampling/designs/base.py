@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.real_numbers import is_whole, settles_first
 from lgvi_warp.sampling.designs.space import Space
 
@@ -20,6 +21,7 @@ MOST_REPLICATES = 64
 Drawn = dict[str, np.ndarray]
 
 
+@explained
 @dataclass(frozen=True)
 class Sampling:
     """How the points of the members fill the unit cube.
@@ -50,6 +52,8 @@ class Sampling:
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         settles_first(cls)
+        if cls.__module__.startswith(__package__.partition(".")[0]):
+            explained(cls)
         registry.add(cls.kinds, cls, "kind")
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:

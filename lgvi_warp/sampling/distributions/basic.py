@@ -14,12 +14,14 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.random import FAR
 from lgvi_warp.common.real_numbers import settle, settles_first
 
 Spread = float | tuple[float, ...] | list[float] | np.ndarray
 
 
+@explained
 @dataclass(frozen=True)
 class Distribution:
     """The distribution of a quantity, around the scene's value of it unless the distribution says otherwise.
@@ -59,6 +61,8 @@ class Distribution:
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         settles_first(cls)
+        if cls.__module__.startswith(__package__.partition(".")[0]):
+            explained(cls)
         registry.add(cls.kinds, cls, "kind")
 
     def __post_init__(self) -> None:
@@ -97,6 +101,8 @@ class Distribution:
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
         """What prevents it from drawing quantities of these shapes, and the remedy; None where it fits."""
+        if len(shapes) != 1:
+            return f"is of one quantity, and there are {len(shapes)}", "give each a distribution"
         (shape,) = shapes
         try:
             numbers = self.numbers_by_name().values() if self.by_component else ()

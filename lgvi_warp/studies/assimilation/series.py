@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.times import rows_at
 from lgvi_warp.results.quantities import OfResult, quantities
 
@@ -16,6 +17,7 @@ from lgvi_warp.results.quantities import OfResult, quantities
 ANGLES = ("euler", "euler[0]", "euler[1]", "euler[2]", "heading")
 
 
+@explained
 @dataclass(frozen=True, eq=False)
 class Series:
     """Values that an instrument measured, with independent normal errors.

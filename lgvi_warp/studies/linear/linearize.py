@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.near import near_names
 from lgvi_warp.control.dvl import DVL
 from lgvi_warp.control.error_state_filter import ErrorStateFilter
@@ -30,6 +31,7 @@ from lgvi_warp.studies.members import scene_of
 INPUTS = ("commands", "wrench")
 
 
+@explained
 @dataclass(frozen=True)
 class LinearModel:
     """x' = A x + B u after a period, y = C x + D u: deviations from a motion.

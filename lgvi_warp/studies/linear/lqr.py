@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.control.state_feedback import StateFeedback
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
@@ -17,6 +18,7 @@ from lgvi_warp.studies.linear.bench import COORDINATES
 from lgvi_warp.studies.linear.linearize import LinearModel
 
 
+@explained
 @dataclass(frozen=True)
 class Regulator:
     """The linear quadratic regulator u = -K x of a model.

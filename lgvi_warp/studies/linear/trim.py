@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.near import near_names
 from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.methods.method import Method
@@ -30,6 +31,7 @@ GUESSES = (0.0, 0.05, 0.5)
 ANGLES = ("roll", "pitch", "drift")
 
 
+@explained
 @dataclass(frozen=True)
 class Trim(Saved):
     """A steady motion, straight and level.

@@ -12,8 +12,10 @@ import numpy as np
 
 from lgvi_warp.calls.prepared import Prepared, prepare, scene_value
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.runs.request import ensemble_of
@@ -26,6 +28,7 @@ from lgvi_warp.studies.search.numbers import Numbers
 from lgvi_warp.studies.search.risk import risk_of
 
 
+@explained
 @dataclass(frozen=True)
 class Tuned(Saved):
     """The numbers with the least risk that a search found.
@@ -199,7 +202,7 @@ def _checked_box(faults: Faults, ensemble: Ensemble, over: Any, budget: Any) -> 
         if name.split("[")[0] in varied:
             faults.add(f'over."{name}"', over[name], "varies by member too", "leave it out of one of them")
     least = ensemble.members * max(LEAST, POPULATION * (len(box.names) if box else 1))
-    if not isinstance(budget, int) or budget < least:
+    if not is_whole(budget, least, 2**31):
         faults.add("budget", budget, "is less than a generation of all members", f"give {least} or more")
     return box
 

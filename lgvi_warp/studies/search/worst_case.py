@@ -14,6 +14,7 @@ from lgvi_warp.calls.prepared import prepare
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.ensemble import Ensemble
@@ -140,7 +141,7 @@ def worst_case(
     with faults.including():
         box = SearchBox.of("within", within, scene)
     least = max(LEAST, POPULATION * (len(box.names) if box else 1))
-    if not isinstance(budget, int) or budget < least:
+    if not is_whole(budget, least, 2**31):
         faults.add("budget", budget, "is less than a generation", f"give {least} or more")
     faults.raise_if_any()
     assert box is not None

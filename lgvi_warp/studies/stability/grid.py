@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.arguments import items_of
+from lgvi_warp.common.arguments import items_of, whole_number
 from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.explained import explained
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics import rates as member_rates
 from lgvi_warp.physics.fields import FIELDS, TABLE
@@ -36,6 +37,7 @@ MOST_MEMBERS = 10_000_000
 FORM = '"NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":set" at the end for parameters'
 
 
+@explained
 @dataclass(frozen=True)
 class Axis:
     """What varies along an axis of a map, from a low to a high value.
@@ -107,6 +109,7 @@ class Axis:
         Returns:
             Values from low to high (points,), in the unit of the axis.
         """
+        points = whole_number("points", points, 1)
         assert self.low is not None
         assert self.high is not None
         return np.geomspace(self.low, self.high, points) if self.log else np.linspace(self.low, self.high, points)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common.errors import MissingExtra, closest, refusal
+from lgvi_warp.common.explained import explained
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.scene.columns import as_given
 from lgvi_warp.studies.sweeps.rare import RareFailures
@@ -29,6 +30,7 @@ LEVELS = {"q05": 0.05, "median": 0.5, "q95": 0.95}
 SUCCESS, RARE = "success", "rare"
 
 
+@explained
 @dataclass(frozen=True, eq=False, repr=False)
 class SweepTable:
     """What the members of a sweep showed, and how often they passed."""

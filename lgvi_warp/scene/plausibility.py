@@ -26,6 +26,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.oddities import Oddities, OddityCheck, gathered
 from lgvi_warp.scene.slices import over_members
+from lgvi_warp.scene.term_limits import CURRENTS, doppler, hull_length, sizes, steepness, strips
 
 Numbers = Mapping[str, np.ndarray]
 
@@ -49,13 +50,6 @@ LIMITS = {
     "depth": Limit(0.0, "m", ABOVE),
     "height": Limit(0.1, "m", "members that rise so far above the mean surface on the way are counted"),
 }
-# Fields of terms that hold velocities of water [m/s].
-CURRENTS = {
-    "current": "velocity",
-    "current_profile": "velocities",
-    "current_harmonics": "amplitudes",
-    "gauss_markov_current": "standard_deviation",
-}
 # Fields of terms and events that hold depths [m].
 DEPTHS = {"floor": "depth", "current_profile": "depths", "stratification": "reference_depth"}
 # Most numbers of samples that are looked at after a run; where there are more, only the last time is.
@@ -67,6 +61,7 @@ FAST = f"a current of {{:.4g}} m/s is beyond the {LIMITS['current'].value:g} m/s
 FAR = "an angle of {:.4g} rad is beyond 90 degrees: is it given in degrees?"
 SHALLOW = ("a depth of {:.4g} m is within one hull length, {:.3g} m, of a surface with waves: where the hull leaves the water "
            "is known to the event surface and the term surface_buoyancy alone")  # fmt: skip
+CRUSHED = "the hull has no volume left at the start's depth of {:.4g} m"
 BEYOND = "the start is {:.4g} m beyond this event: the member stops before its first step; start it before the event"
 HIGH = "a depth of {:.4g} m is above the surface: depth is positive down"
 FAR_AWAY = ("a place is {:.0f} km from environment.origin: lengths across the way to it are {:.2g} % too long there; take an "
@@ -238,7 +233,10 @@ def _far_away(key: str, distance: np.ndarray) -> OddityCheck:
 
 
 # Checks of every member before a run.
-OF_NUMBERS = (waypoints, net_weight, density, currents, fin_angles, depths, inertia, hulls, actuators, driving, remarks)
+OF_NUMBERS = (
+    waypoints, net_weight, density, currents, fin_angles, depths, inertia, hulls, actuators, driving, remarks,
+    steepness, doppler, strips, sizes,
+)  # fmt: skip
 
 
 def of_numbers(
@@ -291,6 +289,10 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
         if any(term.type == "waves" and np.any(term.amplitudes) for term in scene.terms):
             length = hull_length(scene, members.parameters)
             yield "start.position", depth < length, _text(SHALLOW, *np.broadcast_arrays(depth, length))
+    for term in (term for term in scene.terms if term.type == "stratification"):
+        numbers = own(term, members.parameters)
+        lost = numbers.get("compressibility", np.zeros(1)) * (depth - numbers["reference_depth"])
+        yield f"{term.key}.compressibility", lost >= 1.0, _text(CRUSHED, depth)
     if scene.environment.origin is not None:
         yield _far_away("environment.origin", np.hypot(members.position[:, 0], members.position[:, 1]))
     for term in own_flows(scene):
@@ -299,20 +301,6 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
         if water is not None:
             flow = _speed(water[0])
             yield term.key, flow > LIMITS["current"].value, _text(FAST, flow)
-
-
-def hull_length(scene: SceneLike, p: Numbers) -> np.ndarray:
-    """The length of the hull (1 or n,) [m]: by its shape or its strips; else of a spheroid of its mass and inertia."""
-    stations = [p[f"{term.key}.stations"] for term in scene.terms if isinstance(term, StripTerm)]
-    if stations:
-        return np.asarray(np.max([x[:, -1] - x[:, 0] for x in np.broadcast_arrays(*stations)], axis=0))
-    shape = scene.vehicle.shape
-    if shape is not None and not shape.mesh:
-        return np.array([shape.length])
-    rigid = (
-        p["vehicle.inertia"] if "vehicle.inertia" in p else vehicles.about_center(p["vehicle.rigid_body_mass_matrix"])
-    )
-    return np.asarray(np.sqrt(20.0 * _diagonal(rigid).max(axis=1) / vehicles.dry_mass(p)))
 
 
 def beyond(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:

@@ -15,7 +15,7 @@ from lgvi_warp.studies.linear import loops as study
 from lgvi_warp.studies.linear.edges import edges
 from lgvi_warp.studies.linear.sampled_loop import DELAY, SampledLoop
 from lgvi_warp.terms import ControlWrench, Drag, Thrusters
-from tests.support.pages import blocks, reader
+from tests.support.pages import blocks
 from tests.support.refusals import says
 from tests.support.unsettled_loops import LOOPS, STEP, fleet_of
 
@@ -268,8 +268,8 @@ def test_the_heading_loop_of_remus():
 @pytest.mark.parametrize("page", ["docs/controllers/margins.md", "docs/guide/worst_case.md"])
 def test_the_snippets_of_a_page(page, tmp_path, monkeypatch):
     pytest.importorskip("control")
-    monkeypatch.chdir(reader(tmp_path))
-    names = {}
+    monkeypatch.chdir(tmp_path)
+    names = {"lw": lw, "autopilot": autopilot(), "scene": autopilot()}
     # In a page's ensembles are more members, and budgets are larger, than a test needs.
     short = {"256": "8", "200": "4", "20_000": "200", "save=lw": "budget=300, save=lw"}
     for text in blocks(page, "python"):
@@ -430,7 +430,7 @@ def test_a_loop_within_a_dead_band_moves_nothing():
 
 @pytest.mark.parametrize("by", ["eigenvalues", "runs"])
 def test_noise_is_taken_as_its_mean_and_faults_as_off(by):
-    """Also a fault whose time varies: the margins are those of the loop without them to the bit, and say what was left out."""
+    """A fault whose time varies, too: the margins are those of the loop without them, to the bit, and say what they leave out."""
     whole = scene()
     words = {"noise": 0.1, "drift": 0.01} | ({"quantum": 0.02} if by == "eigenvalues" else {})
     sensor, clean = (Sensor(of="heading", bias=0.05, **more) for more in (words, {}))

@@ -157,7 +157,7 @@ class DragMatrix(Term):
 
     Raises:
         SceneError: Where a matrix creates energy: its power nu.D nu is negative at some velocity (for the quadratic matrix,
-            at one of 4,000 fixed directions). Also as `Term`.
+            at the least that a descent from the worst of 4,000 directions finds). Also as `Term`.
     """
 
     type: ClassVar[str] = "drag_matrix"
@@ -208,7 +208,7 @@ BESIDE = ~np.eye(6, dtype=bool)
 def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
     """Which of the matrices (n, 6, 6) would speed a vehicle up, and the worst velocity (n, 6) for each.
 
-    The test is nu.D nu: for linear matrices by eigenvalues, for quadratic ones at 4,000 fixed directions.
+    The test is nu.D nu: for linear matrices by eigenvalues, for quadratic ones by descents from the worst of many directions.
     """
     bad, worst = np.zeros(len(matrices), bool), np.zeros((len(matrices), 6))
     doubtful = ~(_surely_brakes_quadratically if quadratic else _surely_brakes)(matrices)
@@ -247,23 +247,66 @@ def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
 
 def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
     """As `_creates_energy`, for matrices that no inequality decides."""
-    limit = -1e-9 * np.abs(matrices).max(axis=(1, 2))
     if not quadratic:
+        limit = -1e-9 * np.abs(matrices).max(axis=(1, 2))
         # Divided by a power of two, which keeps all digits, lest two of the largest numbers add up to none.
         part = np.exp2(-np.frexp(np.abs(matrices).max(axis=(1, 2)))[1].astype(float))
         scaled = part[:, None, None] * matrices
         values, vectors = np.linalg.eigh(scaled + np.swapaxes(scaled, 1, 2))
         return values[:, 0] < part * limit, vectors[:, :, 0]
     directions = np.random.default_rng(0).normal(size=(4000, 6))
-    directions = np.concatenate([np.eye(6), directions / np.abs(directions).max(axis=1, keepdims=True)])
+    directions = np.concatenate([np.eye(6), directions / np.linalg.norm(directions, axis=1, keepdims=True)])
     products = np.einsum("ki,kj->kij", directions, np.abs(directions) * directions).reshape(-1, 36)
     bad, worst = np.zeros(len(matrices), bool), np.zeros((len(matrices), 6))
+    scale = _own_scale(matrices)
+    scaled = matrices * scale[:, :, None] * scale[:, None, :] ** 2
+    limit = -1e-9 * np.abs(scaled).max(axis=(1, 2))
     for first in range(0, len(matrices), 1024):  # 33 MB at a time
         chunk = slice(first, first + 1024)
-        power = products @ matrices[chunk].reshape(-1, 36).T
-        lowest = power.argmin(axis=0)
-        bad[chunk], worst[chunk] = power.min(axis=0) < limit[chunk], directions[lowest]
+        power = scaled[chunk].reshape(-1, 36) @ products.T
+        lowest, some = directions[power.argmin(axis=1)], np.flatnonzero(power.min(axis=1) >= limit[chunk])
+        bad[chunk] = True
+        if len(some):
+            starts = np.argpartition(power[some], STARTS, axis=1)[:, :STARTS]
+            least, lowest[some] = _descended(scaled[chunk][some], directions[starts])
+            bad[chunk][some] = least < limit[chunk][some]
+        worst[chunk] = scale[chunk] * lowest
     return bad, worst
+
+
+# Directions, the worst, from which a descent begins, and its steps.
+STARTS, DESCENT = 10, 60
+
+
+def _own_scale(matrices: np.ndarray) -> np.ndarray:
+    """Sizes of velocities (n, 6) whose own drag is 1, whatever the units; where an axis has none, as its entries are large."""
+    diagonal = np.abs(np.einsum("nii->ni", matrices))
+    most = np.maximum(np.abs(matrices).max(axis=1), np.abs(matrices).max(axis=2))
+    size = np.where(diagonal > 0.0, diagonal, most)
+    return np.asarray(1.0 / np.cbrt(np.where(size > 0.0, size, 1.0)))
+
+
+def _descended(matrices: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The least power (n,) of x.D |x| x over unit vectors that descents from x (n, starts, 6) find, and where (n, 6)."""
+
+    def power(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        size = np.abs(x)
+        force = (size * x) @ turned
+        slope = force + 2.0 * size * (x @ matrices)
+        value = np.einsum("nsi,nsi->ns", x, force)
+        return value, slope - 3.0 * value[..., None] * x
+
+    turned = np.ascontiguousarray(np.swapaxes(matrices, 1, 2))
+    (value, slope), step = power(x), np.full(x.shape[:2], 0.1) / np.abs(matrices).sum(axis=(1, 2))[:, None]
+    for _ in range(DESCENT):
+        ahead = x - step[..., None] * slope
+        ahead /= np.sqrt(np.einsum("nsi,nsi->ns", ahead, ahead))[..., None]
+        value_ahead, slope_ahead = power(ahead)
+        lower = value_ahead < value
+        x, slope = (np.where(lower[..., None], new, old) for new, old in ((ahead, x), (slope_ahead, slope)))
+        value, step = np.where(lower, value_ahead, value), np.where(lower, 1.6 * step, 0.4 * step)
+    best, every = value.argmin(axis=1), np.arange(len(x))
+    return value[every, best], x[every, best]
 
 
 def entry_words(**matrices: np.ndarray) -> tuple[str, ...]:

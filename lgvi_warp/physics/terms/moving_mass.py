@@ -148,6 +148,16 @@ class MovingMass(Term):
         # Whether it follows commands with a lag or at a limited rate, or remembers how fast it moves.
         return self.carried or (self.driver is not None and any(motion(self).values()))
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        # What has inertia and moves at t = 0 pushes the vehicle back at once.
+        if not (self.carried and self.timed and self.times[0] <= 0.0 < self.times[-1]):
+            return ()
+        i = int(np.searchsorted(self.times, 0.0, side="right")) - 1
+        speed = float(np.linalg.norm(self.places[i + 1] - self.places[i]) / (self.times[i + 1] - self.times[i]))
+        text = f"the mass moves at {speed:.3g} m/s from t = 0 on: the vehicle begins with a kick, its start being that before"
+        return (f"{text}; begin the path later",) if speed > 0.0 else ()
+
     def device_in(self, aligned: bool) -> str:
         features = {"path": True}
         if self.driver is not None:

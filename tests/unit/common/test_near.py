@@ -64,7 +64,7 @@ ELSEWHERE = {"dt": "h", "timestep": "h", "Metod": "method", "H": "h"}
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_unknown_keywords_name_the_nearest(name):
     for word, known in ELSEWHERE.items():
-        told = rf"^{name}\(\) got an unexpected keyword argument '{word}'; did you mean '{known}'"
+        told = rf"^{name}\(\) got an unexpected keyword argument '{word}'; did you mean '{known}s?'"
         with pytest.raises(TypeError, match=told):
             FUNCTIONS[name](SCENE, **{word: 0.1})
     with pytest.raises(TypeError, match=r"known: .*\bh\b"):

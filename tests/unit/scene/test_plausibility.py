@@ -317,7 +317,8 @@ def test_no_example_is_odd(path):
 
 def test_no_scene_of_the_benchmarks_is_odd():
     for name, one in {**problems.each_term(), **problems.coupled(), "all": problems.all_terms()}.items():
-        assert said(one) == (), name
+        # Of all terms at once some are a sea beside a current.
+        assert [text for text in said(one) if name != "all" or not text.startswith("waves.periods")] == [], name
 
 
 def test_every_limit_has_its_reason_and_is_on_the_page():

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.errors import printable
 from lgvi_warp.common.status import Status
 from lgvi_warp.studies.sweeps.comparisons import PairedComparison
 from lgvi_warp.studies.sweeps.rare_output import rare_lines
@@ -42,7 +43,8 @@ def summary(sweep: Sweep) -> str:
     if sweep.rares is not None:
         at = len(lines) if brief else lines.index("## What failures go with") - 1
         lines[at:at] = ["", "## Rare failures", "", *rare_lines(sweep)]
-    return "\n".join(lines) + "\n"
+    # A name of a file may hold line ends.
+    return "\n".join(map(printable, lines)) + "\n"
 
 
 def _in_full(sweep: Sweep) -> list[str]:

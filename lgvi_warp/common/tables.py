@@ -5,11 +5,16 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from lgvi_warp.common import files as durable
+from lgvi_warp.common.errors import printable
+
+# How a text begins that a spreadsheet runs.
+FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 def write_csv(
@@ -18,7 +23,30 @@ def write_csv(
     """Write records to a CSV file; it is there whole or not at all."""
     names = list(dict.fromkeys(key for row in rows for key in row))
     with durable.placed(path, root) as beside, beside.open("x", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, names)
-        writer.writeheader()
-        writer.writerows(rows)
+        writer = csv.writer(file)
+        writer.writerow([cell(name) for name in names])
+        writer.writerows([[cell(row.get(name, "")) for name in names] for row in rows])
     return Path(path)
+
+
+def cell(value: Any) -> Any:
+    """A cell of a table: no text in it is a formula for a spreadsheet, or a control character."""
+    if not isinstance(value, str):
+        return value
+    text = printable(value)
+    return f"'{text}" if value.startswith(FORMULAS) and not is_number(text) else text
+
+
+def is_number(text: str) -> bool:
+    """Whether a text is a number, which a sign may begin."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def markdown(text: str) -> str:
+    """A text of lines without control characters, of which nothing but a mark that begins a line is Markdown."""
+    lines = [re.fullmatch(r"(#+ |- |\d+\. )?(.*)", printable(line)) for line in text.split("\n")]
+    return "\n".join((found[1] or "") + re.sub(r"[\\`*<>\[\]|~]", r"\\\g<0>", found[2]) for found in lines if found)

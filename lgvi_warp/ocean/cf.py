@@ -271,7 +271,7 @@ def _block(longitude: np.ndarray, about: float) -> tuple[int, int]:
     steps = np.diff(longitude)
     gaps = np.flatnonzero(steps > MOST_OF_STEP * np.median(steps)) + 1 if len(steps) else steps.astype(int)
     ends = [0, *gaps.tolist(), len(longitude)]
-    blocks = list(zip(ends, ends[1:]))
+    blocks = list(zip(ends[:-1], ends[1:], strict=True))
     return min(blocks, key=lambda block: np.abs(longitude[block[0] : block[1]] - about).min())
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 # Groups and variables of a file; bytes of an axis, which is read whole, and of a chunk, which is unpacked whole.
 MOST_OBJECTS, MOST_AXIS, MOST_CHUNK = 10_000, 1 << 28, 1 << 30
-# Filters of HDF5 itself: deflate, shuffle, fletcher32, szip, nbit, scaleoffset. For others it would look for a library to load.
+# Filters of HDF5 itself: deflate, shuffle, fletcher32, szip, nbit, scaleoffset. For others it looks for a library.
 FILTERS = range(1, 7)
 
 

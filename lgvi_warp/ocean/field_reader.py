@@ -358,7 +358,7 @@ def _steps_of_time(seconds: np.ndarray) -> int:
         if np.abs(at * (count / at[-1]) - np.round(at)).max() <= EQUAL_TIMES * part:
             return count
     if (gap := _gap(seconds)) is not None:
-        raise refusal("duration", f"{gap[0]:g} to {gap[1]:g} s", "is a gap between times that are no multiples of one interval",
+        raise refusal("duration", f"{gap[0]:g} to {gap[1]:g} s", "is a gap among times without a common interval",
                       "give a shorter duration or a later start, or interpolate the data in time, by ds.interp")  # fmt: skip
     return int(min(np.ceil((seconds[-1] - seconds[0]) / least - 1e-9), 4 * len(steps)))
 

@@ -145,7 +145,7 @@ class Raster:
         except (ProjError, ValueError) as error:  # rasterio's errors of such systems are ValueErrors
             problem = f"is not understood, {' '.join(str(error).split())[:100]}"
         raise refusal("file", self.path, f"has a coordinate reference system that {problem}",
-                      "write one with latitudes and longitudes or with a projection, by gdalwarp -t_srs EPSG:4326")  # fmt: skip
+                      "write one of latitudes and longitudes or a projection, by gdalwarp -t_srs EPSG:4326")  # fmt: skip
 
 
 def _applied(affine: Any, column: Any, row: Any) -> tuple[Any, Any]:

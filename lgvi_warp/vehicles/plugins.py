@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -30,7 +31,7 @@ UNREAD = {
 class Hydrodynamics:
     """Hydrodynamic coefficients of one link, in axes x ahead, y to starboard, z down, about its origin.
 
-    density: [kg/m3]; None if the plugin does not give it. current: Velocity (3,) [m/s] of the water, north, east, down.
+    density: [kg/m3], and current: velocity (3,) [m/s] of the water, north, east, down; None if the plugin does not give it.
     volume: Displaced [m3], as uuv_simulator gives it; None for gz-sim. volume_center: (3,) [m], in the link's own axes (z up).
     """
 
@@ -43,7 +44,7 @@ class Hydrodynamics:
     volume: float | None = None
     volume_center: np.ndarray = field(default_factory=lambda: np.zeros(3))
     neutral: bool = False
-    current: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    current: np.ndarray | None = None
 
 
 def is_hydrodynamics(plugin: Element) -> bool:
@@ -182,6 +183,15 @@ def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
     return diagonal
 
 
+def shared(faults: Faults, tag: str, values: Sequence[Any], remedy: str) -> Any:
+    """What plugins of one body say of its water, each alike; None where none says it."""
+    said = [value for value in values if value is not None]
+    if any(not np.array_equal(value, said[0]) for value in said):
+        shown = "; ".join(" ".join(f"{x:g}" for x in np.atleast_1d(value)) for value in said)
+        faults.add(f"<{tag}>", shown, "differs from plugin to plugin, where a body is in one water", remedy)
+    return said[0] if said else None
+
+
 # Into one body ------------------------------------------------------------------------------------------------------
 
 
@@ -190,7 +200,6 @@ def add_to(faults: Faults, body: Coefficients, hydrodynamics: Hydrodynamics, pos
     X = HALF_TURN_6[:, None] * carried(pose) * HALF_TURN_6
     for name in ("added_mass", "linear"):
         setattr(body, name, getattr(body, name) + X.T @ getattr(hydrodynamics, name) @ X)
-    body.current = body.current + hydrodynamics.current
     for name in ("quadratic", "forward"):
         matrix = getattr(hydrodynamics, name)
         if np.any(matrix) and not np.allclose(X, np.eye(6), atol=1e-12):

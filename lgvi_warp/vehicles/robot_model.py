@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
+from lgvi_warp.vehicles.includes import names_of
 from lgvi_warp.vehicles.links import MOST_LINKS, Joint, Link, add_volumes, link_named, read_inertia, volume_of
 from lgvi_warp.vehicles.plugins import (
     Hydrodynamics,
@@ -122,11 +123,13 @@ def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Ele
     known += [(child, None) for child in ([root] if root.tag == "model" else root.findall("model"))]
     if not known and root.find("link") is not None:
         return root, None
-    if not known:
-        included = listed([text_of(child) for child in root.iter("uri")])
-        problem = f"the file has none of its own, it includes {included}" if included else "the file has none"
-        raise SceneError([f"SDF link: {problem}; give an SDF model with a <link>"])
-    fitting = [pair for pair in known if not is_true(pair[0].findtext("static"))] or known
+    fitting = [pair for pair in known if not is_true(pair[0].findtext("static"))]
+    if not known or (not fitting and name is None):
+        included = [names_of(child)[0] for child in root.iter("include") if names_of(child)]
+        problem = "the file has none of its own" + (" that can move" if known else "")
+        problem += f", it includes {listed(included)}" if included else ""
+        remedy = f"pass include={{{included[0]!r}: 'model.sdf'}}" if included else "give an SDF model with a <link>"
+        raise SceneError([f"SDF link: {problem}; {remedy}"])
     if name is not None:
         fitting = [pair for pair in known if pair[0].get("name") == name]
         if not fitting:

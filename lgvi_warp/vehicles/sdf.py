@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.vehicles.fossen import HALF_TURN, HALF_TURN_6, STANDARD_GRAVITY, Coefficients, rigid_body, turned
+from lgvi_warp.vehicles.includes import put_in_place
 from lgvi_warp.vehicles.links import Link, Lump, beside, joined, link_named, lumped, main_link
-from lgvi_warp.vehicles.plugins import Hydrodynamics, add_to
+from lgvi_warp.vehicles.plugins import Hydrodynamics, add_to, shared
 from lgvi_warp.vehicles.robot_model import GAZEBO_DENSITY, RobotModel, listed, read_model, read_water, world_of
 from lgvi_warp.vehicles.robot_xml import parse_xml
 
@@ -28,6 +29,7 @@ def from_sdf(
     water_density: float | None = None,
     center_of_buoyancy: Sequence[float] | None = None,
     gravity: float | None = None,
+    include: Mapping[str, str | os.PathLike[str]] | None = None,
 ) -> dict[str, Any]:
     """Build a vehicle, its drag and its water from an SDF file (Gazebo) or a URDF.
 
@@ -53,6 +55,8 @@ def from_sdf(
         water_density: Density of the water [kg/m3]; by default that of the world or of a plugin, else 1000.
         center_of_buoyancy: Position (3,) [m] in the main link's axes (z up), in place of that of the shapes.
         gravity: Acceleration of free fall [m/s2]; by default the world's, else 9.80665.
+        include: SDF files (path or text) by the <name>, the <uri> or its last part, that stand in the place of <include>
+            elements with their plugins; by default none: what the file names is never opened by itself.
 
     Returns:
         The tables "vehicle", "environment" and "terms" of a scene file. Without a shape the vehicle is neutral.
@@ -62,7 +66,10 @@ def from_sdf(
             template; the message lists every fault.
     """
     faults = Faults()
-    read = read_model(faults, parse_xml(source, "SDF"), model, link)
+    root = parse_xml(source, "SDF")
+    if include is not None:
+        put_in_place(root, include)
+    read = read_model(faults, root, model, link)
     if world is not None:
         read.water = read_water(faults, read.warnings, world_of(parse_xml(world, "world")))
     refuse_empty(faults, read)
@@ -95,6 +102,9 @@ def add_hydrodynamics(
             problem, remedy = "and the plugin's xDotU ... both give added mass", "keep one, or set disable_added_mass"
             faults.add(f"{body_link.name} <fluid_added_mass>", "...", problem, remedy)
         add_to(faults, body, hydrodynamics, main.pose.inverse().then(body_link.pose))
+    current = shared(faults, "default_current", [each.current for each in plugins], "keep one of them in the file")
+    if current is not None:
+        body.current = current
 
 
 def refuse_empty(faults: Faults, read: RobotModel) -> None:
@@ -163,8 +173,10 @@ def together(read: RobotModel, main: Link) -> list[str]:
 
 def set_water(faults: Faults, read: RobotModel, density: float | None, gravity: float | None) -> None:
     """Set density [kg/m3] and gravity [m/s2] of the model: as given, else the world's, else a plugin's, else the default."""
-    named = [each.density for each in read.hydrodynamics if each.density is not None]
-    density = next(x for x in (density, read.water.density, *named, GAZEBO_DENSITY) if x is not None)
+    density = read.water.density if density is None else density
+    if density is None:
+        density = shared(faults, "water_density", [each.density for each in read.hydrodynamics], "pass water_density=")
+    density = GAZEBO_DENSITY if density is None else density
     gravity = next(x for x in (gravity, read.water.gravity, STANDARD_GRAVITY) if x is not None)
     read.water.density = faults.positive("water_density", density, "kg/m3")
     read.water.gravity = faults.number("gravity", gravity, "m/s2", least=0.0)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common import yaml_text
 from lgvi_warp.common.arguments import names_of
-from lgvi_warp.common.errors import Faults, SceneError, closest
+from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
 from lgvi_warp.vehicles import fossen
 from lgvi_warp.vehicles.plugins import by_diagonal
 
@@ -24,6 +25,7 @@ _ALIASES = {
     "linear": ("linear_damping", "linear_drag", "damping_linear"),
     "forward": ("linear_damping_forward_speed",),
     "quadratic": ("quadratic_damping", "quad_damping", "quadratic_drag", "damping_quadratic"),
+    "mass_matrix": ("mass_matrix", "mass_inertia_matrix", "rigid_body_mass_matrix", "M_RB"),
     "volume": ("volume",),
     "buoyancy": ("buoyancy",),
     "weight": ("weight",),
@@ -45,13 +47,15 @@ def from_yaml(
     matrix_axes: str = "frd",
     quadratic: str = "diagonal",
     ignore: Iterable[str] = (),
+    table: str | Iterable[str] | None = None,
     **given: Any,
 ) -> dict[str, Any]:
     """Build a vehicle, its drag and its water from a YAML file of a robotics package (uuv_simulator, Plankton).
 
     Keys, at the top or one table below:
 
-    * mass; inertia (3, 3x3 or ixx ...) about the centre of gravity; cog, cob;
+    * mass; inertia (3, 3x3 or ixx ...) about the centre of gravity; cog, cob; or mass_matrix (6x6 or 6), that of the
+      rigid body about the origin of the axes;
     * volume (with density), buoyancy or neutrally_buoyant;
     * added_mass (6x6 or 6); linear_damping, linear_damping_forward_speed and quadratic_damping (6 or 6x6), as
       derivatives or magnitudes; or a map `coefficients` of Fossen's names.
@@ -66,6 +70,8 @@ def from_yaml(
         quadratic: What a 6x6 matrix of quadratic damping stands for: its "diagonal" (as in uuv_simulator; default), or
             "full" for the whole matrix.
         ignore: Keys to leave out; other unknown keys are refused. By default none.
+        table: Path in the file to the table that is read, such as "vehicle.dynamics", or a list of its keys; by default all of
+            the file.
         **given: Values by key (mass=..., density=...) that add to the file's or replace them.
 
     Returns:
@@ -86,9 +92,13 @@ def from_yaml(
     for key, value in (("position_axes", position_axes), ("matrix_axes", matrix_axes)):
         faults.choice(key, value, ("flu", "frd"))
     ignore = set(names_of("ignore", ignore))
-    read = by_meaning(faults, parse_yaml(source), ignore) | by_meaning(faults, given, set())
+    content = table_of(parse_yaml(source), table)
+    told: list[Any] = []
+    read = by_meaning(faults, content, ignore, told) | by_meaning(faults, given, set(), told)
     positions = fossen.HALF_TURN if position_axes == "flu" else np.ones(3)
     matrices = fossen.HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)
+    if "mass_matrix" in read:
+        add_rigid_body(faults, read, matrices, positions)
     body = yaml_body(faults, read, positions)
     for name in ("added_mass", "linear", "forward", "quadratic"):
         value = matrices[:, None] * matrix_6(faults, name, read.get(name)) * matrices
@@ -113,8 +123,46 @@ def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
     return content
 
 
-def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> dict[str, Any]:
-    """Sort values by what their keys mean: aliases resolved, tables opened, Fossen's names gathered."""
+def table_of(content: Mapping[str, Any], path: Any) -> Mapping[str, Any]:
+    """The table at a path in a file, or all of it."""
+    if path is None:
+        return content
+    keys = [path] if isinstance(path, str) and path in content else path.split(".") if isinstance(path, str) else path
+    for key in names_of("table", keys):
+        inner = content.get(key)
+        if not isinstance(inner, Mapping):
+            tables = [str(name) for name, value in content.items() if isinstance(value, Mapping)]
+            raise refusal("table", key, "is no table of the file", closest(key, tables) if tables else "leave it out")
+        content = inner
+    return content
+
+
+def add_rigid_body(faults: Faults, read: dict[str, Any], matrices: np.ndarray, positions: np.ndarray) -> None:
+    """Add mass, inertia and centre of gravity of a mass matrix about the origin of the axes to those of a file.
+
+    matrices (6,), positions (3,): signs that turn its axes, and those of positions, into x ahead, y to starboard, z down.
+    """
+    value = read["mass_matrix"]
+    for key in {"mass", "inertia", "center_of_gravity"} & set(read):
+        faults.add(key, read[key], "is given besides mass_matrix", "keep one of them")
+    M = matrices[:, None] * matrix_6(faults, "mass_matrix", value) * matrices
+    mass = float(M[0, 0])
+    offset = M[3:, :3] / (mass or 1.0)
+    center = np.array([offset[2, 1], offset[0, 2], offset[1, 0]])
+    cross = np.cross(np.eye(3), center)
+    rigid = np.block([[mass * np.eye(3), -mass * cross], [mass * cross, M[3:, 3:]]])
+    if not np.allclose(M, rigid, rtol=0.0, atol=1e-9 * np.abs(M).max(initial=1e-300)):
+        remedy = "give mass, inertia, cog and added_mass: with added mass in it, it cannot be taken apart"
+        faults.add("mass_matrix", value, "is not that of a rigid body, m on its diagonal", remedy)
+    inertia = positions[:, None] * (M[3:, 3:] + mass * cross @ cross) * positions
+    read |= {"mass": mass, "inertia": inertia.tolist(), "center_of_gravity": (positions * center).tolist()}
+
+
+def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str], told: list[Any]) -> dict[str, Any]:
+    """Sort values by what their keys mean: aliases resolved, tables opened, Fossen's names gathered.
+
+    told: Unknown keys so far.
+    """
     meanings = {alias: name for name, aliases in _ALIASES.items() for alias in aliases}
     read: dict[str, Any] = {}
     for key, value in content.items():
@@ -130,10 +178,14 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> 
         elif isinstance(key, str) and fossen.read_name(key):
             read.setdefault("coefficients", {})[key] = value
         elif isinstance(value, Mapping):
-            read |= by_meaning(faults, value, ignore)
+            read |= by_meaning(faults, value, ignore, told)
         else:
-            remedy = f"{closest(key, meanings)}; or name it in ignore="
-            faults.add(str(key), value, "is an unknown key", remedy)
+            near = difflib.get_close_matches(str(key), meanings, 1)
+            remedy = f"did you mean {near[0]!r}?; or name it in ignore=" if near else "name it in ignore="
+            # All that is known, once.
+            every = f"known: {', '.join(meanings)}; or name it in ignore=, or the table that is meant in table="
+            faults.add(str(key), value, "is an unknown key", remedy if told else every)
+            told.append(key)
     return read
 
 

@@ -16,7 +16,7 @@ from lgvi_warp.common import machine
 from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.files import write_text
 from lgvi_warp.common.status import failed
-from lgvi_warp.common.tables import write_csv
+from lgvi_warp.common.tables import markdown, write_csv
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.result import Result
 from lgvi_warp.statistics.estimates import paired
@@ -274,7 +274,10 @@ class Sweep(SweepTable):
             tables["rare"] = rare_rows(self)
             tables["rare_comparison"] = [row.row() for row in rare_against_baseline(self)]
         files = [write_csv(rows, target / f"{name}.csv", target) for name, rows in tables.items()]
-        texts = {"sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1), "summary.md": str(self)}
+        texts = {
+            "sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1),
+            "summary.md": markdown(str(self)),
+        }
         return files + [write_text(target / name, text, target) for name, text in texts.items()]
 
     def __str__(self) -> str:

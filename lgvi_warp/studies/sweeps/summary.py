@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.errors import printable
 from lgvi_warp.common.status import Status
 from lgvi_warp.results.outcomes import RISEN
 from lgvi_warp.studies.sweeps.comparisons import PairedComparison
@@ -43,7 +44,8 @@ def summary(sweep: Sweep) -> str:
     if sweep.rares is not None:
         at = len(lines) if brief else lines.index("## What failures go with") - 1
         lines[at:at] = ["", "## Rare failures", "", *rare_lines(sweep)]
-    return "\n".join([*lines, *_above_surface(sweep)]) + "\n"
+    # A name of a file may hold line ends.
+    return "\n".join(map(printable, [*lines, *_above_surface(sweep)])) + "\n"
 
 
 def _above_surface(sweep: Sweep) -> list[str]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from lgvi_warp import plots
 from lgvi_warp.common.arguments import file_path, path_of, result_of
-from lgvi_warp.common.errors import NothingToDraw, SceneError
+from lgvi_warp.common.errors import NothingToDraw, SceneError, printable
 from lgvi_warp.common.files import place_of, write_text
 from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_bytes, file_json, file_text
 from lgvi_warp.common.safe_files import inside
@@ -90,7 +90,7 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
     else:
         run = result_of(result)
         name, parts = name_of(run.provenance), [_paragraph(f"Written on {_day(time.time())}."), *_of_run(run)]
-    heading = html.escape(name)
+    heading = _plain(name)
     head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{heading}</title><style>{STYLE}</style></head>'
     return write_text(path, f"{head}<body><h1>{heading}</h1>{''.join(parts)}</body></html>\n")
 
@@ -173,7 +173,7 @@ def _outcome_table(result: Result) -> str:
     for code in outcomes(result):
         number = counts[code.name.lower()]
         color = OUTCOME_STYLES[code].color
-        mark = f'<span class="outcome" style="background:{color}"></span> {html.escape(code.name.lower())}'
+        mark = f'<span class="outcome" style="background:{color}"></span> {_plain(code.name.lower())}'
         share = f"{100.0 * number / result.members:.3g} %"
         rows.append((_Html(mark), f"{number:,}", share, outcome_text(result, code)))
     return _table(("outcome", "members", "share", "meaning and remedy"), rows)
@@ -211,7 +211,7 @@ def inline(draw: Callable[..., Any], result: Result) -> str:
 
 def _pixels(path: Path) -> str:
     code = base64.b64encode(file_bytes(path, "picture")).decode()
-    return f'<img alt="{html.escape(path.stem)}" src="data:image/png;base64,{code}">'
+    return f'<img alt="{_plain(path.stem)}" src="data:image/png;base64,{code}">'
 
 
 def _settings(result: Result) -> Iterator[tuple[str, str]]:
@@ -285,28 +285,33 @@ class _Html(str):
     __slots__ = ()
 
 
+def _plain(text: str) -> str:
+    """A text in HTML, without control characters but for line ends."""
+    return html.escape(printable(text, "\n"))
+
+
 def _escaped(value: str) -> str:
-    return value if isinstance(value, _Html) else html.escape(value)
+    return value if isinstance(value, _Html) else _plain(value)
 
 
 def _section(heading: str, content: str) -> str:
-    return f"<h2>{html.escape(heading)}</h2>{content}"
+    return f"<h2>{_plain(heading)}</h2>{content}"
 
 
 def _paragraph(text: str) -> str:
-    return f"<p>{html.escape(text)}</p>" if text else ""
+    return f"<p>{_plain(text)}</p>" if text else ""
 
 
 def _preformatted(text: str) -> str:
-    return f"<pre>{html.escape(text)}</pre>"
+    return f"<pre>{_plain(text)}</pre>"
 
 
 def _list(items: Sequence[str]) -> str:
-    return f"<ul>{''.join(f'<li>{html.escape(item)}</li>' for item in items)}</ul>"
+    return f"<ul>{''.join(f'<li>{_plain(item)}</li>' for item in items)}</ul>"
 
 
 def _table(head: Sequence[str], rows: Iterator[Sequence[str]] | Sequence[Sequence[str]]) -> str:
     """A table; head: titles of its columns, none for a table of names and values."""
-    titles = "".join(f"<th>{html.escape(text)}</th>" for text in head)
+    titles = "".join(f"<th>{_plain(text)}</th>" for text in head)
     body = "".join(f"<tr>{''.join(f'<td>{_escaped(text)}</td>' for text in row)}</tr>" for row in rows)
     return f"<table>{f'<tr>{titles}</tr>' if titles else ''}{body}</table>"

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import textwrap
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -75,8 +76,11 @@ def save_figure(figure: Any, path: FilePath, dpi: int | None = None) -> Path:
     dpi = dpi or (DPI if STYLE.get() is None else PRINTED_DPI)
     of_kind("figure", figure, "savefig", "a figure of Matplotlib", "give one, as axes.figure")
     target = file_path("path", path)
-    with durable.placed(target) as beside:
-        figure.savefig(beside, dpi=dpi, format=target.suffix.removeprefix(".") or "png")
+    with durable.placed(target) as beside, durable.new_file(beside) as file:
+        # Drawn in memory: on a full disk a library would raise what it likes, and leave the file open.
+        drawn = io.BytesIO()
+        figure.savefig(drawn, dpi=dpi, format=target.suffix.removeprefix(".") or "png")
+        file.write(drawn.getbuffer())
     return target
 
 

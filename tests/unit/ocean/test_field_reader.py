@@ -460,7 +460,7 @@ def test_a_gap_in_time_changes_no_field_and_is_told(hours):
 
 
 def test_a_gap_between_times_that_have_no_common_interval_is_refused():
-    with pytest.raises(lw.SceneError, match="is a gap between times .* by ds.interp"):
+    with pytest.raises(lw.SceneError, match=r"is a gap among times .* by ds.interp"):
         read(data.cmems(data.still, TIDE, hours=[0.0, 1.0, 2.1234567, 3.0, 100.7654321]))
 
 

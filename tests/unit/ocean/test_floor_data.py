@@ -160,12 +160,14 @@ def test_a_variable_is_a_depth_or_an_elevation_by_what_says_so(attributes, asked
             lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=asked, **known).depth, depth
         )
     else:
-        with pytest.raises(lw.SceneError, match="dry land, .*; give positive = 'up' if the numbers are elevations"):
+        with pytest.raises(lw.SceneError, match=r"dry land, .*; give positive = 'up' if the numbers are elevations"):
             lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=asked, **known)
 
 
 def test_a_variable_that_nothing_explains_needs_a_word():
-    with pytest.raises(lw.SceneError, match="variable = 'Band1': says neither .*; give positive = 'up' for elevations"):
+    with pytest.raises(
+        lw.SceneError, match=r"variable = 'Band1': says neither .*; give positive = 'up' for elevations"
+    ):
         lw.events.Floor.from_file(band(), ORIGIN, variable="Band1")
 
 

@@ -63,8 +63,8 @@ class Heights:
     def take(self, rows: np.ndarray | None) -> None:
         """Go on from what another run left; None: nothing."""
         count = len(self._above)
-        self._height, self._step, above = np.zeros((3, count)) if rows is None else rows.T
-        self._above = above != 0.0
+        height, step, above = np.zeros((3, count)) if rows is None else rows.T
+        self._height, self._step, self._above = height, step.astype(np.int64), above != 0.0
 
 
 def of_states(packets: Any) -> np.ndarray:

@@ -430,7 +430,7 @@ def test_a_loop_within_a_dead_band_moves_nothing():
 
 @pytest.mark.parametrize("by", ["eigenvalues", "runs"])
 def test_noise_is_taken_as_its_mean_and_faults_as_off(by):
-    """A fault whose time varies, too: the margins are those of the loop without them, to the bit, and say what they leave out."""
+    """A fault whose time varies, too: margins are those of the loop without them, to the bit, and say what they leave out."""
     whole = scene()
     words = {"noise": 0.1, "drift": 0.01} | ({"quantum": 0.02} if by == "eigenvalues" else {})
     sensor, clean = (Sensor(of="heading", bias=0.05, **more) for more in (words, {}))

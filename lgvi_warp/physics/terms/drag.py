@@ -172,7 +172,7 @@ class DragMatrix(Term):
         remedy = "drag opposes motion: positive on the diagonal (minus Fossen's X_u, X_u|u| ...), small beside it"
         for kind in ("linear", "quadratic"):
             matrix = getattr(self, kind)
-            (bad,), (velocity,) = _creates_energy(matrix[None], kind == "quadratic")
+            (bad,), (velocity,) = creates_energy(matrix[None], kind == "quadratic")
             if bad:
                 faults.add(kind, matrix, f"creates energy at the velocity {np.round(velocity, 3).tolist()}", remedy)
 
@@ -183,7 +183,7 @@ class DragMatrix(Term):
             if np.array_equal(numbers[kind], getattr(self, kind)[None]):
                 continue  # those of the scene, which `check` let through
             matrices = np.nan_to_num(numbers[kind]) if bad[kind].any() else numbers[kind]
-            bad[kind] = bad[kind] | _creates_energy(matrices, kind == "quadratic")[0]
+            bad[kind] = bad[kind] | creates_energy(matrices, kind == "quadratic")[0]
         return bad
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
@@ -205,7 +205,7 @@ class DragMatrix(Term):
 BESIDE = ~np.eye(6, dtype=bool)
 
 
-def _creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
+def creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
     """Which of the matrices (n, 6, 6) would speed a vehicle up, and the worst velocity (n, 6) for each.
 
     The test is nu.D nu: for linear matrices by eigenvalues, for quadratic ones by descents from the worst of many directions.
@@ -246,7 +246,7 @@ def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
 
 
 def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
-    """As `_creates_energy`, for matrices that no inequality decides."""
+    """As `creates_energy`, for matrices that no inequality decides."""
     if not quadratic:
         limit = -1e-9 * np.abs(matrices).max(axis=(1, 2))
         # Divided by a power of two, which keeps all digits, lest two of the largest numbers add up to none.

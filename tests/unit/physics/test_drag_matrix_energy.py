@@ -6,7 +6,7 @@ import pytest
 from scipy.optimize import minimize
 
 import lgvi_warp as lw
-from lgvi_warp.physics.terms.drag import _creates_energy
+from lgvi_warp.physics.terms.drag import creates_energy
 
 
 def least_power(matrix, size, rng, starts):
@@ -35,7 +35,7 @@ def test_the_least_power_decides(seeds):
     for seed in seeds:
         rng = np.random.default_rng(seed)
         matrix, size = drawn(rng)
-        (bad,), (velocity,) = _creates_energy(matrix[None], True)
+        (bad,), (velocity,) = creates_energy(matrix[None], True)
         least, largest = least_power(matrix, size, rng, 30)
         if abs(least) > 1e-6 * largest:
             assert bad == (least < 0.0), (seed, least)
@@ -51,17 +51,17 @@ def test_units_do_not_decide():
         matrix, _ = drawn(rng)
         size = 10.0 ** rng.uniform(-3.0, 3.0, 6)
         other = matrix * size[:, None] * size**2
-        assert _creates_energy(matrix[None], True)[0] == _creates_energy(other[None], True)[0]
+        assert creates_energy(matrix[None], True)[0] == creates_energy(other[None], True)[0]
 
 
 def test_members_are_searched_as_one_is():
     matrices = np.array([drawn(np.random.default_rng(seed))[0] for seed in range(60)])
-    together = _creates_energy(matrices, True)[0]
-    assert together.tolist() == [bool(_creates_energy(matrix[None], True)[0][0]) for matrix in matrices]
+    together = creates_energy(matrices, True)[0]
+    assert together.tolist() == [bool(creates_energy(matrix[None], True)[0][0]) for matrix in matrices]
 
 
 def test_published_matrices_pass():
     for name in lw.vehicles.names():
         for term in lw.Scene.named(name).terms:
             if term.type == "drag_matrix":
-                assert not _creates_energy(term.quadratic[None], True)[0].any()
+                assert not creates_energy(term.quadratic[None], True)[0].any()

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.prepared import Prepared, scene_value
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.physics.fields import FIELDS

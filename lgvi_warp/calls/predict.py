@@ -18,8 +18,8 @@ import numpy as np
 from lgvi_warp.calls.sizes import Sizes, sizes, with_ends
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.near import near_names
 from lgvi_warp.engine.block import Block, blocks, parts
 from lgvi_warp.engine.executors.threads import Threads

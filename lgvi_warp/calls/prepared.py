@@ -12,9 +12,8 @@ import numpy as np
 
 from lgvi_warp.calls.noise import DRAWN, GIVEN, NoiseOfCalls, checked_indices
 from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, outputs, samples_for, statistics_for, values_of
-from lgvi_warp.common.arguments import flag
+from lgvi_warp.common.arguments import explained, flag
 from lgvi_warp.common.errors import Faults, SceneError, refusal
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress

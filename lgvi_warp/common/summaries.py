@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.explained import explained
+from lgvi_warp.common.arguments import explained
 
 # Most lines of a text, most characters of a line, and most entries of an array that are written out.
 LINES, WIDTH, ENTRIES = 20, 96, 6

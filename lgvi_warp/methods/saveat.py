@@ -24,7 +24,8 @@ class SaveAt:
 
     Args:
         every: Interval of samples [s], from the start on; default None, the end only.
-        at: Rising times of samples [s], >= 0; default None. Give `every` or `at`, not both.
+        at: Rising times of samples [s], >= 0, in any sequence; default None. Give `every` or `at`, not both. Times are
+            whole numbers of steps within 1e-9 of a step, or within the precision of float32 where they are of float32.
         fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. A field that is left out
             takes no memory. In a scene with a controller also its signals: "command", "actuator", "demand", "unmet",
             "exerted", "measured_..." and "reference_..." (see lw.Result); in one with a term `lw.terms.EnergyUse` also "energy_used".

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.declared import array, positive, read, real
 from lgvi_warp.common.errors import Faults, refusal
-from lgvi_warp.common.explained import explained
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import PLACE_UNIT, TABLE
 

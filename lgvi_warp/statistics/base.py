@@ -17,9 +17,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common import registry
-from lgvi_warp.common.arguments import items_of
+from lgvi_warp.common.arguments import explained, items_of
 from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.real_numbers import settle, settles_first
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates import intervals

@@ -63,7 +63,8 @@ def export(
         to: The file. Or "netcdf", all that a store holds with its arrays as they are, or "parquet": for these `out` is the
             file.
         out: The file for these two words; by default beside the run.
-        members: Indices or a slice of the members; by default all whose samples were kept. For maps and MCAP 1,000 at most.
+        members: Indices or a slice of the members, or a mask of all; by default all whose samples were kept. For maps and MCAP
+            1,000 at most.
         origin: Latitude and longitude of the axes' origin [deg]; by default that of the run's environment, if it has one.
         start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; by default that of the run's environment.
         overwrite: Whether to replace a file that exists; by default it is kept, and the export refused.

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.arguments import explained, listed
 from lgvi_warp.common.declared import read, real, word
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.explained import explained
 from lgvi_warp.control.signals import SAVED
 from lgvi_warp.store.arrays import whole_array
 from lgvi_warp.store.layout import MEMBER, parameter_units

@@ -14,9 +14,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.common.arguments import path_of
+from lgvi_warp.common.arguments import explained, path_of
 from lgvi_warp.common.errors import among
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.files import write_text
 from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_json
 from lgvi_warp.common.tables import write_csv

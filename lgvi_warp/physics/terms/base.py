@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.common import names, registry
-from lgvi_warp.common.arguments import items_of
+from lgvi_warp.common.arguments import explained, items_of
 from lgvi_warp.common.declared import read
 from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.real_numbers import settle, settles_first
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.notation import repeated

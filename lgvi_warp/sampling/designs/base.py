@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common import registry
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.real_numbers import is_whole, settles_first
 from lgvi_warp.sampling.designs.space import Space
 

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common import registry
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.random import FAR
 from lgvi_warp.common.real_numbers import settle, settles_first
 

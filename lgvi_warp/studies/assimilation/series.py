@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.times import rows_at
 from lgvi_warp.results.quantities import OfResult, quantities
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.arguments import flag
+from lgvi_warp.common.arguments import explained, flag
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.near import near_names
 from lgvi_warp.control.dvl import DVL
 from lgvi_warp.control.error_state_filter import ErrorStateFilter

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.arguments import of_kind
+from lgvi_warp.common.arguments import explained, of_kind
 from lgvi_warp.common.errors import Faults, SceneError, refusal
-from lgvi_warp.common.explained import explained
 from lgvi_warp.control.state_feedback import StateFeedback
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS

@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults, refusal
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.near import near_names
 from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.methods.method import Method

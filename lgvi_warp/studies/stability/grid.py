@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.arguments import items_of, whole_number
+from lgvi_warp.common.arguments import explained, items_of, whole_number
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.common.explained import explained
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics import rates as member_rates
 from lgvi_warp.physics.fields import FIELDS, TABLE

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import MissingExtra, closest, refusal
-from lgvi_warp.common.explained import explained
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.scene.columns import as_given
 from lgvi_warp.studies.sweeps.rare import RareFailures

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.common.explained import explained
+from lgvi_warp.common.arguments import explained
 from tests.support import odd_calls
 from tests.unit.calls.test_odd_calls import raw_of
 from tests.unit.cli.test_terminal import region, sobol

@@ -153,7 +153,9 @@ def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
 class LateBar:
     """A bar that begins where a call turns out to take long: from its pace, or where that long is over."""
 
-    def __init__(self, begin: Callable[[], Progress | NotebookBar] = bar, clock: Callable[[], float] = time.perf_counter):
+    def __init__(
+        self, begin: Callable[[], Progress | NotebookBar] = bar, clock: Callable[[], float] = time.perf_counter
+    ):
         self._begin, self._clock, self._start = begin, clock, clock()
         self._bar: Progress | NotebookBar | None = None
 

@@ -195,8 +195,8 @@ def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
         )
         remedy = (
             'give by="splitting", which takes no draws as numbers; run plain members, which bound the event by 3 / n; leave '
-            "the noise out, for chains over the numbers that vary alone, and draw it afresh for the members found; or ask for a "
-            "larger relative_error"
+            "the noise out, for chains over the numbers that vary alone, and draw it afresh for the members found; or ask "
+            "for a larger relative_error"
         )
         raise refusal("fleet", "...", problem, remedy)
     if own.draws < MANY_DRAWS:

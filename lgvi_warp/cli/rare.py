@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 from typing import Any
 
 from lgvi_warp.cli.output import Part
@@ -65,9 +66,10 @@ def rare(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -
     out = folder(chosen, "_rare")
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     with progress_bar(chosen.quiet) as progress:
-        found = (study or rare_event)(
+        # Quiet, a terminal is shown nothing however long it takes.
+        found = (study or (inspect.unwrap(rare_event) if chosen.quiet else rare_event))(
             scene, chosen.when, relative_error=chosen.error, by=chosen.by, cheaper=cheaper, looks=chosen.looks,
-            failed=chosen.failed, most=chosen.most, seed=int(seed), threads=chosen.threads, progress=progress or False,
+            failed=chosen.failed, most=chosen.most, seed=int(seed), threads=chosen.threads, progress=progress,
         )  # fmt: skip
     with progress_bar(chosen.quiet, "writing"):
         written = Written(found.save(out))

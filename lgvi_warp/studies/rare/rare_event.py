@@ -197,9 +197,9 @@ def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
             f"{8e-9 * level * own.d:,.1f} GB for each copy"
         )
         remedy = (
-            'give by="splitting", which takes no draws as numbers; run plain members, which bound the event by 3 / n; leave the '
-            "noise out, for chains over the numbers that vary alone, and draw it afresh for the members found; or ask for a "
-            "larger relative_error"
+            'give by="splitting", which takes no draws as numbers; run plain members, which bound the event by 3 / n; leave '
+            "the noise out, for chains over the numbers that vary alone, and draw it afresh for the members found; or ask "
+            "for a larger relative_error"
         )
         raise refusal("fleet", "...", problem, remedy)
     if own.draws < MANY_DRAWS:

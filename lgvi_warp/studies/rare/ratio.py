@@ -79,10 +79,20 @@ def members_of(found: RareEvent) -> FailingMembers:
             u, weights = u[np.sort(rng.choice(len(u), most, p=weights))], np.full(most, 1.0 / most)
         return FailingMembers(u, weights, np.arange(len(u)), 1.0)
     runs = found.runs
+    if len(runs[0].parts):  # members that several conditions count
+        u, weights, chains = np.concatenate([found.normals, found.draws], axis=1), found.weights, found.chains
+        return _whole_chains(u, weights, np.unique(chains, return_inverse=True)[1], most, rng)
     first = np.cumsum([0, *(int(run.failing_chains.max()) + 1 for run in runs)])
     chains = np.concatenate([run.failing_chains + start for run, start in zip(runs, first, strict=False)])
     u = np.concatenate([run.failing for run in runs])
     weights = np.concatenate([np.full(len(run.failing), run.size * run.probability / len(run.failing)) for run in runs])
+    return _whole_chains(u, weights, chains, most, rng)
+
+
+def _whole_chains(
+    u: np.ndarray, weights: np.ndarray, chains: np.ndarray, most: int, rng: np.random.Generator
+) -> FailingMembers:
+    """Some of the members (m, d), about so many at most: whole chains."""
     order = rng.permutation(np.unique(chains))
     kept = np.isin(chains, order[: max(2, int(np.searchsorted(np.cumsum(np.bincount(chains)[order]), most)))])
     chains = np.unique(chains[kept], return_inverse=True)[1]

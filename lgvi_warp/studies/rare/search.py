@@ -378,7 +378,8 @@ class RareSearch:
             if around is not None and len(missed):
                 inside = ~around.apart(found.failing)
             places = [*(run.failing for run in runs), *[missed] * bool(len(missed))]
-            reasons = doubts(found, mixture, *(chains or (None, 0.0)), places, self.relative_error, inside)
+            known, error = chains or (None, 0.0)
+            reasons = doubts(found, mixture, known, error, places, self.relative_error, inside)
             if beyond(seen, found.probability, found.spread):
                 reasons.append(f"a second look gives {seen.probability:.2e}")
             self._beside = 0.0, 0.0
@@ -391,11 +392,11 @@ class RareSearch:
                 return self._found("importance", told, members, runs)
             if attempt + 1 < TRIES:
                 # Beside the members of the chains, those that were drawn, as often as they weigh.
-                logs = [
+                densities = [
                     math.log(share) + each.log_density(found.failing)
                     for share, each in zip(portions(shares), fits, strict=True)
                 ]
-                belongs = np.argmax(logs, axis=0)
+                belongs = np.argmax(densities, axis=0)
                 shares = np.bincount(belongs, found.weights, len(points))
                 grouped = [self._with_drawn(each, found, belongs == i, rng) for i, each in enumerate(points)]
                 fits = [fitted(each, rng) for each in grouped]

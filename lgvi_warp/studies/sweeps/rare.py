@@ -48,7 +48,12 @@ class RareFailure:
         if found.failing is not None:
             rows = _places(numbers, found.normals)
             failing = Table(values={name: values[rows] for name, values in found.failing.own_values().items()})
-        return cls(replace(found, failing=failing, normals=numbers, draws=draws, weights=members.weights), members)
+        return cls(
+            replace(
+                found, failing=failing, normals=numbers, draws=draws, weights=members.weights, chains=members.chains
+            ),
+            members,
+        )
 
 
 def _places(u: np.ndarray, among: np.ndarray) -> np.ndarray:
@@ -188,7 +193,9 @@ class RareFailures:
             return
         # No file holds times: they differ from run to run, where all else is the same to the byte.
         nothing = np.zeros((0, 0))
-        small = replace(answer.found, normals=nothing, draws=nothing, seconds=0.0, plain_seconds=0.0)
+        small = replace(
+            answer.found, normals=nothing, draws=nothing, chains=np.zeros(0, int), seconds=0.0, plain_seconds=0.0
+        )
         words = np.frombuffer(json.dumps({"key": key, "found": small.to_dict()}).encode(), np.uint8)
         place_of(self._path(key), self.folder).parent.mkdir(parents=True, exist_ok=True)
         write_npz(self._path(key), {"words": words, "u": answer.members.u, "weights": answer.members.weights,
@@ -206,7 +213,9 @@ class RareFailures:
             if words["key"] != key or not len(u) == len(members.weights) == len(members.chains):
                 return None
             count = len(words["found"]["moved"])
-            found = RareEvent.from_dict(words["found"] | {"normals": u[:, :count], "draws": u[:, count:]})
+            found = RareEvent.from_dict(
+                words["found"] | {"normals": u[:, :count], "draws": u[:, count:]} | {"chains": members.chains}
+            )
             found = replace(found, seconds=np.nan, plain_seconds=np.nan)
             return RareFailure(found, members)
         except (OSError, ValueError, KeyError, TypeError):

@@ -39,7 +39,8 @@ def rare_rows(sweep: SweepTable) -> list[dict[str, Any]]:
                 array = np.asarray(value)
                 row |= {f"likeliest {name}{list(index) if index else ''}": float(array[index])
                         for index in np.ndindex(array.shape)}  # fmt: skip
-            row |= {f"moved {name}": shift for name, shift in {**found.moved, **found.noise_moved}.items()}
+            row |= {f"moved {name}": shift for name, shift in found.moved.items()}
+            row |= {f"z of noise {name}": score for name, score in found.noise_moved.items()}
         rows.append(row)
     return rows
 

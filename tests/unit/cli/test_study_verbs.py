@@ -349,3 +349,16 @@ def test_arguments_of_derivatives(tmp_path, capsys):
     assert lw.studies.Derivatives.load(tmp_path / "derivatives.json").undefined == slopes.undefined
     content = document([*verb], capsys, study=study)["content"]["derivatives"]
     assert content["jacobian"] == [[None]]
+
+
+@pytest.mark.parametrize("words, remedy", [
+    ("peak depth over 12", 'write "peak depth above 12"'),
+    ("max(depth) > 4 m", 'write "max(depth) above 4"'),
+    ("depth under", 'write "depth below 12.0"'),
+    ("depth", 'write "depth above 12.0"'),
+    ("max(dpeth) above 3", "did you mean 'depth'?"),
+    ("dpeth", "is neither a quantity nor an event"),
+])  # fmt: skip
+def test_words_of_a_rare_event_are_read_before_anything_runs(words, remedy, capsys):
+    assert main(["rare", str(PAPER), "--when", words]) == 2
+    assert remedy in capsys.readouterr().err

@@ -13,7 +13,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.common import progress as module
-from lgvi_warp.common.progress import Progress, callback, shows_progress
+from lgvi_warp.common.progress import LateBar, Progress, callback, shows_if_long, shows_progress
 from tests.support.refusals import says
 
 
@@ -203,3 +203,40 @@ def test_every_long_call_takes_true(call):
     with pytest.raises(lw.SceneError, match="progress = 7: is no function"):
         call(None, *[None] * (2 if call in (lw.tune_gains, lw.worst_case) else call is lw.uq.evaluate),
              *[1.0] * (call is lw.suggest), progress=7)  # fmt: skip
+
+
+def test_a_bar_begins_late_where_a_call_takes_long():
+    for pace, begun in ((0.2, [0.5, 0.75]), (5.0, [])):  # 50 s and 2 s
+        now, shown = [0.0], []
+        late = LateBar(lambda shown=shown: Shown(shown), lambda now=now: now[0])
+        for fraction in (0.005, 0.5, 0.75):
+            now[0] = 10.0 * fraction / (0.1 * pace)
+            late(fraction)
+        late.close()
+        assert shown == [*begun, "closed"][: len(begun) + bool(begun)]
+
+
+class Shown:
+    """Keeps what a bar is told."""
+
+    def __init__(self, told):
+        self.told = told
+
+    def __call__(self, fraction):
+        self.told.append(fraction)
+
+    def close(self):
+        self.told.append("closed")
+
+
+def test_progress_is_shown_by_itself_on_a_terminal_alone(monkeypatch):
+    told = []
+    call = shows_if_long(lambda *, progress=None: told.append(progress))
+    call()
+    call(progress=False)
+    monkeypatch.setattr(module.sys, "stderr", types.SimpleNamespace(isatty=lambda: True))
+    call()
+    call(progress=False)
+    assert told[0] is None
+    assert told[1] is told[3] is False
+    assert isinstance(told[2], LateBar)

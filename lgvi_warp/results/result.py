@@ -70,9 +70,9 @@ class Result(Summarized):
             attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
             Signals of a controller, where SaveAt(fields=...) names them, are those after the look at each time: command and
             actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand, unmet and
-            exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth, _heading;
-            reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed. Of a filter
-            (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k, n, 6), nees, nis and nis_count
+            exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
+            _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed. Of a
+            filter (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k, n, 6), nees, nis, nis_count
             (k, n), innovation and innovation_sigma (k, n, 12). So is energy_used (k, n) [J], of a scene that accounts it.
         status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
         failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN where there

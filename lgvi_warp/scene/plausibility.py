@@ -177,7 +177,7 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
 
 
 def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for components that actuators cannot make, wanted quantities that no law reads, and actuators that nothing drives."""
+    """Look for components that actuators cannot make, wanted quantities that no law reads, and idle actuators."""
     controller = scene.controller
     if controller is None:
         return

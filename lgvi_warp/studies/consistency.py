@@ -61,7 +61,7 @@ class Consistency(Summarized):
 
     @property
     def verdict(self) -> str:
-        """ "consistent", "too sure" where errors or innovations are larger than the filter believes, or "too careful".
+        """One of "consistent", "too sure", with errors or innovations larger than believed, "too careful" and "unknown".
 
         By the p-values of both averages, of which each has to be at least half of 1 - level (Bonferroni).
         """

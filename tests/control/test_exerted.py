@@ -104,5 +104,6 @@ def test_energy_is_that_of_the_true_thrust(name, known):
     wrench = thrust @ np.hstack([thrusters.direction, lever])
     power = np.sum(wrench * np.hstack([found.velocity[:, 0], found.angular_velocity[:, 0]]), axis=1)
     (metric,) = found.statistics.values()
-    # Ticks are five steps apart: the trapezoidal rule between them is off by less than 1 %.
-    np.testing.assert_allclose(metric.value.item(), np.trapezoid(np.abs(power), dx=0.02), rtol=1e-2)
+    # The trapezoidal rule between ticks, five steps apart; it is off by 2 % at most, where the loop chatters.
+    np.testing.assert_allclose(metric.value.item(), np.trapezoid(np.abs(power[::5]), dx=0.1), rtol=1e-9)
+    np.testing.assert_allclose(metric.value.item(), np.trapezoid(np.abs(power), dx=0.02), rtol=3e-2)

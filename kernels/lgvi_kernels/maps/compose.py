@@ -20,7 +20,8 @@ def plays(law, role):
     """The function of a law's module for this role, or None.
 
     A role is the name of a function: "law", "damping", "flow", "evolve", "distance". "potential" and "force" are those of
-    "law" that follow from a potential, and those that do not; "matrix" is "damping" of a law that has no "push"; "law of actuators" and so on: of laws that report where they are.
+    "law" that follow from a potential, and those that do not; "matrix" is "damping" of a law that has no "push"; "law
+    of actuators" and so on: of laws that report where they are.
     """
     if role.endswith(OF_ACTUATORS):
         return plays(law, role.removesuffix(OF_ACTUATORS)) if hasattr(law, "report") else None

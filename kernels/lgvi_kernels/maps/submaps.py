@@ -157,8 +157,8 @@ def make_K(View, Wrench, Flow, law, evolve, flow, flow_varies, shifted, E, V, ac
     law: forces from position and time; evolve: laws that remember, half before and half after; flow: the water carries
     the vehicle, half before and half after, and where it varies in space or time also pushes it; shifted: the origin of
     the forces is not the user's; E: exact flow of drag, or V: velocity-dependent laws, between two half kicks. Order 2.
-    account: the energy used (see accounting.make_kick_account). late: how much later than the kick the middle of the time is that
-    laws remember, in lengths of the kick: half of one for a kick that opens the step, less a half for one that closes it.
+    account: the energy used (see accounting.make_kick_account). late: how much later than the kick the middle of the time
+    is that laws remember, in lengths of the kick: 0.5 for a kick that opens the step, -0.5 for one that closes it.
     """
     drifts, damped, forced = flow is not None, E is not None or V is not None, law is not None or flow_varies
     at_user_origin = make_at_user_origin(shifted)

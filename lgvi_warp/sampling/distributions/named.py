@@ -303,8 +303,9 @@ def from_dict(key: str, content: Any) -> Distribution:
     if foreign:
         return ScipyDistribution.from_table(key, kind, values)
     try:
-        # What stands in a factor is its distribution.
-        distribution: Distribution = KINDS[kind](values) if kind == "factor" else KINDS[kind](**values)
+        # What stands in a factor is its distribution, under its key `law` or by itself.
+        alone = kind == "factor" and list(values) != ["law"]
+        distribution: Distribution = KINDS[kind](values) if alone else KINDS[kind](**values)
         return distribution
     except SceneError as error:
         raise error.prefixed(f"{key}: ") from None

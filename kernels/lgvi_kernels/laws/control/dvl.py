@@ -114,7 +114,7 @@ def made(features):
 
     @wp.func
     def measure(y: Any, p: Any):
-        """Hand the beams on, or let y have the velocity that follows from three of them or four; else the last one, first 0."""
+        """Hand the beams on, or let y have the velocity that follows from three of them or four; else the last, first 0."""
         unity = ones(y.position.x)
         zero = unity - unity
         v = y.velocity + cross(y.angular_velocity, p.place)

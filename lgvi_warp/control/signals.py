@@ -35,7 +35,9 @@ _OF_ACTUATORS = (
 )
 # That of parts which solve a problem by iterations.
 UNCONVERGED = "unconverged"
-_OF_ITERATIONS = Field(UNCONVERGED, (), "1", "solutions by iterations that had not converged at their tick, since the start")
+_OF_ITERATIONS = Field(
+    UNCONVERGED, (), "1", "solutions by iterations that had not converged at their tick, since the start"
+)
 # Rows of a measurement and of a reference, as lgvi_kernels/advance/noting.py writes them.
 _VECTORS = {"position": 0, "attitude": 3}
 _MEASURED = _VECTORS | {"velocity": 12, "water_velocity": 15, "angular_velocity": 18, "depth": 2, "heading": 21}
@@ -120,9 +122,7 @@ def saved_fields(controller: Controller | None, accounted: bool = False) -> dict
         return fields
     absent = _absent_groups(controller)
     signals = {
-        name: signal.field
-        for name, signal in SIGNALS.items()
-        if name != ENERGY_USED and signal.group not in absent
+        name: signal.field for name, signal in SIGNALS.items() if name != ENERGY_USED and signal.group not in absent
     }
     channels = sum(count for _, count in controller.bus.commands.values())
     return fields | signals | {name: replace(signals[name], shape=(channels,)) for name in CHANNELS}

@@ -25,8 +25,8 @@ ARM = PRIORITIES + 12
 SOLUTION = ARM + 1
 EFFORTS = effort_rows
 ROWS = EFFORTS + 7
-# Scratch rows: the state of each channel (1, -1: at its limit ahead, astern; 0: free) and its goal; the demand, its error b, z,
-# c and the slopes, 6 each; the matrices L, E and M; orthonormal lines of the channels (6, channels).
+# Scratch rows: the state of each channel (1, -1: at its limit ahead, astern; 0: free) and its goal; the demand, its error b,
+# z, c and the slopes, 6 each; the matrices L, E and M; orthonormal lines of the channels (6, channels).
 VECTORS, MATRICES = 30, 108
 
 

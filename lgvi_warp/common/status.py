@@ -123,7 +123,7 @@ class StatusArray(np.ndarray):
 
 
 class Warnings(IntFlag):
-    """Signs that the step, the precision, a controller's iterations, a member's numbers or the water do not suit its motion, as bits.
+    """Signs that step, precision, a controller's iterations, a member's numbers or the water do not suit its motion, as bits.
 
     A warning stops nothing. Of two warnings, the higher bit is the more serious.
 

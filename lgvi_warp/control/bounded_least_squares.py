@@ -33,8 +33,8 @@ class BoundedLeastSquares(EffortAllocation):
         speed: Speed ahead [m/s] at which fins are judged; 1 by default.
         priorities: How much an error in X, Y, Z, K, M, N counts, (6,), above 0; 1 by default. [1, 1, 1, 10, 10, 10] makes
             moments before forces.
-        iterations: Largest number of steps of the active-set method at a tick; 100 by default. A run says in its messages where
-            a tick had not converged.
+        iterations: Largest number of steps of the active-set method at a tick; 100 by default. A run says in its messages
+            where a tick had not converged.
 
     Examples:
         >>> import lgvi_warp as lw

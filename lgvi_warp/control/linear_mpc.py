@@ -51,8 +51,8 @@ class LinearMPC(ControlLaw):
     + (u - u_s)^T R (u - u_s), and (x - x_s)^T P (x - x_s) at the end, least, with |u| up to `limit` and its rate up to
     `rate_limit`. The first of them is the demand; at the next tick it begins anew. Where the best inputs without limits keep
     these, they are taken, to round-off; else those within them are found by an interior-point method (Nocedal & Wright 2006,
-    algorithm 16.4), whose demand is right to 1e-6 of the limit, in float32 to 1e-2; a run says in its messages where a tick had
-    not converged.
+    algorithm 16.4), whose demand is right to 1e-6 of the limit, in float32 to 1e-2; a run says in its messages where a tick
+    had not converged.
 
     d is what the model lacks: x less what it predicted, filtered over `disturbance_time`. x_s and u_s are the steady state
     under d in which the `tracked` errors are 0: so steady disturbances leave no error of these. What the actuators did not

@@ -80,12 +80,10 @@ def test_errors_are_those_of_the_exact_solution(size, n, dtype):
     exact = 1e-7 if dtype == "float64" else 1e-5
     assert (error[feasible] <= exact * length[feasible]).all()
     assert (unmet[feasible] == 0.0).all()
-    # Where the best error is small beside the demand, four rounds leave some of it.
-    assert error.mean() <= 1.01 * best.mean()
-    assert (error[~feasible] <= 1.1 * best[~feasible] + exact * length[~feasible]).all()
-    # What is told back is what is missing, but for components below a thousandth of the demand.
-    small = np.abs(off) * [1.0, 1.0, 1.0, *3 * [1.0 / ARM]] <= 1.001e-3 * length[:, None]
+    assert (error[~feasible] <= 1.0001 * best[~feasible] + exact * length[~feasible]).all()
+    # What is told back is what is missing, but for round-off.
     told = unmet != 0.0
+    small = np.abs(off) * [1.0, 1.0, 1.0, *3 * [1.0 / ARM]] <= (1e-7 if dtype == "float64" else 1e-4) * length[:, None]
     np.testing.assert_allclose(unmet[told], -off[told], atol=1e-7 * MOST if dtype == "float64" else 3e-4 * MOST)
     assert small[~told].all()
 
@@ -94,7 +92,7 @@ def test_errors_are_those_of_the_exact_solution(size, n, dtype):
 def test_moments_before_forces():
     first = (1.0, 1.0, 1.0, 10.0, 10.0, 10.0)
     error, best, *_ = compared(BoundedLeastSquares(to="thrusters", priorities=first), 3000, 2.0, "float64", first)
-    assert error.mean() <= 1.01 * best.mean()
+    assert (error <= 1.0001 * best + 1e-7).all()
     moments = []
     for priorities in (first, (1.0,) * 6):
         off = compared(BoundedLeastSquares(to="thrusters", priorities=priorities), 500, 2.0, "float64")[-1]
@@ -105,29 +103,10 @@ def test_moments_before_forces():
 @pytest.mark.slow
 def test_what_is_within_the_limits_is_the_pseudo_inverses_to_the_last_digit():
     demands = drawn(64, 0.1)
-    for sweeps in (0, 2):
-        ours = asked(BoundedLeastSquares(to="thrusters", sweeps=sweeps), demands)
-        theirs = asked(PseudoInverse(to="thrusters"), demands)
-        np.testing.assert_array_equal(ours[0], theirs[0])
-        np.testing.assert_array_equal(ours[2], 0.0)
-
-
-@pytest.mark.slow
-def test_the_redistributed_pseudo_inverse_misses_nothing_that_it_can_make():
-    def missed(allocation):
-        error, _, length, feasible, *_ = compared(allocation, 3000, 1.0, "float64")
-        return np.mean(feasible & (error > 1e-2 * length)), error.mean()
-
-    plain, again, best = (
-        missed(allocation)
-        for allocation in (
-            PseudoInverse(to="thrusters"), BoundedLeastSquares(to="thrusters", sweeps=0, rounds=2),
-            BoundedLeastSquares(to="thrusters"),
-        )
-    )  # fmt: skip
-    assert plain[0] > 0.1
-    assert again[0] < 0.005
-    assert best[1] <= again[1] < 0.8 * plain[1]
+    ours = asked(BoundedLeastSquares(to="thrusters", priorities=[1.0, 1.0, 1.0, 50.0, 50.0, 50.0]), demands)
+    theirs = asked(PseudoInverse(to="thrusters"), demands)
+    np.testing.assert_array_equal(ours[0], theirs[0])
+    np.testing.assert_array_equal(ours[2], 0.0)
 
 
 @pytest.mark.parametrize("channels", [(4,), pytest.param((0, 4, 5, 6, 7), marks=pytest.mark.slow)])
@@ -175,8 +154,9 @@ def test_a_demand_that_is_no_number_ends_the_member():
 
 
 def test_bad_numbers():
-    says(refused(BoundedLeastSquares, to="thrusters", rounds=0), "rounds", "1 or more")
-    says(refused(BoundedLeastSquares, to="thrusters", sweeps=-1), "sweeps", "0 or more")
+    says(refused(BoundedLeastSquares, to="thrusters", iterations=0), "iterations", "1 or more")
+    table = {"type": "bounded_least_squares", "to": "thrusters", "rounds": 4}
+    says(refused(lw.Controller, period=0.1, laws=[LAW], allocation=[table]), "rounds")
     says(refused(BoundedLeastSquares, to="thrusters", priorities=[1.0, 0.0, 1.0, 1.0, 1.0, 1.0]), "priorities")
 
 
@@ -236,7 +216,7 @@ def test_edges(edge, dtype):
         assert errors[0] <= errors[1] * 1.001 + exact * size
         told = left != 0.0
         np.testing.assert_allclose(left[told], (w - B @ t)[told], rtol=0.0, atol=10 * exact * np.linalg.norm(w))
-        assert (np.abs(s * (w - B @ t))[~told] <= 1.001e-3 * size).all()
+        assert (np.abs(s * (w - B @ t))[~told] <= 1e2 * exact * size).all()
 
 
 @pytest.mark.slow
@@ -251,10 +231,121 @@ def test_a_channel_that_makes_nothing_of_what_is_asked_for():
     # Laws ask for N alone: the second thruster pushes through the origin, its column is 0.
     term = lw.terms.Thrusters(position=((-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)), direction=((0.0, 1.0, 0.0),) * 2,
                               coefficient=(10.0, 10.0), limit=1.0)  # fmt: skip
-    for allocation in (BoundedLeastSquares(to="thrusters"), BoundedLeastSquares(to="thrusters", sweeps=0)):
-        controller = lw.Controller(period=0.1, guidance=[SetPoint(heading=2.0)], laws=[HeadingPID(kp=100.0)],
-                                   allocation=[allocation])  # fmt: skip
-        scene = lw.Scene(lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0)), terms=[term], controller=controller)
-        result = lw.solve(scene, "rk4", h=0.1, t1=0.1, save=lw.SaveAt(every=0.1, fields=("command", "unmet")))
-        np.testing.assert_array_equal(np.abs(result.command[0, 0]), [1.0, 0.0])
-        np.testing.assert_allclose(result.unmet[0, 0], [0.0] * 5 + [190.0], rtol=1e-12)
+    controller = lw.Controller(period=0.1, guidance=[SetPoint(heading=2.0)], laws=[HeadingPID(kp=100.0)],
+                               allocation=[BoundedLeastSquares(to="thrusters")])  # fmt: skip
+    scene = lw.Scene(lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0)), terms=[term], controller=controller)
+    result = lw.solve(scene, "rk4", h=0.1, t1=0.1, save=lw.SaveAt(every=0.1, fields=("command", "unmet")))
+    np.testing.assert_array_equal(np.abs(result.command[0, 0]), [1.0, 0.0])
+    np.testing.assert_allclose(result.unmet[0, 0], [0.0] * 5 + [190.0], rtol=1e-12)
+
+
+def spread_out(count, rank, seed=0):
+    """Places and directions of thrusters whose wrenches have a rank, (count, 3) each, and their wrenches (6, count)."""
+    rng = np.random.default_rng(seed)
+    place, way = rng.uniform(-0.5, 0.5, (count, 3)), rng.normal(size=(count, 3))
+    if rank <= 5:
+        # Their lines cut the x axis: no moment about it.
+        place[:, 1:] = 0.0
+    if rank <= 4:
+        way[:, 1] = 0.0
+        place[:, 1] = 0.2 * (rank == 4) * rng.choice([-1.0, 1.0], count)
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    B = np.concatenate([way.T, np.cross(place, way).T])
+    return place, way, B
+
+
+# Six, eight and twelve channels, of ranks 3 to 6.
+FRAMES = {(n, rank): spread_out(n, rank) for n, rank in ((8, 6), (6, 6), (12, 6), (8, 5), (12, 3), (8, 4))}
+# Strong and weak thrusters, [N].
+STRENGTHS = np.array([40.0, 25.0, 60.0, 40.0, 30.0, 40.0, 50.0, 40.0, 35.0, 40.0, 20.0, 40.0])
+
+
+def made_of(frame, demands, priorities, dead, dtype, iterations=100):
+    """Thrusts, what is told back and the messages, of demands (n, 6); priorities (6,) or (n, 6)."""
+    place, way, _ = FRAMES[frame]
+    strength = STRENGTHS[: len(place)]
+    within = BoundedLeastSquares(to="thrusters", priorities=np.ones(6), iterations=iterations)
+    lost = [Fault(name=f"dead_{c}", of="thrusters", channel=c, time=0.0, gain=0.0, known=True) for c in dead]
+    controller = lw.Controller(period=0.1, guidance=[SetPoint(position=[0.0] * 3, heading=0.0)], laws=[LAW],
+                               allocation=[within], faults=lost)  # fmt: skip
+    term = lw.terms.Thrusters(position=place, direction=way, coefficient=strength, limit=1.0)
+    scene = lw.Scene(lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0)), terms=[term], controller=controller)
+    n = len(demands)
+    varied = {"bounded_least_squares.priorities": np.broadcast_to(priorities, (n, 6)).copy()}
+    still = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
+    fleet = lw.Ensemble.from_states(scene, demands[:, :3], *still, demands[:, 3:], varied)
+    save = lw.SaveAt(every=0.1, fields=("command", "unmet", "unconverged"))
+    result = lw.solve(fleet, "rk4", h=0.1, t1=0.1, dtype=dtype, save=save)
+    command = np.float64(result.command[0])
+    return np.sign(command) * command**2 * strength, np.float64(result.unmet[0]), result
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize(
+    ("frame", "dead", "n"),
+    [((8, 6), (), 300), *(pytest.param(f, d, 2000, marks=pytest.mark.slow) for f in FRAMES for d in ((), (1, 4)))],
+)
+def test_priorities_of_any_size_are_met_exactly(frame, dead, n, dtype):
+    """Beside SciPy's active sets: each of many demands in and out of reach, each of its own priorities from 1 to 1e4."""
+    rng = np.random.default_rng(len(dead))
+    B = FRAMES[frame][2]
+    demands = rng.normal(size=(n, 6)) * np.abs(B).sum(axis=1) * 10.0 ** rng.uniform(0.3, 1.8, (n, 1))
+    demands = np.where(rng.random((n, 6)) < 0.7, demands, 0.0)
+    demands = np.float64(np.float32(demands))
+    priorities = np.where(rng.random((n, 6)) < 0.5, 1.0, 10.0 ** rng.uniform(0.0, 4.0, (n, 6)))
+    made, told, result = made_of(frame, demands, priorities, dead, dtype)
+    # In float32 round-off may keep a channel going to its limit and back: rarely, and its error is no larger.
+    unfinished = np.count_nonzero(result.warnings.has(lw.Warnings.CONTROL_NOT_CONVERGED))
+    assert unfinished <= (0 if dtype == "float64" else n // 500)
+    arm = np.sqrt(np.square(B[3:]).sum() / np.square(B[:3]).sum())
+    units, able = np.repeat([1.0, 1.0 / arm], 3), ~np.isin(np.arange(len(B.T)), dead)
+    most = STRENGTHS[: len(B.T)][able]
+    assert np.all(made[:, ~able] == 0.0)
+    exact, lacks = 1e-9 if dtype == "float64" else 2e-5, 0
+    for w, p, t, back in zip(demands, priorities, made, told, strict=True):
+        s = p * units
+        best = lsq_linear(s[:, None] * B[:, able], s * w, (-most, most), tol=1e-15, method="bvls", max_iter=1000).x
+        errors = [np.linalg.norm(s * (B[:, able] @ x - w)) for x in (t[able], best)]
+        # Round-off is of what the channels make as well.
+        assert errors[0] <= 1.01 * errors[1] + exact * np.linalg.norm(s * (np.abs(w) + np.abs(B) @ np.abs(t)))
+        # In each component's own unit, whatever its priority.
+        length = np.linalg.norm(units * w)
+        assert np.all(units * np.abs(w - B @ t - back) <= (1e-7 if dtype == "float64" else 2e-4) * length)
+        lacks += np.any(back != 0.0)
+    assert lacks > n // 5
+
+
+def test_too_few_steps_are_told():
+    demands = np.array([[300.0, 0.0, 0.0, 0.0, 0.0, 20.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    _, _, result = made_of((8, 6), demands, np.ones(6), (), "float64", iterations=1)
+    np.testing.assert_array_equal(result.warnings.has(lw.Warnings.CONTROL_NOT_CONVERGED), [True, False])
+    np.testing.assert_array_equal(result.samples["unconverged"], [[1.0, 0.0], [2.0, 0.0]])
+    assert any("1 of 2 members (2 times at most, first in member 0 at 0 s)" in text for text in result.messages)
+
+
+@pytest.mark.parametrize("priority", [50.0, *(pytest.param(p, marks=pytest.mark.slow) for p in (1.0, 1000.0))])
+def test_a_loop_comes_to_its_place_whatever_the_priorities(priority):
+    """A dead thruster that is known, and a current: the pseudo-inverse comes to 1e-6 m and better, and so must this."""
+    law = PosePID(kp=(120.0, 120, 150), ki=(20.0, 20, 20), kd=(80.0, 80, 100), kr=(20.0,) * 3, kw=(6.0,) * 3,
+                  ki_r=(2.0,) * 3, feedforward="restoring")  # fmt: skip
+    within = BoundedLeastSquares(to="thrusters", priorities=[1.0] * 3 + [priority] * 3)
+    dead = Fault(of="thrusters", channel=4, time=20.0, gain=0.0, known=True)
+    controller = lw.Controller(period=0.1, guidance=[SetPoint(position=(0, 0, 10.0), heading=0.0)], laws=[law],
+                               allocation=[within], faults=[dead])  # fmt: skip
+    scene = lw.Scene.named("bluerov2_heavy", terms=[lw.terms.Current(velocity=(-0.5, 0, 0))],
+                           start={"position": (-6.0, 1.0, 10.0)}, controller=controller)  # fmt: skip
+    result = lw.solve(scene, "psi_x", h=0.05, t1=200.0, save=lw.SaveAt(every=10.0, fields=("position", "unmet")))
+    assert np.linalg.norm(result.position[-1, 0] - [0.0, 0.0, 10.0]) < 1e-6
+    np.testing.assert_array_equal(result.unmet[-1, 0], 0.0)
+
+
+def test_priorities_act_where_thrusters_do_not_span_the_demand():
+    """Six thrusters: X pushes the nose about as well; X = 50 N alone, by the priority of M, within the limits."""
+    place, way = np.array(THRUSTERS.position), np.array(THRUSTERS.direction)
+    place = np.vstack([place[:4], [[0, 0.111, 0], [0, -0.111, 0]]])
+    way = np.vstack([way[:4], [[0, 0, -1.0], [0, 0, -1.0]]])
+    FRAMES["six"] = place, way, np.concatenate([way.T, np.cross(place, way).T])
+    B, demand = FRAMES["six"][2], np.array([[50.0, 0, 0, 0, 0, 0]] * 2)
+    made, told, _ = made_of("six", demand, np.array([[1.0, 1, 1, 1, p, 1] for p in (10.0, 100.0)]), (), "float64")
+    np.testing.assert_allclose((made @ B.T)[:, [0, 4]], [[2.16, 0.184], [0.0226, 0.00192]], rtol=5e-3)
+    np.testing.assert_allclose(told, demand - made @ B.T, atol=1e-8)

@@ -130,7 +130,9 @@ def rushing(iterations, dtype="float64"):
                                 R=RUSH["R"], limit=[40.0], rate_limit=[60.0], disturbance_time=np.inf, horizon=20,
                                 iterations=iterations)  # fmt: skip
     loop = lw.Controller(period=T, guidance=[lw.control.SetPoint(depth=12.0)], laws=[part])
-    body = lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0), added_mass=(0, 0, 0), buoyancy=200.0, center_of_buoyancy=(0, 0, 0))
+    body = lw.Vehicle(
+        20.0, inertia=(5.0, 8.0, 11.0), added_mass=(0, 0, 0), buoyancy=200.0, center_of_buoyancy=(0, 0, 0)
+    )
     terms = [lw.terms.ControlWrench(limit=1e6), lw.terms.Drag(linear=(5, 8, 9.0, 2, 3, 4.0))]
     scene = lw.Scene(body, lw.Environment(gravity=10.0), terms, lw.Start(position=(0, 0, 5.0)), loop)
     save = lw.SaveAt(every=T, fields=("position", "demand", "unconverged"))
@@ -144,8 +146,10 @@ RUSH = dict(A=np.array([[1.0, 20.0 * GAIN], [0.0, DECAY]]), B=np.array([[(T - 20
 
 
 def test_a_loop_with_rate_limits_is_that_of_exact_problems():
-    """Depths and demands of OSQP's kind of problem, solved by Lawson & Hanson's method at each tick: an overshoot of 0.428 m."""
-    part = linear_mpc.LinearMPC(states=["position[2]", "velocity[2]"], inputs=["Z"], limit=np.array([40.0]), horizon=20, **RUSH)
+    """Depths and demands of problems that Lawson & Hanson's method solves at each tick: an overshoot of 0.428 m."""
+    part = linear_mpc.LinearMPC(
+        states=["position[2]", "velocity[2]"], inputs=["Z"], limit=np.array([40.0]), horizon=20, **RUSH
+    )
     x, u, depths, demands = np.array([-7.0, 0.0]), np.zeros(1), [], []
     for _ in range(81):
         H, f = problem(part, x, np.zeros(2))

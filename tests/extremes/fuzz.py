@@ -179,7 +179,7 @@ k_sigma_r = [0.5, 0.6, 0.7]; k_d_r = [3.0, 4.0, 5.0]
 [[controller.laws]]; type = "state_feedback"
 K = [[1,0,0,0,0,0,1,0,0,0,0,0],[0,1,0,0,0,0,0,1,0,0,0,0],[0,0,1,0,0,0,0,0,1,0,0,0],[0,0,0,1,0,0,0,0,0,1,0,0],
      [0,0,0,0,1,0,0,0,0,0,1,0],[0,0,0,0,0,1,0,0,0,0,0,1]]
-[[controller.allocation]]; type = "bounded_least_squares"; to = "control_wrench"; rounds = 2
+[[controller.allocation]]; type = "bounded_least_squares"; to = "control_wrench"; iterations = 2
 [[controller.faults]]; of = "gyroscope"; channel = 1; offset = 0.1
 """),
     ),

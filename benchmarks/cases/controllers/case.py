@@ -36,7 +36,6 @@ def remus(every, **more):
 BELOW, HERE, FAR = (0.0, 0.0, 5.0), (0.0, 0.0, 0.0), (300.0, 200.0, 50.0)
 ALLOCATIONS = {
     "pseudo_inverse": lw.control.PseudoInverse(to="thrusters"),
-    "redistributed pseudo_inverse": lw.control.BoundedLeastSquares(to="thrusters", sweeps=0, rounds=2),
     "bounded_least_squares": lw.control.BoundedLeastSquares(to="thrusters"),
 }
 

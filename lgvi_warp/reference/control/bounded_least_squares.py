@@ -9,8 +9,8 @@ from lgvi_warp.reference.control import cannot
 from lgvi_warp.reference.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.reference.rotation import Array
 
-# A line depends on others below this part of its size. No error, no slope, and no step beyond a limit, are below these parts of
-# the demand, the steepest slope and the range; nothing is told back below the last part of the demand.
+# A line depends on others below this part of its size. No error, no slope, and no step beyond a limit, are below these parts
+# of the demand, the steepest slope and the range; nothing is told back below the last part of the demand.
 DEPENDENT, NONE, FLAT, BESIDE, TOLD = 1e-9, 1e-12, 1e-9, 1e-13, 1e-10
 
 

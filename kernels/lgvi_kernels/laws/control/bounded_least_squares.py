@@ -16,8 +16,8 @@ from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
 
-# Rows: those of rest.py; in the order of priority, the lines (6) of the components of the demand over the arm, their priorities
-# (6) and 1 / these^2 (6); the arm; the lines (6) of the solution without limits, one a channel. Then of each channel those of
+# Rows: those of rest.py; in the order of priority, lines (6) of the components of the demand over the arm, priorities (6) and
+# 1 / these^2 (6); the arm; the lines (6) of the solution without limits, one a channel. Then of each channel those of
 # efforts.py, its column (6) in that order times the root of 1 / weight, and this root.
 LINES_OF_DEMAND = rest_rows
 PRIORITIES = LINES_OF_DEMAND + 36
@@ -25,8 +25,8 @@ ARM = PRIORITIES + 12
 SOLUTION = ARM + 1
 EFFORTS = effort_rows
 ROWS = EFFORTS + 7
-# Scratch rows: the state of each channel (1, -1: at its limit ahead, astern; 0: free) and its goal; the demand, its error b, z, c
-# and the slopes, 6 each; the matrices L, E and M; orthonormal lines of the channels (6, channels).
+# Scratch rows: the state of each channel (1, -1: at its limit ahead, astern; 0: free) and its goal; the demand, its error b,
+# z, c and the slopes, 6 each; the matrices L, E and M; orthonormal lines of the channels (6, channels).
 VECTORS, MATRICES = 30, 108
 
 

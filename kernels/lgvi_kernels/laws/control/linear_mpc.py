@@ -178,7 +178,9 @@ def advance(y: Any, row: int, length: Any, change: Any):
 
 
 @wp.func(inline=False)
-def step(y: Any, p: Any, limits: int, v: int, slope: int, to: int, each: int, L: int, before: int, none: int, zero: Any):
+def step(
+    y: Any, p: Any, limits: int, v: int, slope: int, to: int, each: int, L: int, before: int, none: int, zero: Any
+):
     """Newton's step of the inputs; 1 / its largest length that keeps slacks and multipliers above 0, at least 1."""
     unity = ones(zero)
     k = p.horizon * p.inputs
@@ -310,8 +312,8 @@ def control(w: Any, r: Any, y: Any, p: Any):
     free = limits + 2 * m
     slope_of = free + 2 * n * k
     cost = slope_of + 2 * n * k
-    # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f, slope
-    # and step of iterations, and m zeros; the constraints; the factor.
+    # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f,
+    # slope and step of iterations, and m zeros; the constraints; the factor.
     demand = p.work + wp.static(SEEN)
     x = demand + wp.static(DEMAND)
     before = x + 2 * n

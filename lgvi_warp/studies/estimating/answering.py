@@ -319,7 +319,7 @@ def between_members(
 ) -> tuple[float, float]:
     """The interval of a quantile that few members are beyond: between the quantiles at the ends of its level's interval.
 
-    docs/theory/estimators.md, (E12). As `lw.statistics.Quantiles` has it. Without an end where less than one member is beyond.
+    As `lw.statistics.Quantiles` has it. Without an end where less than one member is beyond.
     """
     samples = samples_of(levels)
     level, at = target.level, target.solved(samples)

@@ -146,10 +146,13 @@ def estimate(
     clock = time.process_time if executor == "threads" else time.perf_counter
     execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
     runs = Runs(fleets, question, float(t1), seed=seed, execution=execution, clock=clock)
+    report = callback(progress) or void
     content = {"scene": whole.scene.to_dict(), "ensemble": whole.to_dict(), "seed": seed, "t1": float(t1)}
     content |= {"versions": machine.versions(), "machine": machine.describe()}
     if recipe is not None:
-        return answering.replayed(runs, question.target, recipe, content)
+        found = answering.replayed(runs, question.target, recipe, content)
+        report(1.0)
+        return found
     asked = error if error is not None else relative_error
     assert asked is not None
     steps = [spacing_of(each.scene, float(t1)) for each in fleets]
@@ -158,7 +161,6 @@ def estimate(
     pilot = Pilot(runs, question.target, noise, float(asked), error is None, single, estimator, heavy_tail=heavy_tail)
     coarse = [coarse_of(spacing, i, ladders[0][0]) for i, spacing in enumerate(steps) if i]
     own = own_setting(whole, float(t1), ladders)
-    report = callback(progress) or void
     try:
         return answering.answered(pilot, ladders, coarse, h is not None, own, report, content)
     except KeyboardInterrupt as stop:

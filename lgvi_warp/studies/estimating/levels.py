@@ -274,7 +274,7 @@ class Level:
         return [*samples, (-self.weight * self.slope, np.concatenate(self.below))] if self.below else samples
 
     def part(self, target: Sought, at: Solved) -> MeanEstimate:
-        """The estimate of the level, times its weight. docs/theory/estimators.md, (E20)."""
+        """The estimate of the level, times its weight. docs/theory/estimators.md, (E20), (E25)."""
         z, least = target.contributions(np.concatenate(self.y), at), target.least(at)
         if self.below:
             z = z - self.slope * target.contributions(np.concatenate(self.below), at)

@@ -22,7 +22,7 @@ from lgvi_warp.studies.estimating.choice import Observed
 from lgvi_warp.studies.estimating.estimators import REPLICATES, UNSEEN, plain, tail_index
 from lgvi_warp.studies.estimating.levels import CALL, Runs, Setting, cube, design, normals
 from lgvi_warp.studies.estimating.target import Solved, Sought, Weighted, mean_of
-from lgvi_warp.studies.estimating.unseen import probes, reach_of
+from lgvi_warp.studies.estimating.unseen import FAR, probes, reach_of
 
 # Members of the first stage, and how many stages there are, each of four times the members of the one before.
 FIRST, STAGES = 64, (64, 256, 1024)
@@ -115,14 +115,20 @@ class Pilot:
         if self.target.kind not in ("mean", "cvar") or not self.runs.dimensions:
             return 0.0
         if setting not in self.reaches:
-            known = normals(design(self.runs.seed, self.name(), self.runs.dimensions, 0, FIRST))
-            far, grid = probes(self.runs.seed, known), self.grid(setting)
-            y = self.y(setting, grid, FIRST)
-            beyond = self.runs(setting, grid, cube(far), np.arange(len(far)) % FIRST)
-            at = self.solved(setting, self.first)
-            z, beyond = self.target.contributions(y, at), self.target.contributions(beyond, at)
-            self.reaches[setting] = reach_of(z, known, beyond, far)
+            self.reaches[setting] = self._reach(setting, self.grid(setting), self.solved(setting, self.first))
         return self.reaches[setting]
+
+    def _reach(self, setting: Setting, grid: float | None, at: Solved) -> float:
+        known = normals(design(self.runs.seed, self.name(), self.runs.dimensions, 0, FIRST))
+        z = self.target.contributions(self.y(setting, grid, FIRST), at)
+        for distance in FAR:
+            far = probes(self.runs.seed, known, distance)
+            try:
+                beyond = self.runs(setting, grid, cube(far), np.arange(len(far)) % FIRST)
+            except SceneError:
+                continue  # so far out members are refused, as of a mass below 0
+            return reach_of(z, known, self.target.contributions(beyond, at), far)
+        return 0.0
 
     @property
     def first(self) -> int:

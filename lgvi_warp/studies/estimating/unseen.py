@@ -16,8 +16,10 @@ from lgvi_warp.studies.estimating.estimators import fitted
 
 # Branches below this probability are strata of their own: all of them together have at most a half, and are at most so many.
 RARE, HALF, MOST_STRATA = 0.125, 0.5, 64
-# Distance of probes from the middle [sd]: 1 in 2,000 is beyond it. Probes along axes at most, and along directions drawn.
-FAR, MOST_AXES, DIRECTIONS = 3.3, 64, 32
+# Distances of probes from the middle [sd], of which the first is taken whose members are physical: 1 in 2,000 is beyond it.
+FAR = (3.3, 2.3, 1.6)
+# Axes along which there are probes at most, and directions that are drawn.
+MOST_AXES, DIRECTIONS = 64, 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,10 @@ class Stratum:
 
 
 def strata_of(fleet: Ensemble) -> list[Stratum]:
-    """The common part of the cube first; then one stratum for each rare branch of a Choice, the others before it common."""
+    """The common part of the cube first; then one stratum for each rare branch of a Choice, the others before it common.
+
+    docs/theory/estimators.md, (E26).
+    """
     rest, common, found = 1.0, dict[int, tuple[np.ndarray, np.ndarray]](), list[Stratum]()
     laws = [variation.distribution for variation in as_given(fleet) for _ in range(variation.size)]
     for column, law in enumerate(laws):
@@ -73,19 +78,22 @@ def branches(law: Choice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.concatenate([[0.0], ends[:-1]]), weights / weights.sum(), np.asarray(same).ravel()
 
 
-def probes(seed: int, normals: np.ndarray) -> np.ndarray:
-    """Members (m, d) of a pilot's normals (n, d), each moved far out along one axis or direction, to either side."""
+def probes(seed: int, normals: np.ndarray, far: float = FAR[0]) -> np.ndarray:
+    """Members (m, d) of a pilot's normals (n, d), each moved so far out along one axis or direction, to either side."""
     d, random = normals.shape[1], generator(seed, "estimate probes")
     axes = np.eye(d)[:MOST_AXES]
     drawn = random.standard_normal((DIRECTIONS if d > 1 else 0, d))
     ways = np.concatenate([axes, drawn / np.linalg.norm(drawn, axis=1, keepdims=True)])
     ways = np.concatenate([ways, -ways])
     members = normals[np.arange(len(ways)) % len(normals)]
-    return np.asarray(members + (FAR - np.einsum("ni,ni->n", members, ways))[:, None] * ways)
+    return np.asarray(members + (far - np.einsum("ni,ni->n", members, ways))[:, None] * ways)
 
 
 def reach_of(y: np.ndarray, normals: np.ndarray, far: np.ndarray, far_normals: np.ndarray) -> float:
-    """The largest distance of probes' numbers (m,) from what members (n,) let expect of them by regression."""
+    """The largest distance of probes' numbers (m,) from what members (n,) let expect of them by regression.
+
+    docs/theory/estimators.md, (E25).
+    """
     n, d = normals.shape
     used = normals if n >= 2 * (d + 1) else normals[:, :0]
     factors, _ = fitted(y, used)

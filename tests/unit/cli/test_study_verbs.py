@@ -321,6 +321,22 @@ def test_arguments_of_an_estimate(capsys):
     )
 
 
+def test_an_estimate_is_written_and_run_again_by_its_file(tmp_path, capsys):
+    """The folder has the answer with its recipe, which --recipe gives to the next."""
+    recipe = {"setting": {"method": "psi_x", "h": 0.025}, "levels": [], "seed": 3}
+    study = Study(dataclasses.replace(answer(), recipe=recipe))
+    verb = ["estimate", PAPER, "--of", "mean depth"]
+    assert main([*verb, "--error", "0.1", "--out", str(tmp_path), "-q"], study=study) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["estimate.csv", "estimate.json", "estimate.txt"]
+    assert main([*verb, "--recipe", str(tmp_path / "estimate.json"), "--heavy-tail", "-q"], study=study) == 0
+    (_, first), (_, second) = study.calls
+    assert (first["recipe"], first["heavy_tail"]) == (None, False)
+    assert (second["recipe"], second["heavy_tail"]) == (recipe, True)
+    (tmp_path / "odd.json").write_text("[1]")
+    assert main([*verb, "--recipe", str(tmp_path / "odd.json")]) == 2
+    assert "is no recipe of an answer" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("option", "words"),
     [(["--risk", "large"], "--risk"), (["--risk", "cvar:2"], "is no part"), (["--cheaper", "a"], "--cheaper")],

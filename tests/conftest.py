@@ -63,7 +63,8 @@ def pytest_itemcollected(item):
 def pytest_terminal_summary(terminalreporter, config):
     """Collect the guards that were skipped."""
     for report in terminalreporter.stats.get("skipped", []):
-        if (kind := dict(report.user_properties).get("guard")) is not None:
+        # What was skipped while collecting has no properties.
+        if (kind := dict(getattr(report, "user_properties", ())).get("guard")) is not None:
             config.stash[SKIPPED_GUARDS][report.nodeid] = kind
 
 

@@ -47,7 +47,9 @@ def test_numbers_that_are_named_together_get_one_factor():
     np.testing.assert_allclose(found["vehicle.added_mass_matrix"], expected, rtol=1e-14)
 
 
-@pytest.mark.parametrize("law", [{}, {"rotation_normal": {"std": 0.1}}, {"uniform": {"low": [0.8, 0.9], "high": 1.2}}, 3.0])
+@pytest.mark.parametrize(
+    "law", [{}, {"rotation_normal": {"std": 0.1}}, {"uniform": {"low": [0.8, 0.9], "high": 1.2}}, 3.0]
+)
 def test_what_is_no_distribution_of_a_number(law):
     assert "factor" in refused(lw.distributions.Factor, law)
 

@@ -54,8 +54,8 @@ def writers(run, folder):
     return made
 
 
-NAMES = (*(f"run{ending}" for ending in ENDINGS), *(f"picture.{ending}" for ending in PICTURES), "run.rrd", "result.npz", "report.html",
-         "table.csv", "text.md")  # fmt: skip
+NAMES = [f"run{ending}" for ending in (*ENDINGS, ".rrd")] + [f"picture.{ending}" for ending in PICTURES]
+NAMES += ["result.npz", "report.html", "table.csv", "text.md"]
 
 
 @contextlib.contextmanager

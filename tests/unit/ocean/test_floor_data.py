@@ -150,7 +150,8 @@ def band(**attributes):
 @pytest.mark.parametrize(("attributes", "asked", "sign"), [
     ({}, "up", 1), ({}, "down", -1), ({"positive": "up"}, "", 1), ({"positive": "down"}, "", -1),
     ({"positive": "down"}, "up", 1), ({"positive": "up"}, "up", 1), ({"standard_name": "altitude"}, "", 1),
-    ({"standard_name": "altitude", "positive": "down"}, "", -1), ({"standard_name": "sea_floor_depth", "positive": "up"}, "", 1),
+    ({"standard_name": "altitude", "positive": "down"}, "", -1),
+    ({"standard_name": "sea_floor_depth", "positive": "up"}, "", 1),
 ])  # fmt: skip
 def test_a_variable_is_a_depth_or_an_elevation_by_what_says_so(attributes, asked, sign):
     known = {"variable": "Band1", "region": REGION}

@@ -87,9 +87,11 @@ def _place(
     )
     own = {word: coordinates[word] for word in named if word in coordinates}
     for offered, fits in itertools.product((own, coordinates), tests):
-        found = {word: c for word, c in offered.items() if c.ndim in (1, 2) and fits(word, c)}
-        first, *others = found.values() or [None]
-        if any(first.dims == c.dims and not np.array_equal(first.values, c.values) for c in others):
+        found: dict[str, Any] = {word: c for word, c in offered.items() if c.ndim in (1, 2) and fits(word, c)}
+        first, *others = list(found.values()) or [None]
+        if first is not None and any(
+            first.dims == c.dims and not np.array_equal(first.values, c.values) for c in others
+        ):
             raise refusal(f"{name}.coordinates", brief(sorted(found)), f"are all its {meaning}",
                           "name one in the variable's attribute coordinates")  # fmt: skip
         if first is not None:

@@ -90,9 +90,9 @@ class FieldData:
                 f"the data have no field from {begin} to {end} h: the current goes straight from one to the other"
             )
         if self.error > MUCH * self.speed:
-            part = f"{100.0 * self.error / self.speed:.2g} % of the rms" if self.speed else "of no current"
+            of_rms = f"{100.0 * self.error / self.speed:.2g} % of the rms" if self.speed else "of no current"
             sentences.append(
-                f"the regular grid changes a velocity by up to {self.error:.3g} m/s, {part}: give a finer spacing"
+                f"the regular grid changes a velocity by up to {self.error:.3g} m/s, {of_rms}: give a finer spacing"
             )
         return tuple(sentences)
 

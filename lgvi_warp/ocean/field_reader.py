@@ -284,7 +284,8 @@ class _FieldReader:
 
     def field(self, scenario: int, time: int) -> tuple[np.ndarray, float]:
         """Velocities (x, y, z, 3) of one field, and the largest change."""
-        total, changes = np.zeros((*self.target.counts, 3)), {}
+        total = np.zeros((*self.target.counts, 3))
+        changes: dict[int, list[Any]] = {}
         for group, component, onto, along in zip(self.group, self.components, self.onto, self.along, strict=True):
             grid = component.placed.grid
             field = grid.values(scenario, time)
@@ -300,7 +301,7 @@ class _FieldReader:
                 change = changes.setdefault(group, [0.0, 0.0, 0.0])
                 change[axis] = change[axis] + onto.change(part, regular, depths)
                 total[..., axis] += regular
-        return total, sum(_largest(change) for change in changes.values())
+        return total, float(np.sum([_largest(change) for change in changes.values()]))
 
     def _whole(self, grid: cf.Gridded, field: np.ndarray, time: int) -> np.ndarray:
         """The field without holes, which are counted."""
@@ -324,8 +325,9 @@ class _FieldReader:
 def _same_nodes(one: _Component, other: _Component) -> bool:
     """Whether two components stand at the same nodes."""
     first, second = one.placed.grid, other.placed.grid
-    same = (np.array_equal(first.latitude, second.latitude), np.array_equal(first.longitude, second.longitude),
-            np.array_equal(*(np.zeros(0) if x.depth is None else x.depth for x in (first, second))))  # fmt: skip
+    pairs = ((first.latitude, second.latitude), (first.longitude, second.longitude), (first.depth, second.depth))
+    none = np.zeros(0)
+    same = [np.array_equal(none if a is None else a, none if b is None else b) for a, b in pairs]
     return all(same) and first.shape == second.shape
 
 

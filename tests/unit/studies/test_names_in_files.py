@@ -2,12 +2,13 @@
 """Names that a file gives, in what is written of a study: no formula, no control character, no Markdown, no HTML."""
 
 import csv
+import json
 import re
 
 import pytest
 
+import lgvi_warp as lw
 from lgvi_warp.common import tables
-from lgvi_warp.views.pages import report
 
 ODD = ["=1+1", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "\r=1", "\n=1", '=HYPERLINK("http://a")']
 
@@ -27,8 +28,9 @@ def test_no_cell_is_a_formula(name, tmp_path):
 @pytest.mark.parametrize("name", ["a\x1b[2Jb", "a\x07", "a\u202eb", "a\x9bb", "a\x00b"])
 def test_control_characters_are_text(name, tmp_path):
     content = tables.write_csv([{"case": name}], tmp_path / "a.csv").read_text()
-    page = "".join((report._section(name, ""), report._paragraph(name), report._preformatted(name), report._list([name]),
-                    report._table([name], [[name]])))  # fmt: skip
+    (tmp_path / "sweep.json").write_text(json.dumps({"baseline": name}))
+    (tmp_path / "summary.md").write_text(f"- {name}: 1\n")
+    page = lw.report(tmp_path, tmp_path / "report.html").read_text()
     for text in (content, page, tables.markdown(f"- {name}: 1")):
         assert ascii(name)[1:-1] in re.sub(r"\\([^\w\s])", r"\1", text)
         assert text.replace("\r\n", "").replace("\n", "").isprintable()

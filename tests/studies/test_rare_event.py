@@ -302,7 +302,7 @@ def test_what_moved_is_the_number_that_decides():
 
 def test_more_draws_than_memory_holds_are_refused_before_anything_runs():
     settings = RUN | {"t1": 600.0, "save": lw.SaveAt(at=[600.0])}
-    with pytest.raises(lw.SceneError, match='draws of noise a member: chains keep some 16,000 .* give by="splitting"'):
+    with pytest.raises(lw.SceneError, match=r'draws of noise a member: chains keep some 16,000 .* give by="splitting"'):
         lw.rare_event(scene_of(NOISE), "position[0] - 99.0", **settings)
 
 

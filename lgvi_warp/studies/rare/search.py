@@ -129,7 +129,10 @@ class Groups(dict[int, list[SubsetRun]]):
 
 
 def united(groups: Groups) -> tuple[float, float, float]:
-    """(probability, spread of its relative error, degrees of freedom) that any condition holds. (B14)."""
+    """(probability, spread of its relative error, degrees of freedom) that any condition holds.
+
+    docs/theory/rare_events.md, (B14).
+    """
     told = [joined(runs) for runs in groups.values()]
     if len(told) == 1:
         return told[0]
@@ -157,7 +160,7 @@ def beyond(seen: Witness, probability: float, spread: float) -> bool:
     )
 
 
-def _of_runs(groups: Groups) -> _Failing:
+def _of_runs(groups: Groups) -> FailingGroup:
     """The failing members of all runs, with their weights."""
     columns, first = [], 0
     for runs in groups.values():
@@ -169,10 +172,10 @@ def _of_runs(groups: Groups) -> _Failing:
             columns.append((run.failing, rows.T, weights, run.failing_chains + first, np.full(len(parts), i % RUNS)))
             first += int(run.failing_chains.max(initial=-1)) + 1
     u, rows, weights, chains, parts = (np.concatenate(column) for column in zip(*columns, strict=True))
-    return _Failing(u, rows.T, weights / weights.sum(), chains, parts)
+    return FailingGroup(u, rows.T, weights / weights.sum(), chains, parts)
 
 
-class _Failing(NamedTuple):
+class FailingGroup(NamedTuple):
     """Failing members: u (m, d), limits by condition (k, m), weights (m,), chains (m,), independent parts (m,)."""
 
     u: np.ndarray
@@ -182,7 +185,7 @@ class _Failing(NamedTuple):
     parts: np.ndarray
 
     @classmethod
-    def alone(cls, u: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> _Failing:
+    def alone(cls, u: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> FailingGroup:
         """Members of which none is related to another."""
         return cls(u, rows, weights, np.arange(len(u)), np.arange(len(u)) % RUNS)
 
@@ -330,10 +333,10 @@ class RareSearch:
         found = sampled(self._rows, self.d, math.ceil(count), self.seed, self._ran)
         if not len(found.failing) and groups:
             return self.subset(groups)
-        members = _Failing.alone(found.failing, found.rows, np.full(len(found.failing), 1.0 / len(found.failing)))
+        members = FailingGroup.alone(found.failing, found.rows, np.full(len(found.failing), 1.0 / len(found.failing)))
         return self._found("plain", (found.probability, found.spread, found.degrees), members, (), found.bounds)
 
-    def _found(self, estimator: str, told: tuple[float, float, float], members: _Failing, runs: Sequence[SubsetRun] = (),
+    def _found(self, estimator: str, told: tuple[float, float, float], members: FailingGroup, runs: Sequence[SubsetRun] = (),
                bounds: tuple[float, float] | None = None) -> RareAnswer:  # fmt: skip
         """The answer; members that chains repeat are one, with the weights of all."""
         distinct, first, place = np.unique(members.u, axis=0, return_index=True, return_inverse=True)
@@ -388,7 +391,7 @@ class RareSearch:
             if not reasons:
                 self._note_beside(found.probability)
                 told = found.probability, UNSEEN * found.spread, found.effective
-                members = _Failing.alone(found.failing, found.rows, found.weights)
+                members = FailingGroup.alone(found.failing, found.rows, found.weights)
                 return self._found("importance", told, members, runs)
             if attempt + 1 < TRIES:
                 # Beside the members of the chains, those that were drawn, as often as they weigh.

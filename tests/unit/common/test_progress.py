@@ -206,7 +206,7 @@ def test_every_long_call_takes_true(call):
 
 
 def test_a_bar_begins_late_where_a_call_takes_long():
-    for pace, begun in ((0.2, [0.5, 0.75]), (5.0, [])):  # 50 s and 2 s
+    for pace, begun in ((0.2, [0.005, 0.5, 0.75]), (50.0, [])):  # 500 s and 2 s
         now, shown = [0.0], []
         late = LateBar(lambda shown=shown: Shown(shown), lambda now=now: now[0])
         for fraction in (0.005, 0.5, 0.75):

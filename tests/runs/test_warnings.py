@@ -383,7 +383,7 @@ def test_energy_is_that_of_the_result(method, monkeypatch):
     alone = seen & ~result.warnings.has(Warnings.ABOVE_SURFACE)
     assert alone.sum() > 1
     np.testing.assert_allclose(result.warning_time[alone], result.time[crossed[alone]], rtol=1e-12)
-    np.testing.assert_allclose(result.warning_value[seen], created[crossed[seen], seen.nonzero()[0]], rtol=1e-5)
+    np.testing.assert_allclose(result.warning_value[alone], created[crossed[alone], alone.nonzero()[0]], rtol=1e-5)
 
 
 @pytest.mark.slow

@@ -174,10 +174,11 @@ def test_members_that_two_steps_leave_apart():
     assert not found.estimator.startswith("levels")
 
 
-def test_the_page():
+def test_the_page(tmp_path, monkeypatch):
     """The snippets of docs/guide/least_cost.md."""
-    known = {"lw": lw}
-    for code in blocks("docs/guide/least_cost.md", "python"):
+    known, snippets = {"lw": lw}, list(blocks("docs/guide/least_cost.md", "python"))
+    monkeypatch.chdir(tmp_path)
+    for code in snippets:
         exec(code, known)
     found, fleet = known["found"], known["fleet"]
     many = lw.Ensemble(fleet.scene, 4096, 5, fleet.vary, sampling="sobol")

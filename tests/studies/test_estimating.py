@@ -174,9 +174,10 @@ def test_members_that_two_steps_leave_apart():
     assert not found.estimator.startswith("levels")
 
 
-def test_the_page():
+def test_the_page(tmp_path, monkeypatch):
     """The snippets of docs/guide/least_cost.md."""
     known = {}
+    monkeypatch.chdir(tmp_path)
     for code in blocks("docs/guide/least_cost.md", "python"):
         exec(code, known)
     found, fleet = known["found"], known["fleet"]

@@ -271,7 +271,7 @@ def test_the_snippets_of_a_page(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = {"lw": lw, "autopilot": autopilot(), "scene": autopilot()}
     # In a page's ensembles are more members, and budgets are larger, than a test needs.
-    short = {"256": "8", "200": "4", "20_000": "200", "save=lw": "budget=300, save=lw"}
+    short = {"256": "8", "200": "4", "2_000": "200", "10_000": "300"}
     for text in blocks(page, "python"):
         for long, brief in short.items():
             text = text.replace(long, brief)

@@ -141,7 +141,11 @@ class RareEvent(Saved):
         runs = tuple(_run_of(run) for run in content["runs"])
         table = None if failing is None else Table(values={name: np.array(each) for name, each in failing.items()})
         paths = tuple((np.array(times), np.array(keys, np.int64)) for times, keys in content.get("paths", ()))
-        more = {"interval": tuple(content["interval"]), "messages": tuple(content["messages"]), "paths": paths}
+        more: dict[str, Any] = {
+            "interval": tuple(content["interval"]),
+            "messages": tuple(content["messages"]),
+            "paths": paths,
+        }
         chances = content.get("by_condition", {})
         more["by_condition"] = {name: Chance(*map(float, each)) for name, each in chances.items()}
         more["chains"] = np.array(content.get("chains", ()), int)

@@ -122,7 +122,7 @@ class SplitSearch:
             )
             self.notes.append(f'{problem}; by="chains" moves these numbers, too')
         return SplitAnswer(probability, spread, len(runs) - 1.0, "splitting", self.walk.members, failing, limits, share, runs,
-                           tuple(self.notes), paths)  # fmt: skip
+                           tuple(self.notes), paths=paths)  # fmt: skip
 
 
 def different(rows: np.ndarray, weights: np.ndarray) -> float:

@@ -18,6 +18,7 @@ from lgvi_warp.common.identity import UNKNOWN, identity
 from lgvi_warp.common.reading import UnreadableError
 from lgvi_warp.control.base import SECTIONS
 from lgvi_warp.physics.given_draws import Stream
+from lgvi_warp.studies.consistency import TimeAverage
 from tests.conftest import ROOT
 from tests.support.odd_calls import goods
 from tests.support.public import DOORS, NAMED
@@ -106,7 +107,8 @@ OTHERS = {
     "Loiter": lambda: lw.control.Loiter(center=V, radius=4.0, speed=1.0, look_ahead=2.0),
     "DockContact": lambda: lw.metrics.DockContact("speed"),
     "Battery": lambda: lw.events.Battery(capacity=3.6e6),
-    "Consistency": lambda: lw.metrics.Consistency(*[np.ones(2)] * 3, np.ones((2, 2)), np.ones(2), np.ones((2, 2)), 0.95),
+    "Consistency": lambda: lw.metrics.Consistency(*[np.ones(2)] * 3, np.ones((2, 2)), np.ones(2), np.ones((2, 2)), 0.95,
+                                                         *[TimeAverage(1.0, 1.0, 2.0, 0.5)] * 2),
     "CurrentField": lambda: lw.terms.CurrentField(velocities=np.ones((2, 2, 2, 3)), spacing=V),
     "LowPass": lambda: lw.control.LowPass(of="depth", time_constant=1.0), "Packed": lambda: lw.laws.Packed({"a": np.ones(2)}),
     "PoseSMC": lambda: lw.control.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V,

@@ -45,6 +45,7 @@ def _checked(function: Function, rows: bool = False, **shapes: tuple[int, ...]) 
             raise refusal(" and ".join(shapes), "...", text, "give as many of each, or one") from None
         return function(*bound.args, **bound.kwargs)
 
+    call.__module__ = __name__  # where a copy by pickle finds it
     return call  # type: ignore[return-value]
 
 
@@ -71,7 +72,7 @@ def repeated(*arrays: np.ndarray) -> list[np.ndarray]:
     return notation.repeated(*read)
 
 
-repeated.__doc__ = notation.repeated.__doc__
+repeated.__doc__, repeated.__module__ = notation.repeated.__doc__, __name__
 
 
 hat = _checked(notation.hat, a=VECTOR)

@@ -158,14 +158,21 @@ def test_vectors_and_joint_distributions():
     # One entry of a vector's own distribution; the others stay.
     _, after, coordinates = moved(D.LogNormal(sigma=[0.5] * 6), "drag.linear", 1.0, learn=NAME)
     assert (list(after), coordinates.at.shape) == ([NAME], (1, 50))
-    # All of it, with an entry that is 0.
-    before, after, _ = moved(D.LogNormal(sigma=0.5), "drag.linear", 1.0)
-    np.testing.assert_allclose(after["drag.linear"], before["drag.linear"] * np.e, rtol=1e-12)
+    # All of it; entries keep their sign, and one that is 0 stays so.
+    current = lw.Scene(BALL, terms=[lw.terms.Current(velocity=[1.0, -0.5, 0.0])])
+    fleet = lw.Ensemble(current, 50, 1, {"current.velocity": D.LogNormal(sigma=0.5)})
+    members = fleet.select(0, 50).parameters
+    coordinates = Coordinates(fleet, targets("current.velocity"), members)
+    after = coordinates.values(coordinates.at + 1.0, members)["current.velocity"]
+    assert (members["current.velocity"][:, 1] < 0.0).all()
+    np.testing.assert_allclose(after, members["current.velocity"] * np.e, rtol=1e-12)
     # A distribution of two numbers together moves both, and says so.
     both = D.Copula([[1.0, 0.8], [0.8, 1.0]], [D.LogNormal(sigma=0.5), D.Uniform(low=10.0, high=30.0)])
     key = "drag.linear[0], drag.linear[1]"
     before, after, _ = moved(both, key, -1.0, learn=NAME)
     assert list(after) == ["drag.linear[0]", "drag.linear[1]"]
+    drawn = slowing(50, 1, **{key: both}).parameters(0, 50)["drag.linear"]
+    np.testing.assert_allclose(np.stack([*before.values()], axis=1), drawn[:, :2], rtol=1e-9)
     scores = stats.norm.ppf((before["drag.linear[1]"] - 10.0) / 20.0)
     expected = 10.0 + 20.0 * stats.norm.cdf(scores - 1.0 * (0.8 + 0.6))
     np.testing.assert_allclose(after["drag.linear[1]"], expected, rtol=1e-7)
@@ -392,6 +399,10 @@ def test_copies_of_a_particle_count_once():
     # Where all that differs is drawn anew, particles are members of their own; ancestors are counted still.
     learned = follow(fleet, y, filter="particles")
     assert learned.ancestors[-1] < 20 < learned.effective[-1]
+    # Copies that nothing can draw apart, since one member had all the weight, stay one.
+    alone = follow(slowing(20), y, std=1e-5, filter="particles", gate=None)
+    assert len(np.unique(alone.parameters[NAME])) == 1
+    assert alone.effective[-1] == pytest.approx(1.0)
 
 
 def test_weights_of_a_table_are_those_of_particles():

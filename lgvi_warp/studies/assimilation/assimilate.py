@@ -29,7 +29,7 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.variations import Target
 from lgvi_warp.studies.assimilation import filters
 from lgvi_warp.studies.assimilation.answer import Assimilated
-from lgvi_warp.studies.assimilation.coordinates import FARTHEST, Coordinates
+from lgvi_warp.studies.assimilation.coordinates import Coordinates
 from lgvi_warp.studies.assimilation.members import rows_of, states_of
 from lgvi_warp.studies.assimilation.series import Series
 from lgvi_warp.studies.linear.trim import step_of
@@ -341,14 +341,8 @@ class _Track:
     def _take(self, ensemble: np.ndarray, centre: np.ndarray) -> None:
         """Set states and learned numbers."""
         self.states, self.learned = states_of(ensemble, centre)
-        self._bound_scores()
         assert self.final is not None
         self.final = self.final.changed(**self.states)
-
-    def _bound_scores(self) -> None:
-        """Keep scores where levels have digits."""
-        scores = self.coordinates.scores[:, None]
-        self.learned = np.where(scores, np.clip(self.learned, -FARTHEST, FARTHEST), self.learned)
 
     def _inflate(self) -> None:
         """Move members away from their mean."""

@@ -23,8 +23,6 @@ from lgvi_warp.scene.variations import MATRICES, Target, Variation
 
 # Distributions whose values, or their logarithms, are linear in normal scores; those of draws together are taken as they are.
 LINEAR, LOGARITHMIC, OF_DRAWS = ("normal", "correlated_normal"), "lognormal", "kernel_density"
-# Scores farther from 0 are those of levels that are rounded to 0 or 1.
-FARTHEST = 8.2
 # Levels at which a distribution is looked at: one with fewer than half as many values chooses among separate ones.
 LEVELS = 400
 
@@ -101,7 +99,7 @@ class Coordinates:
     Attributes:
         at: Rows (p, n) at the start.
         targets: What is learned, and what is drawn together with it.
-        separate, scores: (p,), rows of a distribution that chooses among separate values, and rows that are normal scores.
+        separate: (p,), rows of a distribution that chooses among separate values.
     """
 
     def __init__(self, fleet: Ensemble, targets: Sequence[Target], parameters: Mapping[str, np.ndarray]):
@@ -125,10 +123,7 @@ class Coordinates:
         self.at = np.concatenate([np.empty((0, n)), *(part.at for part in self._parts)])
         counts = [len(part.at) for part in self._parts]
         self._ends = np.cumsum(counts)[:-1]
-        self.separate, self.scores = (
-            np.repeat(np.array(flags, bool), counts)
-            for flags in ([part.separate for part in self._parts], [isinstance(part, _Scores) for part in self._parts])
-        )
+        self.separate = np.repeat(np.array([part.separate for part in self._parts], bool), counts)
 
     def _entries(self, target: Target, laws: Sequence[Variation]) -> list[Target]:
         """The target, or its entries where distributions draw these by themselves."""

@@ -113,7 +113,7 @@ def test_a_controller_in_python_and_its_signals(monkeypatch):
     assert (result.command.shape, result.status.counts()) == ((21, 1, 6), {"ok": 1})
     (text,) = blocks("docs/controllers/signals.md", "python")
     exec(text, names := {})
-    assert names["result"].command.shape[1:] == (1, 2)
+    assert names["result"].command.shape[1:] == (20, 2)
 
 
 def test_statistics_in_a_scene_file(tmp_path):

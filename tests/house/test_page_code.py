@@ -56,6 +56,7 @@ PYTHON = sorted(
 # Pages that read a file of the reader's own, open a window or need a library of an extra, and the test that runs them.
 NOT_ALONE = {
     "docs/gallery.md": "house/test_gallery.py",  # each snippet is a file
+    "docs/start/tutorial.md": "house/test_wheel.py",  # dive.toml, which the page has the reader write
     "docs/guide/vehicles.md": "house/test_docs.py",  # model.sdf
     "docs/guide/sea_floor.md": "unit/ocean/test_floor_data.py",  # gebco.nc
     "docs/guide/recordings.md": "house/test_page_code.py",  # a viewer

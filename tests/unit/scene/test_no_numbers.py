@@ -95,7 +95,7 @@ def test_no_door_takes_what_is_no_number(door, odd):
 def test_members_that_are_masked():
     members = np.ma.array([0, 1, 2], mask=[False, True, False])
     assert "is no list of members" in refused(RunSettings, keep=members)
-    assert "no list of whole numbers" in refused(EnsembleSettings, indices=members)
+    assert "is no list of members" in refused(EnsembleSettings, indices=members)
     assert "is no list of members" in refused(EnsembleSettings, indices=members)
 
 

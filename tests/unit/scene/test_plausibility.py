@@ -224,7 +224,8 @@ def test_heights_above_the_surface_count_from_a_limit_on():
     looked.look(np.array([[2.0, -4.0, -9.0, 5.0, 5.0]]), np.array([12]))
     none = np.zeros(5, np.uint16), np.zeros(5, np.int64), np.full(5, np.nan)
     bits, step, value = looked.added(*none)
-    assert bits.tolist() == [0, 1024, 0, 0, 1024]
+    high = int(lw.Warnings.ABOVE_SURFACE)
+    assert bits.tolist() == [0, high, 0, 0, high]
     assert step.tolist() == [0, 7, 0, 0, 7]
     assert value[[1, 4]].tolist() == [4.0, 9.0]
     (text,) = above_surface(bits, value)

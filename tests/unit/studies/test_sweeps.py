@@ -319,8 +319,10 @@ def test_members_that_pass_and_that_do_not(found):
     (lambda found: found.cell("soft"),
      "at = None: leaves 2 cells of 'soft'; name one point of the grid: at={'controller.delay': 0.02}"),
     (lambda found: found.values("soft", "iae", {"controller.delay": 0.02}),
-     "metric = 'iae': is none of this sweep; known: overshoot heading, iae heading, time_to_failure"),
-    (lambda found: found.worst(by="iae"), "by = 'iae': is no metric of this sweep; known: overshoot heading, iae"),
+     "metric = 'iae': is none of this sweep; did you mean 'iae heading'?"),
+    (lambda found: found.values("soft", "zzz", {"controller.delay": 0.02}),
+     "metric = 'zzz': is none of this sweep; known: overshoot heading, iae heading, time_to_failure"),
+    (lambda found: found.worst(by="iae"), "by = 'iae': is no metric of this sweep; did you mean 'iae heading'?"),
 ])  # fmt: skip
 def test_what_a_sweep_has_not_is_refused_with_what_it_has(gridded, ask, words):
     with pytest.raises(lw.SceneError) as caught:

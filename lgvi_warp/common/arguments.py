@@ -7,7 +7,7 @@ import functools
 import inspect
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from numbers import Real
 from pathlib import Path
 from typing import Any, TypeVar
@@ -70,7 +70,7 @@ def whole_number(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int
 
 def items_of(value: Any) -> list[Any] | None:
     """Read a list, tuple, array, column, range or iterator as a list; None for a text, a mapping and what is no list."""
-    if isinstance(value, str | bytes | Mapping):
+    if isinstance(value, str | bytes | Mapping | Set):
         return None
     value = plain(value)
     try:

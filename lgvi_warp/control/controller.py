@@ -258,7 +258,11 @@ class Controller:
         return tuple(name for name, bad in zip(COMPONENTS, missed, strict=True) if bad)
 
     def undriven(self, terms: Sequence[Term]) -> tuple[str, ...]:
-        """Keys of the terms that take commands, and get none: of no allocation, and of no command or schedule of their own."""
+        """Keys of the terms that take commands, and get none: of no allocation, and of no command or schedule of their own.
+
+        Args:
+            terms: The terms of the scene.
+        """
         return tuple(
             term.key for term in terms if term.channels and term.key not in self.actuators and not term.own_commands
         )
@@ -267,6 +271,9 @@ class Controller:
         """(guidance, quantity) for each wanted quantity that no law reads, in its own or in other words.
 
         A speed is left out where no actuator could make it: a vehicle that something else drives.
+
+        Args:
+            terms: The terms of the scene.
         """
         read = set(WISHES if self.callback is not None else ()).union(*(law.needs for law in self.laws))
         if not self.undriven(terms) and not any(np.any(np.abs(part.reach()[0]) > SPANNED) for part in self.allocation):

@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.advance.noting import EXERTED_ROW, put3
-from lgvi_kernels.lanes.arithmetic import add, cross, mul, positive, sub  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, cross, mul, neg, positive, sub  # noqa: F401
 from lgvi_kernels.lanes.matrix3 import apply
 from lgvi_kernels.lanes.state import damping_struct, view_struct, wrench_struct
 from lgvi_kernels.maps.compose import superpose

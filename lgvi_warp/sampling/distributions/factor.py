@@ -32,7 +32,7 @@ class Factor(JointLaw):
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
         >>> law = lw.distributions.Factor(lw.distributions.Uniform(low=0.8, high=1.2))
         >>> drawn = lw.Ensemble(scene, 4, vary={"drag_matrix.quadratic": law}).parameters(0, 4)["drag_matrix.quadratic"]
-        >>> drawn[:, 1, 1] / 1310.0 == drawn[:, 2, 2] / 131.0
+        >>> abs(drawn[:, 1, 1] / drawn[:, 2, 2] - 10.0) < 1e-12
         array([ True,  True,  True,  True])
     """
 

@@ -46,7 +46,7 @@ ELSEWHERE = {
     "open_run": {"members", "statistics"}, "plots.pairs": {"of"}, "plots.phase": {"of"}, "rare_event": {"cheaper"},
     "resume": {"keepers", "statistics"}, "stability_map": {"methods", "points"}, "suggest": {"methods"}, "sweep": {"metrics"},
     "tradeoff": {"methods"}, "uq.morris": {"of"}, "uq.sobol": {"of", "groups"}, "vehicles.from_sdf": {"center_of_buoyancy"},
-    "vehicles.from_yaml": {"ignore"}, "Scene": {"terms", "events"}, "control.Policy": {"inputs", "outputs", "scale"},
+    "vehicles.from_yaml": {"table", "ignore"}, "Scene": {"terms", "events"}, "control.Policy": {"inputs", "outputs", "scale"},
     "metrics.Consistency": {"time", "members", "nees", "nees_band", "nis", "nis_band"}, "studies.Growth": {"times", "curve"},
     "statistics.Quantity": {"entries"}, "studies.Line": {"values"}, "studies.Suggestion": {"rivals", "worst", "messages"},
     "studies.Tradeoff": {"measurements", "messages"}, "uq.FailedMembers": {"faults"},
@@ -54,7 +54,8 @@ ELSEWHERE = {
     "control.Altimeter": {"bias", "drift", "noise", "place", "quantum"}, "control.Trajectory": {"speed"},
     "control.Waypoints": {"loiter_time", "loiter_turns"},
     "terms.MovingMass": {"limit", "rate_limit", "time_constant", "slide_direction", "turn_axis", "turn_center"},
-    "notation.repeated": {"arrays"}, "designs.Table": {"ignore"}, "metrics.CustomMetric": {"last"},
+    "notation.repeated": {"arrays"},
+    "studies.InnovationTest": {"mean", "mean_band", "ratio_band"}, "designs.Table": {"ignore"}, "metrics.CustomMetric": {"last"},
 }  # fmt: skip
 RECORDS = {"uq.Indices", "uq.MorrisEffects", "uq.SobolIndices"}
 RUN = {"solve": {"statistics", "keep", "tangents"}, "prepare": {"vary", "of", "statistics"}, "gather": {"statistics"},

@@ -305,7 +305,7 @@ def test_the_page_has_every_verb():
 
 
 def test_the_check_of_documents_finds_each_kind_of_fault():
-    good = {"verb": "check", "version": "1", "scene": "a", "members": 3, "notes": ["odd"]}
+    good = {"verb": "check", "version": "1", "scene": "a", "members": 3, "method": None, "notes": ["odd"]}
     assert differing(good, "check") == []
     for key, value, text in (
         ("members", 3.5, "check.members: 3.5 is no whole number"),

@@ -73,6 +73,8 @@ def items_of(value: Any) -> list[Any] | None:
     if isinstance(value, str | bytes | Mapping | Set):
         return None
     value = plain(value)
+    if isinstance(value, range):
+        return None
     try:
         return value.tolist() if isinstance(value, np.ndarray) and value.ndim else list(value)
     except TypeError:

@@ -5,12 +5,16 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Generator, Iterator
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
+
+# Most entries of a range or an iterator that is read: a longer range is left as it is, and an iterator may be endless.
+MOST_ENTRIES = 10_000_000
 
 
 class NotReal(ValueError):  # noqa: N818
@@ -24,6 +28,8 @@ class NotReal(ValueError):  # noqa: N818
 def real_numbers(value: Any) -> np.ndarray:
     """Read real numbers into a new float64 array of their shape; they may be NaN or infinite."""
     value = plain(value)
+    if isinstance(value, range):
+        raise NotReal(f"has more than {MOST_ENTRIES:,} entries")
     for leaf in _parts(value):
         _check(leaf)
     if isinstance(value, np.ma.MaskedArray):
@@ -46,8 +52,13 @@ def plain(value: Any) -> Any:
     """
     if isinstance(value, np.str_):
         return str(value)
+    if isinstance(value, range) and len(value) > MOST_ENTRIES:
+        return value
     if isinstance(value, range | Iterator | Generator):
-        return [plain(item) for item in value]
+        items = [plain(item) for item in itertools.islice(value, MOST_ENTRIES + 1)]
+        if len(items) > MOST_ENTRIES:
+            raise NotReal(f"has more than {MOST_ENTRIES:,} entries")
+        return items
     if isinstance(value, list | tuple):
         return type(value)(map(str, value)) if value and all(type(item) is np.str_ for item in value) else value
     if isinstance(value, np.ndarray):

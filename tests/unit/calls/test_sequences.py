@@ -54,8 +54,8 @@ ELSEWHERE = {
     "control.Altimeter": {"bias", "drift", "noise", "place", "quantum"}, "control.Trajectory": {"speed"},
     "control.Waypoints": {"loiter_time", "loiter_turns"},
     "terms.MovingMass": {"limit", "rate_limit", "time_constant", "slide_direction", "turn_axis", "turn_center"},
-    "notation.repeated": {"arrays"},
-    "studies.InnovationTest": {"mean", "mean_band", "ratio_band"}, "designs.Table": {"ignore"}, "metrics.CustomMetric": {"last"},
+    "notation.repeated": {"arrays"}, "designs.Table": {"ignore"}, "metrics.CustomMetric": {"last"},
+    "studies.InnovationTest": {"mean", "mean_band", "ratio_band"},
 }  # fmt: skip
 RECORDS = {"uq.Indices", "uq.MorrisEffects", "uq.SobolIndices"}
 RUN = {"solve": {"statistics", "keep", "tangents"}, "prepare": {"vary", "of", "statistics"}, "gather": {"statistics"},

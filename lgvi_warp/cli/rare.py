@@ -37,6 +37,11 @@ def rare_arguments(verb: Any) -> None:
         "first, as h=0.1,dtype=float32,controller.delay=0; may be given several times")  # fmt: skip
     add("--failed", choices=("event", "refuse"), default="event", help="what a member that fails is (default event)")
     add("--most", metavar="N", type=int, default=1_000_000, help="members that may be run (default 1000000)")
+    add(
+        "--store",
+        metavar="DIR",
+        help="folder for the results of runs, with which the same command goes on after an interrupt",
+    )
     add_shared(
         verb,
         "--out --method --step --dtype --duration --seed --threads --set",
@@ -70,6 +75,7 @@ def rare(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -
         found = (study or (inspect.unwrap(rare_event) if chosen.quiet else rare_event))(
             scene, chosen.when, relative_error=chosen.error, by=chosen.by, cheaper=cheaper, looks=chosen.looks,
             failed=chosen.failed, most=chosen.most, seed=int(seed), threads=chosen.threads, progress=progress,
+            store=chosen.store,
         )  # fmt: skip
     with progress_bar(chosen.quiet, "writing"):
         written = Written(found.save(out))

@@ -80,6 +80,11 @@ def estimate_arguments(verb: Any) -> None:
         "alike, as controller.delay=0.0; may be given several times")  # fmt: skip
     add("--heavy-tail", action="store_true", help="tell a mean all the same whose variance seems to be infinite")
     add("--recipe", metavar="FILE", help="run the members of an answer again: its estimate.json")
+    add(
+        "--store",
+        metavar="DIR",
+        help="folder for the results of runs, with which the same command goes on after an interrupt",
+    )
     add_shared(verb, "--out --duration --method --step --dtype --seed --threads --set", method="fixes the method",
                step="fixes the step [s]", dtype="fixes the precision", seed="seed of points and noise",
                out="folder for estimate.json, .csv and .txt, replaced if they exist (default: none is written)")  # fmt: skip
@@ -111,7 +116,8 @@ def estimate(chosen: argparse.Namespace, *, study: Part = None) -> int:
     with progress_bar(chosen.quiet) as progress:
         found = (study or answer)(
             scene, chosen.of, chosen.error, relative_error=chosen.relative_error, risk=risk, cheaper=cheaper,
-            threads=chosen.threads, progress=progress, recipe=recipe, heavy_tail=chosen.heavy_tail, **fixed,
+            threads=chosen.threads, progress=progress, recipe=recipe, heavy_tail=chosen.heavy_tail,
+            store=chosen.store, **fixed,
         )  # fmt: skip
     if chosen.out is not None:
         return finish(Written(found.save(folder(chosen))), chosen, {"estimate": found.to_dict()}, str(found))

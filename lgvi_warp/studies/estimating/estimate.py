@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -33,6 +34,7 @@ from lgvi_warp.studies.estimating.levels import Level, Runs, Setting
 from lgvi_warp.studies.estimating.pilot import Pilot
 from lgvi_warp.studies.estimating.question import Question, question_of
 from lgvi_warp.studies.ladders import SHORT
+from lgvi_warp.studies.memory import Remembered
 from lgvi_warp.studies.speed import void
 
 # Methods whose steps are tried: the scene's own, and the first of those that are cheapest by what acts.
@@ -61,6 +63,7 @@ def estimate(
     threads: int | None = None,
     executor: Any = "threads",
     scheduler: str | None = None,
+    store: str | os.PathLike[str] | None = None,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Estimated:
     """Estimate a statistic at an error, for the least work that a small pilot finds.
@@ -100,6 +103,8 @@ def estimate(
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Of those that are no threads the
             time that passes is taken for the cost.
         scheduler: address of Dask's scheduler.
+        store: folder for the results of runs: the same call, after it was interrupted, takes them from there and goes on, with
+            the answer of one that was not. One of other arguments is refused. Default: none.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             from 0 to 1.
 
@@ -109,6 +114,7 @@ def estimate(
     Raises:
         SceneError: for faulty arguments, for a statistic of another kind or without finite variance, where members fail at the
             finest setting, and where the estimator that is fixed cannot be had.
+        OSError: where `store` cannot be written.
         KeyboardInterrupt: if Ctrl-C ends it, which tells how far it was; there is no answer then.
 
     Examples:
@@ -145,7 +151,11 @@ def estimate(
     seed = whole.seed if seed is None else int(EnsembleSettings(1, seed).seed)
     clock = time.process_time if executor == "threads" else time.perf_counter
     execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
-    runs = Runs(fleets, question, float(t1), seed=seed, execution=execution, clock=clock)
+    arguments = {"study": "estimate", "of": of, "error": error, "relative_error": relative_error, "t1": t1, "risk": risk,
+                 "method": method, "h": h, "dtype": dtype, "estimator": estimator, "recipe": recipe,
+                 "heavy_tail": heavy_tail, "seed": seed}  # fmt: skip
+    remembered = Remembered(store, fleets, arguments)
+    runs = Runs(fleets, question, float(t1), seed=seed, execution=execution, clock=clock, remembered=remembered)
     report = callback(progress) or void
     content = {"scene": whole.scene.to_dict(), "ensemble": whole.to_dict(), "seed": seed, "t1": float(t1)}
     content |= {"versions": machine.versions(), "machine": machine.describe()}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -22,6 +23,7 @@ from lgvi_warp.studies.estimating.estimators import REPLICATES, MeanEstimate, pl
 from lgvi_warp.studies.estimating.question import Question
 from lgvi_warp.studies.estimating.target import Solved, Sought, Weighted
 from lgvi_warp.studies.estimating.unseen import strata_of
+from lgvi_warp.studies.memory import Remembered
 
 # Members of one call for each thread, whose numbers stay in its cache, and threads that count.
 AT_ONCE, MOST_THREADS = 8192, 8
@@ -75,11 +77,13 @@ class Runs:
     seconds: processor time of all runs so far, prepared and called, without preparing the first run of each kernel, which
         loads or compiles it [s].
     execution: threads, executor and scheduler, as of `lw.prepare`.
+    remembered: where calls are kept; None for nowhere.
     """
 
     def __init__(
         self, fleets: Sequence[Ensemble], question: Question, t1: float, *, seed: int,
         execution: Mapping[str, Any] | None = None, clock: Callable[[], float] = time.process_time,
+        remembered: Remembered | None = None,
     ):  # fmt: skip
         self.question, self.seed, self.seconds, self.counted = question, seed, 0.0, 0.0
         self.strata = strata_of(fleets[0])
@@ -87,8 +91,10 @@ class Runs:
         self._prepared: dict[tuple[Setting, float | None], Prepared] = {}
         self._calls: list[Call] = []
         self._loaded, self._costs = set[Any](), dict[Any, float]()
+        self._remembered = remembered or Remembered()
         threads = self._execution.get("threads") or machine.thread_count()
-        self._at_once = AT_ONCE * min(threads, MOST_THREADS)
+        # Calls that are kept are the same on any number of threads.
+        self._at_once = AT_ONCE * (MOST_THREADS if self._remembered.keeps else min(threads, MOST_THREADS))
         self.dimensions = fleets[0].space.dimensions
 
     def prepared(self, setting: Setting, grid: float | None) -> Prepared:
@@ -118,12 +124,20 @@ class Runs:
         self.counted += CALL + n * self.cost(setting, grid)
         for first in range(0, n, self._at_once):
             some = slice(first, first + self._at_once)
-            begun = self._clock()
-            groups.append(self.question.numbers(self._call(run, setting, points[some], indices[some])))
-            taken = max(self._clock() - begun, 1e-9)
-            self.seconds += taken
-            self._calls.append(Call(setting, setting.h if grid is None else grid, len(groups[-1]), taken))
+            ran = functools.partial(self._ran, run, setting)
+            numbers, taken = self._remembered(f"{setting!r} {grid!r}", ran, points[some], indices[some])
+            groups.append(numbers)
+            self.seconds += float(taken)
+            self._calls.append(Call(setting, setting.h if grid is None else grid, len(numbers), float(taken)))
         return np.concatenate(groups)
+
+    def _ran(
+        self, run: Prepared, setting: Setting, points: np.ndarray, indices: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers of members (n,), and the processor time that they took [s]."""
+        begun = self._clock()
+        numbers = self.question.numbers(self._call(run, setting, points, indices))
+        return numbers, np.array(max(self._clock() - begun, 1e-9))
 
     def _call(self, run: Prepared, setting: Setting, points: np.ndarray, indices: np.ndarray) -> Any:
         if self.dimensions:

@@ -16,6 +16,7 @@ from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.columns import as_given, columns_of
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.studies.memory import Remembered
 from lgvi_warp.studies.rare.event import FAILED, SURE, RareCondition
 
 # Most numbers of the normals of one call: 160 MB.
@@ -75,7 +76,7 @@ class VehicleLimit(Varying):
     """A scene as a limit: (n, d) standard normals -> (n,), above 0 where the event happens.
 
     fleet: the scene and what varies. condition: the event. settings: of `prepare`. failed: "event", so that a member that
-    fails has the limit `FAILED`, or "refuse".
+    fails has the limit `FAILED`, or "refuse". remembered: where calls are kept, by a name; None for nowhere.
 
     Attributes:
         names: names of the numbers that vary, whose normals come first.
@@ -83,8 +84,12 @@ class VehicleLimit(Varying):
         members, seconds: members that were run, and how long that took [s].
     """
 
-    def __init__(self, fleet: Any, condition: RareCondition, settings: Mapping[str, Any], failed: str = "event"):
+    def __init__(
+        self, fleet: Any, condition: RareCondition, settings: Mapping[str, Any], failed: str = "event",
+        remembered: Remembered | None = None, name: str = "",
+    ):  # fmt: skip
         super().__init__(fleet)
+        self._remembered, self._name = remembered or Remembered(), name
         self.condition, self._refuse = condition, failed == "refuse"
         varies = {"levels": True} if self.fleet.vary else {}
         self.run: Prepared = prepare(
@@ -127,12 +132,18 @@ class VehicleLimit(Varying):
         return np.where(lost, -SURE if self._refuse else FAILED, rows)
 
     def _parts(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Limits (k, n) and which members failed (n,), so many at once as memory holds."""
+        """Limits (k, n) and which members failed (n,), run or remembered."""
+        rows, lost, seconds = self._remembered(self._name, self._ran, u)
+        self.seconds += float(seconds)
+        self.members += len(u)
+        return rows, lost
+
+    def _ran(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Limits (k, n), which members failed (n,), so many at once as memory holds, and how long it took [s]."""
         at_once, begin = max(1, MOST_NUMBERS // self.d), time.perf_counter()
         parts = [self.condition.distances(self._answers(u[i : i + at_once])) for i in range(0, len(u), at_once)]
-        self.seconds += time.perf_counter() - begin
-        self.members += len(u)
-        return np.concatenate([rows for rows, _ in parts], axis=1), np.concatenate([lost for _, lost in parts])
+        seconds = np.array(time.perf_counter() - begin)
+        return np.concatenate([rows for rows, _ in parts], axis=1), np.concatenate([lost for _, lost in parts]), seconds
 
     def _answers(self, u: np.ndarray) -> Any:
         """What the run returns of members with these normals."""

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -20,6 +21,7 @@ from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.memory import Remembered
 from lgvi_warp.studies.rare.answer import RareEvent
 from lgvi_warp.studies.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
 from lgvi_warp.studies.rare.cheaper import cheaper_of, chosen_chain
@@ -61,6 +63,7 @@ def rare_event(
     failed: str = "event",
     most: int = 1_000_000,
     seed: int = 0,
+    store: str | os.PathLike[str] | None = None,
     progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> RareEvent:
@@ -85,6 +88,8 @@ def rare_event(
         failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
         most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
         seed: Seed of all that is drawn; 0 by default.
+        store: Folder for the results of runs, by="chains" alone: the same call, after it was interrupted, takes them from
+            there and goes on, with the answer of one that was not. One of other arguments is refused. None by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False for
             nobody.
@@ -97,6 +102,7 @@ def rare_event(
         SceneError: If an argument is at fault; where the event never happens or always does; where the limit takes so few
             values that nothing says how near a member is; and where members have more draws of noise than chains can keep.
         FailedMembers: With failed="refuse", where members failed.
+        OSError: Where `store` cannot be written.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -112,6 +118,8 @@ def rare_event(
     faults.choice("by", by, WAYS)
     if by == "splitting" and cheaper:
         faults.add("cheaper", cheaper, "is of chains", 'leave it out, or give by="chains"')
+    if by == "splitting" and store is not None:
+        faults.add("store", store, "keeps the runs of chains", 'leave it out, or give by="chains"')
     check_asked(faults, relative_error, most)
     for name in ("of", "levels", "statistics", "draws", "common_noise"):
         if name in settings:
@@ -122,11 +130,14 @@ def rare_event(
     report = callback(progress) or (lambda fraction: None)
     if by == "splitting":
         return _by_splitting(members, condition, float(relative_error), looks, failed, most, seed, report, settings)
-    own = VehicleLimit(members, condition, settings, failed)
+    faster = cheaper_of(cheaper, members, settings)
+    asked = {"study": "rare_event", "limit": limit, "relative_error": relative_error, "most": most, "seed": seed,
+             "cheaper": [each.name for each in faster], "failed": failed, **settings}  # fmt: skip
+    remembered = Remembered(store, [members], asked)
+    own = VehicleLimit(members, condition, settings, failed, remembered, OWN)
     cost = expected_cost(own, relative_error)
     others = {
-        each.name: VehicleLimit(each.fleet, condition, each.settings, failed)
-        for each in cheaper_of(cheaper, members, settings)
+        each.name: VehicleLimit(each.fleet, condition, each.settings, failed, remembered, each.name) for each in faster
     }
     chain, notes = chosen_chain(own, others, seed) if others else (None, [])
     notes = [*cost, *notes]

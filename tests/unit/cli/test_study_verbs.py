@@ -285,17 +285,18 @@ def test_arguments_of_a_rare_event(tmp_path, capsys):
     verb = ["rare", PAPER, "--when", "position[0] above 60", "--out", str(tmp_path)]
     assert main([*verb, "-q"], study=study, draw=draw) == 0
     more = ["--error", "0.2", "--cheaper", "h=0.1,dtype=float32", "--cheaper", "vehicle.mass = 5", "--failed", "refuse",
-            "--most", "50000", "--seed", "7", "--threads", "2", "--by", "splitting", "--looks", "20"]  # fmt: skip
+            "--most", "50000", "--seed", "7", "--threads", "2", "--by", "splitting", "--looks", "20",
+            "--store", "kept"]  # fmt: skip
     assert main([*verb, *more], study=study, draw=draw) == 0
     ((_, when), plain), (_, others) = study.calls
     seed = lw.Scene.load(PAPER).ensemble_settings.seed
     assert when == "position[0] above 60"
     assert plain == {"relative_error": 0.1, "by": "chains", "looks": 50, "cheaper": [], "failed": "event",
-                     "most": 1_000_000, "seed": seed, "threads": None, "progress": None}  # fmt: skip
+                     "most": 1_000_000, "seed": seed, "threads": None, "progress": None, "store": None}  # fmt: skip
     assert others.pop("progress") is not None
     assert others == {"relative_error": 0.2, "by": "splitting", "looks": 20,
                       "cheaper": [{"h": 0.1, "dtype": "float32"}, {"vehicle.mass": 5.0}],
-                      "failed": "refuse", "most": 50_000, "seed": 7, "threads": 2}  # fmt: skip
+                      "failed": "refuse", "most": 50_000, "seed": 7, "threads": 2, "store": "kept"}  # fmt: skip
     assert capsys.readouterr().out.startswith("the probability in words")
     assert main([*verb, "--cheaper", "h", "-q"], study=study, draw=draw) == 2
     assert "--cheaper = 'h': names no values" in capsys.readouterr().err
@@ -305,7 +306,8 @@ def test_arguments_of_an_estimate(capsys):
     study = Study(answer())
     assert main(["estimate", PAPER, "--of", "mean depth", "--error", "0.1", "-q"], study=study) == 0
     more = ["--of", "max(depth)", "--relative-error", "0.01", "--risk", "cvar:0.1", "--cheaper", "controller.delay=0",
-            "--step", "0.1", "--method", "rk4", "--seed", "7", "--threads", "1", "--dtype", "float32"]  # fmt: skip
+            "--step", "0.1", "--method", "rk4", "--seed", "7", "--threads", "1", "--dtype", "float32",
+            "--store", "kept"]  # fmt: skip
     assert main(["estimate", PAPER, *more], study=study) == 0
     assert capsys.readouterr().out == f"{answer()}\n"
     ((scene, of, error), settings), ((other, *_), others) = study.calls
@@ -315,6 +317,7 @@ def test_arguments_of_an_estimate(capsys):
     assert (others["method"], others["h"], others["dtype"], others["threads"]) == ("rk4", 0.1, "float32", 1)
     assert (others["relative_error"], others["risk"]) == (0.01, lw.metrics.CVaR(0.1))
     assert others["cheaper"] == [{"controller.delay": 0.0}]
+    assert (settings["store"], others["store"]) == (None, "kept")
     assert (
         document(["estimate", PAPER, "--of", "depth", "--error", "1"], capsys, study=study)["members"]["psi_x 0.2"]
         == 8192

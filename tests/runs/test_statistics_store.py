@@ -143,7 +143,7 @@ def test_until_stops_a_store_at_the_same_block(stopped, tmp_path):
         assert (one.messages, one.provenance["members"]) == (memory.messages, memory.members)
         assert one.position.tobytes() == memory.position.tobytes()
     assert lw.open_run(stopped).dataset.sizes["realization"] == memory.members
-    with pytest.raises(IndexError, match=f"of {memory.members}"):
+    with pytest.raises(IndexError, match=f"of the {memory.members}"):
         lw.open_run(stopped, [memory.members])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.ocean import regrid
+from lgvi_warp.ocean import cf, regrid
 from lgvi_warp.ocean.places import LocalPlane
 from lgvi_warp.ocean.s_levels import at_depths
 from tests.unit.ocean import data
@@ -157,12 +157,12 @@ def test_levels_that_follow_the_floor(kind):
 def test_beyond_the_first_and_the_last_level_the_nearest_holds(depths, follows):
     """The last interval has a slope, which must not go on below the deepest level."""
     values = 0.5 + np.arange(float(len(depths))) ** 2
-    wanted = np.array([-5.0, 0.0, 1.0, 7.0, 40.0, 41.0, 60.0, 1e4])
-    if follows:
-        columns = [np.broadcast_to(x[:, None, None], (len(depths), 2, 3)) for x in (values, depths)]
-        found = at_depths(*columns, wanted)[:, 1, 2]
-    else:
-        found = regrid._along_first(values, regrid._held(wanted, depths))
+    target = regrid.Regular(np.array([0.0, 0.0, -5.0]), np.array([1.0, 1.0, 3.0]), (1, 1, 25))
+    wanted = target.nodes(2)
+    grid = cf.gridded(data.cmems(EAST, NORTH, depth=depths), cf.EASTWARD, "uo")
+    field, levels = (np.broadcast_to(x[:, None, None], (len(depths), *grid.shape[3:])) for x in (values, depths))
+    onto = regrid.Onto(regrid.Placed(grid, PLANE), target)
+    found = at_depths(field, levels, wanted)[:, 1, 2] if follows else onto(field)[0, 0]
     np.testing.assert_allclose(found, np.interp(wanted, depths, values), rtol=1e-13)
 
 

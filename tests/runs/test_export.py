@@ -14,7 +14,7 @@ import lgvi_warp as lw
 from lgvi_warp.scene.start import Environment
 from lgvi_warp.store.exporting import geojson, kml, ros, tables, trajectories
 from lgvi_warp.store.exporting.lines import cut
-from lgvi_warp.store.exporting.tracks import tracks_of
+from lgvi_warp.store.exporting.tracks import Tracks, tracks_of
 from tests.runs.test_hostile_folders import mutated
 from tests.support.verbs import main
 
@@ -335,6 +335,27 @@ def test_members_leave_the_transforms_as_they_end(result, tmp_path):
     np.testing.assert_array_equal(place, [places[-1, 1], places[-1, 0], -places[-1, 2]])
     assert sum(topic == "/member_1/odometry" for topic, *_ in found) == len(ends)
     assert sum(topic == "/member_3/odometry" for topic, *_ in found) == len(path_of(result, 3)[1])
+
+
+@pytest.mark.parametrize(("off", "extra"), [(0.0, 0), (1e-8, 0), (-1e-8, 0), (0.01, 1), (-0.01, 0)])
+@pytest.mark.parametrize("at", [1, 3])
+def test_a_member_that_ends_at_a_sample_is_written_once(at, off, extra, result, tmp_path, monkeypatch):
+    """Of any end there is one message, and none of the same member has the stamp of another."""
+    pytest.importorskip("mcap_ros2")
+    ends = result.end_time.copy()
+    ends[1] = result.time[at] + off
+    recorded = Tracks.of_members
+    monkeypatch.setattr(Tracks, "of_members", lambda self, name: ends if name == "end_time" else recorded(self, name))
+    ros.write(tracks_of(result, None, Environment(origin=ORIGIN, start=DATE)), tmp_path / "run.mcap", lambda _: None)
+    _, found = messages_of(tmp_path / "run.mcap")
+    start = int(np.datetime64(DATE[:-1], "ns").astype(np.int64))
+    stamps = [time - start for topic, _, time, _ in found if topic == "/member_1/odometry"]
+    wanted = [*result.time[:at], *([result.time[at]] if off > 0.0 else []), *([ends[1]] if extra or off <= 0.0 else [])]
+    np.testing.assert_array_equal(stamps, np.round(np.array(wanted) * 1e6) * 1000)
+    frames = [(time, entry.child_frame_id) for topic, _, time, message in found if topic == "/tf"
+              for entry in message.transforms]  # fmt: skip
+    assert len(frames) == len(set(frames))
+    assert len(frames) == sum(topic.endswith("/odometry") for topic, *_ in found)
 
 
 def test_a_track_across_the_antimeridian_is_cut(tmp_path):

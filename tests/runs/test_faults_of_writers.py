@@ -57,12 +57,6 @@ def writers(run, folder):
 NAMES = [f"run{ending}" for ending in (*ENDINGS, ".rrd")] + [f"picture.{ending}" for ending in PICTURES]
 NAMES += ["result.npz", "report.html", "table.csv", "text.md"]
 
-# Faults of the libraries that are not mended here yet.
-KNOWN = {
-    "run.nc": pytest.mark.xfail(reason="netCDF4 leaves the unfinished file open after an error"),
-    "run.rrd": pytest.mark.xfail(reason="rerun tells of no error of the disk"),
-}
-
 
 @contextlib.contextmanager
 def room(size):
@@ -87,7 +81,7 @@ def open_files(folder):
 
 
 @pytest.mark.skipif(not os.path.isdir("/dev/fd"), reason="the system lists no open files")
-@pytest.mark.parametrize("name", [pytest.param(name, marks=KNOWN[name]) if name in KNOWN else name for name in NAMES])
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("parts", [4, pytest.param(60, marks=pytest.mark.slow)])
 def test_a_disk_that_is_full_at_any_place(name, parts, run, tmp_path):
     write = writers(run, tmp_path)[name]

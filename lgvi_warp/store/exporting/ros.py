@@ -122,12 +122,14 @@ def _about(tracks: Tracks) -> dict[str, str]:
 def _states(tracks: Tracks) -> Iterator[State]:
     """The states in the order of their times: of all members under way at the samples, of each at its end."""
     ends, time = tracks.of_members("end_time"), tracks.time
+    end_stamps, stamps = tracks.moments(ends), tracks.moments(time)
     for when in tracks.spans(30):
         samples = {name: np.asarray(tracks.sample(name, when=when), dtype=np.float64) for name in FIELDS}
         for k, index in enumerate(range(when.start, when.stop)):
             ended_since = ends < time[index]
             if index:
-                ended_since &= ends > time[index - 1]
+                # An end with the stamp of a sample is written as that sample.
+                ended_since &= end_stamps > stamps[index - 1]
             # Members that ended between two samples have the state of their end in the later one.
             for end in np.unique(ends[ended_since]):
                 yield from _state(samples, k, float(end), ended_since & (ends == end))

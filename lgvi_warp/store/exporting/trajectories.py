@@ -13,6 +13,7 @@ import numpy as np
 
 from lgvi_warp.results import member_fields
 from lgvi_warp.results.result import END_TIME
+from lgvi_warp.store.exporting.netcdf_files import new_netcdf
 from lgvi_warp.store.exporting.tracks import FIELDS, Report, Tracks, derived_of, units_of
 
 DIMENSIONS = ("trajectory", "obs")
@@ -41,9 +42,7 @@ NO_DATE = "the run has no date: times count from its start, which is put at 1970
 def netcdf(tracks: Tracks, target: Path, report: Report) -> None:
     """Write a NetCDF-4 file: numbers over trajectory and obs, and numbers of each member over trajectory."""
     tracks.needing(("position",), "a trajectory")
-    import netCDF4
-
-    with netCDF4.Dataset(target, "w") as file:
+    with new_netcdf(target) as file:
         file.setncatts(_attributes(tracks))
         for name, size in zip(DIMENSIONS, (tracks.count, len(tracks.time)), strict=True):
             file.createDimension(name, size)

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.engine.block import Block
 from lgvi_warp.results.result import END_TIME
+from lgvi_warp.store.exporting.netcdf_files import new_netcdf
 from lgvi_warp.store.exporting.tracks import Report
 from lgvi_warp.store.folder import KEPT, Folder
 from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER
@@ -24,14 +25,14 @@ MEMBERS = (MEMBER, KEPT_MEMBER)
 
 def netcdf(folder: Folder, target: Path, report: Report) -> None:
     """Write the run, and its kept members and statistics in groups of their own."""
-    import netCDF4
-
-    with netCDF4.Dataset(target, "w") as file:
+    with new_netcdf(target) as file:
         _group(folder, file, report)
         if (kept := folder.kept()) is not None:
             _group(kept, file.createGroup(KEPT), report)
-    if statistics := open_run(folder.path).statistics:
-        statistics.dataset.to_netcdf(target, mode="a", group="statistics", engine="netcdf4")
+        if statistics := open_run(folder.path).statistics:
+            from xarray.backends import NetCDF4DataStore
+
+            statistics.dataset.dump_to_store(NetCDF4DataStore(file.createGroup("statistics")))
 
 
 def _group(folder: Folder, file: Any, report: Report) -> None:

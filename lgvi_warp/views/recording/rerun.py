@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import tempfile
@@ -76,23 +75,18 @@ def record(
     address = to if isinstance(to, str) else None
     if address is not None:
         viewer.reach(address)
-    ended: OSError | None = None
-    with contextlib.ExitStack() as stack:
-        beside = None if path is None else stack.enter_context(durable.placed(file_path("path", path)))
+    if path is not None:
+        target = file_path("path", path)
+        with durable.placed(target) as beside, durable.named(target), durable.new_file(beside) as file:
+            durable.write_all(file, memoryview(_content(runs)))
+    if address is not None:
         try:
-            if beside or address:
-                _write(runs, beside, address)
+            viewer.watched(lambda: _to_viewer(runs, address), address)
         except OSError as error:
-            if address is None or viewer.answers(address):
+            if viewer.answers(address):
                 raise
-            ended = error
-            if beside:
-                # The stream that failed may still have its file open: this is another one.
-                beside.unlink(missing_ok=True)
-                _write(runs, beside, None)
-    if ended is not None:
-        written = "" if path is None else f", which is in {path}: open that"
-        raise OSError(f"to = {address!r}: the viewer ended before it had the recording{written}") from ended
+            written = "" if path is None else f", which is in {path}: open that"
+            raise OSError(f"to = {address!r}: the viewer ended before it had the recording{written}") from error
     if to is not None and address is None:
         _send(to, runs)
         to.flush()
@@ -133,30 +127,39 @@ def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
     ]
 
 
-def _write(runs: list[Drawn], path: Path | None, address: str | None) -> None:
-    """Write a recording of its own to a file, to the viewer at an address, or to both at once. Raises OSError."""
-    rr = viewer.rerun()
+def _recording(runs: list[Drawn]) -> Any:
+    """A stream with the ids of these runs."""
     names = [identity(run.source) for run in runs]
     name = names[0] if len(runs) == 1 else hashlib.sha256(" ".join(names).encode()).hexdigest()[:16]
-    box = box_of(runs)
-    recording = rr.RecordingStream(f"lgvi_warp_{name}", recording_id=name)
-    sinks = ([rr.FileSink(path)] if path else []) + ([rr.GrpcSink(address)] if address else [])
+    return viewer.rerun().RecordingStream(f"lgvi_warp_{name}", recording_id=name)
 
-    def written() -> None:
-        recording.set_sinks(*sinks, default_blueprint=layout(runs, box, _scales(runs, box)))
+
+def _content(runs: list[Drawn]) -> bytes:
+    """The content of a file: rerun tells of no error of a disk that it writes to itself."""
+    recording = _recording(runs)
+    stream = recording.binary_stream()
+    recording.send_blueprint(_layout(runs), make_active=False)
+    _send(recording, runs, laid_out=True)
+    content = stream.read()
+    recording.disconnect()
+    return content or b""
+
+
+def _to_viewer(runs: list[Drawn], address: str) -> None:
+    """Send a recording of its own to the viewer at an address. Raises OSError."""
+    recording = _recording(runs)
+    try:
+        recording.set_sinks(viewer.rerun().GrpcSink(address), default_blueprint=_layout(runs))
         _send(recording, runs, laid_out=True)
         recording.flush()
         recording.disconnect()
-
-    try:
-        if address:
-            viewer.watched(written, address)
-        else:
-            written()
     except RuntimeError as error:
-        # rerun raises it for a writer that could not start or continue, and prints the reason on stderr.
-        text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"
-        raise OSError(text) from error
+        raise OSError(f"to = {address!r}: the recording could not be sent ({error}); start the viewer again") from error
+
+
+def _layout(runs: list[Drawn]) -> Any:
+    box = box_of(runs)
+    return layout(runs, box, _scales(runs, box))
 
 
 def _scales(runs: list[Drawn], box: WorldBox) -> list[int]:
@@ -169,7 +172,7 @@ def _send(recording: Any, runs: list[Drawn], laid_out: bool = False) -> None:
     box = box_of(runs)
     scales = _scales(runs, box)
     if not laid_out:
-        recording.send_blueprint(layout(runs, box, scales))
+        recording.send_blueprint(_layout(runs))
     recording.send_recording_name(title(runs[0].result) if len(runs) == 1 else " | ".join(run.label for run in runs))
     for run, scale in zip(runs, scales, strict=True):
         log_world(recording, run, box, scale)

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.ocean import cf, regrid
 from lgvi_warp.ocean.places import LocalPlane
+from lgvi_warp.ocean.s_levels import at_depths
 from tests.unit.ocean import data
 
 pyproj = pytest.importorskip("pyproj")
@@ -17,6 +19,7 @@ xr = pytest.importorskip("xarray")
 ORIGIN = (41.5, -70.5)
 PLANE = LocalPlane(*ORIGIN)
 # Within the data by a few kilometers.
+DEPTHS = np.array([0.0, 4.0, 9.0, 20.0, 40.0])
 REGION = [[-3e4, 3e4], [-3e4, 3e4], [0.0, 40.0]]
 # True north turns by 1.5e-3 rad from one node to the next: half way, a speed is too small by an eighth of its square.
 TURN = 3e-7
@@ -147,6 +150,33 @@ def test_levels_that_follow_the_floor(kind):
     depth = nodes(field)[2]
     speed = np.hypot(field.velocities[..., 0], field.velocities[..., 1])
     np.testing.assert_allclose(speed[0, 0], 0.5 - 0.004 * depth, rtol=TURN)
+
+
+@pytest.mark.parametrize("depths", [DEPTHS, DEPTHS[:1], np.array([3.0])])
+@pytest.mark.parametrize("follows", [True, False])
+def test_beyond_the_first_and_the_last_level_the_nearest_holds(depths, follows):
+    """The last interval has a slope, which must not go on below the deepest level."""
+    values = 0.5 + np.arange(float(len(depths))) ** 2
+    target = regrid.Regular(np.array([0.0, 0.0, -5.0]), np.array([1.0, 1.0, 3.0]), (1, 1, 25))
+    wanted = target.nodes(2)
+    grid = cf.gridded(data.cmems(EAST, NORTH, depth=depths), cf.EASTWARD, "uo")
+    field, levels = (np.broadcast_to(x[:, None, None], (len(depths), *grid.shape[3:])) for x in (values, depths))
+    onto = regrid.Onto(regrid.Placed(grid, PLANE), target)
+    found = at_depths(field, levels, wanted)[:, 1, 2] if follows else onto(field)[0, 0]
+    np.testing.assert_allclose(found, np.interp(wanted, depths, values), rtol=1e-13)
+
+
+def test_the_water_below_the_deepest_level_has_its_velocity():
+    field = read(data.cmems(EAST, NORTH), region=[[-3e4, 3e4], [-3e4, 3e4], [0.0, 500.0]], outside="hold")
+    last = field.origin[2] + field.spacing[2] * (field.velocities.shape[4] - 1)
+    assert last == pytest.approx(data.DEPTH[-1])
+    np.testing.assert_allclose(field.data.request.region[2], data.DEPTH[[0, -1]])
+    # By the formula that states are checked with: 0.3 + 0.004 z at 40 m holds at any depth below.
+    places = np.array([[[0.0, 0.0, depth]] for depth in (last, last + 1.0, last + 5.0, 1e4)])
+    water = field.water({"velocities": field.velocities[None], "scenario": np.zeros(1), "times": field.times[None],
+                         "origin": field.origin[None], "spacing": field.spacing[None]}, places, np.zeros(4), {})  # fmt: skip
+    np.testing.assert_allclose(np.hypot(*water[:, 0, :2].T), np.hypot(0.3 + 0.16, -0.1 + 0.08), rtol=1e-4)
+    np.testing.assert_array_equal(water, np.broadcast_to(water[:1], water.shape))
 
 
 def test_depths_go_on_to_regular_levels_and_the_change_is_told():

@@ -419,20 +419,20 @@ def test_a_recording_goes_to_a_stream(mixed, tmp_path):
     assert "| outcome |" in text_of(tmp_path / "mine.rrd", "/run/summary")
 
 
-def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
-    # rerun says so by a RuntimeError when its writer has stopped. What was there before stays.
-    old = tmp_path / "fleet.rrd"
-    assert lw.record(mixed, old) == old
-    before = old.read_bytes()
+def test_a_viewer_that_takes_no_more_leaves_the_whole_file(tmp_path, mixed, monkeypatch):
+    # rerun says so by a RuntimeError when its sender has stopped.
+    whole = lw.record(mixed, tmp_path / "whole.rrd").read_bytes()
 
     def flush(self):
-        raise RuntimeError("File-writer thread shut down prematurely")
+        raise RuntimeError("sender shut down prematurely")
 
     monkeypatch.setattr(rr.RecordingStream, "flush", flush)
-    with pytest.raises(OSError, match="is the disk full"):
-        lw.record(mixed, old)
-    assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"]
-    assert old.read_bytes() == before
+    monkeypatch.setattr(rr.RecordingStream, "set_sinks", lambda *_, **__: None)
+    monkeypatch.setattr(viewer, "reach", lambda address: None)
+    monkeypatch.setattr(viewer, "answers", lambda *_: True)
+    with pytest.raises(OSError, match=r"could not be sent .*; start the viewer again"):
+        lw.record(mixed, tmp_path / "fleet.rrd", to="rerun+http://127.0.0.1:9/proxy")
+    assert abs(len((tmp_path / "fleet.rrd").read_bytes()) - len(whole)) < 0.01 * len(whole)
 
 
 @pytest.mark.parametrize(("arguments", "kind", "words"), [

@@ -293,7 +293,8 @@ def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, t
     Returns: The scene, the names of the numbers that are 0 in it, and what to say of it.
     """
     controller, sensors, zeros = scene.controller, [], list[str]()
-    if controller is None:
+    # A filter believes noises that are not 0; linear models refuse it elsewhere.
+    if controller is None or any(isinstance(part, ErrorStateFilter) for part in controller.sensors):
         return scene, (), ()
     for part in controller.sensors:
         acting = [word for word in words if isinstance(part, Sensor) and np.any(getattr(part, word))]

@@ -8,6 +8,7 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Mapping, Set
+from contextvars import ContextVar
 from numbers import Real
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,6 +18,8 @@ import numpy as np
 from lgvi_warp.common.errors import NoSuchMembers, NothingToDraw, SceneError, ragged, refusal
 from lgvi_warp.common.real_numbers import NotReal, holds_words, is_whole, plain, real_numbers, whole_remedy
 
+# Whether a file is read: what its content raises is a fault of the file, not of an argument.
+of_a_file: ContextVar[bool] = ContextVar("of_a_file", default=False)
 # Members are counted below this.
 MOST = 2**31
 # What a path of files can be given as.
@@ -210,7 +213,7 @@ def _explained(function: Callable[..., Any], bound: bool = False) -> Callable[..
         except (SceneError, NothingToDraw):
             raise
         except RAW as error:
-            if (fault := _misfit(function, bound, args, settings, error)) is None:
+            if of_a_file.get() or (fault := _misfit(function, bound, args, settings, error)) is None:
                 raise
             raise fault from error
 

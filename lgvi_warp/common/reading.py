@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from lgvi_warp.common import safe_files
-from lgvi_warp.common.arguments import path_of
+from lgvi_warp.common.arguments import of_a_file, path_of
 from lgvi_warp.common.errors import NothingToDraw, SceneError
 
 # Largest size of each kind of file [bytes]. Scenes and coefficients (YAML, XML) are written by hand or by a script; parsers
@@ -123,7 +123,7 @@ def file_json(path: str | os.PathLike[str]) -> Any:
 @contextlib.contextmanager
 def corrupt_file_as_scene_error(path: str | os.PathLike[str], otherwise: str, remedy: str) -> Iterator[None]:
     """Turn what the content of a file raises in the `with` block into a fault of the file."""
-    name = str(path_of("path", path))
+    name, before = str(path_of("path", path)), of_a_file.set(True)
     try:
         yield
     except NothingToDraw:
@@ -137,6 +137,8 @@ def corrupt_file_as_scene_error(path: str | os.PathLike[str], otherwise: str, re
         raise SceneError([f"{name}: is damaged, or {otherwise}: {reason}; {remedy}"]) from error
     except MemoryError:
         raise SceneError([f"{name}: does not fit into memory; read it on a larger machine"]) from None
+    finally:
+        of_a_file.reset(before)
 
 
 def _name(path: str | os.PathLike[str]) -> str:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import math
 import os
@@ -168,7 +167,6 @@ class Saved(ABC):
             SceneError: where it is no regular file, is damaged, or of another version.
         """
         with of_study(path):
-            # Raw errors are those of the file.
-            found: Self = inspect.unwrap(cls.from_dict.__func__)(cls, file_json(path))  # type: ignore[attr-defined]
+            found = cls.from_dict(file_json(path))
             list(found.rows()), found.to_json(), str(found)  # what cannot be shown is refused here
             return found

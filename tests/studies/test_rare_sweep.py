@@ -220,7 +220,7 @@ def test_success_by_events_alone_and_by_nothing(scene):
 
 @pytest.mark.parametrize(("more", "words"), [
     ({"rare": 1.0}, "rare = 1.0: is neither true nor a table"),
-    ({"rare": {"error": 0.1}}, "is an unknown key; known: relative_error"),
+    ({"rare": {"error": 0.1}}, "rare.error = 0.1: is an unknown key; did you mean 'relative_error'?"),
     ({"cases": [{"name": "a", "rare": "yes"}]}, "case 'a': rare = 'yes'"),
     ({"cases": [{"name": "a", "rare": {"relative_error": 3.0, "most": 5}}]}, "case 'a': rare.relative_error = 3.0"),
 ])  # fmt: skip
@@ -262,4 +262,4 @@ way = { below = 3.6 }
     # What nobody fails has no rare failure, and that was asked for.
     (tmp_path / "sweep.toml").write_text(text.replace("below = 3.6", "below = 1e9").replace("0.8", "0.01"))
     assert main([*given, "--out", str(out)]) == 1
-    says(capsys.readouterr().out, "- near: none: ", "has a probability below 1e-15, or none")
+    says(capsys.readouterr().out, "- near: none: ", "it never happens, or is rarer than about 1e-15")

@@ -151,8 +151,11 @@ def test_what_cannot_be_tuned():
 
 def test_indices_of_members_are_whole_numbers():
     run = lw.prepare(regulated(), None, "depth", **RUN)
-    for wrong in (np.arange(3), np.array([0.5, 1.0])):
-        with pytest.raises(lw.SceneError, match="are not one whole number from 0 for each member"):
+    for wrong, words in (
+        (np.arange(3), "are not one whole number from 0 for each member"),
+        (np.array([0.5, 1.0]), "give whole numbers from 0"),
+    ):
+        with pytest.raises(lw.SceneError, match=words):
             run.states(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), *np.zeros((2, 2, 3)), indices=wrong)
 
 

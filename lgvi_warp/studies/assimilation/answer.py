@@ -101,6 +101,7 @@ class Assimilated(Summarized, Saved):
                 read[item.name] = _array(content[item.name])
             elif item.type == "Mapping[str, np.ndarray]":
                 read[item.name] = {name: _array(rows) for name, rows in content[item.name].items()}
+        read["ancestors"] = read["ancestors"].astype(np.int64)
         read["left_out"] = {name: rows != 0.0 for name, rows in read["left_out"].items()}
         read["final"] = Final.from_arrays(arrays, ends, parameters)
         return cls(**read | {"messages": tuple(content["messages"])})

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The public names of this door, one a line.
 
+from lgvi_warp.criteria.risk import CVaR as CVaR
 from lgvi_warp.statistics.metrics.actuator_metrics import ActuatorEnergy as ActuatorEnergy
 from lgvi_warp.statistics.metrics.actuator_metrics import CustomMetric as CustomMetric
 from lgvi_warp.statistics.metrics.actuator_metrics import Effort as Effort
@@ -25,6 +26,5 @@ from lgvi_warp.statistics.metrics.tracking_metrics import RMSError as RMSError
 from lgvi_warp.statistics.metrics.tracking_metrics import SettlingTime as SettlingTime
 from lgvi_warp.statistics.metrics.tracking_metrics import SteadyStateError as SteadyStateError
 from lgvi_warp.statistics.metrics.tracking_metrics import Undershoot as Undershoot
-from lgvi_warp.studies.consistency import Consistency as Consistency
-from lgvi_warp.studies.consistency import consistency as consistency
-from lgvi_warp.studies.search.risk import CVaR as CVaR
+from lgvi_warp.uncertainty.consistency import Consistency as Consistency
+from lgvi_warp.uncertainty.consistency import consistency as consistency

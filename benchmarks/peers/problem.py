@@ -18,13 +18,13 @@ import numpy as np
 from benchmarks.peers import equations
 from benchmarks.peers.body import Body, body_of
 from benchmarks.peers.plot import DRIVEN
+from lgvi_warp.measuring import speed
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.sampling.distributions.basic import Normal
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment
-from lgvi_warp.studies import speed
 
 SIZE = 13
 GRAVITY = 9.8

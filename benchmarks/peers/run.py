@@ -22,7 +22,7 @@ from typing import Any
 
 from benchmarks.pages import read, show
 from benchmarks.peers.plot import TITLES
-from lgvi_warp.studies import cost
+from lgvi_warp.measuring import cost
 
 # What is measured, its members times seconds, its errors.
 Setting = tuple[dict[str, Any], float, dict[str, float]]

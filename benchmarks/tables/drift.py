@@ -7,9 +7,9 @@ import numpy as np
 
 import lgvi_warp as lw
 from benchmarks.pages import line, markdown, stamp
+from lgvi_warp.measuring import speed
 from lgvi_warp.physics import notation, terms
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 STEP, STEPS, MEMBERS, SAMPLES = 0.05, 1_000_000, 64, 1000
 M, J = np.array([188.8, 193.8, 198.8]), np.array([5.46, 5.29, 5.72])

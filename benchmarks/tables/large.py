@@ -12,7 +12,7 @@ import lgvi_warp as lw
 from benchmarks import own_process
 from benchmarks.pages import markdown, show, stamp
 from lgvi_warp.common import machine
-from lgvi_warp.studies import speed
+from lgvi_warp.measuring import speed
 
 SETTINGS = {"method": "psi_s", "h": 0.01, "t1": 10.0, "save": lw.SaveAt(every=1.0)}
 SIZES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)

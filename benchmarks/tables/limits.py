@@ -12,8 +12,8 @@ import numpy as np
 
 import lgvi_warp as lw
 from benchmarks.pages import markdown, show
+from lgvi_warp.accuracy.stability.limits import LIMITS
 from lgvi_warp.physics import notation
-from lgvi_warp.studies.stability.limits import LIMITS
 
 METHODS = (
     "phi", "psi", "psi_s", "psi_1", "psi_x", "psi_x8", "psi_w", "tj4(psi_s)", "su4(psi_s)", "kl6(psi_s)", "kl8(psi_s)",

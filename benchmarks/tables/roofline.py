@@ -13,10 +13,10 @@ from benchmarks.pages import ROOT, markdown, show, stamp
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.sampling.distributions.basic import Normal
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.studies import speed
 
 ROWS = ROOT / "benchmarks" / "rows" / "operations.json"
 MEMBERS, STEPS, ROUNDS = 1024, 512, 11

@@ -6,6 +6,7 @@ A picture carries the hash of what made it, so that a stale one is found in any 
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import re
 import subprocess
@@ -132,11 +133,24 @@ def code_of(page: str) -> str:
     return "\n".join(fenced or typed for fenced, typed in CODE.findall(page))
 
 
+def code_of_python(text: str) -> str:
+    """The lines of a module without imports, docstrings, comments and blank lines: what can change a picture."""
+    left_out: set[int] = set()
+    for node in ast.walk(ast.parse(text)):
+        is_docstring = (
+            isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        )
+        if is_docstring or isinstance(node, ast.Import | ast.ImportFrom):
+            left_out.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
+    rows = [row for number, row in enumerate(text.splitlines(), 1) if number not in left_out]
+    return "\n".join(row for row in rows if row.strip() and not row.lstrip().startswith("#"))
+
+
 def digest(*paths: Path) -> str:
-    """The hash of texts, whatever their line ends and the lines that name their licence."""
-    texts = [code_of(path.read_text()) if path.suffix == ".md" else path.read_text() for path in paths]
-    lines = [line for text in texts for line in text.splitlines() if not line.startswith("# SPDX-")]
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+    """The hash of what counts in source files; line ends do not."""
+    readers = {".md": code_of, ".py": code_of_python}
+    texts = [readers.get(path.suffix, str)(path.read_text()) for path in paths]
+    return hashlib.sha256("\n".join("\n".join(text.splitlines()) for text in texts).encode()).hexdigest()
 
 
 def made_of(name: str) -> str:

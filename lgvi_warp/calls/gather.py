@@ -21,7 +21,7 @@ from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
 from lgvi_warp.statistics.estimates.estimate import Estimates
 from lgvi_warp.statistics.estimates.tree import Part
-from lgvi_warp.statistics.values.tracking import check_wanted
+from lgvi_warp.statistics.tracking import check_wanted
 from lgvi_warp.store.open import open_run
 
 

@@ -45,7 +45,7 @@ def derivatives(chosen: argparse.Namespace, *, study: Part = None) -> int:
     Returns: The exit code: 1 if a file was not written, otherwise 0.
     """
     from lgvi_warp.scene.ensemble import Ensemble
-    from lgvi_warp.studies.derivatives.derivatives import derivatives as differences
+    from lgvi_warp.uncertainty.derivatives.derivatives import derivatives as differences
 
     scene = load_scene(chosen)
     out = folder(chosen, "_derivatives")

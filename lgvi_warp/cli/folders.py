@@ -58,15 +58,15 @@ CLASSES = {"tradeoff": "Tradeoff", "stability": "StabilityMap", "rare": "RareEve
 def _study(kind: str) -> Any:
     """The class of what a study found."""
     if kind == "sensitivity":
-        from lgvi_warp.studies.sensitivity.indices import Indices
+        from lgvi_warp.uncertainty.sensitivity.indices import Indices
 
         return Indices
     if kind == "margins":
-        from lgvi_warp.studies.linear.margins import Margins
+        from lgvi_warp.robustness.linear.margins import Margins
 
         return Margins
     if kind == "trim":
-        from lgvi_warp.studies.linear.trim import Trim
+        from lgvi_warp.robustness.linear.trim import Trim
 
         return Trim
     from lgvi_warp import studies
@@ -76,7 +76,7 @@ def _study(kind: str) -> Any:
 
 def contents(folder: Path) -> list[Content]:
     """Look for numbers in a folder."""
-    from lgvi_warp.studies.files import STUDY_FILES
+    from lgvi_warp.criteria.files import STUDY_FILES
 
     patterns = {"result": "result*.npz", **STUDY_FILES}
     studies: list[Content] = []
@@ -131,11 +131,11 @@ def _part(content: Content, chosen: argparse.Namespace, describe: Part) -> tuple
 def text_of(kind: str, study: Any) -> str:
     """Describe what a study found."""
     if kind == "tradeoff":
-        from lgvi_warp.studies.tradeoff import report_text
+        from lgvi_warp.accuracy.tradeoff import report_text
 
         return report_text(study)
     if kind == "stability":
-        from lgvi_warp.studies.stability import map as stability
+        from lgvi_warp.accuracy.stability import map as stability
 
         return stability.report_text(study)
     return str(study)

@@ -61,8 +61,8 @@ def margins(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None
     Returns: The exit code: 1 if members failed or a file was not written, otherwise 0.
     """
     from lgvi_warp import plots
-    from lgvi_warp.studies.linear.loops import FAILED
-    from lgvi_warp.studies.linear.margins import margins as bearable
+    from lgvi_warp.robustness.linear.loops import FAILED
+    from lgvi_warp.robustness.linear.margins import margins as bearable
 
     scene = load_scene(chosen)
     out = folder(chosen, "_margins")
@@ -112,7 +112,7 @@ def worst_case(chosen: argparse.Namespace, *, study: Part = None) -> int:
 
     Returns: The exit code: 1 if a file was not written, otherwise 0; a member that fails is an answer.
     """
-    from lgvi_warp.studies.search.worst_case import worst_case as search
+    from lgvi_warp.robustness.search.worst_case import worst_case as search
 
     faults = Faults()
     within = {name: ends for text in chosen.within for name, ends in _bounds(faults, text)}
@@ -184,7 +184,7 @@ def trim(chosen: argparse.Namespace, *, study: Part = None) -> int:
 
     Returns: The exit code, 0.
     """
-    from lgvi_warp.studies.linear.trim import trim as steady
+    from lgvi_warp.robustness.linear.trim import trim as steady
 
     faults = Faults()
     fixed = dict(pair for text in chosen.fixed for pair in _value(faults, text))

@@ -84,7 +84,7 @@ def bench_arguments(verb: Any) -> None:
 @as_verb("bench", "speed of the kernel on this machine, beside the core's peak", bench_arguments, reads=True)
 def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     """Run the verb bench: measure the kernel's speed on this machine."""
-    from lgvi_warp.studies import speed
+    from lgvi_warp.measuring import speed
 
     readings = []
     for line in (measure or speed.measure)(chosen.members, chosen.steps):
@@ -108,9 +108,9 @@ def calibrate_arguments(verb: Any) -> None:
 )
 def calibrate(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     """Run the verb calibrate: measure the widths of packets on this machine, and keep the best ones for later runs."""
+    from lgvi_warp.measuring import packet_width as tuning
     from lgvi_warp.runs.request import Request
     from lgvi_warp.scene.ensemble import Ensemble
-    from lgvi_warp.studies import packet_width as tuning
 
     if chosen.scene is not None:
         plan = Request(Ensemble.from_scene(load_scene(chosen))).plan()

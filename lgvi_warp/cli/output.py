@@ -16,7 +16,7 @@ import numpy as np
 
 from lgvi_warp import __version__
 from lgvi_warp.common.errors import printable
-from lgvi_warp.studies.files import finite_or_none
+from lgvi_warp.criteria.files import finite_or_none
 
 # A function of the package that a verb calls: an argument of the verb, by default the package's own.
 Part = Callable[..., Any] | None

@@ -63,7 +63,7 @@ def rare(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -
     Returns: The exit code: 1 if members failed with --failed refuse, or a file was not written, otherwise 0.
     """
     from lgvi_warp import plots
-    from lgvi_warp.studies.rare.rare_event import rare_event
+    from lgvi_warp.uncertainty.rare.rare_event import rare_event
 
     scene = load_scene(chosen)
     _refuse_boundless(chosen.when, scene)
@@ -85,7 +85,7 @@ def rare(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -
 
 def _refuse_boundless(text: str, scene: Any) -> None:
     """Refuse words that are no event, before anything compiles, and a quantity without a bound. Raises SceneError."""
-    from lgvi_warp.studies.rare.event import condition_of, has_bound
+    from lgvi_warp.uncertainty.rare.event import condition_of, has_bound
 
     condition_of(text, scene)
     words = text.strip()

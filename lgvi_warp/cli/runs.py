@@ -218,7 +218,7 @@ def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> 
         if getattr(chosen, name) is not None:
             text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
             raise SceneError([f"{text}; leave out --{name} or --error"])
-    from lgvi_warp.studies import suggest as study
+    from lgvi_warp.accuracy import suggest as study
 
     settings = {"methods": [chosen.method] if chosen.method else None, "threads": chosen.threads}
     with progress_bar(chosen.quiet) as progress:
@@ -230,8 +230,8 @@ def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> 
 
 def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namespace, verify: Part = None) -> list[str]:
     """Print the error of a run, measured by some members at half its step."""
+    from lgvi_warp.accuracy.suggest import verified
     from lgvi_warp.scene.ensemble import Ensemble
-    from lgvi_warp.studies.suggest import verified
 
     error, members = (verify or verified)(Ensemble.from_scene(scene), result, suggested)
     measured = f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g}"

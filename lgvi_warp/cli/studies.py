@@ -53,7 +53,7 @@ def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = Non
     scene = load_scene(chosen)
     out = folder(chosen, "_tradeoff")
     from lgvi_warp import plots
-    from lgvi_warp.studies.tradeoff import tradeoff as measure
+    from lgvi_warp.accuracy.tradeoff import tradeoff as measure
 
     settings = {"of": chosen.of, "methods": chosen.methods, "seconds": chosen.seconds}
     with progress_bar(chosen.quiet) as progress:
@@ -107,7 +107,7 @@ def estimate(chosen: argparse.Namespace, *, study: Part = None) -> int:
         recipe = content.get("recipe", content) if isinstance(content, dict) else content
     risk, cheaper = _risk(chosen.risk), [_number_of(text) for text in chosen.cheaper]
     scene = load_scene(chosen)
-    from lgvi_warp.studies.estimating.estimate import estimate as answer
+    from lgvi_warp.uncertainty.estimating.estimate import estimate as answer
 
     # load_scene puts step, method and dtype into the scene: what is asked for by name is fixed.
     fixed: dict[str, Any] = {"method": scene.run.method if chosen.method is not None else None,
@@ -129,7 +129,7 @@ def _risk(text: str | None) -> Any:
     """A risk as the command has it. Raises SceneError."""
     if text is None or text == "mean":
         return "mean"
-    from lgvi_warp.studies.search.risk import CVaR
+    from lgvi_warp.criteria.risk import CVaR
 
     kind, _, share = text.partition(":")
     try:
@@ -254,7 +254,7 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
     from lgvi_warp import plots
-    from lgvi_warp.studies.stability.map import GRIDS, stability_map
+    from lgvi_warp.accuracy.stability.map import GRIDS, stability_map
 
     maps = {"stability": (chosen.x or "h", chosen.y or "angular_velocity")}
     if chosen.grid:
@@ -303,10 +303,10 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
     plan: From the setup and the threads to the text of --plan.
     Returns: The exit code: 1 if all cells were refused, or all rare failures that were asked for, or a file failed, else 0.
     """
-    from lgvi_warp.studies.sweeps.file import arguments_of_file
-    from lgvi_warp.studies.sweeps.rare_output import rare_refused
-    from lgvi_warp.studies.sweeps.setup import plan_text, setup_of
-    from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
+    from lgvi_warp.robustness.sweeps.file import arguments_of_file
+    from lgvi_warp.robustness.sweeps.rare_output import rare_refused
+    from lgvi_warp.robustness.sweeps.setup import plan_text, setup_of
+    from lgvi_warp.robustness.sweeps.sweep import sweep as run_sweep
     from lgvi_warp.views.plots.sweep_pictures import pictures
 
     arguments = arguments_of_file(chosen.scene)

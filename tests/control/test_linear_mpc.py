@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear, nnls
 import lgvi_warp as lw
 from lgvi_warp.control.linear_mpc import COORDINATES
 from lgvi_warp.reference.control import linear_mpc
-from lgvi_warp.studies.linear.bench import COORDINATES as OF_MODELS
+from lgvi_warp.robustness.linear.bench import COORDINATES as OF_MODELS
 from tests.support.loops import torpedo, twin_states
 
 T = 0.1

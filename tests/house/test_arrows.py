@@ -150,9 +150,5 @@ def test_an_arrow_from_any_room_to_the_command_is_seen(monkeypatch):
             assert (module, "lgvi_warp.cli.command") in arrows_up()
 
 
-# Circles that are still there; the list may only become shorter.
-CIRCLES = {"statistics", "studies", "views"}
-
-
 def test_no_folders_of_a_room_import_each_other():
-    assert circles_of_folders().keys() == CIRCLES
+    assert circles_of_folders() == {}

@@ -34,7 +34,7 @@ VERBS = {
     "worst-case": (lw.worst_case, {}),
 }
 # Rooms in which a folder belongs to one question.
-ROOMS_OF_FOLDERS = ("studies",)
+ROOMS_OF_FOLDERS = ("measuring", "uncertainty", "robustness", "accuracy")
 
 
 def value_of(text):

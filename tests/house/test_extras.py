@@ -12,7 +12,7 @@ from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.store.settings import needed
-from lgvi_warp.studies.sensitivity import analyses
+from lgvi_warp.uncertainty.sensitivity import analyses
 from lgvi_warp.views.pages import run_again
 from lgvi_warp.views.plots import canvas
 from lgvi_warp.views.recording import rerun

@@ -11,7 +11,7 @@ from benchmarks.cases.energy import case as energy
 from benchmarks.cases.operations import case as operations
 from benchmarks.cases.threads import case as threads
 from benchmarks.tables import roofline
-from lgvi_warp.studies import speed
+from lgvi_warp.measuring import speed
 
 
 def counter(folder, name, micro_joules, span=1_000_000):

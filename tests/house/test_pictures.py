@@ -9,7 +9,7 @@ from PIL import Image
 
 from benchmarks import pages
 from benchmarks.tables import fronts
-from lgvi_warp.studies.comparison import Sample
+from lgvi_warp.measuring.comparison import Sample
 from tests.conftest import ROOT
 
 sys.path.append(str(ROOT / "docs"))
@@ -34,12 +34,12 @@ def test_it_is_of_what_made_it(name):
 
 
 def test_a_stale_picture_is_found(tmp_path):
-    """Whatever changes in any source changes the hash; line ends and the licence do not."""
-    a, b = tmp_path / "a", tmp_path / "b"
-    a.write_text("# SPDX-License-Identifier: X\nx = 1\n")
+    """Code of any source changes the hash; line ends, comments, docstrings and imports do not."""
+    a, b = tmp_path / "a.py", tmp_path / "b.toml"
+    a.write_text('# SPDX-License-Identifier: X\n"""One."""\nimport math\nx = 1\n')
     b.write_text("y = 2\n")
     digest = pictures.digest(a, b)
-    a.write_bytes(b"# SPDX-License-Identifier: Y\r\nx = 1\r\n")
+    a.write_bytes(b'# Y\r\n"""Two."""\r\nfrom math import (\r\n  pi)\r\n\r\nx = 1\r\n')
     assert pictures.digest(a, b) == digest
     b.write_text("y = 3\n")
     assert pictures.digest(a, b) != digest

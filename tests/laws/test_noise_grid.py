@@ -11,12 +11,12 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.law import add, div, mul, normals_over, ones, root  # noqa: F401
 from lgvi_warp.checks.bench import KICK, STEP, Bank, Bench
+from lgvi_warp.measuring.comparison import Sample, drawn_every
 from lgvi_warp.physics import terms
 from lgvi_warp.reference.random import draws_of_step, normals
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.wrench_noise import WrenchNoise
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies.comparison import Sample, drawn_every
 from tests.support.tools import GRAVITY, slope, vehicle
 
 # A chance of 6e-7 for a right code; the seeds are fixed: a failure means a changed law.

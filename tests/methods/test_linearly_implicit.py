@@ -8,11 +8,11 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.engine.survey import frame_of
+from lgvi_warp.measuring.comparison import Sample
 from lgvi_warp.methods.tableaux import DOP853, RK4, RKW3
 from lgvi_warp.reference import explicit, linearly_implicit
 from lgvi_warp.reference.terms.drag import Drag, DragMatrix
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies.comparison import Sample
 from tests.laws import test_parity, test_remus_100
 from tests.laws.cases import CASES, together
 from tests.methods import test_coupled

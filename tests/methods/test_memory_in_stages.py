@@ -8,13 +8,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import lgvi_warp as lw
+from lgvi_warp.measuring.comparison import Sample
 from lgvi_warp.methods import tableaux
 from lgvi_warp.methods.method import ORDERS
 from lgvi_warp.physics import terms
 from lgvi_warp.reference import explicit, linearly_implicit, munthe_kaas
 from lgvi_warp.reference.terms.control_fins import ControlFins
 from lgvi_warp.reference.terms.thrusters import Thrusters
-from lgvi_warp.studies.comparison import Sample
 from tests.laws import test_parity as test_terms
 from tests.laws.case import Case
 from tests.laws.cases import together

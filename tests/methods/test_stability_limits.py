@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks.tables.limits import EXPLICIT_DRAG, LARGE, MASS, METHODS, MOTIONS, SMALL, measured, munk_run
-from lgvi_warp.studies.stability.limits import LIMITS
+from lgvi_warp.accuracy.stability.limits import LIMITS
 
 # method -> (limit, whether stable windows above the first loss count).
 KNOWN = {"phi": (1.41, False), "psi": (1.50, False), "psi_s": (2.13, False), "psi_1": (2.00, True), "cg3": (1.69, False),

@@ -22,9 +22,9 @@ from lgvi_warp.statistics.counts import Exceedance
 from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.moments import Covariance, Mean
 from lgvi_warp.statistics.values.values import Values
-from lgvi_warp.studies.estimating import estimators, target
-from lgvi_warp.studies.rare.search import joined
-from lgvi_warp.studies.rare.subset import SubsetRun
+from lgvi_warp.uncertainty.estimating import estimators, target
+from lgvi_warp.uncertainty.rare.search import joined
+from lgvi_warp.uncertainty.rare.subset import SubsetRun
 
 # The paper's example: J, and h Omega = h (0.3, 0.2, 0.1) with h = 0.01; larger steps beside it.
 J = np.array([5.46, 5.29, 5.72])

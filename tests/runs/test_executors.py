@@ -25,8 +25,8 @@ from lgvi_warp.engine.executors.processes import Processes
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
 from lgvi_warp.engine.kernel_cache import one_at_a_time
 from lgvi_warp.engine.work import Work
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 from tests.conftest import ROOT
 from tests.support.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, markers
 from tests.support.toy_work import STEPS, Traced

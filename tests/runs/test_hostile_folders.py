@@ -16,20 +16,20 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.accuracy.stability.map import StabilityMap
+from lgvi_warp.accuracy.tradeoff import Tradeoff
 from lgvi_warp.common import files, machine, safe_files
+from lgvi_warp.robustness.sweeps import record as records
 from lgvi_warp.store import folder as store
 from lgvi_warp.store.solve import request_of
 from lgvi_warp.store.state import state
-from lgvi_warp.studies.sensitivity.indices import Indices
-from lgvi_warp.studies.stability.map import StabilityMap
-from lgvi_warp.studies.sweeps import record as records
-from lgvi_warp.studies.tradeoff import Tradeoff
+from lgvi_warp.uncertainty.sensitivity.indices import Indices
 from tests.conftest import ROOT
 from tests.support import hostile
 from tests.support.made import straight
 from tests.support.stores import SETTINGS, STATISTICS, differing, fleet
 from tests.unit.cli.test_terminal import region, sobol
-from tests.unit.studies.test_cost import found as tradeoff_of
+from tests.unit.measuring.test_cost import found as tradeoff_of
 
 # A second or two each, and memory [MB]; other work on the machine may take its part.
 SECONDS, SECONDS_TO_DRAW, MEGABYTES = 10.0, 20.0, 300

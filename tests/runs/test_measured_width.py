@@ -5,9 +5,9 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.engine import widths
+from lgvi_warp.measuring import packet_width, speed
 from lgvi_warp.runs.measured_width import candidates, measure, with_best_width
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import packet_width, speed
 
 
 class Clock:

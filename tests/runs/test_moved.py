@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.measuring import speed
 from lgvi_warp.sampling.designs.table import Table, moved
-from lgvi_warp.studies import speed
 from tests.support.stores import differing
 
 SETTINGS = {"method": "psi_s", "h": 0.01, "t1": 0.1}

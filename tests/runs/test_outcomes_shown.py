@@ -331,7 +331,7 @@ def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, mo
 
 
 def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
-    from lgvi_warp.views.recording.drawn import LEVELS, drawn_of
+    from lgvi_warp.views.drawn import LEVELS, drawn_of
 
     statistics = [lw.statistics.Quantiles("depth"), lw.statistics.Extremes("depth")]
     save = lw.SaveAt(every=1.0)

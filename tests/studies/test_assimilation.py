@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
-from lgvi_warp.studies.assimilation import filters
+from lgvi_warp.uncertainty.assimilation import filters
 
 MASS, DRAG = 10.0, 4.0
 TIMES = np.array([1.0, 2.5, 4.0])

@@ -9,8 +9,8 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp.scene.variations import targets
-from lgvi_warp.studies.assimilation import filters, innovations
-from lgvi_warp.studies.assimilation.coordinates import Coordinates
+from lgvi_warp.uncertainty.assimilation import filters, innovations
+from lgvi_warp.uncertainty.assimilation.coordinates import Coordinates
 from tests.studies.test_assimilation import DRAG, MASS, TIMES, design, drifting, kalman, series, unknowns
 
 D = lw.distributions

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
 from lgvi_warp.reference.control import Measurement, Reference, pose_errors
-from lgvi_warp.studies.linear.bench import MotionBench, plant
+from lgvi_warp.robustness.linear.bench import MotionBench, plant
 from tests.laws import test_remus_100 as equations
 
 MASS, INERTIA, GRAVITY, PERIOD, LAG = 20.0, np.array((5.0, 8.0, 11.0)), 10.0, 0.1, 0.3

@@ -10,10 +10,10 @@ import lgvi_warp as lw
 from lgvi_warp.control import AllocationMatrix, DepthPID, HeadingPID, Sensor, SetPoint, SpeedPID
 from lgvi_warp.control.loop_gain import FACTOR
 from lgvi_warp.distributions import Choice, Uniform
+from lgvi_warp.robustness.linear import loops as study
+from lgvi_warp.robustness.linear.edges import edges
+from lgvi_warp.robustness.linear.sampled_loop import DELAY, SampledLoop
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp.studies.linear import loops as study
-from lgvi_warp.studies.linear.edges import edges
-from lgvi_warp.studies.linear.sampled_loop import DELAY, SampledLoop
 from lgvi_warp.terms import ControlWrench, Drag, Thrusters
 from tests.support.pages import blocks
 from tests.support.refusals import says

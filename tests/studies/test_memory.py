@@ -8,9 +8,9 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.npy_files import write_npz
-from lgvi_warp.studies.estimating.levels import Runs
-from lgvi_warp.studies.memory import Remembered
-from lgvi_warp.studies.rare.limit import VehicleLimit
+from lgvi_warp.criteria.memory import Remembered
+from lgvi_warp.uncertainty.estimating.levels import Runs
+from lgvi_warp.uncertainty.rare.limit import VehicleLimit
 from tests.support.refusals import refused, says
 
 SECONDS = ("seconds", "plain_seconds", "pilot_seconds")

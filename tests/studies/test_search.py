@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.studies.search.box import search
+from lgvi_warp.robustness.search.box import search
 from tests.studies.test_linear import PERIOD, cost, regulated, regulator  # noqa: F401  (a fixture)
 from tests.support.refusals import says
 

@@ -10,14 +10,14 @@ from scipy.special import ndtr, ndtri
 
 import lgvi_warp as lw
 from lgvi_warp.sampling.final import joined
-from lgvi_warp.studies.rare.event import SURE, condition_of
-from lgvi_warp.studies.rare.flock import Flock
-from lgvi_warp.studies.rare.moving import moved
-from lgvi_warp.studies.rare.split_search import SplitSearch
-from lgvi_warp.studies.rare.splitting import piloted, split_runs
-from lgvi_warp.studies.rare.stages import Stage, walked
-from lgvi_warp.studies.rare.subset import NoProgress
-from lgvi_warp.studies.rare.walk import VehicleWalk, pieces
+from lgvi_warp.uncertainty.rare.event import SURE, condition_of
+from lgvi_warp.uncertainty.rare.flock import Flock
+from lgvi_warp.uncertainty.rare.moving import moved
+from lgvi_warp.uncertainty.rare.split_search import SplitSearch
+from lgvi_warp.uncertainty.rare.splitting import piloted, split_runs
+from lgvi_warp.uncertainty.rare.stages import Stage, walked
+from lgvi_warp.uncertainty.rare.subset import NoProgress
+from lgvi_warp.uncertainty.rare.walk import VehicleWalk, pieces
 from tests.support.refusals import says
 
 # A body of mass and added mass M in linear drag and white noise of force: speeds die out in TAU, and grow by S sqrt(t).

@@ -8,12 +8,12 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.accuracy.stability import map as stability
+from lgvi_warp.accuracy.stability.grid import StabilityGrid
+from lgvi_warp.accuracy.stability.map import Cell, StabilityMap, report_text
+from lgvi_warp.accuracy.stability.runs import column, make_references
 from lgvi_warp.engine.step_warnings import COARSE
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.studies.stability import map as stability
-from lgvi_warp.studies.stability.grid import StabilityGrid
-from lgvi_warp.studies.stability.map import Cell, StabilityMap, report_text
-from lgvi_warp.studies.stability.runs import column, make_references
 from tests.conftest import ROOT
 from tests.support.refusals import says
 

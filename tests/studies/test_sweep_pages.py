@@ -6,9 +6,9 @@ import random
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.studies.sweeps.file import arguments_of_file
-from lgvi_warp.studies.sweeps.setup import setup_of
-from lgvi_warp.studies.sweeps.success import success_of
+from lgvi_warp.criteria.success import success_of
+from lgvi_warp.robustness.sweeps.file import arguments_of_file
+from lgvi_warp.robustness.sweeps.setup import setup_of
 from tests.conftest import ROOT
 from tests.support.pages import blocks
 

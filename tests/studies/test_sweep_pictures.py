@@ -7,7 +7,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import failed
-from lgvi_warp.studies.sweeps.output import against_baseline
+from lgvi_warp.robustness.sweeps.output import against_baseline
 from lgvi_warp.views.plots import sweep_pictures as sweeps
 from tests.studies.test_sweep import found, scene, swept  # noqa: F401  (fixtures)
 

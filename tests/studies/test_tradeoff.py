@@ -19,15 +19,15 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.law import add, div, int_lane, lane, mul, normals3, ones, root, struct  # noqa: F401
 from lgvi_warp import cli
-from lgvi_warp.studies import comparison, cost
-from lgvi_warp.studies import suggest as suggestion
-from lgvi_warp.studies import tradeoff as tradeoffs
-from lgvi_warp.studies import trials as settings
-from lgvi_warp.studies.budget import Budget
-from lgvi_warp.studies.comparison import Sample
-from lgvi_warp.studies.ladders import Ladders
-from lgvi_warp.studies.reference import make_reference
-from lgvi_warp.studies.trials import TRUST, tried
+from lgvi_warp.accuracy import suggest as suggestion
+from lgvi_warp.accuracy import tradeoff as tradeoffs
+from lgvi_warp.measuring import comparison, cost
+from lgvi_warp.measuring import trials as settings
+from lgvi_warp.measuring.budget import Budget
+from lgvi_warp.measuring.comparison import Sample
+from lgvi_warp.measuring.ladders import Ladders
+from lgvi_warp.measuring.reference import make_reference
+from lgvi_warp.measuring.trials import TRUST, tried
 from tests.conftest import ROOT
 from tests.support.random_scenes import judged, random_scene
 from tests.support.refusals import says

@@ -25,10 +25,10 @@ from benchmarks import own_process, problems
 from benchmarks.peers.problem import driven_scene
 from lgvi_warp.common import warp_setup
 from lgvi_warp.engine.plan import Plan
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies import speed
 
 TABLE = Path(__file__).parent.parent / "data" / "hot_loops.json"
 # How much more than recorded a loop may hold, and how much longer than recorded its kernel may compile beside PLAIN.

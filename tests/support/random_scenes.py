@@ -4,11 +4,11 @@
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp.studies import suggest as suggestion
-from lgvi_warp.studies.comparison import Sample
-from lgvi_warp.studies.cost import costs
-from lgvi_warp.studies.reference import make_reference
-from lgvi_warp.studies.trials import PRECISIONS, tried
+from lgvi_warp.accuracy import suggest as suggestion
+from lgvi_warp.measuring.comparison import Sample
+from lgvi_warp.measuring.cost import costs
+from lgvi_warp.measuring.reference import make_reference
+from lgvi_warp.measuring.trials import PRECISIONS, tried
 
 
 def random_scene(seed):

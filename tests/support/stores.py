@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import lgvi_warp as lw
-from lgvi_warp.studies import speed
+from lgvi_warp.measuring import speed
 
 # 4 blocks of 256 members, the last one ragged; 31 samples.
 MEMBERS, SETTINGS = 1003, {"method": "psi_s", "h": 0.01, "t1": 3.0, "save": lw.SaveAt(every=0.1)}

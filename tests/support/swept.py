@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from lgvi_warp.common.status import Status
-from lgvi_warp.studies.sweeps.output import Sweep
-from lgvi_warp.studies.sweeps.record import Record
-from lgvi_warp.studies.sweeps.setup import END, SweepCell
+from lgvi_warp.robustness.sweeps.output import Sweep
+from lgvi_warp.robustness.sweeps.record import Record
+from lgvi_warp.robustness.sweeps.setup import END, SweepCell
 from tests.support.made import made
 
 N = 40

@@ -14,16 +14,16 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 import lgvi_warp as lw
+from lgvi_warp.accuracy.stability.grid import Line
+from lgvi_warp.accuracy.stability.map import StabilityMap
+from lgvi_warp.accuracy.tradeoff import Measurement, Tradeoff
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, StatusArray
-from lgvi_warp.studies.comparison import Candidate
-from lgvi_warp.studies.linear.margins import Margins
-from lgvi_warp.studies.stability.grid import Line
-from lgvi_warp.studies.stability.map import StabilityMap
-from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
+from lgvi_warp.measuring.comparison import Candidate
+from lgvi_warp.robustness.linear.margins import Margins
+from lgvi_warp.views.drawn import at_levels
 from lgvi_warp.views.plots import canvas
 from lgvi_warp.views.plots.read import quantity_of, survey_of
-from lgvi_warp.views.recording.drawn import at_levels
 from tests.support.made import made, turned
 from tests.unit.views.test_cost_pictures import RUNS, TERMS
 

@@ -9,8 +9,8 @@ import numpy as np
 import lgvi_warp as lw
 from benchmarks.problems import difference
 from lgvi_warp.engine.packets import Packets
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 METHODS = ("psi_s", "psi_x", "su4(psi_x)", "bm4(psi_x)", "rkn4_6", "kl6(psi_x)", "ss6_13(psi_x)", "bm6(psi_x)", "rkn6_11",
            "rkn6_14", "kl8(psi_x)", "su8_15(psi_x)", "ss8_21(psi_x)", "gauss4", "gauss6", "gauss8", "gauss12")  # fmt: skip

@@ -24,8 +24,8 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_kernels.lanes.rotations import rotation_struct, transpose_apply
 from lgvi_kernels.maps.rotation import quartic_rotation, quartic_series
+from lgvi_warp.measuring import speed
 from lgvi_warp.physics import notation
-from lgvi_warp.studies import speed
 
 WIDTH, REAL = 8, wp.float64
 Lane, Lane3, Rotation = lane(WIDTH, REAL), lane3(WIDTH, REAL), rotation_struct(WIDTH, REAL)

@@ -3,9 +3,9 @@
 
 import numpy as np
 
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.studies import speed
 
 METHODS = ("psi_s", "psi", "psi_1", "psi_x", "kl8(psi_x)", "rk8")
 LEVELS = ("none", "safe", "all")

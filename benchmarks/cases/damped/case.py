@@ -14,9 +14,9 @@ import dataclasses
 import numpy as np
 
 import lgvi_warp as lw
+from lgvi_warp.measuring import cost
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import cost
 
 TIME = 30.0  # s
 ERRORS = (1e-1, 1e-2, 1e-3, 1e-4)  # m

@@ -10,10 +10,10 @@ import time
 import numpy as np
 
 import lgvi_warp as lw
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs import tangents
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.copies import with_copies
-from lgvi_warp.studies import speed
 
 NAMES = {
     "paper": ("vehicle.mass", "vehicle.center_of_buoyancy[2]"),

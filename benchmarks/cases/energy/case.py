@@ -11,9 +11,9 @@ from pathlib import Path
 
 import lgvi_warp as lw
 from lgvi_warp.common import machine
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 COUNTERS = Path("/sys/class/powercap")
 # AMD's too; "intel-rapl-mmio:0" counts a package a second time.

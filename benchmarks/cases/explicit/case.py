@@ -4,9 +4,9 @@
 import numpy as np
 
 from lgvi_warp.engine.packets import Packets
+from lgvi_warp.measuring import speed
 from lgvi_warp.methods.method import Method
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 STEPS = {
     "psi_s": (0.02, 0.01),

@@ -3,9 +3,9 @@
 
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.measuring import speed
 from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 # Methods and widths that are measured quickly.
 QUICK = ("psi_s", "psi_x"), (8,)

@@ -4,9 +4,9 @@
 import time
 
 from lgvi_warp.common import machine
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 
 def run(quick):

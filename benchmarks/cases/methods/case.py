@@ -9,9 +9,9 @@ width is used as well as the default is, and 10 where vectorisation fell off a c
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.measuring import speed
 from lgvi_warp.methods.method import Method
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 METHODS = (
     "phi", "phi_adjoint", "psi", "psi_s", "psi_1", "psi_x", "psi_x8", "psi_w", "tj4(psi_s)", "su4(psi_s)", "su4(psi_x)",

@@ -13,8 +13,8 @@ import lgvi_warp as lw
 from benchmarks import problems
 from benchmarks.arm import cross, step
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.measuring import speed
 from lgvi_warp.methods import method as methods
-from lgvi_warp.studies import speed
 
 # Every method of `lgvi-warp list methods`; compositions are of psi_x there.
 METHODS = (*methods.PROGRAMS, *methods.TWO_PART, *methods.GAUSS, *methods.RUNGE_KUTTA,

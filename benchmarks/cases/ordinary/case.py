@@ -5,8 +5,8 @@ import numpy as np
 
 from benchmarks.cases.ordinary.kernel import command
 from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 
 def run(quick):

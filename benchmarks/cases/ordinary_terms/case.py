@@ -7,10 +7,10 @@ Processor time, the least of all rounds: other work on the machine lengthens it 
 from benchmarks import problems
 from benchmarks.cases.ordinary_terms.kernel import command
 from benchmarks.timing import least
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.sampling.distributions.basic import Normal
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.studies import speed
 
 STEP = 0.01
 

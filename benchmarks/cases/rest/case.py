@@ -6,9 +6,9 @@ import time
 import numpy as np
 
 from lgvi_warp.engine.packets import Packets
+from lgvi_warp.measuring import speed
 from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 DTYPES = ("float64", "float32", "float32_compensated")
 H, STEPS, PARTS = 0.01, 40_000, 20

@@ -11,10 +11,10 @@ from functools import partial
 import numpy as np
 
 import lgvi_warp as lw
+from lgvi_warp.measuring import speed
 from lgvi_warp.methods.method import SOLVERS, Method
 from lgvi_warp.reference import riccati, rotation
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 FIXED = {"quartic": (0, 1, 2), "cayley": (0, 1, 2), "newton": (0, 1, 2), "moser_veselov": (0, 1)}
 SHAPES = {"paper": (5.46, 5.29, 5.72), "general": (1.0, 2.0, 2.5), "near sphere": (1.0, 1.001, 1.002),

@@ -13,9 +13,9 @@ import lgvi_warp as lw
 from benchmarks import own_process
 from lgvi_warp.common import machine
 from lgvi_warp.engine.keepers.observation import Observation
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 
 def statistics():

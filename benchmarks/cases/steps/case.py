@@ -2,9 +2,9 @@
 """Cost and memory as steps grow: time per vehicle and step, and the peak memory of a process that does that run alone."""
 
 from benchmarks import own_process
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 
 def alone(members, steps):

@@ -25,6 +25,7 @@ from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.loop import RunProgress, run_blocks
 from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.work import Work
+from lgvi_warp.measuring import speed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.provenance import messages, provenance
 from lgvi_warp.runs.run import run_plan
@@ -34,7 +35,6 @@ from lgvi_warp.store.create import create
 from lgvi_warp.store.layout import columns
 from lgvi_warp.store.run import StoredRun
 from lgvi_warp.store.settings import Store
-from lgvi_warp.studies import speed
 
 
 def in_turn(calls, rounds):

@@ -15,10 +15,10 @@ import numpy as np
 
 import lgvi_warp as lw
 from benchmarks import own_process
+from lgvi_warp.accuracy.suggest import CANDIDATES
 from lgvi_warp.common import warp_setup
+from lgvi_warp.measuring import cost
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import cost
-from lgvi_warp.studies.suggest import CANDIDATES
 
 MOST = 20.0  # s
 ERRORS = (1e-2, 1e-3, 1e-5)  # m

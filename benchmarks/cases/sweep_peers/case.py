@@ -19,7 +19,7 @@ import numpy as np
 
 import lgvi_warp as lw
 from benchmarks.timing import least
-from lgvi_warp.studies.sweeps.file import arguments_of_file
+from lgvi_warp.robustness.sweeps.file import arguments_of_file
 
 HERE = Path(__file__).parent
 OURS = ("scene.toml", "sweep.toml")

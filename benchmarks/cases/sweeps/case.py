@@ -26,7 +26,7 @@ def beside_runs(cases, members, t1):
         t1: end of the runs [s].
     """
     import lgvi_warp as lw
-    from lgvi_warp.studies.sweeps.setup import setup_of
+    from lgvi_warp.robustness.sweeps.setup import setup_of
 
     def runs(of, end):
         setup = setup_of(SCENE, None, gains(cases), None, of, None, None, METRICS, {})

@@ -9,10 +9,10 @@ terms" are without noise.
 from benchmarks import problems
 from benchmarks.peers.plot import DRIVEN
 from benchmarks.peers.problem import driven_scene
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.sampling.distributions.basic import Normal, Uniform
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.studies import speed
 
 STEP = 0.01
 SPREAD = {"start.angular_velocity": Normal(relative=0.1)}

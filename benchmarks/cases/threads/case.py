@@ -12,9 +12,9 @@ import os
 from pathlib import Path
 
 from lgvi_warp.common import machine
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import speed
 
 NODES = Path("/sys/devices/system/node")
 

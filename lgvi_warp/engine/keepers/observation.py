@@ -19,9 +19,9 @@ from lgvi_warp.scene.settings import read_keep
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
+from lgvi_warp.statistics.tracking import check_wanted
 from lgvi_warp.statistics.until import StoppingRule, Until, from_dict, watch
 from lgvi_warp.statistics.values.quantity import Quantity
-from lgvi_warp.statistics.values.tracking import check_wanted
 
 # Effective members below which intervals of weighted members are not to be relied on.
 FEW = 100

@@ -13,8 +13,8 @@ import numpy as np
 
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.statistics import tracking
 from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
-from lgvi_warp.statistics.values import tracking
 from lgvi_warp.statistics.values.quantity import Quantity
 
 # Times that differ by less than this part of the run are the same.

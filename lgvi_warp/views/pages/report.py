@@ -22,10 +22,10 @@ from lgvi_warp.common.files import place_of, write_text
 from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_bytes, file_json, file_text
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.status import Warnings
+from lgvi_warp.criteria.files import STUDY_FILES, of_study
 from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.results.varied import varied
 from lgvi_warp.statistics.estimates.table import table
-from lgvi_warp.studies.files import STUDY_FILES, of_study
 from lgvi_warp.views.commands import faults
 from lgvi_warp.views.fleet import OUTCOME_STYLES, title
 from lgvi_warp.views.pages.run_again import how_to_run_again

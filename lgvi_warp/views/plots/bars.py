@@ -14,7 +14,7 @@ from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.words import in_words
 
 if TYPE_CHECKING:
-    from lgvi_warp.studies.sensitivity.indices import Indices
+    from lgvi_warp.uncertainty.sensitivity.indices import Indices
 
 # Most panels: a picture of more cannot be read.
 MOST = 12

@@ -13,7 +13,7 @@ from lgvi_warp.views.plots.canvas import panels, style, widen, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 
 if TYPE_CHECKING:
-    from lgvi_warp.studies.linear.margins import Margins
+    from lgvi_warp.robustness.linear.margins import Margins
 
 LABELS = {
     "gain_lower": "lower gain margin, a factor",

@@ -15,6 +15,7 @@ from lgvi_warp.common.status import Status, failed, stop_time
 from lgvi_warp.results.outcomes import outcomes
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import mixed, of_members
+from lgvi_warp.views.drawn import at_levels
 from lgvi_warp.views.fleet import members_of_run, title
 from lgvi_warp.views.plots.canvas import (
     COLORS,
@@ -39,7 +40,6 @@ from lgvi_warp.views.plots.read import (
     with_samples,
 )
 from lgvi_warp.views.plots.words import HINT, floors, floors_of_each, in_words, is_depth, label_of
-from lgvi_warp.views.recording.drawn import at_levels
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result

@@ -12,8 +12,8 @@ from lgvi_warp.views.plots.canvas import panels, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 
 if TYPE_CHECKING:
-    from lgvi_warp.studies.stability.grid import Line
-    from lgvi_warp.studies.stability.map import StabilityMap
+    from lgvi_warp.accuracy.stability.grid import Line
+    from lgvi_warp.accuracy.stability.map import StabilityMap
 
 # Colours of stability_map's classes, distinct for every kind of colour vision and in grey; silent failures are hatched.
 CELLS = ("#0072B2", "#9BD1F0", "#F0E442", "#8C8C8C", "#D55E00")
@@ -99,8 +99,8 @@ def _legend(figure: Any, drawn: set[str]) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    from lgvi_warp.studies.stability.limits import TEXTS
-    from lgvi_warp.studies.stability.map import Cell
+    from lgvi_warp.accuracy.stability.limits import TEXTS
+    from lgvi_warp.accuracy.stability.map import Cell
 
     handles: list[Any] = [
         Patch(facecolor=color, edgecolor="black", linewidth=0.4, label=f"{cell.name.lower()}: {cell.text}",

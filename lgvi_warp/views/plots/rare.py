@@ -14,8 +14,8 @@ from lgvi_warp.views.plots.canvas import COLORS, GREY, panels, style, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 
 if TYPE_CHECKING:
-    from lgvi_warp.studies.rare.answer import RareEvent
-    from lgvi_warp.studies.rare.subset import SubsetRun
+    from lgvi_warp.uncertainty.rare.answer import RareEvent
+    from lgvi_warp.uncertainty.rare.subset import SubsetRun
 
 # Members as plain sampling draws them, and most failing ones, that are drawn.
 PLAIN, MOST = 1000, 1000

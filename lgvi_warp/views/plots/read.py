@@ -16,8 +16,8 @@ from lgvi_warp.results.quantities import EndQuantity, OfResult, samples_of
 from lgvi_warp.statistics.values.functional import quantity
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import AT_ONCE, Shown, few, select_members
+from lgvi_warp.views.drawn import about
 from lgvi_warp.views.plots.words import DEPTHS, events, is_depth
-from lgvi_warp.views.recording.drawn import about
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result

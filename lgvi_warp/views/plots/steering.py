@@ -10,10 +10,10 @@ import numpy as np
 from lgvi_warp.common.status import under_way
 from lgvi_warp.views.choice import MOST_BODIES
 from lgvi_warp.views.commands import channels, faults
+from lgvi_warp.views.drawn import at_levels
 from lgvi_warp.views.plots.canvas import GREY, legend_below, line_marker, shade, style
 from lgvi_warp.views.plots.read import quantity_of, selected, survey_of
 from lgvi_warp.views.plots.words import WORDS
-from lgvi_warp.views.recording.drawn import at_levels
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result

@@ -16,11 +16,11 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import failed, under_way
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import samples_of
-from lgvi_warp.statistics.values import tracking
-from lgvi_warp.studies.sweeps.output import Sweep
-from lgvi_warp.studies.sweeps.setup import END, SweepCell
-from lgvi_warp.studies.sweeps.summary import against_baseline
-from lgvi_warp.studies.sweeps.sweep_table import SUCCESS
+from lgvi_warp.robustness.sweeps.output import Sweep
+from lgvi_warp.robustness.sweeps.setup import END, SweepCell
+from lgvi_warp.robustness.sweeps.summary import against_baseline
+from lgvi_warp.robustness.sweeps.sweep_table import SUCCESS
+from lgvi_warp.statistics import tracking
 from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, legend_below, panels, point_down, style, wrapped
 from lgvi_warp.views.plots.fans import draw_bands
 from lgvi_warp.views.plots.picture import FilePath

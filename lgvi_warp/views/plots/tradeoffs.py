@@ -13,7 +13,7 @@ from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, apart, panels, w
 from lgvi_warp.views.plots.picture import FilePath, picture
 
 if TYPE_CHECKING:
-    from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
+    from lgvi_warp.accuracy.tradeoff import Measurement, Tradeoff
 
 # Precision -> line style and fill of the markers.
 PRECISIONS = {"float64": ("-", "full"), "float32": ("--", "none"), "float32_compensated": (":", "left")}

@@ -12,8 +12,8 @@ from lgvi_warp.control.signals import CHANNELS
 from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.views.choice import frames_of
 from lgvi_warp.views.commands import channels, faults
+from lgvi_warp.views.drawn import LEVELS, Drawn, Fan, at_levels, first_ended
 from lgvi_warp.views.fleet import OUTCOME_STYLES
-from lgvi_warp.views.recording.drawn import LEVELS, Drawn, Fan, at_levels, first_ended
 from lgvi_warp.views.recording.world import TIMELINE, log_static, send_columns
 
 # Bands of a fan, outermost first: name, places of its levels, and opacity.

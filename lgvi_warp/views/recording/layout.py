@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.control.signals import CHANNELS, ENERGY_USED
-from lgvi_warp.views.recording.drawn import OFF, Drawn, Fan
+from lgvi_warp.views.drawn import OFF, Drawn, Fan
 from lgvi_warp.views.recording.eye import ASPECT, SIGHT, distance
 from lgvi_warp.views.recording.world import TIMELINE, WorldBox
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views import choice
+from lgvi_warp.views.drawn import NEEDED, Drawn, drawn_of
 from lgvi_warp.views.fleet import members_of_run
 from lgvi_warp.views.recording import viewer
-from lgvi_warp.views.recording.drawn import NEEDED, Drawn, drawn_of
 from lgvi_warp.views.recording.graphs import log_member
 from lgvi_warp.views.recording.layout import live_layout
 from lgvi_warp.views.recording.world import WorldBox, box_of, log_bodies, log_frame, log_paths, scale_of

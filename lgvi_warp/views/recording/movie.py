@@ -15,9 +15,9 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common.arguments import file_path, result_of
 from lgvi_warp.common.errors import Faults, MissingExtra
 from lgvi_warp.views.choice import finite_rows
+from lgvi_warp.views.drawn import drawn_of
 from lgvi_warp.views.fleet import title
 from lgvi_warp.views.recording import headless
-from lgvi_warp.views.recording.drawn import drawn_of
 from lgvi_warp.views.recording.rerun import record
 
 if TYPE_CHECKING:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from lgvi_warp.common import files as durable
 from lgvi_warp.common.arguments import file_path, of_kind, result_of
 from lgvi_warp.common.errors import NothingToDraw, SceneError
+from lgvi_warp.views.drawn import Drawn, drawn_of
 from lgvi_warp.views.fleet import identity, title
 from lgvi_warp.views.recording import viewer
-from lgvi_warp.views.recording.drawn import Drawn, drawn_of
 from lgvi_warp.views.recording.eye import ASPECT
 from lgvi_warp.views.recording.graphs import COLORS, log_graphs
 from lgvi_warp.views.recording.layout import layout

@@ -12,7 +12,7 @@ from lgvi_warp.common import summaries
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import of_members
-from lgvi_warp.views.recording.drawn import Drawn
+from lgvi_warp.views.drawn import Drawn
 from lgvi_warp.views.recording.hull import shape_of
 from lgvi_warp.views.recording.world import WorldBox, chosen_member, floors_of, reliefs_of
 

@@ -12,7 +12,7 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import finite_rows
-from lgvi_warp.views.recording.drawn import Drawn, quaternion_xyzw
+from lgvi_warp.views.drawn import Drawn, quaternion_xyzw
 from lgvi_warp.views.recording.eye import ASPECT, far_pixel
 from lgvi_warp.views.recording.hull import Mesh, hull_of, mesh_of, shape_of
 from lgvi_warp.views.sea_floor import Relief, flat_depths, reliefs

@@ -8,7 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.arguments import members_of
-from lgvi_warp.views.recording.drawn import places_of
+from lgvi_warp.views.drawn import places_of
 from tests.support.odd_calls import BODY
 
 N = 4

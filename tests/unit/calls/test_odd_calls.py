@@ -12,7 +12,7 @@ import lgvi_warp as lw
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from tests.support import odd_calls
 from tests.unit.cli.test_terminal import region, sobol
-from tests.unit.studies.test_cost import found as tradeoff_of
+from tests.unit.measuring.test_cost import found as tradeoff_of
 
 # What a call may end with: the refusal, a picture of nothing, a library that is not installed, a file that is not there.
 DELIBERATE = (lw.SceneError, NothingToDraw, MissingExtra, OSError)

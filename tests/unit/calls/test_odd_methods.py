@@ -9,7 +9,7 @@ from lgvi_warp.common.arguments import explained
 from tests.support import odd_calls
 from tests.unit.calls.test_odd_calls import raw_of
 from tests.unit.cli.test_terminal import region, sobol
-from tests.unit.studies.test_cost import found as tradeoff_of
+from tests.unit.measuring.test_cost import found as tradeoff_of
 
 pytestmark = pytest.mark.kernel
 

@@ -16,7 +16,7 @@ from lgvi_warp.cli.writing import Written
 from tests.support.verbs import Study, main
 from tests.unit.cli.test_run_summary import MACHINE, told
 from tests.unit.cli.test_terminal import region, sobol
-from tests.unit.studies.test_cost import found as tradeoff_of
+from tests.unit.measuring.test_cost import found as tradeoff_of
 
 
 @pytest.fixture
@@ -129,8 +129,8 @@ def test_verbose_info_of_a_result_says_how(tmp_path, capsys):
 
 
 def test_studies_have_their_reports():
-    from lgvi_warp.studies.stability import map as stability
-    from lgvi_warp.studies.tradeoff import report_text
+    from lgvi_warp.accuracy.stability import map as stability
+    from lgvi_warp.accuracy.tradeoff import report_text
 
     assert folders.text_of("tradeoff", tradeoff_of(4.0)) == report_text(tradeoff_of(4.0))
     assert folders.text_of("stability", region()) == stability.report_text(region())

@@ -10,15 +10,15 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli, uq
+from lgvi_warp.accuracy.stability.map import GRIDS
 from lgvi_warp.cli import studies
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
-from lgvi_warp.studies.stability.map import GRIDS
 from tests.conftest import ROOT
 from tests.support.verbs import Study, main
 from tests.unit.cli.test_terminal import document, region, sobol
-from tests.unit.studies.test_cost import found as tradeoff_of
-from tests.unit.studies.test_estimating import answer
+from tests.unit.measuring.test_cost import found as tradeoff_of
+from tests.unit.uncertainty.test_estimating import answer
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 

@@ -15,16 +15,16 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.accuracy.stability.grid import Line
+from lgvi_warp.accuracy.stability.map import StabilityMap
+from lgvi_warp.accuracy.tradeoff import Tradeoff
 from lgvi_warp.calls import predict as prediction
 from lgvi_warp.cli import arguments, command, output, signals
-from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
-from lgvi_warp.studies.stability.grid import Line
-from lgvi_warp.studies.stability.map import StabilityMap
-from lgvi_warp.studies.tradeoff import Tradeoff
+from lgvi_warp.uncertainty.sensitivity.indices import Indices, MorrisEffects, SobolIndices
 from tests.conftest import ROOT
 from tests.support.json_page import TABLES, differing
 from tests.support.verbs import Study, main
-from tests.unit.studies.test_cost import found as tradeoff_of
+from tests.unit.measuring.test_cost import found as tradeoff_of
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 SMALL = ["--members", "20", "--duration", "2", "--set", "run.save_every=0.5"]

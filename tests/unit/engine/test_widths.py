@@ -10,10 +10,10 @@ from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.common import machine
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.widths import path as path_of_users
+from lgvi_warp.measuring import packet_width as tuning
+from lgvi_warp.measuring import speed
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.studies import packet_width as tuning
-from lgvi_warp.studies import speed
 
 EPYC, XEON = "AMD EPYC 9654", "Intel(R) Xeon(R) Platinum 8481C"
 DTYPES = ("float64", "float32", "float32_compensated")

@@ -11,9 +11,9 @@ import math
 import numpy as np
 import pytest
 
+from lgvi_warp.accuracy.stability import limits as theory
 from lgvi_warp.methods import limits
 from lgvi_warp.methods.method import Method
-from lgvi_warp.studies.stability import limits as theory
 
 TABLES = {"munk": limits.MUNK, "restoring": limits.RESTORING}
 

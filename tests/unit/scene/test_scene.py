@@ -6,7 +6,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
-from lgvi_warp.studies.sweeps.cases import Case
+from lgvi_warp.robustness.sweeps.cases import Case
 from tests.support.refusals import faults, says
 
 VEHICLE = lw.Vehicle(mass=10.0, inertia=(1.0, 2.0, 2.5))

@@ -9,13 +9,13 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.cli.command import main
+from lgvi_warp.measuring.distance import compared_in
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.results.quantities import quantities
 from lgvi_warp.statistics.paths.path import followed
 from lgvi_warp.statistics.until import watch
 from lgvi_warp.statistics.values.values import Values
-from lgvi_warp.studies.distance import compared_in
 from tests.conftest import ROOT
 
 K, N = 7, 5

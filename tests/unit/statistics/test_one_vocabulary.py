@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.measuring.distance import QUANTITIES, compared_in
 from lgvi_warp.physics import notation
 from lgvi_warp.results.quantities import quantities
 from lgvi_warp.statistics.values.functional import functional, quantity
 from lgvi_warp.statistics.values.quantity import KNOWN
-from lgvi_warp.studies.distance import QUANTITIES, compared_in
 from tests.support.refusals import refused, says
 
 K, N = 4, 3

@@ -8,7 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.studies.sweeps.summary import against_baseline
+from lgvi_warp.robustness.sweeps.summary import against_baseline
 from lgvi_warp.views.plots import sweep_pictures as sweeps
 from tests.support.swept import ByHand, N, swept
 

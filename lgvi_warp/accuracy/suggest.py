@@ -1,0 +1,476 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The cheapest setting that keeps a given error: searched on a sample, checked on more members and after the run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.accuracy import tradeoff as tradeoffs
+from lgvi_warp.accuracy.tradeoff import chosen_methods, growth_of, growth_text, noise_text
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.executors import check_threads
+from lgvi_warp.engine.plan import Plan, choose_plan
+from lgvi_warp.measuring import comparison, cost
+from lgvi_warp.measuring.budget import Budget, rounded_up
+from lgvi_warp.measuring.comparison import Candidate, Sample
+from lgvi_warp.measuring.distance import Distance, compared_in
+from lgvi_warp.measuring.kernels import KERNELS, Kernels
+from lgvi_warp.measuring.ladders import ROUNDS, SHORT, Ladders
+from lgvi_warp.measuring.reference import Growth, Reference, make_reference, time_over
+from lgvi_warp.measuring.speed import void
+from lgvi_warp.measuring.trials import Trial, tried
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import TimeGrid
+from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.results.result import Result
+from lgvi_warp.runs.default_method import is_damped
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.uncertainty.estimating.estimate import drawn
+from lgvi_warp.uncertainty.estimating.mean_setting import MeanSetting, mean_settings
+
+# A setting is accepted where its error on the sample is below the error asked for by this factor.
+SAFETY = 1.15
+# Number of times that errors are compared at, where the scene gives none: few, so that steps may be long.
+TIMES = 5
+# Methods in the order in which they are tried; those that are seldom the cheapest are left out.
+CANDIDATES = tuple(name for name in tradeoffs.CANDIDATES if name not in ("phi", "psi", "psi_w"))
+# Tried as well for drag by its exact flow, and where damping limits the step.
+STIFFLY_DAMPED = ("psi_x", "rkw3")
+# Number of members that the choice is checked on, and how many times as many times, where steps become no shorter than this.
+CHECKED, DENSER, SHORTER = 1024, 4, 1.1
+# The largest errors that tell how errors fall off: a 64th of the members, at least 8; below 40 members none tell.
+TAIL, FEWEST_IN_TAIL, FEWEST = 64, 8, 40
+# Chance that another fleet, as large and drawn alike, has a larger error than is expected.
+CHANCE = 0.1
+# Number of members that a finished run is checked on.
+CONFIRMED = 64
+# Part of a search's time that a reference gets.
+SHARE = 0.4
+# Number of settings in the last comparison of costs.
+FINALISTS = 4
+# Bytes of a member besides its samples: state, parameters, status, and the arrays they are made from.
+BYTES_OF_A_MEMBER = 2000
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """Cheapest setting found for an error, with what it is predicted to cost.
+
+    Attributes:
+        settings: arguments for `lw.solve(fleet, **settings)`: method, h and dtype.
+        setting: the same as a Candidate.
+        error: error asked for [`unit`].
+        of: name of the quantity that the error is of.
+        unit: unit of that quantity.
+        expected: largest error over members and path: that of the members checked, carried on to the size of the fleet by how
+            the largest ones fall off; one fleet in ten, as large and drawn alike, exceeds it [`unit`].
+        us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
+        run_seconds: predicted run time of all members on `threads` threads, without compiling [s].
+        threads: threads that `run_seconds` assumes.
+        memory_bytes: predicted memory of the run and its result [bytes].
+        members: number of members that the setting was checked on.
+        t1: end time that was checked [s].
+        reference: the pair of runs that errors were measured against, in words.
+        reference_error: largest difference between these two runs [`unit`].
+        rivals: (setting, us_per_vehicle_second, error) of the next best settings.
+        worst: indices of the members with the largest errors, the largest first; `verified` runs them again.
+        asked: the quantity itself, for `verified`.
+        messages: notes for the user.
+    """
+
+    settings: dict[str, Any]
+    setting: Candidate
+    error: float
+    of: str
+    unit: str
+    expected: float
+    us_per_vehicle_second: float
+    run_seconds: float
+    threads: int
+    memory_bytes: int
+    members: int
+    t1: float
+    reference: str
+    reference_error: float
+    rivals: tuple[tuple[Candidate, float, float], ...] = ()
+    worst: tuple[int, ...] = ()
+    asked: Distance | None = field(default=None, repr=False, compare=False)
+    messages: tuple[str, ...] = ()
+
+    @property
+    def margin(self) -> float:
+        """Factor by which the expected error is below the error asked for; infinite without any error."""
+        return self.error / self.expected if self.expected > 0.0 else math.inf
+
+    def __str__(self) -> str:
+        s = self.setting
+        lines = [
+            *(f"note        {message}" for message in self.messages),
+            f"chosen      {s.name}, {s.dtype}, step {s.h:.6g} s: {self.of} to {self.expected:.1e} {self.unit} up to "
+            f"{self.t1:g} s, {self.margin:.2g} times better than asked ({self.members} members checked)",
+            f"predicted   {self.run_seconds:.2g} s on {self.threads} thread{'s' * (self.threads > 1)}, "
+            f"{self.memory_bytes / 1e6:.2g} MB",
+            f"reference   {self.reference}: they agree to {self.reference_error:.1e} {self.unit}",
+        ]
+        for rival, price, error in self.rivals:
+            times = price / self.us_per_vehicle_second
+            lines.append(f"  next best {rival.name}, {rival.dtype}, step {rival.h:.4g} s: {times:.2f} times the time, "
+                         f"{self.of} to {error:.1e} {self.unit}")  # fmt: skip
+        return "\n".join(lines)
+
+
+@shows_progress
+def suggest(
+    fleet: Ensemble | Scene,
+    error: float = 1e-3,
+    of: Any = "position",
+    t1: float | None = None,
+    methods: Sequence[str] | None = None,
+    members: int = 128,
+    threads: int | None = None,
+    seconds: float = 30.0,
+    progress: Callable[[float], None] | bool | None = None,
+) -> Suggestion:
+    """Find the cheapest method, step and precision that keep an error for every member up to a time.
+
+    The search runs a sample of members; its best settings are then checked on up to 1024 members. Their largest errors are
+    carried on to the size of the fleet by a Pareto tail, and steps shortened where that is too large. Where noise acts, all
+    runs of the search see one path of it, drawn every noise_step of the scene or, without one, finer than any step that is
+    tried; a run of the setting draws at its own steps.
+
+    Args:
+        fleet: the ensemble, or a Scene with one.
+        error: largest error allowed, over members and path, in the unit of `of`; above 0. Default 1e-3.
+        of: quantity that the error is of: any that statistics know, such as "position" [m], "attitude" [rad], "depth" [m],
+            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity; or the mean of a number, such as
+            "mean position[0]", whose bias at the end is told with its interval, as `lw.estimate` does. Default "position".
+        t1: end time [s]. Default: run.duration of the scene.
+        methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
+        members: size of the sample that is searched. Default 128.
+        threads: threads of the predicted run. Default: those of this machine.
+        seconds: processor time of the search, about and without compiling [s]. Default 30.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            from 0 to 1.
+
+    Returns:
+        The cheapest setting, its expected error, its predicted time and memory, and the next best settings.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message; where noise acts that is no NoisyTerm; and where no reference is
+            ten times better than the error, with the time up to which one is.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+        >>> suggestion = lw.suggest(fleet, error=1e-3, t1=2.0, methods=["rk4"], members=4, seconds=5.0)
+        >>> suggestion.settings["method"], suggestion.expected < 1e-3
+        ('rk4', True)
+        >>> result = lw.solve(fleet, t1=2.0, **suggestion.settings)
+    """
+    compared = compared_in(of)
+    faults = Faults()
+    faults.positive("error", error, compared.unit)
+    faults.positive("seconds", seconds)
+    check_threads(faults, threads)
+    faults.raise_if_any()
+    names = chosen_methods(methods, CANDIDATES)
+    report = callback(progress) or void
+    sample = Sample(fleet, t1, members, TIMES)
+    if compared.mean and compared.functional is not None and compared.functional.size == 1 and redrawn(sample.whole):
+        return suggestion_of_mean(sample, compared, error, methods and names, seconds, report, threads)
+    return suggestion_on(sample, compared, error, names, seconds, report, methods is not None, threads=threads)
+
+
+def suggestion_on(
+    sample: Sample, compared: Distance, error: float, names: Sequence[str], seconds: float,
+    report: Callable[[float], None], named: bool, *, threads: int | None = None,
+    make_reference: Callable[..., Reference] = make_reference,
+) -> Suggestion:  # fmt: skip
+    """Search a sample for the cheapest setting, as `suggest` says; named: whether the methods were asked for by name."""
+    taken, refused = sample.accepted(names)
+    if not taken:
+        raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
+    if sample.noise(taken[0]) == "free":
+        problem = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
+        raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
+
+    def reference_on(sample: Sample) -> Reference:
+        return checked_reference(sample, compared, error, seconds, taken, make_reference=make_reference)
+
+    reference = reference_on(sample)
+    sample = reference.sample
+    report(0.3)
+    ladders = Ladders(sample, reference, compared, error / SAFETY, Budget((1.0 - SHARE) * seconds), named)
+    candidates = searched(ladders, taken, compared, error, seconds, report)
+    times = times_to_check(sample, candidates)
+    if times > 1 or sample.whole.members > sample.members:
+        reference = reference_on(sample.more(CHECKED, times))
+    finalists = checked(candidates, reference, compared.name, error)
+    prices = reference.sample.kernels.costs([trial.plan for trial, _ in finalists], ROUNDS)
+    priced = list(zip(finalists, prices, strict=True))
+    doubt = cost.disagreement([(trial.candidate.text, price.spread) for (trial, _), price in priced])
+    priced.sort(key=lambda pair: pair[1].us_per_vehicle_second)
+    (best, expected), price = priced[0]
+    notes = [doubt] if doubt else []
+    notes += [noise_text(reference.sample)] if reference.sample.draws else []
+    notes += [f"{name} is left out: {why}" for name, why in refused.items() if named]
+    if expected > error:
+        notes.append(f"no step was found that keeps {error:g} {compared.unit}: {expected:.1e} is expected of the best")
+    ensemble = sample.whole
+    used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
+    report(1.0)
+    return Suggestion(
+        settings=best.candidate.options(),
+        setting=best.candidate,
+        error=float(error),
+        of=compared.name,
+        unit=compared.unit,
+        expected=expected,
+        us_per_vehicle_second=price.us_per_vehicle_second,
+        run_seconds=seconds_of(ensemble, best.candidate, sample.t1, kernels=sample.kernels) / used,
+        threads=used,
+        memory_bytes=memory_of(ensemble, best.candidate, sample.t1),
+        members=reference.sample.members,
+        t1=sample.t1,
+        reference=reference.text,
+        reference_error=reference.error(compared.name),
+        rivals=tuple((rival.candidate, its.us_per_vehicle_second, apart) for (rival, apart), its in priced[1:]),
+        worst=worst_of(best, reference, compared.name),
+        asked=compared,
+        messages=tuple(notes),
+    )
+
+
+def redrawn(fleet: Ensemble) -> bool:
+    """Whether other members can be drawn from what varies in a fleet."""
+    try:
+        drawn(fleet)
+    except SceneError:
+        return False
+    return True
+
+
+def suggestion_of_mean(
+    sample: Sample, compared: Distance, error: float, methods: Sequence[str] | None, seconds: float,
+    report: Callable[[float], None], threads: int | None,
+) -> Suggestion:  # fmt: skip
+    """The cheapest setting whose mean has a bias below an error, by the ladders of `lw.estimate`."""
+
+    def candidate(each: MeanSetting) -> Candidate:
+        return Candidate(each.setting.method, each.setting.h, each.setting.dtype)
+
+    def run_seconds(each: MeanSetting) -> float:
+        return seconds_of(ensemble, candidate(each), sample.t1, kernels=sample.kernels)
+
+    ensemble = sample.whole
+    kept = mean_settings(ensemble, compared.name, error, sample.t1, methods, report, seconds, threads)[:FINALISTS]
+    prices = {each.setting: run_seconds(each) for each in kept}
+    best, *others = sorted(kept, key=lambda each: prices[each.setting])
+    us = {setting: 1e6 * price / (sample.t1 * ensemble.members) for setting, price in prices.items()}
+    setting = candidate(best)
+    used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
+    return Suggestion(
+        settings=setting.options(),
+        setting=setting,
+        error=float(error),
+        of=compared.name,
+        unit=compared.unit,
+        expected=best.largest,
+        us_per_vehicle_second=us[best.setting],
+        run_seconds=prices[best.setting] / used,
+        threads=used,
+        memory_bytes=memory_of(ensemble, setting, sample.t1),
+        members=best.members,
+        t1=sample.t1,
+        reference=f"{best.reference} on {best.members} members drawn anew",
+        reference_error=best.beyond,
+        rivals=tuple((candidate(each), us[each.setting], each.largest) for each in others),
+        asked=compared,
+        messages=("of a mean the bias at the end is told, with its 95 % interval, as lw.estimate does",),
+    )
+
+
+def searched(
+    ladders: Ladders, taken: Sequence[str], compared: Distance, error: float, seconds: float,
+    report: Callable[[float], None],
+) -> list[Candidate]:  # fmt: skip
+    """The cheapest settings of a sample that keep the target: of the short list, and of all methods where these fail."""
+    few = list(taken) if ladders.named else short_list(ladders.sample, taken)
+    ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
+    if not ladders.named:
+        stiff = [name for name in STIFFLY_DAMPED if name in taken and name not in few and ladders.limited_by_damping]
+        ladders.climb(stiff)
+        others = [name for name in taken if name not in (*few, *stiff)]
+        ladders.climb(others, lambda part: report(0.7 + 0.1 * part), new_kernels=not ladders.priced)
+    if ladders.priced:
+        return [trial.candidate for trial in ladders.cheapest()[:FINALISTS]]
+    problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
+    if ladders.budget.over:
+        cause = f"{seconds:g} s were over before a step was short enough; try seconds={rounded_up(4.0 * seconds):g}"
+        raise SceneError([f"{cause}. {problem}; or ask for a larger error or a shorter t1"])
+    raise SceneError([f"{problem}; ask for a larger error or a shorter t1"])
+
+
+def checked(candidates: Sequence[Candidate], reference: Reference, of: str, error: float) -> list[tuple[Trial, float]]:
+    """Settings that keep the error on the reference's sample, their steps shortened for that, with the error expected.
+
+    Where none does, the first one.
+    """
+    sample = reference.sample
+
+    def shortened(candidate: Candidate) -> tuple[Trial, float]:
+        return refined(sample, candidate, reference, of, error / SAFETY**0.5, sample.whole.members)
+
+    trials = [shortened(candidate) for candidate in candidates]
+    # Where the sample did not show what float32 rounds off, no shorter step mends it.
+    missed = [candidate for candidate, (_, apart) in zip(candidates, trials, strict=True) if apart > error]
+    trials += [shortened(replace(candidate, dtype="float64")) for candidate in missed if candidate.dtype == "float32"]
+    return [(trial, apart) for trial, apart in trials if apart <= error] or trials[:1]
+
+
+def errors_of(trial: Trial, reference: Reference, of: str) -> np.ndarray:
+    """Largest error over the path of each member of a trial (n,) [its unit]."""
+    apart = comparison.distances(trial.result, reference.result, reference.asked)[of]
+    return np.asarray(np.max(np.where(np.isnan(apart), 0.0, apart), axis=0))
+
+
+def worst_of(trial: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
+    """The members of a trial that have the largest errors."""
+    return tuple(int(i) for i in np.argsort(-errors_of(trial, reference, of))[:members])
+
+
+def largest_in_fleet(errors: np.ndarray, members: int) -> float:
+    """Carry the largest error of some members, drawn as those of the fleet are, on to a fleet.
+
+    The largest ones fall off as a power of their rank (Hill 1975), which gives the error that a fleet exceeds with a chance of
+    CHANCE (Weissman 1978). Tails that end are fallen off faster: for them it is too large, never too small.
+    """
+    n = len(errors)
+    falling = np.sort(errors)[::-1]
+    k = max(FEWEST_IN_TAIL, n // TAIL)
+    if n < FEWEST or falling[k] <= 0.0:
+        return float(falling[0])
+    exponent = float(np.mean(np.log(falling[:k] / falling[k])))
+    return float(max(falling[0], falling[k] * (k * max(members, n) / (n * CHANCE)) ** exponent))
+
+
+def checked_reference(
+    sample: Sample, of: Distance, error: float, seconds: float, taken: Sequence[str], *,
+    make_reference: Callable[..., Reference] = make_reference, grown: Callable[..., Growth] = growth_of,
+) -> Reference:  # fmt: skip
+    """Make a reference that is ten times better than the error up to the end; SceneError where there is none."""
+    reference = make_reference(sample, of, goal=error / 30.0, seconds=SHARE * seconds)
+    apart = reference.error(of.name)
+    if apart <= 0.1 * error:
+        return reference
+    problem = f"error = {error:g} {of.unit} of {of.name} up to {sample.t1:g} s cannot be checked"
+    differ = f"{reference.text} differ by {apart:.1e} {of.unit}"
+    if reference.more:
+        cause, remedy = time_over(seconds, reference.more, SHARE)
+        raise SceneError([f"{cause}; {remedy}. {problem} yet: {differ}; or ask for a larger error or a shorter t1"])
+    until = sample.times[reference.reaches(of.name, 0.1 * error)]
+    remedy = f"ask for t1 (--duration) up to {until:g} s" if until > 0.0 else "ask for a shorter t1 (--duration)"
+    grows = growth_text(grown(reference.sample, taken, reference))
+    raise SceneError(
+        [f"{problem}: {differ}, and agree no better with shorter steps; {grows}; {remedy}, or for a larger error"]
+    )
+
+
+def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
+    """The methods to try first, by what acts in the scene."""
+    if sample.noise(taken[0]) != "none":
+        names = SHORT["noisy"]
+    elif not is_damped(sample.ensemble):
+        names = SHORT["conservative"]
+    else:
+        splits = [name for name in STIFFLY_DAMPED if name in taken and not Method(name).tableau]
+        exact = any(sample.plan(sample.candidate(name, 1)).kernel_choice.drag for name in splits)
+        names = (*SHORT["damped"], *(splits if exact else ()))
+    return [name for name in names if name in taken] or list(taken)
+
+
+def times_to_check(sample: Sample, candidates: Sequence[Candidate]) -> int:
+    """By how much the times of comparison may grow in number for the steps of some settings: 1 where noise acts."""
+    steps = [round(float(sample.spacing) / candidate.h) for candidate in candidates]
+    grid = sample.draws or sample.fixed_draws
+    allowed = [n for n in range(1, DENSER + 1) if not grid and all(n * -(-m // n) <= SHORTER * m for m in steps)]
+    return max(allowed, default=1)
+
+
+def refined(
+    sample: Sample, candidate: Candidate, reference: Reference, of: str, target: float, members: int
+) -> tuple[Trial, float]:
+    """Run a setting on a sample and shorten its step until a whole fleet keeps the target, at most six times.
+
+    Returns: The last trial, and the largest error expected in the fleet.
+    """
+    m = sample.allowed(math.ceil(float(sample.spacing) / candidate.h * (1.0 - 1e-9)))
+    order = 1 if sample.draws else Method(candidate.method).order
+    for left in reversed(range(7)):
+        trial = tried(sample, sample.candidate(candidate.method, m, candidate.dtype), reference)
+        size = largest_in_fleet(errors_of(trial, reference, of), members) if trial.errors else math.inf
+        if size <= target or m == sample.draws or not left:
+            break
+        factor = min((size / target) ** (1.0 / order) * 1.02, 2.0) if np.isfinite(size) else 1.5
+        m = sample.allowed(max(m + 1, math.ceil(m * factor)))
+    return trial, size
+
+
+def seconds_of(
+    fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256, *, kernels: Kernels = KERNELS,
+    timed: Callable[..., np.ndarray] = cost.timed,
+) -> float:  # fmt: skip
+    """Predict the CPU time of a run of all members from that of a few, with the scene's samples and without compiling [s]."""
+    n = min(members, fleet.members)
+    plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
+    kernels.compile(plan)
+    return float(timed([lambda: kernels.run(plan)], 2).min()) * fleet.members / n
+
+
+def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
+    """Predict the memory of a run of all members, with the scene's samples [bytes]."""
+    grid = make_plan(fleet.subset([0]), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype).grid
+    a_sample = 18 * np.dtype(machine.DTYPES[candidate.dtype]).itemsize
+    return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
+
+
+def verified(
+    fleet: Ensemble, result: Result, suggestion: Suggestion, *, run: Callable[[Plan, int], Result] = run_plan
+) -> tuple[float, int]:
+    """Measure the error of a finished run by running some of its members again with half the step.
+
+    The members are those with the largest errors in the search, then the first ones. At half the step a method of order p is
+    2^p times better, so the difference is the error but for one part in 2^p. In noise both steps see one path, drawn at
+    each shorter one; errors are of order 1, and what each halving changes is independent, so that squares add up.
+
+    Returns: The largest error over these members and all samples, and how many members they are.
+    """
+    candidate = suggestion.setting
+    chosen = list(dict.fromkeys((*suggestion.worst, *range(fleet.members))))[:CONFIRMED]
+    checked_fleet = fleet.subset(chosen)
+    plan = make_plan(checked_fleet, candidate.resolved(), candidate.h, float(result.time[-1]), dtype=candidate.dtype)
+    h = result.provenance["step"]
+    steps = np.rint(result.time / h).astype(np.int64)
+    # In double precision, so that the error contains the run's round-off too.
+    done, share = comparison.part(result, chosen), 1.0 - 2.0**-plan.method.order
+    if any(isinstance(term, NoisyTerm) for term, _ in plan.kernel_choice.laws):
+        checked_fleet, share = comparison.drawn_every(checked_fleet, h / 2.0, own_grid=False), math.sqrt(1.0 - 2.0**-2)
+        grid_of_run = TimeGrid(h, steps, result.time)
+        done = run(choose_plan(checked_fleet, plan.method, grid_of_run, plan.fields, candidate.dtype), 1)
+    half = choose_plan(checked_fleet, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
+    with np.errstate(all="ignore"):
+        apart = comparison.distances(done, run(half, 1), suggestion.asked)
+        size = comparison.errors(apart, len(result.time) - 1)[suggestion.of]["path_max"]
+    return size / share, len(chosen)

@@ -1,0 +1,477 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Speed against accuracy of every method, step, precision and solver, measured on a sample of an ensemble."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
+from lgvi_warp.measuring import comparison, cost
+from lgvi_warp.measuring.budget import Budget
+from lgvi_warp.measuring.comparison import Candidate, Sample
+from lgvi_warp.measuring.distance import QUANTITIES, Distance, compared_in
+from lgvi_warp.measuring.reference import LOST, Growth, Reference, make_reference, measured_growth, time_over
+from lgvi_warp.measuring.speed import void
+from lgvi_warp.measuring.trials import TRUST, Trial, trials_of, tried
+from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.results.result import Result
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+
+# Tried in this order; those that a scene refuses are left out.
+CANDIDATES = ("kl8(psi_x)", "psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "rk8", "su8_15(psi_x)", "ss6_13(psi_x)",
+              "rkn6_11", "rkn6_14", "bm6(psi_x)", "bm4(psi_x)", "rk5", "rk5_ck", "rk4", "rkw3", "psi_1", "psi", "psi_w",
+              "kl8(psi_s)", "kl6(psi_s)", "su4(psi_s)", "phi")  # fmt: skip
+# Part of a trade-off's time that its reference gets.
+SHARE = 0.3
+# How errors of members are reduced to a number.
+KINDS = ("end_max", "end_rms", "path_max", "path_rms")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Cost and errors of one setting.
+
+    Attributes:
+        setting: method, step, precision and solver.
+        us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling.
+        compile_seconds: time to load its kernel, once a process [s].
+        errors: quantity -> {"end_max", "end_rms", "path_max", "path_rms"} over the members, in the units of
+            Tradeoff.units; empty where a member failed or noise acts.
+        energy_drift: largest |E(t) - E(0)| [J]; NaN where a force of the scene supplies or takes energy.
+        biases: difference of means and spreads in standard errors, by name, such as "position_mean".
+        order: order of the method.
+        trusted: quantity -> whether the error is at least ten times that of the reference.
+        cost_spread: median of the cost's readings over the least, which is taken.
+    """
+
+    setting: Candidate
+    us_per_vehicle_second: float
+    compile_seconds: float
+    errors: dict[str, dict[str, float]]
+    energy_drift: float
+    biases: dict[str, float]
+    order: int
+    trusted: dict[str, bool]
+    cost_spread: float = 1.0
+
+    def error(self, of: str = "position", kind: str = "path_max") -> float:
+        """Give one error of this setting.
+
+        Args:
+            of: name of the quantity. Default "position".
+            kind: "end_max", "end_rms", "path_max" or "path_rms": largest or root mean square of the members, at the end or
+                over the path. Default "path_max".
+
+        Returns:
+            The error, in the unit of the quantity; infinite where there is none.
+        """
+        return self.errors.get(of, {}).get(kind, math.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Tradeoff(Saved):
+    """Measurements of settings on a sample of an ensemble, from 0 to t1.
+
+    Attributes:
+        measurements: one for each setting that was run and did not fail.
+        of: name of the quantity that decides how far the reference is trusted.
+        members: size of the sample.
+        t1: end time; biases are up to it [s].
+        until: time up to which the reference is trusted; errors of members are up to it [s].
+        reference: what errors are measured against, in words.
+        reference_error: quantity -> the reference's own largest error up to `until`; empty where noise acts.
+        growth: how fast small differences grow; None where noise acts.
+        refused: method -> why the scene does not take it.
+        messages: notes for the user.
+        seconds: time that the measurement took [s].
+        units: quantity -> unit of its errors.
+        missing: method that was asked for by its name and has no measurement -> why.
+    """
+
+    measurements: tuple[Measurement, ...]
+    of: str
+    members: int
+    t1: float
+    until: float
+    reference: str
+    reference_error: dict[str, float]
+    growth: Growth | None
+    refused: dict[str, str] = field(default_factory=dict)
+    messages: tuple[str, ...] = ()
+    seconds: float = 0.0
+    units: dict[str, str] = field(default_factory=lambda: dict(QUANTITIES))
+    missing: dict[str, str] = field(default_factory=dict)
+    study: ClassVar[str] = "tradeoff"
+
+    def shown(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
+        """List the measurements whose error the reference can resolve, the cheapest first.
+
+        Args:
+            of: name of the quantity. Default: that of the trade-off.
+            kind: "end_max", "end_rms", "path_max" or "path_rms". Default "path_max".
+
+        Returns:
+            Measurements in order of rising cost.
+
+        Raises:
+            SceneError: where the trade-off has no such quantity or kind.
+        """
+        of, faults = self.of if of is None else of, Faults()
+        faults.choice("of", of, (self.of, *self.units))
+        faults.choice("kind", kind, KINDS)
+        faults.raise_if_any()
+        good = [entry for entry in self.measurements if np.isfinite(entry.error(of, kind)) and entry.trusted.get(of)]
+        return sorted(good, key=lambda measurement: measurement.us_per_vehicle_second)
+
+    def front(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
+        """List the measurements on the Pareto front: each is more accurate than all cheaper ones.
+
+        Args:
+            of: name of the quantity. Default: that of the trade-off.
+            kind: "end_max", "end_rms", "path_max" or "path_rms". Default "path_max".
+
+        Returns:
+            Measurements in order of rising cost and falling error.
+        """
+        front: list[Measurement] = []
+        for measurement in self.shown(of, kind):
+            if not front or measurement.error(of or self.of, kind) < front[-1].error(of or self.of, kind):
+                front.append(measurement)
+        return front
+
+    def to_dict(self) -> dict[str, Any]:
+        return finite_or_none(asdict(self) | {"front": [asdict(measurement.setting) for measurement in self.front()]})
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Tradeoff:
+        # Errors and times that were not finite were infinite, other numbers NaN.
+        growth = content["growth"]
+        if growth is not None:
+            times = {name: with_missing_as(growth[name], math.inf) for name in ("doubling", "predictable")}
+            curves = {name: np.array(with_missing_as(growth[name], math.nan)) for name in ("times", "curve")}
+            growth = Growth(**growth | times | curves | {"rate": with_missing_as(growth["rate"], math.nan)})
+        measured = tuple(_measurement(row) for row in content["measurements"])
+        values = {name: entry for name, entry in content.items() if name != "front"}
+        values |= {"measurements": measured, "growth": growth, "messages": tuple(content["messages"])}
+        return cls(**values | {"reference_error": with_missing_as(content["reference_error"], math.inf)})
+
+    def rows(self) -> list[dict[str, Any]]:
+        on_front = {measurement.setting for measurement in self.front()}
+        rows = []
+        for measurement in self.measurements:
+            row: dict[str, Any] = asdict(measurement.setting)
+            row |= {"order": measurement.order, "front": measurement.setting in on_front}
+            row |= {"us_per_vehicle_second": measurement.us_per_vehicle_second, "cost_spread": measurement.cost_spread}
+            row |= {"compile_seconds": measurement.compile_seconds}
+            for of in self.units:
+                row |= {f"{of}_{kind}": measurement.error(of, kind) for kind in KINDS}
+                row[f"{of}_trusted"] = measurement.trusted.get(of, False)
+            row["energy_drift"] = measurement.energy_drift
+            rows.append(row | {f"bias_{name}": value for name, value in measurement.biases.items()})
+        return rows
+
+
+def _measurement(row: dict[str, Any]) -> Measurement:
+    numbers = {name: with_missing_as(row[name], math.nan) for name in ("energy_drift", "biases")}
+    errors = with_missing_as(row["errors"], math.inf)
+    return Measurement(**row | numbers | {"setting": Candidate(**row["setting"]), "errors": errors})
+
+
+def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDIDATES) -> tuple[str, ...]:
+    """The names of the methods to try: those given, if all are known, or the default ones."""
+    if methods is None:
+        return tuple(default)
+    faults, names = Faults(), listed("methods", methods, "methods")
+    for name in names:
+        try:
+            Method(name)
+        except SceneError:
+            some = ", ".join((*PROGRAMS, *(f"{composition}(psi_s)" for composition in COMPOSITIONS)))
+            faults.add("methods", name, "is not known", f"known: {some}")
+    if not names:
+        faults.add("methods", methods, "is empty", "name one method or more, or leave it out")
+    faults.raise_if_any()
+    return tuple(names)
+
+
+@shows_progress
+def tradeoff(
+    fleet: Ensemble | Scene,
+    t1: float | None = None,
+    of: Any = "position",
+    methods: Sequence[str] | None = None,
+    members: int = 128,
+    seconds: float = 45.0,
+    progress: Callable[[float], None] | bool | None = None,
+) -> Tradeoff:
+    """Measure cost and error of methods, steps, precisions and solvers on the first members of a fleet.
+
+    The cost of a step is CPU time of the thread that runs it: the least of several readings, one number for all steps
+    of a method. Readings that disagree are reported in the messages. Errors are measured against a reference that two
+    independent runs agree on to a tenth of the smallest error shown. Where noise acts, all runs see one path of it, drawn
+    every noise_step of the scene or, without one, finer than any step that is tried; where that cannot be, or the path is too
+    rough for errors of members, statistics are compared with those of the finest run.
+
+    Args:
+        fleet: the ensemble, or a Scene with one.
+        t1: end time [s]. Default: run.duration of the scene.
+        of: quantity that decides how far the reference is good enough: any that statistics know ("position", "attitude",
+            "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position, attitude,
+            velocity, angular_velocity and energy are measured as well. Default "position".
+        methods: names of the methods to try; each has a setting measured, or is named in `missing`. Default: all that the
+            scene takes.
+        members: size of the sample. Default 128.
+        seconds: processor time to spend [s]: kernels that are compiled may take as much again. One coarse setting of every
+            method comes first, then each step is halved in turn; the messages list what is left out. Default 45.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            from 0 to 1.
+
+    Returns:
+        Measurements of every setting, with their Pareto front.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message; and where no reference can be found.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+        >>> found = lw.tradeoff(fleet, t1=1.0, methods=["rk4"], members=2, seconds=2.0)
+        >>> found.front()[0].setting.method
+        'rk4'
+    """
+    compared = compared_in(of)
+    faults = Faults()
+    faults.positive("seconds", seconds)
+    faults.raise_if_any()
+    names = chosen_methods(methods)
+    sample = Sample(fleet, t1, members)
+    return tradeoff_on(sample, compared, names, seconds, callback(progress) or void, methods is not None)
+
+
+def tradeoff_on(
+    sample: Sample, compared: Distance, names: Sequence[str], seconds: float, report: Callable[[float], None],
+    named: bool, *, make_reference: Callable[..., Reference] = make_reference,
+    grown: Callable[..., Growth] | None = None,
+) -> Tradeoff:  # fmt: skip
+    """Measure methods on a sample, as `tradeoff` says; named: whether they were asked for by name."""
+    begun, whole = time.perf_counter(), Budget(seconds)
+    taken, refused = sample.accepted(names)
+    if not taken:
+        raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
+    messages: list[str] = []
+    reference: Reference | None = None
+    until, growth, noise = len(sample.times) - 1, None, sample.noise(taken[0])
+    if noise == "free":
+        messages.append("noise acts, whose path differs from step to step: only statistics are compared")
+        finest = tried(sample, sample.candidate(taken[0], 32 * sample.coarsest(0.5)), None).result
+    else:
+        reference = make_reference(sample, compared, seconds=SHARE * seconds, report=lambda part: report(0.2 * part))
+        sample, finest = reference.sample, reference.result
+        if noise == "grid":
+            messages.append(noise_text(sample))
+    if reference and noise == "grid" and reaches_nothing(reference, compared):
+        apart = reference.error(compared.name)
+        messages.append(f"{reference.text} differ by {apart:.1e}: only statistics are compared")
+        reference = None
+    if reference:
+        until = trusted_until(reference, compared, seconds)
+        growth = (grown or growth_of)(sample, taken, reference)
+        if until < len(sample.times) - 1:
+            text = f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees"
+            messages.append(f"{text} with itself; beyond it only statistics are meaningful")
+    budget = Budget(0.6 * seconds)
+    trials, skipped = trials_of(
+        sample, taken, reference, until, budget, whole, lambda part: report(0.2 + 0.6 * part), named
+    )
+    if skipped:
+        messages.append(
+            f"no time for {', '.join(skipped)}: run again, the kernels are compiled now, or give more seconds"
+        )
+    measured = measurements(sample, trials, reference, finest, until, compared)
+    doubt = cost.disagreement([(measurement.setting.text, measurement.cost_spread) for measurement in measured])
+    messages += [doubt] if doubt else []
+    report(1.0)
+    return Tradeoff(
+        measurements=tuple(measured),
+        of=compared.name,
+        members=sample.members,
+        t1=sample.t1,
+        until=float(sample.times[until]),
+        reference=reference.text if reference else "the finest run's statistics, since noise acts",
+        reference_error={name: reference.error(name, until) for name in reference.own} if reference else {},
+        growth=growth,
+        refused=refused,
+        messages=tuple(messages),
+        seconds=time.perf_counter() - begun,
+        units=QUANTITIES | {compared.name: compared.unit},
+        missing=without_reading(names, trials, measured, refused, seconds) if named else {},
+    )
+
+
+def without_reading(
+    names: Sequence[str], trials: Sequence[Trial], measured: Sequence[Measurement], refused: dict[str, str],
+    seconds: float,
+) -> dict[str, str]:  # fmt: skip
+    """The methods that were asked for and have no measurement, and why."""
+
+    def why(name: str) -> str:
+        least = min(trial.candidate.h for trial in trials if trial.candidate.method == name)
+        return (
+            f"members failed at every step down to {least:.4g} s; for shorter ones give more seconds than {seconds:g}"
+        )
+
+    missing = set(names) - {measurement.setting.method for measurement in measured}
+    return {name: refused.get(name) or why(name) for name in names if name in missing}
+
+
+def growth_of(
+    sample: Sample, taken: Sequence[str], reference: Reference, *, measure: Callable[..., Growth] = measured_growth
+) -> Growth:
+    """Measure how errors grow, by the method of highest order at about the reference's step."""
+    method = max(taken, key=lambda name: Method(name).order)
+    often = sample if sample.draws else Sample(sample.whole, sample.t1, sample.members, kernels=sample.kernels)
+    m = max(1, round(float(often.spacing) / reference.result.provenance["step"]))
+    return measure(often, often.candidate(method, m))
+
+
+def noise_text(sample: Sample) -> str:
+    """How the runs of a comparison share their noise, in words."""
+    every = f"{sample.h(sample.draws):.4g} s"
+    return f"noise acts: all runs see one path of it, drawn every {every}; errors by paths are of order 1"
+
+
+def reaches_nothing(reference: Reference, of: Distance) -> bool:
+    """True if a reference is too rough for errors of members even at the first time."""
+    return reference.reaches(of.name, LOST / (TRUST * TRUST)) < 1
+
+
+def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
+    """Index of the last sample at which errors below 1e-2 can be measured; SceneError without one.
+
+    seconds: of the whole trade-off, for the message [s].
+    """
+    until = reference.reaches(of.name, LOST / (TRUST * TRUST))
+    if reaches_nothing(reference, of):
+        apart = reference.own[of.name][1]
+        end = reference.result.time[1]
+        problem = f"no reference: {reference.text} differ by {apart:.2g} {of.unit} after {end:g} s"
+        if reference.more:
+            cause, remedy = time_over(seconds, reference.more, SHARE)
+            raise SceneError([f"{cause}; {remedy}. There is {problem}; or give a shorter t1 (--duration)"])
+        raise SceneError([f"{problem}, and agree no better with shorter steps; give a shorter t1 (--duration)"])
+    return until
+
+
+def measurements(
+    sample: Sample, trials: Sequence[Trial], reference: Reference | None, finest: Result, until: int,
+    distance: Distance | None = None,
+) -> list[Measurement]:  # fmt: skip
+    """Cost, errors, drifts and biases of the trials that did not fail; without a reference, no errors."""
+    good = [trial for trial in trials if not comparison.failed(trial.result) and (trial.errors or reference is None)]
+    compiled: dict[tuple[str, str], float] = {}
+    for trial in trials:
+        key = trial.candidate.name, trial.candidate.dtype
+        compiled[key] = max(compiled.get(key, 0.0), trial.result.compile_seconds)
+    measured = []
+    for trial, price in zip(good, sample.kernels.costs([trial.plan for trial in good]), strict=True):
+        limits = {of: reference.error(of, until) for of in trial.errors} if reference else {}
+        with np.errstate(all="ignore"):
+            biases = comparison.biases(trial.result, finest, distance)
+            kept = "energy" in invariants.conserved(trial.result)
+            drift = invariants.drift(trial.result)["energy"] if kept else math.nan
+        measured.append(
+            Measurement(
+                setting=trial.candidate,
+                us_per_vehicle_second=price.us_per_vehicle_second,
+                cost_spread=price.spread,
+                compile_seconds=compiled[trial.candidate.name, trial.candidate.dtype],
+                errors=trial.errors,
+                energy_drift=drift,
+                biases=biases,
+                order=trial.plan.method.order,
+                trusted={of: trial.errors[of]["path_max"] >= TRUST * limit for of, limit in limits.items()},
+            )
+        )
+    return measured
+
+
+def report_text(tradeoff: Tradeoff) -> str:
+    """The trade-off as a text of several lines."""
+    unit = tradeoff.units[tradeoff.of]
+    lines = [f"missing     {name}: {why}" for name, why in tradeoff.missing.items()]
+    lines += [f"note        {message}" for message in tradeoff.messages]
+    lines.append(f"sample      {tradeoff.members} members, 0 to {tradeoff.t1:g} s, {len(tradeoff.measurements)} settings in "
+                 f"{tradeoff.seconds:.0f} s")  # fmt: skip
+    if tradeoff.reference_error:
+        apart = tradeoff.reference_error[tradeoff.of]
+        lines.append(f"reference   {tradeoff.reference}: they agree to {apart:.1e} {unit} up to {tradeoff.until:g} s")
+    if tradeoff.growth:
+        lines.append(f"predictable {growth_text(tradeoff.growth)}")
+    if tradeoff.refused:
+        lines.append(f"refused     {', '.join(tradeoff.refused)} (why: tradeoff.json)")
+    if tradeoff.measurements:
+        spreads = [measurement.cost_spread for measurement in tradeoff.measurements]
+        lines.append(f"costs       {cost.agreement_text(spreads)}")
+    front = tradeoff.front()
+    kept = any(np.isfinite(measurement.energy_drift) for measurement in front)
+    if front:
+        header = ("us/vehicle/s", "method", "precision", "step [s]", f"{tradeoff.of} [{unit}]", "rms")
+        heads = "{:>12}  {:<18}{:<20}{:>10}{:>15}{:>10}".format(*header)
+        without = f"; nothing of {', '.join(tradeoff.missing)}" if tradeoff.missing else ""
+        lines += ["", f"Cheapest settings for each error ({tradeoff.of}, largest over members and path{without}):",
+                  heads + ("{:>18}".format("energy drift [J]") if kept else "")]  # fmt: skip
+    for measurement in front:
+        s = measurement.setting
+        lines.append(f"{measurement.us_per_vehicle_second:>12.3g}  {s.name:<18}{s.dtype:<20}{s.h:>10.4g}"
+                     f"{measurement.error(tradeoff.of):>15.1e}{measurement.error(tradeoff.of, 'path_rms'):>10.1e}"
+                     + (f"{measurement.energy_drift:>18.1e}" if kept else ""))  # fmt: skip
+    return "\n".join([*lines, *bias_lines(tradeoff)])
+
+
+def growth_text(growth: Growth) -> str:
+    """How errors grow, in words."""
+    if not np.isfinite(growth.rate):
+        return "unknown: a difference of 1e-8 rad grows beyond measure at once"
+    if growth.power is not None:
+        return (f"errors grow like time to the power {growth.power:.1f}, {growth.factor:.2g} times in this run: single "
+                "trajectories are meaningful throughout")  # fmt: skip
+    until = ", ".join(f"{dtype} to about {t:.3g} s" for dtype, t in growth.predictable.items())
+    return (f"errors double every {growth.doubling:.3g} s (rate {growth.rate:.2g} /s, {growth.factor:.2g} times in this run). "
+            f"One round-off reaches {LOST:g}: {until}; beyond, compare statistics only")  # fmt: skip
+
+
+def bias_lines(tradeoff: Tradeoff) -> list[str]:
+    """A table of the statistics' biases against the step.
+
+    It is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
+    """
+    double = [entry for entry in tradeoff.measurements
+              if entry.biases and entry.setting.dtype == "float64" and entry.setting.plain]  # fmt: skip
+    if not double:
+        return []
+    name = min(double, key=lambda measurement: abs(measurement.order - 2)).setting.name
+    chosen = [measurement for measurement in double if measurement.setting.name == name]
+    chosen.sort(key=lambda measurement: -measurement.setting.h)
+    means = ("attitude", "velocity", "energy", "angular_momentum")
+    columns = ["position_mean", "position_std", *(f"{name}_mean" for name in means)]
+    heads = [column.replace("angular_momentum", "ang.mom.").replace("_", " ") for column in columns]
+    if tradeoff.of not in QUANTITIES and any(f"{tradeoff.of}_mean" in measurement.biases for measurement in chosen):
+        columns, heads = [f"{tradeoff.of}_mean", *columns], [f"{tradeoff.of} mean", *heads]
+    title = f"Bias of statistics up to {tradeoff.t1:g} s by {name}, in standard errors of {tradeoff.members} members"
+    lines = ["", f"{title} (1.4: chance):", "{:>12}".format("step [s]") + "".join(f"{head:>15}" for head in heads)]
+    for measurement in chosen:
+        cells = (f"{measurement.biases[key]:>15.1e}" if key in measurement.biases else f"{'-':>15}" for key in columns)
+        lines.append(f"{measurement.setting.h:>12.4g}" + "".join(cells))
+    return lines

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results of a study's calls in a folder, so that one that was interrupted goes on where it ended."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import path_of
+from lgvi_warp.common.errors import refusal
+from lgvi_warp.common.identity import UNKNOWN, identity
+from lgvi_warp.common.npy_files import of_npz, write_npz
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.functions import functions_of, identities
+
+Arrays = tuple[np.ndarray, ...]
+# Whatever these are, the numbers are the same.
+NO_MATTER = ("threads", "executor", "scheduler")
+
+
+class Remembered:
+    """Calls of functions of arrays, each kept as the next numbered file of a folder: a call that is kept is not run again.
+
+    store: the folder, made if needed; None keeps nothing.
+    fleets: what is run. asked: every other argument that the calls depend on.
+    """
+
+    def __init__(
+        self,
+        store: str | os.PathLike[str] | None = None,
+        fleets: Sequence[Ensemble] = (),
+        asked: Mapping[str, Any] | None = None,
+    ):
+        self._folder: Path | None = None
+        self._count = 0
+        if store is not None:
+            self._folder = path_of("store", store)
+            self._asked = self._key(fleets, asked or {})
+            self._folder.mkdir(parents=True, exist_ok=True)
+            self._kept(0)  # one of other arguments is refused before anything runs
+
+    @property
+    def keeps(self) -> bool:
+        """Whether calls are kept."""
+        return self._folder is not None
+
+    def __call__(self, name: str, run: Callable[..., Arrays], *arrays: np.ndarray) -> Arrays:
+        """What a function returns of arrays; name: of the function, among those that are called.
+
+        Raises: SceneError, where the folder has another call in this place.
+        """
+        if self._folder is None:
+            return run(*arrays)
+        # A call that fails has a number, but no file, and fails again.
+        number, self._count = self._count, self._count + 1
+        digest = hashlib.sha256(name.encode())
+        for array in arrays:
+            digest.update(f"\n{array.dtype.str} {array.shape}\n".encode() + np.ascontiguousarray(array).tobytes())
+        if (kept := self._kept(number)) is not None:
+            if str(kept["call"]) != digest.hexdigest():
+                raise self._other(f"has another call as {self._path(number).name}")
+            return tuple(kept[f"result_{i}"] for i in range(len(kept) - 2))
+        results = run(*arrays)
+        words = {"asked": np.array(self._asked), "call": np.array(digest.hexdigest())}
+        write_npz(self._path(number), words | {f"result_{i}": each for i, each in enumerate(results)}, self._folder)
+        return results
+
+    def _path(self, number: int) -> Path:
+        assert self._folder is not None
+        return self._folder / f"{number:06d}.npz"
+
+    def _kept(self, number: int) -> dict[str, np.ndarray] | None:
+        """The content of a file; None where there is none, or it is torn. Raises SceneError: it is of other arguments."""
+        try:
+            arrays = of_npz(self._path(number))
+        except (FileNotFoundError, ValueError):
+            return None
+        if not {"asked", "call"} <= arrays.keys() or str(arrays["asked"]) != self._asked:
+            raise self._other("keeps the calls of other arguments, of another scene or of another version")
+        return arrays
+
+    def _other(self, problem: str) -> Exception:
+        remedy = "give the arguments that it was begun with, or another folder"
+        return refusal("store", str(self._folder), problem, remedy)
+
+    def _key(self, fleets: Sequence[Ensemble], asked: Mapping[str, Any]) -> str:
+        """What the arguments are, as text. Raises SceneError where a function of the user's cannot be told from others."""
+        told = {f"[{i}] {place}": each for i, fleet in enumerate(fleets)
+                for place, each in identities(functions_of(fleet)).items()}  # fmt: skip
+        told |= {name: identity(value) for name, value in asked.items() if name not in NO_MATTER}
+        if unknown := [place for place, text in told.items() if text == UNKNOWN]:
+            problem = f"cannot tell {', '.join(unknown[:3])} from others in a later call"
+            raise refusal("store", str(self._folder), problem, "leave store out, or give functions a version")
+        scenes = [[fleet.scene.to_dict(), fleet.to_dict()] for fleet in fleets]
+        return key_of({"scenes": scenes, "asked": told, "versions": machine.versions()})
+
+
+def key_of(content: Mapping[str, Any]) -> str:
+    """A key for what decides a cell's numbers: 32 hexadecimal digits."""
+    text = json.dumps(content, sort_keys=True, default=_plain)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return repr(value)

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cost and error of a setting: trials, references, ladders of steps, speed."""

@@ -1,0 +1,412 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`margins`: how much gain and delay the loop of each member bears, by eigenvalues and by runs in lanes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.near import near_names
+from lgvi_warp.control.delay import MOST_PERIODS
+from lgvi_warp.criteria.files import Saved
+from lgvi_warp.criteria.running import step_of
+from lgvi_warp.methods.method import Method
+from lgvi_warp.robustness.linear.bench import COORDINATES, calm
+from lgvi_warp.robustness.linear.disk import disks
+from lgvi_warp.robustness.linear.edges import edges
+from lgvi_warp.robustness.linear.linearize import OF_MEAN_ZERO, RANDOM, check_parts, chosen_places, of_the_mean
+from lgvi_warp.robustness.linear.loops import IDLE, LEAST_TICKS, UNSETTLED, Loops, Study
+from lgvi_warp.robustness.linear.peaks import OF_THE_DEMAND, peaks
+from lgvi_warp.robustness.linear.sampled_loop import SampledLoop
+from lgvi_warp.runs.request import ensemble_of
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+
+OF, WAYS = ("gain", "delay", "disk", "peak"), ("eigenvalues", "runs")
+# Those of a linear model alone.
+LINEAR = ("disk", "peak")
+# Members whose margins are sought together.
+GROUP = 2048
+# Width of the last brackets, in the logarithm of the factor: of eigenvalues, and of runs, which judge to some 0.4 %.
+NARROW = {"eigenvalues": 1e-6, "runs": 2e-3}
+PERCENTILES = (0.0, 5.0, 25.0, 50.0, 75.0, 95.0, 100.0)
+UNITS = {"delay": "s", "disk_phase": "rad", "frequency": "rad/s"}
+GAINS = ("gain_lower", "gain_upper")
+DISKS = ("disk", "disk_gain_lower", "disk_gain_upper", "disk_phase", "disk_frequency")
+NAMES = {"gain": GAINS, "delay": ("delay",), "disk": DISKS, "peak": ()}
+
+
+def unit_of(name: str) -> str:
+    """The unit of a margin; "" for a number."""
+    return UNITS.get(name, UNITS.get(name.rsplit("_", 1)[-1], ""))
+
+
+@dataclass(frozen=True)
+class Margins(Saved):
+    """Margins of a loop by member.
+
+    Each is NaN for a member whose loop does not settle as it is, of which `why` tells more.
+
+    Attributes:
+        loop: key of the law; "all laws" for the whole controller.
+        values: by name, (n,): "gain_lower" and "gain_upper", between which the factors on the demand lie that the loop bears
+            (0 and infinite where it bears all that were asked); "delay", the largest delay [s] beside the loop's own, in whole
+            steps; "disk", the disk margin of all components of the demand at once, what it says of factors
+            ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where ("disk_frequency" [rad/s]);
+            peak gains, "sensitivity_peak", "complementary_peak" and "position[2]_peak" of what was asked `to`, and where
+            ("..._frequency" [rad/s]).
+        by_runs: the same, as runs show them; without those that were not asked.
+        why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
+            nothing" where its commands have no effect, "failed"; "" where it has.
+        step: step of the runs [s], to which delays are known.
+        messages: what the user should know, such as that the step was shortened to fit the period.
+    """
+
+    study: ClassVar[str] = "margins"
+
+    loop: str
+    values: Mapping[str, np.ndarray]
+    by_runs: Mapping[str, np.ndarray]
+    why: np.ndarray
+    step: float
+    messages: tuple[str, ...] = ()
+
+    @property
+    def steady(self) -> np.ndarray:
+        """Whether the loop settles as it is, (n,)."""
+        return np.asarray(self.why == "")
+
+    @property
+    def reasons(self) -> dict[str, int]:
+        """How many members have no margins, by the reason."""
+        return dict(Counter(each for each in self.why.tolist() if each).most_common())
+
+    @property
+    def members(self) -> int:
+        """The number of members, n."""
+        return len(self.why)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Convert the margins to plain values, for JSON.
+
+        Returns:
+            "loop", "step", "why", "messages", and under "eigenvalues" and "runs" lists by name: None for NaN, "inf" for
+            infinity.
+        """
+
+        def plain(value: float) -> float | str | None:
+            return value if np.isfinite(value) else None if np.isnan(value) else str(value)
+
+        ways = {
+            way: {name: [plain(v) for v in column.tolist()] for name, column in columns.items()}
+            for way, columns in zip(WAYS, (self.values, self.by_runs), strict=True)
+            if columns
+        }
+        return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), "messages": list(self.messages), **ways}
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        values, by_runs = (
+            {name: np.array([np.nan if v is None else float(v) for v in column]) for name, column in columns.items()}
+            for columns in (content.get(way, {}) for way in WAYS)
+        )
+        why = np.array(content["why"], dtype=object)
+        return cls(str(content["loop"]), values, by_runs, why, float(content["step"]), tuple(content["messages"]))
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        by_runs = {f"{name}_by_runs": column for name, column in self.by_runs.items()}
+        for member, why in enumerate(self.why.tolist()):
+            columns = {name: float(column[member]) for name, column in (*self.values.items(), *by_runs.items())}
+            yield {"member": member, "why": why, **columns}
+
+    def percentiles(self, of: Sequence[float] = PERCENTILES) -> dict[str, np.ndarray]:
+        """Find how margins are distributed over the members that settle as they are.
+
+        Args:
+            of: percentages (k,), in [0, 100].
+
+        Returns:
+            By name, (k,): each the margin of a member; NaN where no member settles.
+        """
+        columns = self._columns()
+        quantiles = np.asarray(of) / 100.0
+        return {
+            name: np.quantile(v[self.steady], quantiles, method="inverted_cdf")
+            if self.steady.any()
+            else np.full(len(quantiles), np.nan)
+            for name, v in columns.items()
+        }
+
+    def curve(self, name: str, by: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Find the distribution of a margin for a picture: how many members have less.
+
+        Args:
+            name: "gain_lower", "gain_upper", "delay", "disk" or another of `values`.
+            by: "eigenvalues" or "runs"; None, the default, for the first of them that was asked.
+
+        Returns:
+            (margins of the members that settle as they are, rising; the part of them with at most that much).
+        """
+        columns = self._columns() if by is None else {"eigenvalues": self.values, "runs": self.by_runs}[by]
+        values = np.sort(columns[name][self.steady])
+        return values, np.arange(1, len(values) + 1) / max(1, len(values))
+
+    def worst(self, count: int = 10, name: str | None = None) -> np.ndarray:
+        """Find the members that bear least.
+
+        Args:
+            count: how many (default 10).
+            name: by which margin; None, the default, for the first of "gain_upper", "delay", "disk" and "sensitivity_peak"
+                that was asked. Of a peak the largest is the worst.
+
+        Returns:
+            Indices (count,), the least first; members that do not settle as they are before all others.
+        """
+        columns = self._columns()
+        chosen = name or next(word for word in ("gain_upper", "delay", "disk", "sensitivity_peak") if word in columns)
+        values = columns[chosen] * (-1.0 if chosen.endswith(("lower", "peak")) else 1.0)
+        return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[:count]
+
+    @property
+    def reasons_text(self) -> str:
+        """The reasons in words, the most frequent first."""
+        return "; ".join(f"{count:,}: {why}" for why, count in self.reasons.items())
+
+    def _columns(self) -> Mapping[str, np.ndarray]:
+        return self.values or self.by_runs
+
+    def __str__(self) -> str:
+        lines = [f"{self.loop}: margins of {self.members} members"]
+        if self.reasons:
+            lines.append(f"{sum(self.reasons.values())} of them have none ({self.reasons_text}); the others:")
+        width = max(22, *(len(f"{name} {unit_of(name)}") + 1 for name in self._columns()))
+        lines.append(f"{'':{width}}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
+        for name, row in self.percentiles().items():
+            lines.append(f"{f'{name} {unit_of(name)}'.strip():{width}}" + "".join(f"{value:10.4g}" for value in row))
+        return "\n".join([*lines, *self.messages])
+
+
+@near_names()
+def margins(
+    fleet: Ensemble | Scene,
+    loop: str | None = None,
+    of: Sequence[str] = ("gain", "delay"),
+    *,
+    by: Sequence[str] = ("eigenvalues",),
+    about: float = 60.0,
+    settle: float = 1200.0,
+    seconds: float = 240.0,
+    tilt: float = 1e-3,
+    most: float = 100.0,
+    longest: float = 10.0,
+    skew: float = 0.0,
+    to: Sequence[str] = (),
+    method: str | Method | None = None,
+    h: float | None = None,
+) -> Margins:
+    """Find how much gain and delay the loop of each member bears.
+
+    A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
+    vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at its
+    limit. Else the member goes on for twice the time, and again, up to `settle`. Then it is turned aside, and must come back
+    in a run. Where one of this is not so, it has no margins, and `why` says which.
+
+    By eigenvalues: those of the sampled loop about that motion. It is affine in the factor on the law's demand, and each delay
+    within a period is linearised: so all brackets are halved without a run. Neutral modes that no law sees do not count.
+
+    By runs: every member has a factor, or a delay, of its own in a lane; each run divides all brackets at once. From the same
+    motion, turned by `tilt`, a loop settles if what its rates and commands swing shrinks from the second to the last
+    third of the run and is less than in the first; and if in the last third no command is at its limit, the body is aside by
+    less than 10 tilts, and turns by less within a period. Where it shrinks by little, a run of 1.5 times the length is judged
+    as well. The error is not judged: a slow integral hides a small fast limit cycle in it.
+
+    Where the answer changes more than once, the edge is one of them.
+
+    Noise and drift of sensors are taken as 0, their mean, and faults as off; by eigenvalues rounding, too: see `messages`.
+
+    The disk margin is that of the sampled loop, opened at all components of the law's demand: at any frequency each may have
+    a complex factor of its own in the disk (1 + (1 - skew) d / 2) / (1 - (1 + skew) d / 2), |d| < margin (Seiler, Packard,
+    Gahinet 2020, IEEE Control Systems 40(5)). It is 1 / the largest structured singular value of S + (skew - 1) / 2.
+
+    A peak gain is how much of a disturbance that is added to the law's demand comes through, at the frequency where most does:
+    to the demand that acts (S, the sensitivity), to the law's answer (T), and to each number of the motion in `to`, per unit
+    of the demand; with several components the largest singular value, so it is the H-infinity norm. It is infinite where the
+    gain grows towards frequency 0. The largest of the members is the worst-case gain of the ensemble.
+
+    Args:
+        fleet: An Ensemble, or a Scene whose [ensemble] is meant; without waves and noise.
+        loop: Key of the law, such as "heading_pid"; None, the default, for all laws together.
+        of: Some of "gain", "delay", "disk" and "peak"; the first two by default. A delay is that of all commands; "disk" and
+            "peak" are by eigenvalues only.
+        by: "eigenvalues", the default, "runs", or both.
+        about: Time after which the loop is looked at [s]; 60 by default.
+        settle: Longest time that a member is given to be steady [s]; 1200 by default.
+        seconds: Length of the runs [s]; 240 by default.
+        tilt: Angle by which they begin aside, about each axis of the body [rad]; 0.001 by default.
+        most: Largest factor, and one over the least; 100 by default.
+        longest: Longest delay that is added [s]; 10 by default.
+        skew: Skew of the disk, from -1 to 1: 0, the default, for factors and their inverses alike; 1 for the sensitivity S.
+        to: Numbers of the motion whose peak gains are wanted too, as "position[2]" [m], "rotation[1]" [rad, body axes],
+            "velocity" [m/s], "angular_velocity" [rad/s], as of `linearize`; none by default.
+        method: As of `lw.solve`; default that of the scene.
+        h: Step [s]; default that of the scene.
+
+    Returns:
+        The margins of each member.
+
+    Raises:
+        SceneError: If an argument or the scene is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> law = lw.control.HeadingPID(kp=2.0, kd=4.0)
+        >>> controller = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(heading=0.0)], laws=[law])
+        >>> vehicle = lw.Vehicle(50.0, inertia=[4.0, 5.0, 6.0], buoyancy=490.3325)
+        >>> drag = lw.terms.Drag(linear=[20.0, 20.0, 20.0, 8.0, 8.0, 8.0])
+        >>> scene = lw.Scene(vehicle, terms=[lw.terms.ControlWrench(), drag], controller=controller)
+        >>> bearable = lw.linear.margins(lw.Ensemble(scene, 2), "heading_pid", method="rk4", h=0.02)
+        >>> bearable.values["gain_upper"].round(1), bearable.values["delay"]
+        (array([30., 30.]), array([6.62, 6.62]))
+    """
+    ensemble = ensemble_of(fleet)
+    scene: Any = ensemble.scene
+    of, by = tuple(listed("of", of, "names")), tuple(listed("by", by, "names"))
+    faults = Faults()
+    for word in of:
+        faults.choice("of", word, OF)
+    for word in by:
+        faults.choice("by", word, WAYS)
+    for name, value in {"about": about, "settle": settle, "seconds": seconds, "longest": longest, "tilt": tilt}.items():
+        faults.positive(name, value)
+    faults.number("most", most, "", 1.0)
+    faults.number("skew", skew, "", -1.0, 1.0)
+    if set(LINEAR) & set(of) and "eigenvalues" not in by:
+        faults.add("by", by, "has no disk margins and no peaks, which are of a linear model", 'add "eigenvalues"')
+    outputs = _outputs(faults, to, of)
+    _check_loop(faults, scene.controller, loop, seconds)
+    faults.raise_if_any()
+    calm(scene, "margins")
+    linear = "eigenvalues" in by
+    scene, zeros, messages = of_the_mean(scene, OF_MEAN_ZERO if linear else RANDOM)
+    check_parts(scene.controller, 'margins by="eigenvalues"' if linear else "margins", None if linear else RANDOM)
+    for name in ensemble.varied_names.intersection(zeros):
+        faults.add(name, "...", "varies, where margins take it as 0", "leave it out of what varies")
+    faults.raise_if_any()
+    ensemble = ensemble.in_scene(scene) if messages else ensemble
+    study = Study(ensemble, loop, about, settle, seconds, tilt, method, step_of(scene, h))
+    of_way = {"eigenvalues": of, "runs": [word for word in of if word not in LINEAR]}
+    peak_names = [f"{name}_{of_peak}" for name in (*OF_THE_DEMAND, *outputs) for of_peak in ("peak", "frequency")]
+    each_names = NAMES | {"peak": tuple(peak_names)}
+    names = {way: [name for word in of_way[way] for name in each_names[word]] for way in by}
+    n = ensemble.members
+    answers: Answers = {way: {name: np.full(n, np.nan) for name in names.get(way, ())} for way in WAYS}
+    why: np.ndarray = np.full(n, "", dtype=object)
+    for first in range(0, n, GROUP):
+        places = np.arange(first, min(first + GROUP, n))
+        groups, why[places] = study.loops(places)
+        for loops in groups:
+            why[loops.places], of_loops = _group(loops, of, by, most, longest, skew, outputs)
+            for way in by:
+                for name, column in of_loops[way].items():
+                    answers[way][name][loops.places] = column
+    grid = study.bench.plan.grid
+    return Margins(
+        loop or "all laws", answers["eigenvalues"], answers["runs"], why, grid.h, (*grid.messages, *messages)
+    )
+
+
+def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: float) -> None:
+    """Check that a controller has the law, and enough ticks in a run."""
+    if controller is None:
+        faults.add("controller", None, "is not in the scene, and margins are those of a loop", "give [controller]")
+    elif loop is not None and loop not in (keys := [law.key for law in controller.laws]):
+        faults.add("loop", loop, "is no law of the controller", closest(loop, keys))
+    elif not faults and seconds < LEAST_TICKS * controller.period:
+        least = LEAST_TICKS * controller.period
+        faults.add(
+            "seconds", seconds, f"is less than {LEAST_TICKS} ticks", f"give {least:g} or more, to see an envelope"
+        )
+
+
+def _outputs(faults: Faults, to: Any, of: Sequence[str]) -> dict[str, int]:
+    """Places in the motion of the numbers that peaks are asked to, by name."""
+    places = chosen_places(faults, "to", listed("to", to, "names"), COORDINATES)
+    if places and "peak" not in of:
+        faults.add("to", to, "is asked without peaks", 'add "peak" to `of`')
+    return {COORDINATES[i]: i for i in places}
+
+
+# Margins (n,) by name, by way.
+Answers = dict[str, dict[str, np.ndarray]]
+
+
+def _group(
+    loops: Loops,
+    of: Sequence[str],
+    by: Sequence[str],
+    most: float,
+    longest: float,
+    skew: float,
+    outputs: Mapping[str, int],
+) -> tuple[np.ndarray, Answers]:
+    """Why loops have no margins (n,), and margins by way and by name."""
+    bench, n, delays_now = loops.study.bench, len(loops.places), loops.delay
+    every, unity, h = np.arange(n), np.ones(n), bench.plan.grid.h
+    last = np.minimum(round(longest / h), (MOST_PERIODS - 1) * bench.every - delays_now)
+    answers: Answers = {way: {} for way in WAYS}
+    why: np.ndarray = np.where(loops.return_to_it(), "", UNSETTLED).astype(object)
+    ways: dict[str, Any] = {"runs": loops.settle} if "runs" in by else {}
+    if "eigenvalues" in by:
+        apart = loops.study.components if set(LINEAR) & set(of) else ()
+        sampled = SampledLoop(bench, loops.places, loops.motion, loops.begin, apart)
+        ways = {"eigenvalues": sampled.stable} | ways
+        why[(why == "") & ~sampled.moves] = IDLE
+        why[(why == "") & ~sampled.stable(unity, delays_now, every)] = UNSETTLED
+        if apart:
+            answers["eigenvalues"] = _of_frequencies(
+                sampled, delays_now, why == "", of, skew, loops.study.period, outputs
+            )
+    start = np.where(why == "", 1.0, np.nan)
+    for way, holds in ways.items():
+        known = answers["eigenvalues"]
+        if "gain" in of:
+            guesses = [known.get(name, np.full(n, np.nan)) for name in ("gain_lower", "gain_upper")]
+
+            def factors(values: np.ndarray, both: np.ndarray, holds: Any = holds) -> np.ndarray:
+                return np.asarray(holds(values, delays_now[both % n], both % n))
+
+            ends = np.repeat((1.0 / most, most), n)
+            brackets = edges(factors, np.tile(start, 2), ends, np.concatenate(guesses), NARROW[way])
+            with np.errstate(invalid="ignore"):
+                middle = np.sqrt(brackets[:, 0] * brackets[:, 1])
+            answers[way]["gain_lower"], answers[way]["gain_upper"] = np.split(middle, 2)
+        if "delay" in of:
+
+            def delays(values: np.ndarray, some: np.ndarray, holds: Any = holds) -> np.ndarray:
+                return np.asarray(holds(unity[some], delays_now[some] + values.astype(np.int64), some))
+
+            guess = np.rint(known["delay"] / h) if "delay" in known else np.full(n, np.nan)
+            brackets = edges(delays, start - 1.0, last.astype(float), guess, 1.0, whole_numbers=True)
+            held = np.where(np.isinf(brackets[:, 1]), np.inf, brackets[:, 0])
+            answers[way]["delay"] = np.where(why == "", held * h, np.nan)
+    return why, answers
+
+
+def _of_frequencies(
+    sampled: SampledLoop, delays: np.ndarray, settled: np.ndarray, of: Sequence[str], skew: float, period: float,
+    outputs: Mapping[str, int],
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Disk margins and peak gains by name (n,) of loops with delays in steps; NaN where they do not settle."""
+    values: dict[str, np.ndarray] = {}
+    for opened in sampled.opened(delays, np.flatnonzero(settled)):
+        found = disks(opened, skew, period) if "disk" in of else {}
+        found |= peaks(opened, list(outputs.values()), list(outputs), period) if "peak" in of else {}
+        for name, column in found.items():
+            values.setdefault(name, np.full(len(delays), np.nan))[opened.some] = column
+    return values

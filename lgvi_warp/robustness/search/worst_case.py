@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`worst_case`: numbers within bounds for which a quantity is worst."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from lgvi_warp.calls.prepared import prepare
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.near import near_names
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
+from lgvi_warp.criteria.members import scene_of
+from lgvi_warp.results.quantities import OfInterest
+from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, search
+from lgvi_warp.robustness.search.numbers import Numbers
+from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.statistics.base import Statistic
+
+WORST = ("largest", "smallest")
+
+
+@dataclass(frozen=True)
+class WorstCase(Saved):
+    """The worst member that a search found: a lower bound of the true worst.
+
+    Attributes:
+        parameters: its numbers by name, those that were searched.
+        value: its quantity; infinite for a member that failed, of which it is the first that was found.
+        of: name of the quantity.
+        worst: "largest" or "smallest".
+        at_bounds: by name, "low", "high" or "" of the numbers.
+        restarts: (r,), the worst value of each evolution: where they differ, more may be found.
+        runs: number of members that were run.
+        fleet: the member, to run it again; None where this was read from a file, beside which the numbers lie as the table
+            worst_case.csv: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")) is the member.
+        of_metric: whether the quantity is a metric, which is infinite where a loop never gets there; by default False.
+    """
+
+    study: ClassVar[str] = "worst_case"
+
+    parameters: Mapping[str, float]
+    value: float
+    of: str
+    worst: str
+    at_bounds: Mapping[str, str]
+    restarts: np.ndarray
+    runs: int
+    fleet: Ensemble | None
+    of_metric: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        return finite_or_none({item.name: getattr(self, item.name) for item in fields(self) if item.name != "fleet"})
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        # What is not finite is a member that failed, or never got there.
+        worse = math.inf if content["worst"] == "largest" else -math.inf
+        restarts = np.array(with_missing_as(content["restarts"], worse), np.float64)
+        value = math.inf if content["value"] is None else content["value"]
+        return cls(**content | {"value": value, "restarts": restarts, "fleet": None})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        yield dict(self.parameters)
+
+    def __str__(self) -> str:
+        where = ", ".join(
+            f"{name} = {value:.6g}" + (f" ({side})" if (side := self.at_bounds[name]) else "")
+            for name, value in self.parameters.items()
+        )
+        if math.isinf(self.value):
+            event = f"{self.of} is infinite, or a member fails" if self.of_metric else "a member fails"
+            return f"{event}: {where}; found in {self.runs} runs"
+        bound = "a lower bound of the largest" if self.worst == "largest" else "an upper bound of the smallest"
+        restarts = ", ".join(f"{value:.6g}" for value in self.restarts)
+        return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {restarts}"
+
+
+@shows_progress
+@near_names(prepare)
+def worst_case(
+    fleet: Scene | Ensemble,
+    within: Mapping[str, Any],
+    of: OfInterest | Statistic | Mapping[str, Any],
+    *,
+    worst: str = "largest",
+    budget: int = 20_000,
+    restarts: int = 3,
+    seed: int = 0,
+    progress: Callable[[float], None] | bool | None = None,
+    **settings: Any,
+) -> WorstCase:
+    """Search numbers within bounds for the member whose quantity is worst.
+
+    Differential evolution, in which a generation is an ensemble, several times from other places; then the corners, where they
+    are few; then a walk from the worst place. Noise is the same for all. What no member showed may be worse still.
+
+    Args:
+        fleet: A Scene or an Ensemble, whose scene is meant: numbers that are not searched are the scene's.
+        within: (low, high) of each number by name, such as {"vehicle.buoyancy": (297.0, 302.0)}; (low, high, "log") where
+            the search should go by the logarithm.
+        of: A quantity of one number, as of `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a metric, as of
+            `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
+        worst: "largest", the default, or "smallest". A member that fails is worse than all others, and ends the search.
+        budget: Number of members that may be run; 20,000 by default.
+        restarts: Number of evolutions; 3 by default, fewer where the budget is small.
+        seed: Seed of the search; 0 by default.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
+            None, the default, for nobody.
+        **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
+
+    Returns:
+        The worst member.
+
+    Raises:
+        SceneError: If an argument is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> within = {"vehicle.buoyancy": (300.0, 310.0)}
+        >>> worst = lw.worst_case(scene, within, "depth", worst="smallest", budget=400, h=0.1, t1=2.0)
+        >>> worst.parameters
+        {'vehicle.buoyancy': 310.0}
+    """
+    scene = scene_of(fleet)
+    faults = Faults()
+    if isinstance(fleet, Ensemble) and fleet.weights(0, 1) is not None:
+        problem = "has members with weights, which a search within bounds has no use for"
+        faults.add("fleet", fleet.sampling.kind, problem, "give the scene alone")
+    faults.choice("worst", worst, WORST)
+    box = None
+    with faults.including():
+        box = SearchBox.of("within", within, scene)
+    least = max(LEAST, POPULATION * (len(box.names) if box else 1))
+    if not is_whole(budget, least, 2**31):
+        faults.add("budget", budget, "is less than a generation", f"give {least} or more")
+    faults.raise_if_any()
+    assert box is not None
+    numbers_of = Numbers(scene, list(box.names), "of", of, {**settings, "common_noise": True})
+    sign, report = -1.0 if worst == "largest" else 1.0, callback(progress) or (lambda share: None)
+
+    def cost(inside: np.ndarray) -> np.ndarray:
+        values = numbers_of(lambda run: run(box.values(inside)))
+        return np.where(np.isnan(values), -np.inf, sign * values)
+
+    best = search(
+        cost, len(box.names), budget, seed, restarts, good_enough=-np.finfo(float).max,
+        report=lambda count: report(min(1.0, count / budget)))  # fmt: skip
+    numbers = box.values(best.at[None])[0]
+    sides = {
+        name: "low" if value == low else "high" if value == high else ""
+        for name, value, low, high in zip(box.names, numbers, box.low, box.high, strict=True)
+    }
+    parameters = dict(zip(box.names, map(float, numbers), strict=True))
+    member = Ensemble(scene, None, 0, None, Table(values={name: [value] for name, value in parameters.items()}))
+    # A search by the sign; a failure is infinite whatever is worst.
+    value = math.inf if math.isinf(best.cost) else sign * best.cost
+    label, of_metric = numbers_of.label, numbers_of.of_metric
+    return WorstCase(parameters, value, label, worst, sides, sign * best.restarts, best.runs, member, of_metric)

@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a sweep tells its user: comparisons, ranks, the worst members and their causes, as tables, files and words."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import closest, refusal
+from lgvi_warp.common.files import write_text
+from lgvi_warp.common.status import failed
+from lgvi_warp.common.tables import markdown, write_csv
+from lgvi_warp.criteria.files import finite_or_none
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.results.result import Result
+from lgvi_warp.robustness.sweeps.comparisons import PairedComparison, compared, corrected, ranks
+from lgvi_warp.robustness.sweeps.rare import RareComparison
+from lgvi_warp.robustness.sweeps.rare_output import provenance_of_rare, rare_against_baseline, rare_rows
+from lgvi_warp.robustness.sweeps.setup import END, SweepCell, rerun_members_of
+from lgvi_warp.robustness.sweeps.summary import against_baseline, summary
+from lgvi_warp.robustness.sweeps.sweep_table import SUCCESS, SweepTable
+from lgvi_warp.robustness.sweeps.verdicts import matters_of
+from lgvi_warp.statistics.estimates import paired
+from lgvi_warp.statistics.estimates.given_data import explained
+from lgvi_warp.uncertainty.rare.answer import RareEvent
+
+# Worst members that are listed.
+LISTED = 20
+
+
+class Sweep(SweepTable):
+    """What a sweep found: success, comparisons, ranks, the worst members; as tables, files and words.
+
+    Attributes:
+        setup: what was run.
+        cells: its cells, cases times points of the grid, in order.
+        records: what their members showed.
+        conditions: what a member must fulfil to pass.
+        baseline: name of the case that others are compared with.
+        confidence: confidence level of all intervals.
+        interval: how intervals of probabilities are formed.
+        rares: rare failures of the cells that ask for them; None where none does.
+        matters: the least difference that matters, by "success" [points] and metric [its unit]; those that were given.
+    """
+
+    def compare(
+        self,
+        first: str,
+        second: str,
+        at: Mapping[str, Any] | None = None,
+        quantile: float | None = None,
+        matters: Any = None,
+    ) -> list[PairedComparison]:
+        """Compare two cases on the same members: their success and each metric, at each point of the grid.
+
+        Success: difference of proportions of the members that differ, Tango's interval, McNemar's exact test. Metrics:
+        paired t of members that failed in neither case and whose numbers are finite; or of a quantile, by the bootstrap of
+        members. p is corrected for all of these comparisons by Holm. docs/guide/is_my_controller_robust.md says how to read
+        it.
+
+        Args:
+            first: name of a case.
+            second: name of another case; differences are second less first.
+            at: values of the grid by name; None (default) for all points.
+            quantile: level of the quantile to compare in place of means; None (default) for means.
+            matters: the least difference that matters, as of `lw.sweep`; None (default) for that of the sweep.
+
+        Returns:
+            The comparisons, success first at each point; `row()` of one is a record of a table, and `verdict` "better",
+            "worse", "equivalent" or "undecided" where it is known what matters.
+
+        Raises:
+            SceneError: there is no such case, point or metric.
+        """
+        pairs = [(a, b) for a in self.cells_of(first, at) for b in self.cells_of(second, at) if a.point == b.point]
+        judged = self if matters is None else replace(self, matters=matters_of(matters, self.metrics, SUCCESS))
+        return self.corrected_for_number([row for a, b in pairs for row in compared(judged, a, b, quantile)])
+
+    def corrected_for_number(self, rows: list[PairedComparison]) -> list[PairedComparison]:
+        """Correct p of comparisons that were made together for their number, by Holm.
+
+        Args:
+            rows: the comparisons, as of `compare`.
+
+        Returns:
+            The same with `p` corrected, and `real` by that and the sweep's confidence.
+        """
+        return corrected(rows, self.confidence)
+
+    def rare(self, case: str, at: Mapping[str, Any] | None = None) -> RareEvent:
+        """Return the rare failure of a case that asks for it: the probability that a member does not pass.
+
+        Its failing members are those that are compared with other cases, some 4,000 at most.
+
+        Args:
+            case: name of the case.
+            at: values of the grid by name; may be left out where there is no grid.
+
+        Returns:
+            The answer of `lw.rare_event`: probability, interval, failing members, the likeliest of them.
+
+        Raises:
+            SceneError: there is no such case or point, it did not ask, or it was refused.
+        """
+        cell = self.cell(case, at)
+        answer = None if self.rares is None else self.rares.of(cell)
+        if answer is None:
+            raise refusal("case", cell.name, "did not ask for its rare failure", "give the case rare = true")
+        if answer.found is None:
+            raise refusal(
+                "case", cell.name, f"has no rare failure: {answer.refused}", "mend it, or ask for another one"
+            )
+        return answer.found
+
+    def compare_rare(self, first: str, second: str, at: Mapping[str, Any] | None = None) -> list[RareComparison]:
+        """Compare the rare failures of two cases, at each point of the grid: how many times as often the second fails.
+
+        Failing members of either are run in both, with the same numbers and noise: P(B) / P(A) = P(B | A) / P(A | B). Where
+        too few fail in both, it is the ratio of the two answers. p is corrected for all of these comparisons by Holm.
+
+        Args:
+            first: name of a case.
+            second: name of another case; ratios are second over first.
+            at: values of the grid by name; None (default) for all points.
+
+        Returns:
+            The comparisons, of points where both have a rare failure; `row()` of one is a record of a table.
+
+        Raises:
+            SceneError: there is no such case or point.
+        """
+        pairs = [(a, b) for a in self.cells_of(first, at) for b in self.cells_of(second, at) if a.point == b.point]
+        return [] if self.rares is None else self.rares.compare(pairs)
+
+    def ranking(self, at: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+        """Rank the cases by success, and say of which others each is better than chance explains, and by how much.
+
+        With a grid a case's success is the mean over its points, of each member's share of points passed; a case that was
+        refused at a point is left out. All pairs of cases are tested, McNemar's exact test or with a grid a paired t of
+        shares, and p is corrected for all pairs by Holm.
+
+        Args:
+            at: values of the grid by name; None (default) for all points.
+
+        Returns:
+            Records with rank, case, value, lower, upper, better_than and better_by, the best first.
+
+        Raises:
+            SceneError: there is no such point.
+        """
+        return ranks(self, at)
+
+    def worst(self, count: int = 20, by: str | None = None, case: str | None = None) -> list[dict[str, Any]]:
+        """Find the worst members of all cells: those that failed, the earliest first, then by a metric, the largest first.
+
+        Args:
+            count: how many; by default 20.
+            by: name of the metric; default the first one that success limits from above, else the first one.
+            case: name of the case; None (default) for all.
+
+        Returns:
+            Records with case, point, member, status, whether it passed, the metrics and what varies.
+
+        Raises:
+            SceneError: there is no such metric or case.
+        """
+        limited = [name for name, (_, below) in self.conditions.limits.items() if np.isfinite(below)]
+        by = by or next(iter([*limited, *self.metrics]))
+        if by not in self.metrics:
+            raise refusal("by", by, "is no metric of this sweep", closest(str(by), self.metrics))
+        places: list[tuple[float, float, int, int]] = []
+        for cell in (cell for name in ((case,) if case else self.cases) for cell in self.cells_of(name)):
+            record = self.record(cell)
+            if record.refused:
+                continue
+            lost, ends = failed(record.status), record.numbers[END]
+            size = np.nan_to_num(record.numbers[by], nan=np.inf)
+            # Sorted by what comes first: earlier failures, then larger numbers; members in their order.
+            group, rank = np.where(lost, 0.0, 1.0), np.where(lost, ends, -size)
+            order = np.lexsort((np.arange(len(lost)), rank, group))[:count]
+            places += [(float(group[i]), float(rank[i]), cell.index, int(i)) for i in order]
+        return [self._member_row(self.cells[index], i) for _, _, index, i in sorted(places)[:count]]
+
+    def _member_row(self, cell: SweepCell, i: int) -> dict[str, Any]:
+        record, inputs = self.record(cell), self.inputs(cell, i, i + 1)
+        return {"case": cell.case.name, **cell.point, "member": i, "status": int(record.status[i]),
+                "passed": bool(self.passed(cell)[i]), **{name: float(x[i]) for name, x in record.numbers.items()},
+                **{name: float(x[0]) for name, x in inputs.items()}}  # fmt: skip
+
+    def causes(self, case: str, at: Mapping[str, Any] | None = None, of: str = SUCCESS) -> list[dict[str, Any]]:
+        """Find which of the inputs that vary explain success or a metric, the most important first.
+
+        share: the part of the variance over members that the mean over this input explains, from the members at hand (by
+        bins), with its interval and the F test's p, corrected for the number of inputs by Holm. slope: the standardised
+        coefficient of a linear regression on all inputs. Inputs are meant to be drawn independently.
+
+        Args:
+            case: name of the case.
+            at: values of the grid by name; may be left out where there is no grid.
+            of: "success" (default), or the name of a metric, over members that did not fail.
+
+        Returns:
+            Records with input, share, lower, upper, p, slope, and the input's median where members pass and where they do not.
+
+        Raises:
+            SceneError: there is no such case, point or metric, or it was refused.
+        """
+        cell = self.cell(case, at)
+        passed, inputs = self.passed(cell), self.inputs(cell)
+        y = passed.astype(np.float64)
+        if of != SUCCESS:
+            y = np.where(failed(self.record(cell).status), np.nan, self.values(case, of, at))
+        effects = explained(inputs, y, self.confidence)
+        p = paired.holm(np.array([effect.p for effect in effects.values()]))
+        rows = [{"input": name, **effect._asdict(), "p": float(level), "median_passed": _median(inputs[name][passed]),
+                 "median_failed": _median(inputs[name][~passed])}
+                for (name, effect), level in zip(effects.items(), p, strict=True)]  # fmt: skip
+        return sorted(rows, key=lambda row: -np.nan_to_num(row["share"], nan=-1.0))
+
+    def again(
+        self,
+        case: str,
+        members: Sequence[int],
+        at: Mapping[str, Any] | None = None,
+        save: SaveAt | None = None,
+        threads: int | None = None,
+    ) -> Result:
+        """Run members again alone, with the bits that they had, and save their samples.
+
+        Args:
+            case: name of the case.
+            members: their indices.
+            at: values of the grid by name; may be left out where there is no grid.
+            save: which samples, and when; default as the scene says.
+            threads: number of threads; default as of `lw.solve`.
+
+        Returns:
+            Their result.
+
+        Raises:
+            SceneError: there is no such case, point or member.
+        """
+        return rerun_members_of(self.setup, self.cell(case, at), members, save, threads)
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write table.csv, comparison.csv, ranking.csv, worst.csv, causes.csv, sweep.json and summary.md into a folder.
+
+        Where rare failures were asked for, rare.csv and rare_comparison.csv too.
+
+        Args:
+            folder: of the files, made if needed.
+
+        Returns:
+            Paths of the files.
+
+        Raises:
+            OSError: they cannot be written.
+        """
+        target = Path(folder)
+        target.mkdir(parents=True, exist_ok=True)
+        tables = {"table": self.rows(), "comparison": [row.row() for row in against_baseline(self)],
+                  "ranking": self.ranking(), "worst": self.worst(LISTED)}  # fmt: skip
+        tables["causes"] = [{"case": cell.case.name, **cell.point, "of": of, **row} for cell in self.cells
+                            if not self.record(cell).refused for of in (SUCCESS, *self.metrics) if of != END
+                            for row in self.causes(cell.case.name, cell.point, of)]  # fmt: skip
+        if self.rares is not None:
+            tables["rare"] = rare_rows(self)
+            tables["rare_comparison"] = [row.row() for row in rare_against_baseline(self)]
+        files = [write_csv(rows, target / f"{name}.csv", target) for name, rows in tables.items()]
+        texts = {
+            "sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1),
+            "summary.md": markdown(str(self)),
+        }
+        return files + [write_text(target / name, text, target) for name, text in texts.items()]
+
+    def __str__(self) -> str:
+        return summary(self)
+
+
+def _median(x: np.ndarray) -> float:
+    return float(np.median(x)) if len(x) else np.nan
+
+
+def provenance(table: SweepTable) -> dict[str, Any]:
+    """All that the sweep follows from, of plain types."""
+    setup = table.setup
+    cells = [{"case": cell.case.name, "at": {name: as_json(value) for name, value in cell.point.items()}, "key": cell.key,
+              "fixed": list(cell.fixed), "refused": table.record(cell).refused, "messages": list(table.record(cell).messages)}
+             | provenance_of_rare(table, cell) for cell in table.cells]  # fmt: skip
+    scene = setup.scene.to_dict()
+    scene.pop("ensemble", None)
+    metrics = {name: metric.to_dict() | {"unit": table.unit(name)} for name, metric in setup.metrics.items()}
+    return {"scene": scene, "ensemble": setup.members.to_dict(), "metrics": metrics, "success": table.conditions.to_dict(),
+            "baseline": table.baseline, "confidence": table.confidence, "interval": table.interval,
+            "settings": {name: as_json(value) for name, value in setup.settings.items()}, "cells": cells,
+            "versions": machine.versions()} | ({"matters": dict(table.matters)} if table.matters else {})  # fmt: skip
+
+
+def as_json(value: Any) -> Any:
+    """A value as JSON can hold it: plain types, others as text."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)
+    return value if isinstance(value, int | float | str | bool | list | None) else str(value)

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`sweep`: cases of a closed loop at all points of a grid, on the same members."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from lgvi_warp.calls.solve import solve
+from lgvi_warp.common.arguments import path_of
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.near import near_names
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.criteria.success import INTERVALS, success_of
+from lgvi_warp.robustness.sweeps.output import Sweep
+from lgvi_warp.robustness.sweeps.rare import RareFailures
+from lgvi_warp.robustness.sweeps.rare_output import rare_against_baseline
+from lgvi_warp.robustness.sweeps.record import Record, Records
+from lgvi_warp.robustness.sweeps.setup import Setup, SweepCell, setup_of
+from lgvi_warp.robustness.sweeps.sweep_table import SUCCESS
+from lgvi_warp.robustness.sweeps.verdicts import matters_of
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+
+# Parts of the progress of a rare failure, where a cell's own members are one.
+RARE_PARTS = 20
+# Said of a cell whose function holds what cannot be compared.
+NOT_KEPT = "cannot be told from other functions, so this cell runs in every call; give version=1 where it takes one"
+
+
+@shows_progress
+@near_names(solve)
+def sweep(
+    scene: Scene | Ensemble | str | os.PathLike[str],
+    cases: Any = None,
+    grid: Mapping[str, Any] | None = None,
+    *,
+    vary: Mapping[str, Any] | None = None,
+    members: int | None = None,
+    seed: int | None = None,
+    sampling: Any = None,
+    metrics: Sequence[Any] = (),
+    success: Any = None,
+    baseline: str | None = None,
+    confidence: float = 0.95,
+    interval: str = "wilson",
+    matters: Any = None,
+    rare: Any = None,
+    out: str | os.PathLike[str] | None = None,
+    threads: int | None = None,
+    executor: Any = "threads",
+    scheduler: str | None = None,
+    progress: Callable[[float], None] | bool | None = None,
+    **settings: Any,
+) -> Sweep:
+    """Run cases at all points of a grid on the same members, and say what holds and which case is better.
+
+    All cells have the same vehicles, starts, seas, sensor noise and faults: what is drawn depends on seed, member and name
+    alone. What a case sets does not vary in it; so does what it does not have. Cells that differ in numbers share a kernel. A
+    case that is refused or does not compile is noted, and the others go on.
+
+    In memory are the numbers of one cell at a time with `out`, 8 bytes for each member and metric; without it, of all cells.
+
+    Args:
+        scene: The scene, the path of a scene file, or an Ensemble whose scene, members, seed, vary and sampling are taken.
+        cases: Tables of `name`, `set` (numbers by name), `replace` (lists of parts, such as "laws"), `vehicle` (another one,
+            or numbers of it) and `scene` (another one); or {name: numbers that it sets}. Default: the scene alone.
+        grid: Name of a number -> its values: every case is run at all combinations. By default no grid.
+        vary: Distributions beside those of the scene, as for Ensemble; they replace those of the same name.
+        members: Number of members of every cell; default those of the scene.
+        seed: Seed of the members; default that of the scene.
+        sampling: As for Ensemble; default that of the scene.
+        metrics: One number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of": "heading"}, "iae
+            heading", or an expression over the path, "max(norm(demand))". "time_to_failure" is always among them.
+        success: What a member must fulfil: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: reach the end.
+        baseline: Name of the case that others are compared with; default the first one.
+        confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
+        interval: Of probabilities: "wilson" (default) or "clopper_pearson".
+        matters: The least difference that matters: of success in points, 1.0; and of metrics in their units, {"success": 1.0,
+            "overshoot depth": 0.1}. Comparisons then say better or worse by more than that, equivalent where the interval
+            lies within it, or undecided. Less of a metric is better, but where success limits it from below alone. By
+            default None.
+        rare: True for the probability that a member does not pass, however small, by lw.rare_event, in every cell whose case
+            says nothing else; or some of its arguments, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}.
+            Cells are compared by failing members of either. None (default) for those whose case asks.
+        out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
+            whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
+            code and what that leads to; by `version` where lw.control.Callback and lw.metrics.CustomMetric have one.
+        threads: As of solve.
+        executor: As of solve; default "threads".
+        scheduler: As of solve; default None.
+        progress: As of solve, of all cells together; None, the default, for nobody.
+        **settings: Further arguments of solve, such as method, h, t1, dtype.
+
+    Returns:
+        The sweep: success, comparisons, ranks, the worst members and their causes, as tables, files and words.
+
+    Raises:
+        SceneError: If arguments are at fault; the message names every fault.
+        OSError: If the folder cannot be written.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> table = lw.sweep(
+        ...     scene,
+        ...     {"slow": {}, "quick": {"heading_pid.kp": 2.0}},
+        ...     members=16,
+        ...     vary={"control_fins.area": lw.distributions.Normal(relative=0.05)},
+        ...     metrics=[lw.metrics.IAE("heading")],
+        ...     h=0.05,
+        ...     t1=30.0,
+        ... )
+        >>> table.cases, table.members_count
+        (('slow', 'quick'), 16)
+    """
+    setup = setup_of(scene, cases, grid, vary, members, seed, sampling, metrics, settings, rare)
+    execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
+    return swept(setup, success, baseline, confidence, interval, out, callback(progress), execution, matters)
+
+
+def swept(
+    setup: Setup, success: Any, baseline: str | None, confidence: float, interval: str,
+    out: str | os.PathLike[str] | None, progress: Any, execution: Mapping[str, Any], matters: Any = None,
+) -> Sweep:  # fmt: skip
+    """Run the cells of a setup, as `sweep` says; execution: threads, executor and scheduler."""
+    faults = Faults()
+    level = faults.number("confidence", confidence, "1")
+    if level is not None and not 0.0 < level < 1.0:
+        faults.add("confidence", confidence, "is not between 0 and 1", "give 0.95")
+    faults.choice("interval", interval, INTERVALS)
+    baseline = setup.cases[0].name if baseline is None else baseline
+    faults.choice("baseline", baseline, [case.name for case in setup.cases])
+    conditions, least = None, dict[str, float]()
+    with faults.including():
+        least = matters_of(matters, tuple(setup.metrics), SUCCESS)
+    with faults.including():
+        conditions = success_of(success, tuple(setup.metrics))
+    faults.raise_if_any()
+    assert conditions is not None
+    records = Records(None if out is None else path_of("out", out), list(setup.metrics), setup.members.members)
+    rares = None
+    if asking := sum(bool(case.rare) for case, _ in setup.cells):
+        with faults.including():
+            rares = RareFailures(setup, conditions, records.folder, float(confidence), execution["threads"])
+        faults.raise_if_any()
+    records.check()
+    total = len(setup.cells) + RARE_PARTS * asking
+    cells = list(_run(setup, records, progress, total, execution))
+    found = Sweep(setup, cells, records, conditions, baseline, float(confidence), interval, rares, least)
+    if rares is not None:
+        _run_rare(rares, found, progress, total, execution)
+    return found
+
+
+def _run_rare(rares: RareFailures, found: Sweep, progress: Any, total: int, execution: Mapping[str, Any]) -> None:
+    """Find the rare failures that are asked for, and compare them with those of the baseline."""
+    asking = [cell for cell in found.cells if cell.case.rare and not found.record(cell).refused]
+    done = total - RARE_PARTS * len(asking)
+    for i, cell in enumerate(asking):
+        at = done + RARE_PARTS * i
+        share = progress and (lambda part, at=at: progress((at + RARE_PARTS * part) / total))
+        assert cell.fleet is not None
+        rares.run(cell, found.records.folder is not None and not found.setup.unknown(cell.fleet), share, execution)
+    rare_against_baseline(found)
+    if progress:
+        progress(1.0)
+
+
+def _run(
+    setup: Setup, records: Records, progress: Any, total: int, execution: Mapping[str, Any]
+) -> Iterator[SweepCell]:
+    """Run the cells that are not recorded yet, and note those that are refused; total: parts of the progress in all."""
+    setup.note_functions()
+    for i, (case, point) in enumerate(setup.cells):
+        share = progress and (lambda part, i=i: progress((i + part) / total))
+        fleet, key, fixed = None, f"refused {i}", list[str]()
+        try:
+            fleet, fixed = setup.fleet(case, point)
+            key = setup.key(fleet)
+            if records.get(key) is None:
+                record = setup.run(fleet, **execution, progress=share)
+                unknown = setup.unknown(fleet) if records.folder is not None else []
+                messages = *record.messages, *(f"{place}: {NOT_KEPT}" for place in unknown)
+                records.put(key, replace(record, messages=messages), lasting=not unknown)
+        except SceneError as error:
+            records.put(key, Record.of_refusal(" ".join(str(error).split())))
+        if share:
+            share(1.0)
+        yield SweepCell(i, case, point, key, fleet, tuple(fixed))

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `derivatives` answers: derivatives with their errors, and what has none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
+
+# Pairs of names that are told with one reason.
+MOST_NAMES = 2
+ARRAYS = ("value", "jacobian", "error", "increments")
+
+
+@dataclass(frozen=True, eq=False)
+class Derivatives(Saved):
+    """Derivatives of what a run gives by numbers of its scene, made by `lw.derivatives`.
+
+    m is the number of quantities, k that of numbers. Of a fleet of n members every array has the members first: (n, m, k).
+
+    Attributes:
+        of: names of the quantities (m,).
+        units: their units (m,), "" where these are not known.
+        by: names of the numbers (k,).
+        value: the quantities (m,).
+        jacobian: derivative of each quantity by each number (m, k) [unit of the quantity / unit of the number]; NaN for none.
+        error: estimate of the error of each derivative (m, k), by how far differences at several increments are apart, and by
+            round-off; no bound: now and then an error is up to some 3 times that. The error of the method's step is not in
+            it. NaN where there is no derivative.
+        increments: the largest increment that each derivative stands on (m, k) [unit of the number]; NaN where there is none.
+        undefined: "quantity by number" -> why it has no derivative, in a sentence.
+        messages: notes for the user.
+        members: copies of members that were run.
+        provenance: scene, settings, versions and machine.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere", start={"velocity": [0.0, 0.0, 0.5]})
+        >>> slopes = lw.derivatives(scene, "depth", "start.velocity[2]", method="psi_x", h=0.1, t1=2.0)
+        >>> print(f"{slopes.jacobian[0, 0]:.4f}")
+        2.0000
+    """
+
+    study: ClassVar[str] = "derivatives"
+
+    of: tuple[str, ...]
+    units: tuple[str, ...]
+    by: tuple[str, ...]
+    value: np.ndarray
+    jacobian: np.ndarray
+    error: np.ndarray
+    increments: np.ndarray = field(repr=False)
+    undefined: Mapping[str, str]
+    messages: tuple[str, ...] = ()
+    members: int = 0
+    provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def __str__(self) -> str:
+        fleet = self.value.ndim == 2
+        lines = ["of a fleet: mean over members, and the least and the largest"] if fleet else []
+        for i, label in enumerate(self.of):
+            unit = f" {self.units[i]}" if self.units[i] not in ("", "1") else ""
+            value = _ends(self.value[:, i]) if fleet else f"{self.value[i]:.7g}"
+            lines.append(f"{label} = {value}{unit}")
+            for j, number in enumerate(self.by):
+                slopes, errors = self.jacobian[..., i, j], self.error[..., i, j]
+                text = _ends(slopes) if fleet else _sure(float(slopes), float(errors))
+                lines.append(f"  by {number:<28} {text}")
+        pairs: dict[str, list[str]] = {}
+        for name, reason in self.undefined.items():
+            pairs.setdefault(reason, []).append(name)
+        for reason, names in pairs.items():
+            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+            lines.append(f"undefined   {', '.join(names[:MOST_NAMES])}{more}: {reason}")
+        return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
+
+    def to_dict(self) -> dict[str, Any]:
+        return finite_or_none({item.name: getattr(self, item.name) for item in fields(self)})
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        arrays = {name: np.array(with_missing_as(content[name], math.nan), dtype=np.float64) for name in ARRAYS}
+        texts = {name: tuple(content[name]) for name in ("of", "units", "by", "messages")}
+        return cls(**content | arrays | texts)
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        jacobian = np.atleast_3d(self.jacobian.T).T
+        names = {name: np.reshape(getattr(self, name), jacobian.shape) for name in ARRAYS[1:]}
+        values = np.reshape(self.value, jacobian.shape[:2])
+        for member, i, j in np.ndindex(*jacobian.shape):
+            about = {"member": member, "of": self.of[i], "by": self.by[j], "value": float(values[member, i])}
+            yield about | {name: float(array[member, i, j]) for name, array in names.items()}
+
+
+def _sure(value: float, error: float) -> str:
+    """A derivative with its error."""
+    return "none" if math.isnan(value) else f"{value:.9g} +- {error:.1g}"
+
+
+def _ends(values: np.ndarray) -> str:
+    """The mean of members, with the least and the largest; how many have none."""
+    known = values[np.isfinite(values)]
+    count = len(values) - len(known)
+    missing = f" ({count} members have none)" if count > 1 else " (1 member has none)" if count else ""
+    return f"{known.mean():.6g}, {known.min():.6g} to {known.max():.6g}{missing}" if len(known) else "none"

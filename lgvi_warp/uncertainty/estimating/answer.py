@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The answer to what a statistic is, with its error and what it took."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
+
+from lgvi_warp.common import summaries
+from lgvi_warp.common.summaries import Summarized
+from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
+from lgvi_warp.uncertainty.estimating.levels import Setting
+
+
+@dataclass(frozen=True, repr=False)
+class Estimated(Summarized, Saved):
+    """A statistic with its interval, made by `lw.estimate`.
+
+    Attributes:
+        of: name of the statistic.
+        unit: unit of the value and of all errors.
+        value: the estimate [`unit`].
+        interval: its 95 % interval, of sampling and bias together, (low, high) [`unit`].
+        error: root mean square asked for [`unit`].
+        sampling_error: standard error of sampling [`unit`].
+        bias: difference from the finer setting that the bias was told by, which is not taken off [`unit`].
+        bias_interval: its 95 % interval, with what is left beyond that setting, (low, high) [`unit`].
+        setting: the setting whose statistic is estimated, as "psi_x 0.025".
+        settings: the same as arguments of `lw.solve`: method, h and dtype.
+        reference: the finer setting that the bias was told by, and the number of members.
+        estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
+        members: number of members of the run by setting, "psi_x 0.025 less psi_x 0.2" for pairs.
+        seconds: processor time of all, pilot included, without compiling [s].
+        pilot_seconds: that of the pilot [s].
+        plain_seconds: predicted processor time of plain Monte Carlo in the same setting, to the same error [s].
+        own_seconds: the same at the scene's own step; None where it has none.
+        rivals: estimator -> how many times less than plain Monte Carlo it was predicted to cost, in that setting.
+        messages: notes for the user.
+        recipe: what it takes to run the same members again, to the bit, as lw.estimate(fleet, of, recipe=found.recipe): seed,
+            setting, estimator, and by level settings, slopes, strata and members.
+        provenance: scene, ensemble, settings, versions and machine.
+    """
+
+    study: ClassVar[str] = "estimate"
+    endings: ClassVar[tuple[str, ...]] = ("json", "csv", "txt")
+
+    of: str
+    unit: str
+    value: float
+    interval: tuple[float, float]
+    error: float
+    sampling_error: float
+    bias: float
+    bias_interval: tuple[float, float]
+    setting: str
+    settings: Mapping[str, Any]
+    reference: str
+    estimator: str
+    members: Mapping[str, int]
+    seconds: float
+    pilot_seconds: float
+    plain_seconds: float
+    own_seconds: float | None = None
+    rivals: Mapping[str, float] = field(default_factory=dict)
+    messages: tuple[str, ...] = ()
+    recipe: Mapping[str, Any] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def error_reached(self) -> float:
+        """Root mean square of sampling error and bias [`unit`]."""
+        return math.hypot(self.sampling_error, self.bias)
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        return f"Estimated {self.of}", self._rows()
+
+    def _rows(self) -> summaries.Rows:
+        after = "" if self.unit in ("", "1") else f" {self.unit}"
+        low, high = self.interval
+        digits = _digits(self.value, 0.5 * (high - low))
+        members = ", ".join(f"{name}: {count:,}" for name, count in self.members.items())
+        below, above = self.bias_interval
+        gain = f" ({self.plain_seconds / self.seconds:.2g} times)" if self.seconds > 0.0 else ""
+        cost = (f"{self.seconds:.2g} s, pilot {self.pilot_seconds:.2g} s; plain Monte Carlo in the same setting "
+                f"{self.plain_seconds:.2g} s{gain}")  # fmt: skip
+        if self.own_seconds is not None:
+            cost += f", at the scene's own step {self.own_seconds:.2g} s"
+        tried = ", ".join(f"{name} {gain:.2g} times" for name, gain in self.rivals.items())
+        return [
+            ("value", f"{self.value:.{digits}g}{after}, 95 % interval {low:.{digits}g} to {high:.{digits}g}"),
+            ("sampling", f"{self.sampling_error:.2g}{after}   {self.estimator}: {members}"),
+            ("bias", f"{self.bias:.2g}{after} ({below:.2g} to {above:.2g})   {self.setting} against {self.reference}"),
+            ("cost", cost),
+            *([("tried", tried)] if tried else []),
+            *(("note", message) for message in self.messages),
+        ]
+
+    def __str__(self) -> str:
+        rows = self._rows()
+        first, width = self.of, max(len(self.of), 10)
+        labels = [first, *(label for label, _ in rows[1:])]
+        return "\n".join(f"{label:<{width}}  {text}" for label, (_, text) in zip(labels, rows, strict=True))
+
+    def to_dict(self) -> dict[str, Any]:
+        names = [item.name for item in fields(self) if item.name not in ("provenance", "settings")]
+        content = {name: getattr(self, name) for name in names} | {"members": dict(self.members)}
+        return dict(finite_or_none(content | {"rivals": dict(self.rivals), "recipe": dict(self.recipe)}))
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        low, high = content["interval"]
+        ends = (-math.inf if low is None else low, math.inf if high is None else high)
+        settings = Setting.from_dict(content["recipe"]["setting"]).options()
+        numbers = {
+            name: with_missing_as(content[name], math.inf) for name in ("error", "sampling_error", "plain_seconds")
+        }
+        more = {"interval": ends, "bias_interval": tuple(with_missing_as(content["bias_interval"], math.inf))}
+        return cls(**content | numbers | more | {"messages": tuple(content["messages"]), "settings": settings})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        names = (
+            "of",
+            "unit",
+            "value",
+            "error",
+            "sampling_error",
+            "bias",
+            "setting",
+            "reference",
+            "estimator",
+            "seconds",
+        )
+        low, high = self.interval
+        yield {name: getattr(self, name) for name in names[:3]} | {"low": low, "high": high} | {
+            name: getattr(self, name) for name in names[3:]} | {"members": sum(self.members.values())}  # fmt: skip
+
+
+def _digits(value: float, half: float) -> int:
+    """How many digits show a value to a hundredth of half its interval."""
+    if not (math.isfinite(half) and half > 0.0 and value):
+        return 6
+    return min(12, max(3, 2 + math.ceil(math.log10(max(abs(value) / half, 1.0)))))

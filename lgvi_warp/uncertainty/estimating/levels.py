@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs of settings on points of the cube: the numbers of their members, what they cost, and levels of paired settings."""
+
+from __future__ import annotations
+
+import functools
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.calls.prepared import Prepared, prepare
+from lgvi_warp.common import machine
+from lgvi_warp.common.random import generator
+from lgvi_warp.criteria.memory import Remembered
+from lgvi_warp.measuring.comparison import drawn_every
+from lgvi_warp.methods.method import Method
+from lgvi_warp.sampling.designs.sequences import SOBOL_BITS, sobol_points
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.uncertainty.estimating.estimators import REPLICATES, MeanEstimate, plain, regressed, replicated, together
+from lgvi_warp.uncertainty.estimating.question import Question
+from lgvi_warp.uncertainty.estimating.target import Solved, Sought, Weighted
+from lgvi_warp.uncertainty.estimating.unseen import strata_of
+
+# Members of one call for each thread, whose numbers stay in its cache, and threads that count.
+AT_ONCE, MOST_THREADS = 8192, 8
+# Counted time of a call by itself, and of an evaluation of the forces of a member, a draw of its noise [s]: about what a core
+# takes. Choices follow these, so that one seed gives one answer.
+CALL, EVALUATION, DRAW = 1e-3, 1e-8, 1e-8
+# What a step in single precision counts, and one of a cheaper scene.
+SINGLE, CHEAPER = 0.55, 0.5
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How members are run: method, step [s], precision, and which scene, 0 the user's, others the cheaper ones in order."""
+
+    method: Any
+    h: float
+    dtype: str = "float64"
+    scene: int = 0
+
+    def __str__(self) -> str:
+        name = self.method if isinstance(self.method, str) else self.method.name
+        precision = "" if self.dtype == "float64" else f" {self.dtype}"
+        return f"{name} {self.h:.6g}{precision}" + (f" of cheaper scene {self.scene}" if self.scene else "")
+
+    @property
+    def kind(self) -> tuple[Any, ...]:
+        """What settings that differ in their steps alone have in common."""
+        return self.method, self.dtype, self.scene
+
+    def options(self) -> dict[str, Any]:
+        """Arguments of `lw.solve`."""
+        return {"method": self.method, "h": self.h, "dtype": self.dtype}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Convert it to plain values, for JSON."""
+        return asdict(self)  # a Method is a dict then
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Setting:
+        """Build it from `to_dict`."""
+        method = content["method"]
+        return cls(**{**content, "method": method if isinstance(method, str) else Method(**method)})
+
+
+class Runs:
+    """Runs of one question in any setting, each prepared once.
+
+    fleets: the user's ensemble, then the cheaper scenes' with the same variation.
+    strata: of the user's ensemble, the common one first.
+    counted: counted time of all calls so far, which is the same in every call of `lw.estimate` [s].
+    seconds: processor time of all runs so far, prepared and called, without preparing the first run of each kernel, which
+        loads or compiles it [s].
+    execution: threads, executor and scheduler, as of `lw.prepare`.
+    remembered: where calls are kept; None for nowhere.
+    """
+
+    def __init__(
+        self, fleets: Sequence[Ensemble], question: Question, t1: float, *, seed: int,
+        execution: Mapping[str, Any] | None = None, clock: Callable[[], float] = time.process_time,
+        remembered: Remembered | None = None,
+    ):  # fmt: skip
+        self.question, self.seed, self.seconds, self.counted = question, seed, 0.0, 0.0
+        self.strata = strata_of(fleets[0])
+        self._fleets, self._t1, self._execution, self._clock = fleets, t1, execution or {}, clock
+        self._prepared: dict[tuple[Setting, float | None], Prepared] = {}
+        self._calls: list[Call] = []
+        self._loaded, self._costs = set[Any](), dict[Any, float]()
+        self._remembered = remembered or Remembered()
+        threads = self._execution.get("threads") or machine.thread_count()
+        # Calls that are kept are the same on any number of threads.
+        self._at_once = AT_ONCE * (MOST_THREADS if self._remembered.keeps else min(threads, MOST_THREADS))
+        self.dimensions = fleets[0].space.dimensions
+
+    def prepared(self, setting: Setting, grid: float | None) -> Prepared:
+        """The run of a setting, with noise on a grid [s], None for draws once a step; SceneError where it is refused."""
+        key = setting, grid
+        if key not in self._prepared:
+            begun, fleet = self._clock(), self._fleets[setting.scene]
+            fleet = Ensemble(fleet.scene, 1, self.seed, fleet.vary)
+            fleet = fleet if grid is None else drawn_every(fleet, grid)
+            asked = self.question.settings(fleet.scene)
+            run = self._prepared[key] = prepare(
+                fleet, levels=self.dimensions > 0, t1=self._t1, **self._execution, **setting.options(), **asked
+            )
+            kernel = run.noise.plan.spec
+            # What loads a kernel, or compiles it, is no cost of later calls.
+            if kernel in self._loaded:
+                self.seconds += max(self._clock() - begun, 0.0)
+            self._loaded.add(kernel)
+        return self._prepared[key]
+
+    def __call__(
+        self, setting: Setting, grid: float | None, points: np.ndarray, indices: np.ndarray, stratum: int = 0
+    ) -> np.ndarray:
+        """The numbers of members (n,) at points (n, d) of a stratum, with noise of these indices; NaN where they failed."""
+        run, n = self.prepared(setting, grid), len(points)
+        groups, points = [], self.strata[stratum].placed(points)
+        self.counted += CALL + n * self.cost(setting, grid)
+        for first in range(0, n, self._at_once):
+            some = slice(first, first + self._at_once)
+            ran = functools.partial(self._ran, run, setting)
+            numbers, taken = self._remembered(f"{setting!r} {grid!r}", ran, points[some], indices[some])
+            groups.append(numbers)
+            self.seconds += float(taken)
+            self._calls.append(Call(setting, setting.h if grid is None else grid, len(numbers), float(taken)))
+        return np.concatenate(groups)
+
+    def _ran(
+        self, run: Prepared, setting: Setting, points: np.ndarray, indices: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers of members (n,), and the processor time that they took [s]."""
+        begun = self._clock()
+        numbers = self.question.numbers(self._call(run, setting, points, indices))
+        return numbers, np.array(max(self._clock() - begun, 1e-9))
+
+    def _call(self, run: Prepared, setting: Setting, points: np.ndarray, indices: np.ndarray) -> Any:
+        if self.dimensions:
+            return run(points, seed=self.seed, indices=indices)
+        start = self._fleets[setting.scene].select(0, 1)
+        states = (start.position, start.attitude, start.velocity, start.angular_velocity)
+        many = (np.repeat(state, len(points), axis=0) for state in states)
+        return run.states(*many, indices=indices, seed=self.seed)
+
+    @property
+    def members(self) -> int:
+        """How many members were run so far."""
+        return sum(call.members for call in self._calls)
+
+    def cost(self, setting: Setting, grid: float | None = None) -> float:
+        """Counted time of a member [s]: evaluations of forces, and draws of noise on a grid [s]."""
+        method = Method(setting.method) if isinstance(setting.method, str) else setting.method
+        each = method.gauss * 8 or (len(method.tableau.b) if method.tableau else len(method.stages))
+        one = EVALUATION * each * (SINGLE if setting.dtype != "float64" else 1.0) * (CHEAPER if setting.scene else 1.0)
+        return self._t1 * (one / setting.h + (0.0 if grid is None else DRAW / grid))
+
+    def measured_cost(self, setting: Setting, grid: float | None = None) -> float:
+        """Processor time of a member in a large call [s], from all calls so far of its kind."""
+        key = setting, grid, len(self._calls)
+        if key not in self._costs:
+            like = [call for call in self._calls if call.setting.kind == setting.kind]
+            others = [call for call in self._calls if call.setting.kind != setting.kind]
+            self._costs[key] = member_cost(like, setting.h, setting.h if grid is None else grid, others)
+        return self._costs[key]
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call: its setting, the time between two draws of noise [s], its members and its processor time [s]."""
+
+    setting: Setting
+    draw: float
+    members: int
+    seconds: float
+
+
+def member_cost(calls: Sequence[Call], h: float, draw: float, others: Sequence[Call] = ()) -> float:
+    """The processor time of a member [s], as `fitted`; what a call takes by itself is no cost of a member."""
+    cost = float(fitted(calls, others)[1:4] @ (1.0, 1.0 / h, 1.0 / draw))
+    # Where all is taken for the calls' own, the cheapest call bounds it.
+    return max(cost, 1e-2 * min(call.seconds / call.members for call in calls))
+
+
+def fitted(calls: Sequence[Call], others: Sequence[Call] = ()) -> np.ndarray:
+    """Processor time by least squares over calls: per call, member, step and draw, none below 0 [s]. Relative residuals count.
+
+    others: calls of other kinds, which take as much by themselves.
+    """
+    from scipy.optimize import nnls
+
+    def rows(some: Sequence[Call]) -> np.ndarray:
+        return np.array([[c.members, c.members / c.setting.h, c.members / c.draw] for c in some]).reshape(-1, 3)
+
+    mine, theirs = rows(calls), rows(others)
+    apart = np.block([[mine, np.zeros_like(mine)], [np.zeros_like(theirs), theirs]])
+    columns = np.column_stack([np.ones(len(apart)), apart])
+    seconds = np.array([c.seconds for c in (*calls, *others)])
+    size = np.maximum(np.abs(columns).max(axis=0), 1e-300)
+    return np.asarray(nnls(columns / size / seconds[:, None], np.ones(len(seconds)))[0] / size)
+
+
+def design(seed: int, name: str, dimensions: int, first: int, count: int, replicates: int = REPLICATES) -> np.ndarray:
+    """Members of replicates of Sobol points (count, d), from a member on: member i is point i // R of replicate i mod R.
+
+    A replicate is one scrambled sequence with a digital shift of its own.
+
+    replicates: 0 for independent points, of which a count of each name is drawn once.
+    """
+    if not replicates:
+        return np.asarray(generator(seed, f"{name} {first}").random((count, dimensions)))
+    members, parts = np.arange(first, first + count), 2.0**SOBOL_BITS
+    words = (sobol_points(seed, name, dimensions, members // replicates) * parts).astype(np.uint64)
+    shifts = generator(seed, f"{name} shifts").integers(2**SOBOL_BITS, size=(replicates, dimensions), dtype=np.uint64)
+    return np.asarray(((words ^ shifts[members % replicates]) + 0.5) / parts)
+
+
+@dataclass
+class Level:
+    """Members of a setting and, on the same points and noise, of a coarser one times a slope.
+
+    weight: of the mean of fine less slope times coarse in the sum of all levels.
+    grid: of the noise of both [s]; None for draws once a step.
+    kind: "sobol", "plain" or "regression".
+    members: number of members, fixed beforehand.
+    reach: how far the number of a member may be that none of few is like; at least their spread.
+    stratum: of which all members are.
+    """
+
+    fine: Setting
+    coarse: Setting | None
+    slope: float
+    weight: float
+    grid: float | None
+    kind: str
+    members: int
+    first_index: int = 0
+    name: str = ""
+    reach: float = 0.0
+    stratum: int = 0
+    y: list[np.ndarray] = field(default_factory=list)
+    below: list[np.ndarray] = field(default_factory=list)
+    points: list[np.ndarray] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Convert how it is run to plain values, for JSON."""
+        own = {each.name: getattr(self, each.name) for each in fields(self)[:-3]}
+        return own | {"fine": self.fine.to_dict(), "coarse": self.coarse and self.coarse.to_dict()}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Level:
+        """Build it from `to_dict`."""
+        fine, coarse = Setting.from_dict(content["fine"]), content["coarse"] and Setting.from_dict(content["coarse"])
+        return cls(**{**content, "fine": fine, "coarse": coarse})
+
+    def grow(self, runs: Runs, count: int) -> None:
+        """Run so many more members."""
+        done = sum(map(len, self.y))
+        replicates = REPLICATES if self.kind == "sobol" else 0
+        points = design(runs.seed, self.name, runs.dimensions, done, count, replicates)
+        indices = self.first_index + np.arange(done, done + count)
+        self.y.append(runs(self.fine, self.grid, points, indices, self.stratum))
+        if self.coarse is not None:
+            self.below.append(runs(self.coarse, self.grid, points, indices, self.stratum))
+        self.points.append(points if self.kind == "regression" else points[:, :0])
+
+    def failed(self) -> Setting | None:
+        """The setting at which members failed that were run last; None for none."""
+        for setting, numbers in ((self.fine, self.y), (self.coarse, self.below)):
+            if setting is not None and np.isnan(numbers[-1]).any():
+                return setting
+        return None
+
+    def more(self, share: float) -> int:
+        """A part of the members of the level so far, in whole replicates; all or three times that where balanced."""
+        points = sum(map(len, self.y)) // REPLICATES
+        if self.kind == "sobol" and points & (points - 1) == 0:
+            return REPLICATES * points * (1 if share <= 1.0 else 3)
+        return REPLICATES * math.ceil(share * points)
+
+    def weighted(self) -> list[Weighted]:
+        """The level's part in the sum of levels."""
+        samples = [(self.weight, np.concatenate(self.y))]
+        return [*samples, (-self.weight * self.slope, np.concatenate(self.below))] if self.below else samples
+
+    def part(self, target: Sought, at: Solved) -> MeanEstimate:
+        """The estimate of the level, times its weight. docs/theory/estimators.md, (E20), (E25)."""
+        z, least = target.contributions(np.concatenate(self.y), at), target.least(at)
+        if self.below:
+            z = z - self.slope * target.contributions(np.concatenate(self.below), at)
+        # No answer is surer than the effect of members that so many others do not show.
+        least = max(least, self.reach, float(np.std(z)))
+        if self.kind == "sobol":
+            return replicated(z, least).times(self.weight)
+        if self.kind == "regression":
+            return regressed(z, normals(np.concatenate(self.points)), least).times(self.weight)
+        return plain(z, least).times(self.weight)
+
+
+def normals(points: np.ndarray) -> np.ndarray:
+    """Standard normals of levels, column by column."""
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(np.clip(points, 2.0**-53, 1.0 - 2.0**-53)))
+
+
+def cube(normals: np.ndarray) -> np.ndarray:
+    """Levels of standard normals."""
+    from scipy.special import ndtr
+
+    return np.asarray(ndtr(normals))
+
+
+def samples_of(levels: Sequence[Level]) -> list[Weighted]:
+    """The numbers of all levels, with their weights."""
+    return [sample for level in levels for sample in level.weighted()]
+
+
+def estimated(levels: Sequence[Level], target: Sought) -> tuple[Solved, MeanEstimate]:
+    """The target from all levels, and the estimate of its error. docs/theory/estimators.md, (E20)."""
+    samples = samples_of(levels)
+    at = target.solved(samples)
+    parts = together([level.part(target, at) for level in levels])
+    # What regression takes away of a quantile's error is in the mean of the contributions.
+    adjusted = target.kind in ("mean", "probability") or any(level.kind == "regression" for level in levels)
+    value = parts.value if adjusted else at.value
+    return at, replace(parts, value=value)

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `rare_event` answers: a probability with its error, what it cost, and the members for which the event happens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from lgvi_warp.criteria.files import Saved, finite_or_none
+from lgvi_warp.criteria.running import duration_text
+from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.uncertainty.rare.causes import Chance, moved_text
+from lgvi_warp.uncertainty.rare.subset import SubsetRun
+
+# Most numbers that are listed as moved by the event.
+MOST_MOVED = 6
+ESTIMATORS = {
+    "importance": "weights of members drawn about the failing ones of chains",
+    "subset": "subset simulation",
+    "plain": "plain sampling",
+    "splitting": "splitting in time",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class RareEvent(Saved):
+    """The probability of a rare event, and members for which it happens.
+
+    Attributes:
+        event: what was asked for, in words.
+        probability: of the event; members that fail count as it, where failed="event".
+        interval: (lower, upper), of 95 % by Student's t of the logarithm.
+        relative_error: standard deviation of the probability's error, as a part of it.
+        estimator: "importance", "subset", "plain" or "splitting".
+        members: number of members that were run, by setting: "scene", and what `cheaper` says; with splitting in whole runs.
+        failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None where
+            noise alone varies. With splitting one may come several times, with other noise.
+        normals: (m, d), the numbers that vary of these members as standard normals, in the order of `moved`.
+        draws: (m, k), standard normals of noise of these members, for lw.prepare(..., draws="given"); k = 0 without noise, and
+            with splitting.
+        weights: (m,), what each of them stands for; they sum to 1.
+        failed_share: part of the probability that is of members that failed, or have a number that is not finite.
+        likeliest: values by name of the likeliest of these members, that with the least distance from the middle.
+        likeliest_draws: (k,), standard normals of its noise.
+        distance: its distance from the middle, in standard deviations of all that varies.
+        moved: by name, the mean of the failing members in standard deviations from the middle.
+        noise_moved: by term or sensor, a z-score of the failing members' draws: of their mean path or of their sum of squares.
+            That of noise which does not matter is about a standard normal number; from 4.5 on it is no chance.
+        runs: the runs of subset simulation: thresholds and limits of each level; with splitting, scores of members: what their
+            limit is expected to be at the end in what is not known of it, infinite where the event happened.
+        plain_members: members that plain Monte Carlo would take for this error.
+        plain_seconds: how long these would take at the pace of this call [s].
+        seconds: how long the runs of members took [s].
+        messages: notes for the user.
+        provenance: scene, what varies, settings, versions and machine.
+        paths: with splitting, for each of the failing members (times (k + 1,) [s], indices (k,)): from one time to the next it
+            has the noise of an index, by the seed of the call, as in `run.states(final, indices=, seed=)`.
+        moved_size: by name, the mean absolute value of the failing members in standard deviations; 0.80 of all members.
+        moved_spread: by name, the standard deviation of the failing members in that of all members.
+        moved_z: by name, the z-score farthest from 0 of these three against all members; from 4.5 on it is no chance.
+        by_condition: where the event is any of several conditions, (probability, lower, upper) of each alone by its words, and
+            of "any" and "all" of them; empty otherwise, and with splitting.
+        chains: (m,), the chain of each of the failing members, where those of one are related; different numbers elsewhere.
+    """
+
+    study: ClassVar[str] = "rare"
+    endings: ClassVar[tuple[str, ...]] = ("json", "csv", "txt")
+
+    event: str
+    probability: float
+    interval: tuple[float, float]
+    relative_error: float
+    estimator: str
+    members: Mapping[str, int]
+    failing: Table | None = field(repr=False)
+    normals: np.ndarray = field(repr=False)
+    draws: np.ndarray = field(repr=False)
+    weights: np.ndarray = field(repr=False)
+    failed_share: float
+    likeliest: Mapping[str, Any]
+    likeliest_draws: np.ndarray = field(repr=False)
+    distance: float
+    moved: Mapping[str, float]
+    noise_moved: Mapping[str, float]
+    runs: tuple[SubsetRun, ...] = field(repr=False)
+    plain_members: float
+    plain_seconds: float
+    seconds: float
+    messages: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    paths: tuple[tuple[np.ndarray, np.ndarray], ...] = field(default=(), repr=False)
+    moved_size: Mapping[str, float] = field(default_factory=dict, repr=False)
+    moved_spread: Mapping[str, float] = field(default_factory=dict, repr=False)
+    moved_z: Mapping[str, float] = field(default_factory=dict, repr=False)
+    by_condition: Mapping[str, Chance] = field(default_factory=dict)
+    chains: np.ndarray = field(default_factory=lambda: np.zeros(0, int), repr=False)
+
+    def __str__(self) -> str:
+        low, high = self.interval
+        members = ", ".join(f"{count:,} at {name}" for name, count in self.members.items())
+        lines = [
+            f"probability {self.probability:.3g}, 95 % interval {low:.3g} to {high:.3g} "
+            f"(error {100.0 * self.relative_error:.2g} % of it)",
+            f"event       {self.event}",
+            f"by          {ESTIMATORS[self.estimator]}",
+            f"members     {members}; {duration_text(self.seconds)}",
+            f"plain       would take {self.plain_members:,.3g} members for this error, {duration_text(self.plain_seconds)}",
+        ]
+        lines += [f"            {name}: {chance.probability:.3g} ({chance.lower:.3g} to {chance.upper:.3g})"
+                  for name, chance in self.by_condition.items() if name != "any"]  # fmt: skip
+        if self.failed_share > 0.0:
+            lines.append(f"failed      {self.failed_share:.1%} of the probability is of members that failed")
+        if len(self.weights) and (self.moved or self.noise_moved):
+            numbers = ", ".join(f"{name} = {_short(value)}" for name, value in self.likeliest.items())
+            noise = " and its noise" if len(self.likeliest_draws) or self.estimator == "splitting" else ""
+            lines.append(f"likeliest   {numbers or 'the scene'}{noise}: {self.distance:.2f} sd from the middle")
+            columns = [each.values() for each in (self.moved, self.moved_size, self.moved_spread, self.moved_z)]
+            moved = dict(zip(self.moved, zip(*columns, strict=False), strict=False))
+            lines.append(f"moved       {moved_text(moved, self.noise_moved, MOST_MOVED)}")
+        return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
+
+    def to_dict(self) -> dict[str, Any]:
+        failing = None if self.failing is None else self.failing.own_values()
+        kept = ("probability", "spread", "thresholds", "acceptance", "size", "members")
+        runs = [{name: getattr(run, name) for name in kept} | {"limits": list(run.limits)} for run in self.runs]
+        own = {item.name: getattr(self, item.name) for item in fields(self)}
+        paths = [list(path) for path in self.paths]
+        return finite_or_none(
+            own | {"failing": failing, "runs": runs, "likeliest": dict(self.likeliest), "paths": paths}
+        )
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        arrays = {name: np.array(content[name], float) for name in ("draws", "normals", "weights", "likeliest_draws")}
+        for name in ("draws", "normals"):
+            arrays[name] = arrays[name].reshape(len(arrays["weights"]), -1)
+        failing = content["failing"]
+        runs = tuple(_run_of(run) for run in content["runs"])
+        table = None if failing is None else Table(values={name: np.array(each) for name, each in failing.items()})
+        paths = tuple((np.array(times), np.array(keys, np.int64)) for times, keys in content.get("paths", ()))
+        more: dict[str, Any] = {
+            "interval": tuple(content["interval"]),
+            "messages": tuple(content["messages"]),
+            "paths": paths,
+        }
+        chances = content.get("by_condition", {})
+        more["by_condition"] = {name: Chance(*map(float, each)) for name, each in chances.items()}
+        more["chains"] = np.array(content.get("chains", ()), int)
+        return cls(**content | arrays | more | {"failing": table, "runs": runs})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        columns = {} if self.failing is None else _entries(self.failing.own_values())
+        for i, weight in enumerate(self.weights):
+            yield {name: float(column[i]) for name, column in columns.items()} | {"weight": float(weight)}
+
+
+def _run_of(content: Mapping[str, Any]) -> SubsetRun:
+    """A run from the content of a file, which leaves its failing members out: they are those of the answer."""
+    nothing = np.zeros(0)
+    thresholds = np.array([-np.inf if bound is None else bound for bound in content["thresholds"]])
+    limits = tuple(np.array([np.inf if each is None else each for each in level]) for level in content["limits"])
+    return SubsetRun(content["probability"], content["spread"], thresholds, limits, np.array(content["acceptance"]),
+                     nothing.reshape(0, 0), nothing, content["size"], content["members"])  # fmt: skip
+
+
+def _entries(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of single numbers: of a vector or a matrix its entries, "start.position[2]"."""
+    entries = {}
+    for name, values in columns.items():
+        for index in np.ndindex(*values.shape[1:]):
+            entries[f"{name}[{','.join(map(str, index))}]" if index else name] = values[(slice(None), *index)]
+    return entries
+
+
+def _short(value: Any) -> str:
+    array = np.asarray(value)
+    return f"{float(array):.5g}" if array.ndim == 0 else f"[{', '.join(f'{x:.4g}' for x in array.ravel()[:6])}]"

@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`rare_event`: the probability of what plain sampling would hardly ever see."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.calls.prepared import prepare
+from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import whole_number
+from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.near import near_names
+from lgvi_warp.common.progress import callback, shows_if_long, shows_progress
+from lgvi_warp.criteria.memory import Remembered
+from lgvi_warp.criteria.running import duration_text
+from lgvi_warp.results.quantities import OfInterest
+from lgvi_warp.runs.request import ensemble_of
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.uncertainty.rare.answer import RareEvent
+from lgvi_warp.uncertainty.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
+from lgvi_warp.uncertainty.rare.cheaper import cheaper_of, chosen_chain
+from lgvi_warp.uncertainty.rare.event import SURE, RareCondition, condition_of
+from lgvi_warp.uncertainty.rare.limit import VehicleLimit
+from lgvi_warp.uncertainty.rare.search import RareAnswer, RareSearch
+from lgvi_warp.uncertainty.rare.split_search import SplitSearch
+from lgvi_warp.uncertainty.rare.subset import MOST_LEVELS, NoProgress
+from lgvi_warp.uncertainty.rare.walk import VehicleWalk
+
+# What members of the scene's own setting are called.
+OWN = "the scene's own"
+ALL_LOST = (
+    "every failing member failed, or has a number that is not finite (NaN): the probability is of that; "
+    'failed="refuse" shows the first of them'
+)
+WAYS = ("chains", "splitting")
+ASK = 'ask for what is rare, as "peak depth above 12"'
+# Members of a level that chains take for an error of 10 %, levels of a search for 1e-5, and the most numbers of a level.
+LEVEL_MEMBERS, LEVELS, MOST_LEVEL_NUMBERS = 16_000, 5, 250_000_000
+# Draws from which on the cost is told before the first level, and members of the trial for it.
+MANY_DRAWS, TRIAL = 1000, 32
+# The least error that can be asked, and the fewest members.
+LEAST_ERROR, FEWEST = 0.005, 10_000
+
+
+@shows_progress
+@near_names(prepare)
+@shows_if_long
+def rare_event(
+    fleet: Scene | Ensemble,
+    limit: OfInterest | Mapping[str, Any],
+    *,
+    relative_error: float = 0.1,
+    by: str = "chains",
+    cheaper: Sequence[Mapping[str, Any]] = (),
+    looks: int = 50,
+    failed: str = "event",
+    most: int = 1_000_000,
+    seed: int = 0,
+    store: str | os.PathLike[str] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
+    **settings: Any,
+) -> RareEvent:
+    """Estimate the probability of an event that plain Monte Carlo would hardly ever see, with its error.
+
+    Chains of members go level by level towards the event (subset simulation), over the numbers that vary and over the draws of
+    noise, in four independent runs; then members drawn about the failing ones, with weights, are the answer where checks say
+    that it may be believed, and more chains otherwise. What is likelier than 1e-3 is sampled plainly.
+
+    Args:
+        fleet: A Scene or an Ensemble; what varies is its `vary`, by distributions, and its noise.
+        limit: The event: a quantity or a function of a Result, of which above 0 is the event, "max(depth) - 40.0"; conditions
+            in a sweep's words, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of an event of the
+            scene.
+        relative_error: Standard deviation wanted of the probability's error, as a part of it, 0.005 to 0.5; 0.1 by default.
+        by: "chains", the default, or "splitting", for a scene with noise and an event that is seen on the way: a number at the
+            end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
+        cheaper: Settings that chains may use first, the answer being that of the scene's own: numbers and settings of the run
+            that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by default.
+        looks: With by="splitting", into how many pieces the time is cut, at most, 2 to 1,000; 50 by default. More of them need
+            fewer members, and each costs a call. Pieces begin at samples and at ticks of a controller.
+        failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
+        most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
+        seed: Seed of all that is drawn; 0 by default.
+        store: Folder for the results of runs, by="chains" alone: the same call, after it was interrupted, takes them from
+            there and goes on, with the answer of one that was not. One of other arguments is refused. None by default.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False for
+            nobody.
+        **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
+
+    Returns:
+        The probability, its interval, what it took, and the members for which the event happens.
+
+    Raises:
+        SceneError: If an argument is at fault; where the event never happens or always does; where the limit takes so few
+            values that nothing says how near a member is; and where members have more draws of noise than chains can keep.
+        FailedMembers: With failed="refuse", where members failed.
+        OSError: Where `store` cannot be written.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere")
+        >>> fleet = lw.Ensemble(scene, vary={"start.velocity[2]": lw.distributions.Normal(std=0.1)})
+        >>> found = lw.rare_event(fleet, "depth - 0.35", method="psi_x", h=0.1, t1=1.0)
+        >>> found.estimator
+        'importance'
+    """
+    members = ensemble_of(fleet)
+    faults = Faults()
+    faults.choice("failed", failed, ("event", "refuse"))
+    faults.choice("by", by, WAYS)
+    if by == "splitting" and cheaper:
+        faults.add("cheaper", cheaper, "is of chains", 'leave it out, or give by="chains"')
+    if by == "splitting" and store is not None:
+        faults.add("store", store, "keeps the runs of chains", 'leave it out, or give by="chains"')
+    check_asked(faults, relative_error, most)
+    for name in ("of", "levels", "statistics", "draws", "common_noise"):
+        if name in settings:
+            faults.add(name, settings[name], "is what rare_event decides", "leave it out")
+    faults.raise_if_any()
+    whole_number("seed", seed, 0), whole_number("looks", looks, 2, 1000)
+    condition = condition_of(limit, members.scene)
+    report = callback(progress) or (lambda fraction: None)
+    if by == "splitting":
+        return _by_splitting(members, condition, float(relative_error), looks, failed, most, seed, report, settings)
+    faster = cheaper_of(cheaper, members, settings)
+    asked = {"study": "rare_event", "limit": limit, "relative_error": relative_error, "most": most, "seed": seed,
+             "cheaper": [each.name for each in faster], "failed": failed, **settings}  # fmt: skip
+    remembered = Remembered(store, [members], asked)
+    own = VehicleLimit(members, condition, settings, failed, remembered, OWN)
+    cost = expected_cost(own, relative_error)
+    others = {
+        each.name: VehicleLimit(each.fleet, condition, each.settings, failed, remembered, each.name) for each in faster
+    }
+    chain, notes = chosen_chain(own, others, seed) if others else (None, [])
+    notes = [*cost, *notes]
+    search = RareSearch(
+        own.each, own.d, relative_error, seed, most, chained=chain, margin=chain.margin if chain else 0.0, report=report,
+        notes=notes, witness=own.tolerant,
+    )  # fmt: skip
+    try:
+        found = search.answer()
+    except NoProgress as stuck:
+        raise _refused(stuck, condition) from None
+    if found.probability >= 1.0:
+        lost = bool(np.isinf(found.limits).all())
+        problem = f"happens for each of {found.members:,} members" + (", all of which failed" if lost else "")
+        remedy = "mend what fails" if lost else ASK
+        raise refusal("limit", condition.label, problem, remedy)
+    return _told(found, own, others, condition, settings)
+
+
+def _by_splitting(
+    fleet: Ensemble, condition: RareCondition, relative_error: float, looks: int, failed: str, most: int, seed: int,
+    report: Callable[[float], None], settings: Mapping[str, Any]) -> RareEvent:  # fmt: skip
+    """The answer by splitting in time."""
+    walk = VehicleWalk(fleet, condition, settings, failed == "refuse", seed, looks)
+    search = SplitSearch(walk, relative_error, seed, most, report)
+    try:
+        found = search.answer()
+    except NoProgress as stuck:
+        if stuck.kind != "never":
+            raise _refused(stuck, condition) from None
+        problem = f"was reached by none of some {walk.members:,} members, whatever its probability"
+        remedy = 'give by="chains", which moves numbers that vary, too; or move the bound'
+        raise refusal("limit", condition.label, problem, remedy) from None
+    if found.probability >= 1.0:
+        problem = f"happens for each of {len(found.limits):,} members"
+        raise refusal("limit", condition.label, problem, ASK)
+    paths = tuple((walk.times[points], keys) for points, keys in found.paths)
+    answer = replace(_told(found, walk, {}, condition, settings), paths=paths)
+    if answer.plain_members < walk.members:
+        note = f'splitting gains nothing here: it took {walk.members:,} members; by="chains", or plain ones'
+        answer = replace(answer, messages=(*answer.messages, note))
+    return answer
+
+
+def check_asked(faults: Faults, relative_error: Any, most: Any) -> None:
+    """Note what is wrong with the error that is asked for, and with the members that may be run."""
+    error = faults.number("relative_error", relative_error)
+    if error is not None and not LEAST_ERROR <= error <= 0.5:
+        faults.add(
+            "relative_error",
+            relative_error,
+            "is not between 0.005 and 0.5",
+            "give a part of the probability, such as 0.1",
+        )
+    with faults.including():
+        whole_number("most", most, FEWEST)
+
+
+def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
+    """What a search with many draws of noise will take, told on a terminal, too; nothing for few. Raises SceneError.
+
+    Refused are more numbers of a level than memory should hold.
+    """
+    level = LEVEL_MEMBERS * (0.1 / relative_error) ** 2
+    if level * own.d > MOST_LEVEL_NUMBERS:
+        problem = (
+            f"has {own.draws:,} draws of noise a member: chains keep some {level:,.0f} members at once, "
+            f"{8e-9 * level * own.d:,.1f} GB for each copy"
+        )
+        remedy = (
+            'give by="splitting", which takes no draws as numbers; run plain members, which bound the event by 3 / n; leave '
+            "the noise out, for chains over the numbers that vary alone, and draw it afresh for the members found; or ask "
+            "for a larger relative_error"
+        )
+        raise refusal("fleet", "...", problem, remedy)
+    if own.draws < MANY_DRAWS:
+        return []
+    trial = np.random.default_rng(0).standard_normal((TRIAL, own.d))
+    own.tolerant(trial)  # compiles
+    begin = own.seconds
+    own.tolerant(trial)
+    members = LEVELS * level
+    text = (
+        f"{own.draws:,} draws of noise a member; expected are some {members:,.0f} members at 1e-5, about "
+        f"{duration_text(members * (own.seconds - begin) / TRIAL)}"
+    )
+    if sys.stderr.isatty():
+        sys.stderr.write(f"{text}\n")
+    return [text]
+
+
+def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
+    """What is wrong where chains came no nearer to the event."""
+    if stuck.kind == "steps":
+        problem = "has the same value for most members, so that nothing says how near one is to the event"
+        remedy = 'give a number that grows towards it: a distance, "peak depth above 12", or the name of an event'
+        return refusal("limit", condition.label, problem, remedy)
+    largest = "farthest from it" if stuck.largest <= -SURE else f"{stuck.largest:.4g}"
+    reached = "fewer than a tenth of the last level's members" if stuck.largest > 0.0 else "no member"
+    problem = (
+        f"was reached by {reached} within {MOST_LEVELS} levels, each a tenth of the one before, or before the limit grew no "
+        f"more: it never happens, or is rarer than about 1e-{MOST_LEVELS - 2}; the largest limit that members reached is "
+        f"{largest}"
+    )
+    return refusal("limit", condition.label, problem, "move the bound, or widen what varies")
+
+
+def _told(
+    found: RareAnswer,
+    own: VehicleLimit | VehicleWalk,
+    others: Mapping[str, VehicleLimit],
+    condition: RareCondition,
+    settings: Mapping[str, Any],
+) -> RareEvent:
+    """The answer in the scene's numbers."""
+    limits: dict[str, VehicleLimit | VehicleWalk] = {OWN: own, **others}
+    count = len(own.names)
+    nearest = int(np.argmin((found.failing**2).sum(axis=1)))
+    best = found.failing[nearest : nearest + 1]
+    # With splitting, members of one start are related.
+    chains = found.chains if len(found.chains) else np.unique(found.failing, axis=0, return_inverse=True)[1].ravel()
+    parts = found.parts if len(found.parts) else chains % PARTS
+    moves = moves_of(found.failing[:, :count], found.weights, chains)
+    moved, size, spread, z = (dict(zip(own.names, map(float, column), strict=True)) for column in moves)
+    columns: dict[str, list[int]] = {}
+    for source in own.sources:
+        columns.setdefault(source.of, []).extend(np.arange(found.failing.shape[1])[count:][source.columns])
+    lost = float(found.weights[np.isinf(found.limits)].sum())
+    messages = [*found.notes, *[ALL_LOST] * (lost >= 1.0 - 1e-12)]
+    of_any = Chance(found.probability, *found.interval())
+    several = len(condition.names) == len(found.rows) > 1
+    plain = (1.0 - found.probability) / (found.probability * max(found.spread, 1e-12) ** 2)
+    return RareEvent(
+        event=condition.label,
+        probability=found.probability,
+        interval=found.interval(),
+        relative_error=found.spread,
+        estimator=found.estimator,
+        members={name: each.members for name, each in limits.items()},
+        failing=own.table(found.failing),
+        normals=found.failing[:, :count],
+        draws=found.failing[:, count:],
+        weights=found.weights,
+        failed_share=lost,
+        likeliest={name: value[0] for name, value in own.values(best).items()} if count else {},
+        likeliest_draws=best[0, count:],
+        distance=float(np.linalg.norm(best)),
+        moved=moved,
+        moved_size=size,
+        moved_spread=spread,
+        moved_z=z,
+        noise_moved={
+            name: noise_score(found.failing[:, own_], found.weights, chains, parts) for name, own_ in columns.items()
+        },
+        by_condition=chances_of(condition.names, found.rows, found.weights, chains, of_any, found.spread)
+        if several
+        else {},
+        chains=chains,
+        runs=found.runs,
+        plain_members=plain,
+        plain_seconds=plain * own.seconds / max(1, own.members),
+        seconds=sum(each.seconds for each in limits.values()),
+        messages=tuple(messages),
+        provenance={
+            "scene": own.fleet.scene.to_dict(),
+            "ensemble": own.fleet.to_dict(),
+            "settings": {name: str(value) for name, value in settings.items()},
+            "versions": machine.versions(),
+            "machine": machine.describe(),
+        },
+    )

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How many times as often one rare event happens as another, from members of either that are run in both."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from lgvi_warp.common.random import generator
+from lgvi_warp.uncertainty.rare.answer import RareEvent
+from lgvi_warp.uncertainty.rare.causes import RELATED
+from lgvi_warp.uncertainty.rare.limit import VehicleLimit
+
+# Most failing members of one event that are run in the other, and most of their normals; the fewest independent ones, in
+# effect, that happen in both.
+MOST_RUN, MOST_NUMBERS, FEWEST_SHARED = 4000, 4_000_000, 20.0
+
+
+@dataclass(frozen=True)
+class Share:
+    """The part of one event's members for which another happens; spread: of its relative error; count: independent members."""
+
+    value: float
+    spread: float
+    count: float
+
+    @classmethod
+    def of(cls, happens: np.ndarray, weights: np.ndarray, chains: np.ndarray, related: float = 1.0) -> Share:
+        """From members (n,) with weights, of which those of one chain are related; related: times the spread of chains."""
+        total = np.bincount(chains, weights)
+        alike = bool((happens == happens[0]).all())
+        share = float(happens[0]) if alike else float(weights @ happens) / total.sum()
+        # Of a ratio of two sums over independent chains.
+        away = np.bincount(chains, weights * (happens - share))
+        variance = related**2 * float((away**2).sum()) / total.sum() ** 2
+        count = float(total.sum() ** 2 / (total**2).sum()) / related**2
+        # Where all or none are seen, chance may have hidden one: no less than half a member is unsure.
+        smooth = (share * count + 0.5) / (count + 1.0)
+        variance = smooth * (1.0 - smooth) / (count + 2.0) if alike else variance
+        return cls(share, math.sqrt(variance) / share if share > 0.0 else math.inf, count)
+
+
+@dataclass(frozen=True)
+class RareRatio:
+    """How many times as often a second event happens as a first; paired: from members of either in both, or from two answers.
+
+    p: of the ratio being 1, from the normal law of its logarithm.
+    """
+
+    value: float
+    lower: float
+    upper: float
+    p: float
+    paired: bool
+
+
+class FailingMembers(NamedTuple):
+    """Members for which an event happens: normals u (m, d) of numbers and noise, weights (m,) and chains (m,) of them.
+
+    related: times the spread that chains tell, where they begin at members that are related.
+    """
+
+    u: np.ndarray
+    weights: np.ndarray
+    chains: np.ndarray
+    related: float
+
+
+def members_of(found: RareEvent) -> FailingMembers:
+    """An event's failing members: whole chains of them, some 4,000 at most."""
+    rng = generator(0, "rare pairs")
+    most = min(MOST_RUN, max(100, MOST_NUMBERS // max(1, found.normals.shape[1] + found.draws.shape[1])))
+    if found.estimator != "subset":
+        u, weights = np.concatenate([found.normals, found.draws], axis=1), found.weights
+        if len(u) > most:
+            u, weights = u[np.sort(rng.choice(len(u), most, p=weights))], np.full(most, 1.0 / most)
+        return FailingMembers(u, weights, np.arange(len(u)), 1.0)
+    runs = found.runs
+    if len(runs[0].parts):  # members that several conditions count
+        u, weights, chains = np.concatenate([found.normals, found.draws], axis=1), found.weights, found.chains
+        return _whole_chains(u, weights, np.unique(chains, return_inverse=True)[1], most, rng)
+    first = np.cumsum([0, *(int(run.failing_chains.max()) + 1 for run in runs)])
+    chains = np.concatenate([run.failing_chains + start for run, start in zip(runs, first, strict=False)])
+    u = np.concatenate([run.failing for run in runs])
+    weights = np.concatenate([np.full(len(run.failing), run.size * run.probability / len(run.failing)) for run in runs])
+    return _whole_chains(u, weights, chains, most, rng)
+
+
+def _whole_chains(
+    u: np.ndarray, weights: np.ndarray, chains: np.ndarray, most: int, rng: np.random.Generator
+) -> FailingMembers:
+    """Some of the members (m, d), about so many at most: whole chains."""
+    order = rng.permutation(np.unique(chains))
+    kept = np.isin(chains, order[: max(2, int(np.searchsorted(np.cumsum(np.bincount(chains)[order]), most)))])
+    chains = np.unique(chains[kept], return_inverse=True)[1]
+    return FailingMembers(u[kept], weights[kept] / weights[kept].sum(), chains, RELATED)
+
+
+def carried(u: np.ndarray, own: VehicleLimit, other: VehicleLimit, seed: int) -> np.ndarray:
+    """The normals of members of one limit as those of another, by the names of numbers and draws.
+
+    What the first does not have is drawn anew: it decides nothing there.
+    """
+    v = generator(seed, "rare carried").standard_normal((len(u), other.d))
+    columns = {name: i for i, name in enumerate(own.names)}
+    for i, name in enumerate(other.names):
+        if name in columns:
+            v[:, i] = u[:, columns[name]]
+    sources = {(each.of, each.stream, each.first, each.spacing, each.numbers): each for each in own.sources}
+    for each in other.sources:
+        same = sources.get((each.of, each.stream, each.first, each.spacing, each.numbers))
+        if same is not None:
+            v[:, len(other.names) :][:, each.columns] = u[:, len(own.names) :][:, same.columns]
+    return v
+
+
+def shared(failing: FailingMembers, own: VehicleLimit, other: VehicleLimit, seed: int = 0) -> Share:
+    """The part of an event's members for which that of another limit happens, with the same numbers and the same noise.
+
+    docs/theory/rare_events.md, (B12).
+    """
+    happens = other(carried(failing.u, own, other, seed)) > 0.0
+    return Share.of(happens.astype(float), failing.weights, failing.chains, failing.related)
+
+
+def ratio_of(
+    first: RareEvent, second: RareEvent, of_first: Share, of_second: Share, confidence: float = 0.95
+) -> RareRatio:
+    """The ratio of two probabilities; of_first: the part of the first's members for which the second happens; and back.
+
+    docs/theory/rare_events.md, (B12).
+
+    P(B) / P(A) = P(B | A) / P(A | B), the best bridge between the two laws of failing members (Meng & Wong 1996), where the
+    events have members in common; the ratio of two independent answers where that is better known.
+    """
+    from scipy.special import ndtr, ndtri
+
+    spread = math.hypot(first.relative_error, second.relative_error)
+    log_ratio, paired = math.log(second.probability / first.probability), False
+    if min(each.value * each.count for each in (of_first, of_second)) >= FEWEST_SHARED:
+        bridged = math.hypot(of_first.spread, of_second.spread)
+        if bridged < spread:
+            spread, paired = bridged, True
+            log_ratio = math.log(of_first.value / of_second.value)
+    away = float(ndtri(0.5 + 0.5 * confidence)) * spread
+    p = 2.0 * float(ndtr(-abs(log_ratio) / spread)) if spread > 0.0 else float(log_ratio == 0.0)
+    return RareRatio(math.exp(log_ratio), math.exp(log_ratio - away), math.exp(log_ratio + away), p, paired)

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene as a function of what varies, in the shapes of SALib and scipy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.calls.prepared import prepare
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.labelled import is_labelled
+from lgvi_warp.results.quantities import OfInterest
+from lgvi_warp.sampling.designs.designs import salib_problem
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.columns import as_given, columns_of
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.uncertainty.sensitivity.outputs import known_arguments
+
+
+class ScalarModel:
+    """A scene as a function of what varies, for SALib, scipy and other libraries; made by `model`.
+
+    Args:
+        scene: the scene.
+        vary: name -> distribution, or names alone.
+        of: one or several quantities of interest, as of `sobol`.
+        levels: whether X holds numbers in (0, 1) in place of the values themselves.
+        failed: "refuse" or "nan", for members that fail.
+        settings: further arguments of `lw.prepare`.
+
+    Attributes:
+        names: of the columns of X (d,), in the order of `vary`.
+        scene, vary, of, levels, failed: as given.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message.
+    """
+
+    def __init__(self, scene: Scene, vary: Any, of: Any, levels: bool, failed: str, settings: Mapping[str, Any]):
+        self.scene, self.of, self.levels, self.failed = scene, of, levels, failed
+        self.vary = dict(vary) if isinstance(vary, Mapping) else None
+        self._progress = settings.get("progress")
+        settings = {name: value for name, value in settings.items() if name != "progress"}
+        self._prepared = prepare(scene, vary, of, levels=levels, failed=failed, **settings)
+        self._fleet = Ensemble(scene, 1, 0, self.vary)
+        self._variations = as_given(self._fleet)
+        joint = [variation.key for variation in self._variations if variation.distribution.joint]
+        if joint and not levels:
+            raise SceneError([f"vary.\"{key}\": is a joint distribution, whose values are not single numbers; use levels=True"
+                              for key in joint])  # fmt: skip
+        # Column of the ensemble's cube, whose keys are sorted, for each column of X.
+        self._columns = [
+            column for variation in self._variations for column in columns_of(self._fleet.space, variation.key)
+        ]
+        self.names = self._prepared.names
+
+    @property
+    def problem(self) -> dict[str, Any]:
+        """Description of the columns for SALib.sample: num_vars, names, bounds, and dists or groups.
+
+        With levels it is the unit cube; otherwise it holds the distributions, all of which SALib must have.
+
+        Raises:
+            SceneError: for distributions that SALib does not have, and for names alone.
+        """
+        if self.levels:
+            cube = salib_problem(self._fleet.space)
+            by_column = {key: [cube[key][column] for column in self._columns] for key in ("names", "bounds", "groups")
+                         if key in cube}  # fmt: skip
+            return cube | by_column
+        faults = Faults("vary.")
+        bounds, kinds = [], []
+        for variation in self._variations:
+            for distribution in entries_of(variation):
+                described = salib_distribution(*distribution)
+                if described is None:
+                    faults.add(f'"{variation.key}"', variation.distribution, "is unknown to SALib", "use levels=True")
+                    break
+                kinds.append(described[0])
+                bounds.append(described[1])
+        if not self._variations:
+            faults.add("names", list(self.names), "have no distributions", "map names to distributions")
+        faults.raise_if_any()
+        return {"num_vars": len(self.names), "names": list(self.names), "bounds": bounds, "dists": kinds}
+
+    @property
+    def distributions(self) -> list[Any]:
+        """Distribution of each column (d,), each with `ppf`, for scipy.stats.sobol_indices(dists=...).
+
+        Raises:
+            SceneError: for names alone.
+        """
+        if not self._variations:
+            raise SceneError(["vary: names alone have no distributions; map names to distributions"])
+        return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
+
+    def __call__(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
+        """Run members with these numbers and return their quantities; row i always has the same noise, if not told otherwise.
+
+        X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a structured
+            array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
+        indices: (n,), whose noise each row has, as of such a run. Default None for 0 to n - 1.
+        Returns: Y (n,), or (n, m) of several numbers: SALib's shape.
+        """
+        return np.asarray(self._prepared(X, seed=seed, indices=indices, progress=self._progress))
+
+    def scipy(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
+        """Run members as a call does, in scipy's shape.
+
+        Args:
+            X: (d, n), rows in the order of `names`; or by name, in any order.
+            seed: as of a call.
+            indices: as of a call.
+
+        Returns:
+            Y (n,), or (m, n) of several numbers.
+
+        Raises:
+            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
+            FailedMembers: with failed="refuse", where members failed.
+        """
+        if is_labelled(X):
+            return np.ascontiguousarray(self(X, seed=seed, indices=indices).T)
+        faults = Faults()
+        array = faults.real("X", X, f"give an array of shape ({len(self.names)}, n)")
+        faults.raise_if_any()
+        return np.ascontiguousarray(self(np.asarray(array).T, seed=seed, indices=indices).T)
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Uniform distribution on (0, 1): the value is the level itself."""
+
+    def ppf(self, u: Any) -> np.ndarray:
+        return np.asarray(u, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Distribution of the number that one column of an ensemble's cube determines."""
+
+    fleet: Ensemble
+    column: int
+
+    def ppf(self, u: Any) -> np.ndarray:
+        levels = np.reshape(np.asarray(u, dtype=np.float64), -1)
+        cube = np.full((len(levels), self.fleet.space.dimensions), 0.5)
+        cube[:, self.column] = np.clip(levels, 2.0**-53, 1.0 - 2.0**-53)
+        label = self.fleet.space.factors[self.column][0]
+        (wanted,) = variations.targets(label)
+        split = self.fleet.space.split(cube)
+        for variation in self.fleet.variations:
+            for target, values in variation.values(split[variation.key]):
+                if target == wanted:
+                    return values.reshape(np.shape(u))
+                if target.name == wanted.name and target.index is None and wanted.index is not None:
+                    entry: tuple[Any, ...] = (slice(None), *wanted.index)
+                    return values[entry].reshape(np.shape(u))
+        raise KeyError(label)
+
+
+def entries_of(estimate: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
+    """The distributions of the single entries of a variation, with the base and the numbers of each."""
+    (base,) = estimate.bases
+    distribution = estimate.distribution
+    numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
+               for name, value in distribution.numbers_by_name().items()
+               if np.ndim(value) <= base.ndim and distribution.kind != "choice"}  # fmt: skip
+    return [(distribution, value, {name: column[i] for name, column in numbers.items()})
+            for i, value in enumerate(np.reshape(base, -1))]  # fmt: skip
+
+
+def salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
+    """Translate a distribution to SALib's (name, bounds); None where SALib has none for it."""
+    base = float(base)
+    mean = float(numbers.get("mean", base))
+    if distribution.kind == "normal":
+        return "norm", [mean, float(numbers["std"] if "std" in numbers else abs(base) * numbers["relative"])]
+    if distribution.kind == "uniform":
+        if "low" in numbers:
+            return "unif", [float(numbers["low"]), float(numbers["high"])]
+        half = float(numbers["half_width"] if "half_width" in numbers else abs(base) * numbers["relative"])
+        return "unif", [base - half, base + half]
+    if distribution.kind == "lognormal" and float(numbers.get("median", base)) > 0.0:
+        return "lognorm", [float(np.log(numbers.get("median", base))), float(numbers["sigma"])]
+    return None
+
+
+@known_arguments()
+def model(
+    scene: Scene,
+    vary: Mapping[Any, Any] | Sequence[str],
+    of: OfInterest | Sequence[OfInterest],
+    *,
+    levels: bool = False,
+    failed: str = "refuse",
+    **settings: Any,
+) -> ScalarModel:
+    """Turn a scene into a function of what varies; noise is frozen by row, unless a call gives `seed` or `indices`.
+
+    f(X) takes X (n, d) and returns Y (n,) or (n, m), for SALib; f.scipy(X) takes X (d, n), for scipy's sobol_indices.
+
+    Args:
+        scene: the scene.
+        vary: name -> distribution, or names alone. The columns are the entries that `names` lists, in this order.
+        of: one or several quantities of interest, as of `sobol`.
+        levels: whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values
+            themselves; joint distributions need it. Default False.
+        failed: "refuse" for an error where members fail, "nan" for NaN in their place. Default "refuse".
+        settings: further arguments of `lw.prepare` (method, h, t1, save, dtype, threads, common_noise), and `progress`.
+
+    Returns:
+        The function; X may also be a data frame, a mapping, a structured array or an xarray Dataset with columns by name.
+
+    Raises:
+        SceneError: for faulty arguments, all in one message.
+        TypeError: for an argument that does not exist.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> depth = lw.uq.model(lw.Scene.named("sphere"), ["start.position[2]"], "depth", method="psi_s", h=0.1, t1=1.0)
+        >>> depth([[0.0], [2.0]])
+        array([0., 2.])
+    """
+    return ScalarModel(scene, vary, of, levels, failed, settings)

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results of a sensitivity analysis, as tables and files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
+
+
+@dataclass(frozen=True, eq=False)
+class Indices(Saved):
+    """Result of a sensitivity analysis of m quantities for d factors.
+
+    Attributes:
+        factors: what varies independently (d,).
+        quantities: labels of the quantities of interest (m,).
+        mean: mean of the quantities over the design (m,) [their units].
+        std: standard deviation of the quantities over the design (m,) [their units].
+        samples: number of groups or paths of the design that were used.
+        members: number of members that were run.
+        failed: number of members that failed.
+        confidence: level of the intervals; fields named ..._confidence hold their half widths.
+        messages: notes for the user.
+        provenance: scene, settings, versions and machine of the runs.
+    """
+
+    factors: tuple[str, ...]
+    quantities: tuple[str, ...]
+    mean: np.ndarray
+    std: np.ndarray
+    samples: int
+    members: int
+    failed: int
+    confidence: float
+    messages: tuple[str, ...]
+    provenance: dict[str, Any] = field(repr=False)
+    study: ClassVar[str] = "sensitivity"
+    endings: ClassVar[tuple[str, ...]] = ("txt", "csv", "json")
+    name: ClassVar[str] = ""
+    columns: ClassVar[tuple[str, ...]] = ()
+    # Column -> field with the half width of its interval.
+    intervals: ClassVar[dict[str, str]] = {}
+    # Columns that a picture shows; empty: all.
+    drawn: ClassVar[tuple[str, ...]] = ()
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """List one record for each quantity, factor and index.
+
+        Yields:
+            Records of quantity, factor, other, index, value and confidence.
+        """
+        for q, quantity in enumerate(self.quantities):
+            for f, factor in enumerate(self.factors):
+                for column in self.columns:
+                    name = self.intervals.get(column)
+                    half = getattr(self, name)[q, f] if name else np.nan
+                    yield {"quantity": quantity, "factor": factor, "other": "", "index": column,
+                           "value": float(getattr(self, column)[q, f]), "confidence": float(half)}  # fmt: skip
+
+    def _heading(self) -> str:
+        return f"{self.name}: {self.samples} samples, {self.members} members, {self.failed} failed"
+
+    def __str__(self) -> str:
+        """A table for each quantity."""
+        width = max(len(label) for label in (*self.factors, "factor"))
+        lines = [self._heading(), *(f"note: {message}" for message in self.messages)]
+        for q, quantity in enumerate(self.quantities):
+            lines += ["", f"{quantity}: mean {self.mean[q]:.6g}, standard deviation {self.std[q]:.3g}"]
+            lines.append(f"  {'factor':<{width}}" + "".join(f"  {column:>21}" for column in self.columns))
+            for f, factor in enumerate(self.factors):
+                cells = "".join(f"  {self._cell(column, q, f):>21}" for column in self.columns)
+                lines.append(f"  {factor:<{width}}{cells}")
+            lines += self._more(q)
+        lines.append(f"+- is half the {self.confidence:.0%} interval")
+        return "\n".join(lines)
+
+    def _cell(self, column: str, q: int, f: int) -> str:
+        value = getattr(self, column)[q, f]
+        name = self.intervals.get(column)
+        return f"{value:.4g}" + (f" +- {getattr(self, name)[q, f]:.2g}" if name else "")
+
+    def _more(self, q: int) -> list[str]:
+        """Lines below a quantity's table."""
+        return []
+
+    def to_dict(self) -> dict[str, Any]:
+        names = ("name", "factors", "quantities", "samples", "members", "failed", "confidence", "messages")
+        content = {name: getattr(self, name) for name in (*names, "mean", "std")}
+        content["rows"] = list(self.rows())
+        return finite_or_none(content) | {"provenance": self.provenance}
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Indices:
+        """Build the result of an analysis from the content of a JSON file.
+
+        Args:
+            content: as `to_dict` returns it.
+
+        Returns:
+            Indices of the analysis that it names; numbers that were not finite are NaN.
+
+        Raises:
+            ValueError: where it names no known analysis.
+        """
+        kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
+        if not kinds:
+            raise ValueError(f"{content['name']!r} is no analysis")
+        return kinds[0]._from(content)
+
+    @classmethod
+    def _from(cls, content: dict[str, Any]) -> Indices:
+        """A result from the content of a JSON file."""
+        places = _places(content)
+        shape = len(content["quantities"]), len(content["factors"])
+        rows = [row for row in content["rows"] if row["index"] in cls.columns]
+        if len(rows) != shape[0] * shape[1] * len(cls.columns):
+            raise ValueError(f"has {len(rows):,} rows for {shape[0]:,} quantities and {shape[1]:,} factors")
+        arrays = {name: np.full(shape, np.nan) for name in (*cls.columns, *cls.intervals.values())}
+        for row in rows:
+            at = places["quantities"][row["quantity"]], places["factors"][row["factor"]]
+            arrays[row["index"]][at] = with_missing_as(row["value"], np.nan)
+            if row["index"] in cls.intervals:
+                arrays[cls.intervals[row["index"]]][at] = with_missing_as(row["confidence"], np.nan)
+        names = ("samples", "members", "failed", "confidence", "provenance")
+        kept: dict[str, Any] = arrays | {name: content[name] for name in names}
+        kept |= {name: tuple(content[name]) for name in ("factors", "quantities", "messages")}
+        kept |= {name: np.array(with_missing_as(content[name], np.nan), dtype=np.float64) for name in ("mean", "std")}
+        return cls(**kept, **cls._pairs_from(content))
+
+    @classmethod
+    def _pairs_from(cls, content: dict[str, Any]) -> dict[str, Any]:
+        """Further arguments of this analysis."""
+        return {}
+
+
+def _places(content: dict[str, Any]) -> dict[str, dict[str, int]]:
+    """Places of the names of quantities and of factors."""
+    return {key: {name: i for i, name in enumerate(content[key])} for key in ("quantities", "factors")}
+
+
+@dataclass(frozen=True, eq=False)
+class SobolIndices(Indices):
+    """Parts of the variance of each quantity.
+
+    All indices of a quantity that does not vary are NaN, and a message says so.
+
+    Attributes:
+        first: part due to each factor alone (m, d) [1].
+        first_confidence: half width of its interval (m, d).
+        total: part due to each factor with all its interactions (m, d) [1].
+        total_confidence: half width of its interval (m, d).
+        second: part due to two factors together, beyond what each does alone (m, d, d) [1]; symmetric, NaN on the diagonal;
+            None if not asked for.
+        second_confidence: half width of its interval (m, d, d), or None.
+    """
+
+    first: np.ndarray
+    first_confidence: np.ndarray
+    total: np.ndarray
+    total_confidence: np.ndarray
+    second: np.ndarray | None
+    second_confidence: np.ndarray | None
+    name: ClassVar[str] = "Sobol indices"
+    columns: ClassVar[tuple[str, ...]] = ("first", "total")
+    intervals: ClassVar[dict[str, str]] = {"first": "first_confidence", "total": "total_confidence"}
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        yield from super().rows()
+        for q, j, k in self._pairs():
+            assert self.second is not None
+            assert self.second_confidence is not None
+            yield {"quantity": self.quantities[q], "factor": self.factors[j], "other": self.factors[k], "index": "second",
+                   "value": float(self.second[q, j, k]), "confidence": float(self.second_confidence[q, j, k])}  # fmt: skip
+
+    @classmethod
+    def _pairs_from(cls, content: dict[str, Any]) -> dict[str, Any]:
+        """Indices of two factors together, where the file has them."""
+        rows = [row for row in content["rows"] if row["index"] == "second"]
+        if not rows:
+            return {"second": None, "second_confidence": None}
+        places, m, d = _places(content), len(content["quantities"]), len(content["factors"])
+        if 2 * len(rows) != m * d * (d - 1):
+            raise ValueError(f"has {len(rows):,} rows of pairs for {m:,} quantities and {d:,} factors")
+        second, half = (np.full((m, d, d), np.nan) for _ in range(2))
+        for row in rows:
+            q = places["quantities"][row["quantity"]]
+            j, k = (places["factors"][row[name]] for name in ("factor", "other"))
+            second[q, j, k] = second[q, k, j] = with_missing_as(row["value"], np.nan)
+            half[q, j, k] = half[q, k, j] = with_missing_as(row["confidence"], np.nan)
+        return {"second": second, "second_confidence": half}
+
+    def _pairs(self) -> list[tuple[int, int, int]]:
+        d = 0 if self.second is None else len(self.factors)
+        return [(q, j, k) for q in range(len(self.quantities)) for j in range(d) for k in range(j + 1, d)]
+
+    def _more(self, q: int) -> list[str]:
+        """List the pairs with the largest second-order indices."""
+        if self.second is None or self.second_confidence is None:
+            return []
+        pairs = [(self.second[q, j, k], self.second_confidence[q, j, k], j, k) for p, j, k in self._pairs() if p == q]
+        pairs = sorted((pair for pair in pairs if pair[0] > pair[1]), reverse=True)[:10]
+        return [f"  {self.factors[j]} with {self.factors[k]}: second {value:.4g} +- {half:.2g}"
+                for value, half, j, k in pairs]  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class MorrisEffects(Indices):
+    """Elementary effects on each quantity, per whole side of the unit cube.
+
+    mu and sigma of a factor of several numbers, such as an attitude, are NaN: a step moves all of them.
+
+    Attributes:
+        mu_star: mean of their absolute values (m, d) [the quantity's unit].
+        mu_star_confidence: half width of its interval (m, d).
+        mu: mean (m, d) [the quantity's unit].
+        sigma: standard deviation (m, d) [the quantity's unit]; large where a factor acts differently from place to place.
+    """
+
+    mu_star: np.ndarray
+    mu_star_confidence: np.ndarray
+    mu: np.ndarray
+    sigma: np.ndarray
+    name: ClassVar[str] = "Morris screening"
+    columns: ClassVar[tuple[str, ...]] = ("mu_star", "mu", "sigma")
+    intervals: ClassVar[dict[str, str]] = {"mu_star": "mu_star_confidence"}

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is told of a kernel's speed, from times that are given here."""
+
+import json
+
+import pytest
+
+from lgvi_warp.measuring import speed
+from lgvi_warp.methods.method import Method
+
+
+def test_a_record_tells_nanoseconds_and_the_part_of_the_peak():
+    found = speed.record(Method("psi_s"), "float64", 8, 20e-9, 50e9)
+    assert (found["ns_per_vehicle_step"], found["peak_gfma"]) == (20.0, 50.0)
+    assert found["part_of_peak"] == pytest.approx(found["operations"] / (20e-9 * 2 * 50e9), abs=6e-4)
+    assert (found["method"], found["dtype"], found["width"]) == ("psi_s", "float64", 8)
+
+
+def test_times_are_by_vehicle_and_step():
+    """400 vehicles of 50 steps in 0.4 ms are 20 ns a vehicle and step, next to the peak of the same precision."""
+    asked = []
+    prepare = lambda plan: asked.append((plan.ensemble.members, plan.grid.steps, plan.dtype))  # noqa: E731
+    peak = {"float64": 50e9, "float32": 100e9}.get
+    lines = speed.measure(400, 50, prepare=prepare, timed=lambda calls: [4e-4 for _ in calls], peak_of=peak)
+    found = [json.loads(line) for line in lines]
+    assert asked == [(400, 50, "float64"), (400, 50, "float32")]
+    assert [(one["dtype"], one["ns_per_vehicle_step"], one["peak_gfma"]) for one in found] == [
+        ("float64", 20.0, 50.0), ("float32", 20.0, 100.0)
+    ]  # fmt: skip
+
+
+def test_readings_are_medians_in_turn():
+    """Each call is made once before it counts; then all take turns, and of each the median time is told."""
+    calls = []
+    now, lengths = 0.0, {"a": iter([9.0, 1.0, 5.0, 2.0]), "b": iter([9.0, 30.0, 10.0, 20.0])}
+
+    def call(name):
+        nonlocal now
+        calls.append(name)
+        now += next(lengths[name])
+
+    readings = speed.interleaved([lambda: call("a"), lambda: call("b")], rounds=3, clock=lambda: now)
+    assert readings == [2.0, 20.0]
+    assert calls == ["a", "b"] * 4

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rare events with several failure modes, likely events, and limits that are not finite: against closed forms over seeds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import ndtr, ndtri
+
+from lgvi_warp.uncertainty.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
+from lgvi_warp.uncertainty.rare.mixture import fitted
+from lgvi_warp.uncertainty.rare.plain import sampled
+from lgvi_warp.uncertainty.rare.search import RareAnswer, RareSearch
+from lgvi_warp.uncertainty.rare.subset import NoProgress, climb, first_levels
+from lgvi_warp.uncertainty.rare.witness import Surroundings, wide_of, witnessed
+
+
+def two_modes(rate, share, p=1e-5, alone=False):
+    """(limit, probability): one mode grows `rate` times as slowly as the other, and has a share of the probability."""
+    near, far = -ndtri((1.0 - share) * p), -ndtri(share * p)
+
+    def limit(u):
+        rows = np.stack([u[:, 0] - near, (u[:, 1] - far) / rate])
+        return rows if alone else rows.max(axis=0)
+
+    return limit, p - share * (1.0 - share) * p**2
+
+
+def piecewise(u):
+    """Breitung (2019), example 1: the mode at 4 is steep near failure alone, the levels lead to the one at 5."""
+    x, y = u.T
+    return -np.minimum(np.where(x > 3.5, 4.0 - x, 0.85 - 0.1 * x), np.where(y > 2.0, 0.5 - 0.1 * y, 2.3 - y))
+
+
+def balls(u):
+    """The metaball function: failure lies outside of two hills, of which one leads away from the likelier places."""
+    x, y = u.T
+    left = 30.0 / ((4.0 * (x + 2.0) ** 2 / 9.0 + y**2 / 25.0) ** 2 + 1.0)
+    return 5.0 - left - 20.0 / (((x - 2.5) ** 2 / 4.0 + (y - 0.5) ** 2 / 25.0) ** 2 + 1.0)
+
+
+def branches(u):
+    """Two branches and two corners, of which neither pair is the other's continuation (Waarts 2000), made rarer."""
+    x, y = u.T
+    both = 5.0 + 0.1 * (x - y) ** 2 - np.abs(x + y) / math.sqrt(2.0)
+    return -np.minimum(both, 9.5 / math.sqrt(2.0) - np.abs(x - y))
+
+
+def by_grid(limit, reach=8.0, count=1601):
+    """Probability of an event of two normals, summed over a grid."""
+    t = np.linspace(-reach, reach, count)
+    weights = np.exp(-0.5 * t**2) / math.sqrt(2.0 * math.pi) * (t[1] - t[0])
+    x, y = np.meshgrid(t, t, indexing="ij")
+    return float((np.outer(weights, weights).ravel() * (limit(np.column_stack([x.ravel(), y.ravel()])) > 0.0)).sum())
+
+
+def held(limit, d, p, seeds, **more):
+    """How many of the intervals hold a probability."""
+    intervals = [RareSearch(limit, d, seed=seed, **more).answer().interval() for seed in seeds]
+    return sum(low <= p <= high for low, high in intervals)
+
+
+@pytest.mark.parametrize("alone", [False, True], ids=["one function", "conditions"])
+def test_a_mode_that_no_level_leads_to_is_in_the_answer(alone):
+    limit, p = two_modes(1000.0, 0.5, alone=alone)
+    found = RareSearch(limit, 2, seed=1).answer()
+    assert abs(found.probability / p - 1.0) < 4.0 * found.spread < 0.2
+    # Half the weight of the failing members is of either mode.
+    assert found.weights @ (found.failing[:, 0] > 4.0) == pytest.approx(0.5, abs=0.1)
+    assert any("second look" in note for note in found.notes) is not alone
+    assert found.rows.shape[0] == 1 + alone
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("alone", [False, True], ids=["one function", "conditions"])
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.5, 0.9])
+@pytest.mark.parametrize("rate", [1.0, 10.0, 1000.0])
+def test_two_modes_over_seeds(rate, share, alone):
+    limit, p = two_modes(rate, share, alone=alone)
+    assert held(limit, 2, p, range(20)) >= 18
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("d", [6, 12, 20])
+def test_two_modes_of_more_numbers(d):
+    limit, p = two_modes(100.0, 0.5)
+    assert held(limit, d, p, range(20)) >= 18
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limit", [piecewise, balls, branches])
+def test_published_counterexamples_over_seeds(limit):
+    p = ndtr(-4.0) + ndtr(-5.0) - ndtr(-4.0) * ndtr(-5.0) if limit is piecewise else by_grid(limit, 9.0, 4001)
+    assert held(limit, 2, p, range(20)) >= 18
+
+
+def test_a_published_counterexample():
+    found = RareSearch(piecewise, 2, seed=3).answer()
+    p = ndtr(-4.0) + ndtr(-5.0)
+    assert abs(found.probability / p - 1.0) < 4.0 * found.spread < 0.4
+
+
+def test_one_mode_takes_hardly_more_members():
+    # Without the second look 13,750 on average over the first six seeds.
+    found = [
+        RareSearch(lambda u: u.sum(axis=1) / math.sqrt(2.0) + ndtri(1e-6), 2, seed=seed).answer() for seed in (1, 2)
+    ]
+    assert {each.estimator for each in found} == {"importance"}
+    assert np.mean([each.members for each in found]) < 1.3 * 13_750
+
+
+def test_conditions_by_chains_alone_share_members_of_both():
+    # Nested: whoever is above 4.3 is above 4.0 too, and counts half in each.
+    found = RareSearch(lambda u: np.stack([u[:, 0] - 4.0, u[:, 0] - 4.3]), 2, seed=2, weighted=False).answer()
+    assert found.estimator == "subset"
+    assert abs(found.probability / ndtr(-4.0) - 1.0) < 3.0 * found.spread < 0.5
+    each = chances_of(
+        ("a", "b"), found.rows, found.weights, found.chains, Chance(found.probability, *found.interval()), found.spread
+    )
+    assert each["a"].lower <= ndtr(-4.0) <= each["a"].upper
+    assert each["b"].lower <= ndtr(-4.3) <= each["b"].upper
+    assert each["all"] == each["b"]
+
+
+def test_a_condition_that_never_happens_has_a_bound_and_hides_no_other():
+    found = RareSearch(lambda u: np.stack([u[:, 0] - 4.0, 0.0 * u[:, 1] - 1.0]), 2, seed=2).answer()
+    assert abs(found.probability / ndtr(-4.0) - 1.0) < 4.0 * found.spread
+    of_any = Chance(found.probability, *found.interval())
+    each = chances_of(("a", "b"), found.rows, found.weights, found.chains, of_any, found.spread)
+    assert each["b"].probability == 0.0 < each["b"].upper < 0.1 * of_any.upper
+    assert each["a"].lower < each["a"].probability == of_any.probability
+
+
+def test_what_has_many_normals_says_that_it_may_miss_a_mode():
+    found = RareSearch(lambda u: u.sum(axis=1) / 10.0 - 3.8, 100, seed=1, relative_error=0.5).answer()
+    assert any("3 / n" in note and "100 normals" in note for note in found.notes)
+
+
+def test_the_second_look_gives_the_probability_of_a_half_space():
+    u = [witnessed(lambda u: u[:, 0] > 4.0, 2, wide_of(1e-5), np.random.default_rng(seed)) for seed in range(4)]
+    ratios = np.array([each.probability for each in u]) / ndtr(-4.0)
+    assert abs(ratios.mean() - 1.0) < 0.5
+    assert (u[0].u[:, 0] > 4.0).all()
+    # The law beyond 4 has the mean phi(4) / (1 - Phi(4)).
+    assert np.mean([each.u[:, 0].mean() for each in u]) == pytest.approx(4.226, abs=0.08)
+    none = witnessed(lambda u: u[:, 0] > 99.0, 2, 2.5, np.random.default_rng(0))
+    assert (len(none.u), none.probability, none.spread) == (0, 0.0, math.inf)
+
+
+def test_surroundings_are_where_other_runs_go_too():
+    rng = np.random.default_rng(1)
+    runs = [rng.standard_normal((200, 3)) for _ in range(4)]
+    around = Surroundings(runs, rng)
+    assert around.apart(rng.standard_normal((1000, 3))).mean() < 0.05
+    assert around.apart(rng.standard_normal((100, 3)) + 8.0).all()
+    # A place that one run alone found is among them.
+    runs[2] = runs[2] + 8.0
+    assert not Surroundings(runs, rng).apart(runs[2]).any()
+
+
+@pytest.mark.parametrize("d", [1, 2, 6])
+def test_likely_events_are_held(d):
+    thresholds = np.geomspace(1e-3, 0.4, 8)
+    limits = [lambda u, p=p: u.sum(axis=1) / math.sqrt(d) + ndtri(p) for p in thresholds]
+    found = [RareSearch(limit, d, seed=i, relative_error=0.5).answer() for i, limit in enumerate(limits)]
+    intervals = [each.interval() for each in found]
+    assert all(high > 1.005 * low > 0.0 for low, high in intervals)
+    assert sum(low <= p <= high for p, (low, high) in zip(thresholds, intervals, strict=True)) >= 7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("error", [0.1, 0.3])
+def test_likely_events_are_held_over_thresholds(error):
+    held_ = 0
+    for d in (1, 2, 6):
+        for i, p in enumerate(np.geomspace(1e-3, 0.4, 67)):
+            held_ += held(lambda u, p=p, d=d: u.sum(axis=1) / math.sqrt(d) + ndtri(p), d, p, [i], relative_error=error)
+    assert held_ >= 185
+
+
+def test_sequences_that_agree_are_not_sure():
+    # 0.25 of each sequence of 64, whatever it is scrambled by.
+    found = sampled(lambda u: u[:, 0] + ndtri(0.25), 1, 64, seed=0)
+    assert found.probability == 0.25
+    assert found.spread == pytest.approx((1.0 / 64.0) / 4.0 / 0.25)
+    few = sampled(lambda u: u[:, 0] - 2.5, 1, 1024, seed=0)
+    assert few.bounds is not None
+    assert few.bounds[0] < ndtr(-2.5) < few.bounds[1]
+
+
+def test_minus_infinity_is_farthest_from_the_event():
+    with np.errstate(divide="ignore"):
+        for at in (0.0, 1.6):  # half, and 5 % have a finite limit
+            found = RareSearch(
+                lambda u, at=at: np.log(np.maximum(u[:, 0] - at, 0.0)) - math.log(4.26 - at), 1, seed=1
+            ).answer()
+            assert abs(found.probability / ndtr(-4.26) - 1.0) < 4.0 * found.spread < 0.5
+
+
+def test_not_a_number_is_a_member_that_failed():
+    found = RareSearch(lambda u: np.where(u[:, 0] > 4.1, np.nan, u[:, 0] - 4.0), 2, seed=1).answer()
+    assert abs(found.probability / ndtr(-4.0) - 1.0) < 4.0 * found.spread
+    assert found.weights @ np.isinf(found.limits) == pytest.approx(ndtr(-4.1) / ndtr(-4.0), abs=0.1)
+
+
+def test_no_interval_is_without_width():
+    nothing = np.zeros((1, 1))
+    answer = RareAnswer(1e-5, 0.0, 15.0, "subset", 10_000, nothing, nothing[0], np.ones(1))
+    low, high = answer.interval()
+    assert low < 1e-5 < high
+
+
+def test_levels_go_no_further_than_the_numbers():
+    with pytest.raises(NoProgress) as stuck:
+        RareSearch(lambda u: u[:, 0] - 9.5, 2).answer()
+    assert stuck.value.kind == "never"
+    found = RareSearch(lambda u: u[:, 0] + ndtri(1e-15), 2, seed=1).answer()
+    assert abs(math.log(found.probability / 1e-15)) < 4.0 * found.spread
+
+
+def test_the_probability_below_the_last_level_is_of_its_members_that_fail():
+    """Mutated to the level's own probability, the last factor is lost: a run would tell up to ten times as much."""
+    ratios = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        limit = lambda u: u[:, 0] + ndtri(2e-3)  # noqa: E731
+        (run,) = climb(limit, first_levels(limit, 1, 2000, [rng]), [rng])
+        last = run.limits[-1]
+        assert run.probability == pytest.approx(0.1 ** (len(run.limits) - 1) * (last > 0.0).mean(), rel=1e-9)
+        ratios.append(run.probability / 2e-3)
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.12)
+
+
+def test_the_number_of_parts_is_that_of_schwarz():
+    """One cloud is one part, though four fit it better; three far ones are three: the penalty counts all free numbers."""
+    rng = np.random.default_rng(3)
+    assert [len(fitted(rng.standard_normal((150, 3)), rng).shares) for _ in range(2)] == [1] * 2
+    three = np.concatenate([rng.normal(at, 0.3, (60, 3)) for at in (-4.0, 0.0, 4.0)])
+    assert len(fitted(three, rng).shares) == 3
+
+
+def test_a_two_sided_event_moves_the_number_that_decides_and_no_noise():
+    for seed in range(4):
+        limit = lambda u: np.abs(u[:, 0]) - 4.0  # noqa: E731
+        found = RareSearch(limit, 41, seed=seed, relative_error=0.3).answer()
+        moves = moves_of(found.failing[:, :1], found.weights, found.chains)
+        assert abs(moves.z[0]) > 10.0
+        assert moves.size[0] == pytest.approx(4.22, abs=0.1)
+        assert noise_score(found.failing[:, 1:], found.weights, found.chains, found.parts) < 4.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("d", [10, 60, 400])
+def test_irrelevant_noise_is_not_significant_over_seeds(d):
+    scores, others = [], []
+    for seed in range(20):
+        found = RareSearch(lambda u: np.abs(u[:, 0]) - 3.5, d + 2, seed=seed, relative_error=0.3).answer()
+        scores.append(noise_score(found.failing[:, 2:], found.weights, found.chains, found.parts))
+        others.append(moves_of(found.failing[:, :2], found.weights, found.chains).z)
+    assert max(scores) < 4.5
+    assert (np.abs(np.array(others)[:, 0]) > 10.0).all()
+    assert (np.abs(np.array(others)[:, 1]) < 4.5).all()
+
+
+def test_noise_that_decides_is_significant():
+    # The mean path is moved, or, by a two-sided event, the sum of squares alone.
+    for limit in (lambda u: u.sum(axis=1) / 8.0 - 3.8, lambda u: np.abs(u.sum(axis=1)) / 8.0 - 3.8):
+        found = RareSearch(limit, 64, seed=1, relative_error=0.3).answer()
+        assert noise_score(found.failing, found.weights, found.chains, found.parts) > 4.5
+        assert set(found.parts) == set(range(PARTS))
+
+
+def test_the_balls_are_rare():
+    assert by_grid(balls) == pytest.approx(1.13e-5, rel=0.02)
+    assert quad(lambda t: math.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi), 4.0, 40.0)[0] == pytest.approx(ndtr(-4.0))

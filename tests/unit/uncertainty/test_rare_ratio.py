@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How many times as often one rare event of standard normals happens as another, against closed forms."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.special import ndtri
+
+from lgvi_warp.uncertainty.rare.ratio import Share, carried, members_of, ratio_of, shared
+from lgvi_warp.uncertainty.rare.search import RareSearch
+
+
+class Limit:
+    """A limit of normals with names and sources, as that of a vehicle."""
+
+    def __init__(self, function, names, sources=()):
+        self.function, self.names, self.sources = function, names, sources
+        self.d = len(names) + sum(each.numbers for each in sources)
+
+    def __call__(self, u):
+        return self.function(u)
+
+
+def source(of, column, numbers=2):
+    return SimpleNamespace(
+        of=of, stream="noise", first=0.0, spacing=0.1, numbers=numbers, columns=slice(column, column + numbers)
+    )
+
+
+def beyond(bound):
+    return Limit(lambda u: u[:, 0] - bound, ("a", "b", "c"))
+
+
+def answer(limit, seed, **more):
+    found = RareSearch(limit, limit.d, seed=seed, **more).answer()
+    return SimpleNamespace(
+        probability=found.probability,
+        relative_error=found.spread,
+        estimator=found.estimator,
+        normals=found.failing,
+        draws=np.zeros((len(found.failing), 0)),
+        weights=found.weights,
+        runs=found.runs,
+    )
+
+
+def compared(first, second, seed, **more):
+    a, b = answer(first, seed, **more), answer(second, seed, **more)
+    shares = shared(members_of(a), first, second, seed), shared(members_of(b), second, first, seed)
+    return ratio_of(a, b, *shares)
+
+
+@pytest.mark.parametrize("weighted", [True, False], ids=["weights", "chains"])
+def test_the_ratio_is_that_of_the_normal_law(weighted):
+    near, far = -ndtri(1e-5), -ndtri(4e-6)
+    found = compared(beyond(near), beyond(far), 1, weighted=weighted)
+    # Weights know each probability to 2 %, which two answers make better use of than a thousand members.
+    assert found.paired is not weighted
+    assert found.lower < 0.4 < found.upper
+    assert np.log(found.upper / found.lower) < (0.1 if weighted else 0.9)
+    back = compared(beyond(far), beyond(near), 1, weighted=weighted)
+    assert back.value == pytest.approx(1.0 / found.value, rel=1e-9)
+
+
+def test_events_that_have_nothing_in_common_are_compared_by_their_answers():
+    first = Limit(lambda u: u[:, 0] + ndtri(1e-5), ("a", "b"))
+    second = Limit(lambda u: -u[:, 0] + ndtri(2e-5), ("a", "b"))
+    found = compared(first, second, 2)
+    assert not found.paired
+    assert found.lower < 2.0 < found.upper
+
+
+def test_an_event_and_itself_are_as_likely_and_not_more_sure_than_members_can_tell():
+    found = compared(beyond(4.2), beyond(4.2), 3)
+    assert found.value == 1.0
+    assert found.lower < 1.0 < found.upper
+    assert found.p == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("weighted", [True, False], ids=["weights", "chains"])
+def test_intervals_hold_as_often_as_they_say(weighted):
+    first = beyond(-ndtri(1e-5))
+    # As likely, about a direction 11 degrees away.
+    second = Limit(lambda u: (u[:, 0] + 0.2 * u[:, 1]) / 1.04**0.5 + ndtri(1e-5), ("a", "b", "c"))
+    found = [compared(first, second, seed, weighted=weighted, relative_error=0.2) for seed in range(30)]
+    logs = np.log([each.value for each in found])
+    told = np.array([np.log(each.upper / each.lower) / (2.0 * 1.96) for each in found])
+    assert all(each.paired for each in found) is not weighted
+    # 28.5 of 30 are expected, and fewer than 26 in 2 of 100 such tests.
+    assert sum(each.lower < 1.0 < each.upper for each in found) >= 26
+    assert 1.0 / 1.5 < np.sqrt((logs**2).mean()) / np.sqrt((told**2).mean()) < 1.5
+
+
+def test_members_are_carried_by_the_names_of_numbers_and_draws():
+    own = Limit(None, ("a", "b"), [source("compass", 0), source("cell", 2)])
+    other = Limit(None, ("b", "new"), [source("cell", 0), source("gyro", 2), source("compass", 4, numbers=4)])
+    u = np.arange(5.0)[:, None] * np.ones(6) + 0.1 * np.arange(6)
+    v = carried(u, own, other, 1)
+    assert v.shape == (5, 2 + 8)
+    np.testing.assert_array_equal(v[:, 0], u[:, 1])
+    np.testing.assert_array_equal(v[:, 2:4], u[:, 4:6])
+    # What the first has not, or draws otherwise, is drawn.
+    assert len(np.unique(v[:, [1, 4, 5, 6, 7, 8, 9]])) == 35
+    assert np.abs(v[:, [1, 4, 5, 6, 7, 8, 9]]).max() < 5.0
+
+
+def test_a_share_of_chains_is_no_surer_than_their_number():
+    happens = np.repeat([1.0, 0.0, 1.0, 1.0], 10)
+    share = Share.of(happens, np.ones(40), np.repeat(np.arange(4), 10))
+    assert share.value == 0.75
+    assert share.count == 4.0
+    # Of four chains, each all or nothing: the binomial law of four.
+    assert share.spread == pytest.approx(np.sqrt(0.25 * 0.75 / 4.0) / 0.75)
+    alone = Share.of(happens, np.ones(40), np.arange(40))
+    assert alone.spread == pytest.approx(np.sqrt(0.25 * 0.75 / 40.0) / 0.75)
+    every = Share.of(np.ones(40), np.ones(40), np.arange(40))
+    assert (every.value, every.count) == (1.0, 40.0)
+    assert 0.0 < every.spread < 0.03
+    assert Share.of(np.zeros(40), np.ones(40), np.arange(40)).spread == np.inf
+
+
+def test_whole_chains_are_kept():
+    found = answer(Limit(lambda u: np.sqrt((u**2).sum(axis=1)) - 6.0, tuple("abcdef")), 1)
+    assert found.estimator == "subset"
+    members = members_of(found)
+    assert len(members.u) <= 4100
+    assert members.weights.sum() == pytest.approx(1.0)
+    failing = np.concatenate([run.failing for run in found.runs])
+    chains = np.concatenate([1000 * i + run.failing_chains for i, run in enumerate(found.runs)])
+    # Chains that began at the same member share rows.
+    places = {}
+    for row, chain in zip(failing, chains, strict=True):
+        places.setdefault(row.tobytes(), set()).add(chain)
+    whole = {key: np.count_nonzero(chains == key) for key in np.unique(chains)}
+    for chain in np.unique(members.chains):
+        rows = members.u[members.chains == chain]
+        assert len(rows) in {whole[key] for row in rows for key in places[row.tobytes()]}

@@ -55,9 +55,9 @@ def exact(t, n):
 class Runs:
     """Stands for the kernels: a run's error along x is size[method] h^order times time times (1 + index of the member).
 
-    Its heading is off by half as much [rad]. An infinite size is a failure. late: method -> time from which it is a metre
-    off. A step costs `prices[method, dtype]` microseconds; float32 adds `round_off` to the error. grows: how a difference of
-    two starts grows with time. stops: members that a floor stops, and when.
+    Its heading is off by half as much [rad]. An infinite size is a failure. late: method -> time from which it is off by a
+    metre a second. A step costs `prices[method, dtype]` microseconds; float32 adds `round_off` to the error. grows: how a
+    difference of two starts grows with time. stops: members that a floor stops, and when.
     """
 
     def __init__(self, sizes, prices=None, round_off=1e-5, late=None, grows=None, stops=None):
@@ -84,7 +84,7 @@ class Runs:
             ended = {"status": np.full(n, Status.NON_FINITE), "end": np.full(n, t[1])}
         else:
             off = (size * h**plan.method.order + single * self.round_off) * np.outer(t, 1.0 + np.arange(n))
-            off += (t >= self.late.get(name, np.inf))[:, None]
+            off += (t * (t >= self.late.get(name, np.inf)))[:, None]
         if self.grows:
             # A turn of the start is seen in the path alone.
             turned_by = np.linalg.norm(plan.ensemble.select(0, n).attitude - self.start(plan), axis=(1, 2)) / math.sqrt(
@@ -405,11 +405,11 @@ def test_a_reference_too_rough_is_refused_with_what_would_do(scene):
     said = refusal(tradeoff_by, early, fleet_of(scene), methods=["rk4"])
     assert said.startswith("no reference: rk8 at h = ")
     assert said.endswith(
-        "differ by 1 m after 0.2 s, and agree no better with shorter steps; give a shorter t1 (--duration)"
+        "differ by 0.2 m after 0.2 s, and agree no better with shorter steps; give a shorter t1 (--duration)"
     )
     said = refusal(suggestion_by, late, fleet_of(scene), 1e-2, ["rk4"])
     assert said.startswith("error = 0.01 m of position up to 4 s cannot be checked: rk8 at h = ")
-    assert "differ by 1.0e+00 m, and agree no better with shorter steps; " in said
+    assert "differ by 4.0e+00 m, and agree no better with shorter steps; " in said
     assert said.endswith("; ask for t1 (--duration) up to 0.8 s, or for a larger error")
     said = refusal(suggestion_by, early, fleet_of(scene), 1e-2, ["rk4"])
     assert "; ask for a shorter t1 (--duration), or for a larger error" in said

@@ -10,8 +10,8 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common import machine
 from lgvi_warp.engine import widths
-from lgvi_warp.measuring import scaling, speed
 from lgvi_warp.measuring import packet_width as tuning
+from lgvi_warp.measuring import scaling, speed
 from lgvi_warp.measuring.cost import Cost
 from lgvi_warp.runs.settle import make_plan
 

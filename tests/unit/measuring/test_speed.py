@@ -5,8 +5,6 @@ import json
 from types import SimpleNamespace
 from unittest import mock
 
-import pytest
-
 import lgvi_warp as lw
 from lgvi_warp.measuring import speed
 

@@ -30,7 +30,7 @@ from lgvi_warp.store.export import fault_of_library
 from lgvi_warp.store.run import StoredRun
 from lgvi_warp.store.state import state
 from tests.conftest import ROOT
-from tests.support.disks import Disk, full, refused
+from tests.support.disks import Disk, full
 from tests.support.refusals import says
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
 
@@ -211,11 +211,6 @@ def test_samples_may_be_larger_than_the_memory_of_the_run(tmp_path):
     stored = sum(path.stat().st_size for path in tmp_path.rglob("c.*"))
     assert stored > 1.4e9
     assert peak < stored / 2
-
-
-def test_the_same_run_leaves_the_same_bytes(whole, tmp_path):
-    lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", threads=1)
-    assert differing(whole, tmp_path / "run.zarr") == []
 
 
 def test_an_existing_run_is_refused_replaced_or_gone_on_with(copy):
@@ -597,17 +592,6 @@ def test_more_threads_or_another_python_are_no_difference(copy):
     assert lw.resume(copy, threads=2).members == MEMBERS
 
 
-def test_a_full_disk_keeps_what_is_finished(tmp_path, whole):
-    path = tmp_path / "run.zarr"
-    kept = r"No space left on device: the blocks that were finished are kept.*lgvi-warp resume"
-    with pytest.raises(OSError, match=kept), Disk(full(("created", "position/c.0.2.0"))):
-        lw.solve(fleet(), **SETTINGS, store=path, threads=1)
-    assert not list(path.rglob(f"*{durable.UNFINISHED}"))
-    assert state(path)["damage"] == []
-    lw.resume(path)
-    assert differing(whole, path) == []
-
-
 def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole):
     """Some systems find out when they sync: the run ends, and all other blocks that were written are there."""
     path = tmp_path / "run.zarr"
@@ -654,21 +638,6 @@ def test_too_small_a_disk_is_refused_before_the_run(tmp_path, monkeypatch):
     with pytest.raises(lw.SceneError, match=r"needs 0.00 GB, and the disk has 0.00 GB left; save less often"):
         lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_that_is_read_only(tmp_path):
-    tmp_path.chmod(0o500)
-    with pytest.raises(OSError, match="choose a folder that can be written"):
-        lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
-
-
-def test_a_file_system_that_is_read_only(tmp_path, capsys):
-    arguments = ["run", str(ROOT / "examples" / "paper.toml"), "--members", "5", "--out", str(tmp_path), "--store",
-                 "zarr"]  # fmt: skip
-    with Disk(refused(errno.EROFS, ("created", ".json"))):
-        assert cli.main([*arguments, "--quiet"]) == 1
-    assert "Read-only file system: choose a folder that can be written" in capsys.readouterr().err
 
 
 def test_chunks_are_synced_before_their_block_is_marked(tmp_path):

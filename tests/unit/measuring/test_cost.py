@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Costs from readings of a clock that the test makes up: one number a kernel, whatever else the machine does."""
 
-import math
 import threading
 import time
 from types import SimpleNamespace
@@ -63,6 +62,20 @@ def test_where_longer_steps_are_more_work_they_cost_no_less():
     assert disturbed == [4.0, 4.0, 2.0, 2.0]
 
 
+@pytest.mark.parametrize(("noise", "told"), [(1.02, False), (1.2, False), (2.0, True), (30.0, True)])
+def test_readings_that_disagree_are_told(noise, told):
+    seconds = np.array([[1.0, noise, noise, noise, 1.0], [1.0, noise, 1.0, noise, noise]])
+    (_, spread), _ = of_steps([Kind("a", 1.0), Kind("a", 0.5)], seconds)
+    text = cost.disagreement([("psi_x float64", spread), ("rk4 float64", 1.0)])
+    assert spread == noise
+    if told:
+        assert f"psi_x float64 ({noise:.2g} times)" in text
+        assert "rk4" not in text
+        assert "idle machine" in text
+    else:
+        assert text is None
+
+
 def test_a_least_reading_is_met_again():
     kinds = [Kind("a", 1.0), Kind("a", 0.5), Kind("b", 1.0), Kind("c", 1.0)]
     nan = np.nan
@@ -71,75 +84,10 @@ def test_a_least_reading_is_met_again():
     assert [least for least, _ in of_steps(kinds, seconds)] == [1.0, 1.0, 1.0, 2.0]
 
 
-def test_costs_that_are_unsure_are_read_again():
-    """Of two kernels one is disturbed: it alone is read again, at most three times, until two readings are near."""
-    left = [iter([1.0] * 9), iter([1.0, 9.0, 5.0, 3.0, 2.0, 2.05] + [1.0] * 9)]
-    read = []
-
-    def of_kinds(which):
-        read.append(list(which))
-        return np.array([[next(left[i]) for _ in range(2)] for i in which])
-
-    kinds = [Kind("quiet", 0.5), Kind("busy", 0.5)]
-    seconds = cost.readings(kinds, of_kinds)
-    assert read == [[0, 1], [1], [1], [1]]
-    nan = np.nan
-    np.testing.assert_array_equal(seconds, [[1, 1, *[nan] * 6], [1, 9, 5, 3, 2, 2.05, 1, 1]])
-    assert cost.of_steps(kinds, seconds) == [(1.0, 1.0), (1.0, np.median([1, 9, 5, 3, 2, 2.05, 1, 1]))]
-
-
-def test_disagreement_is_above_its_bound():
-    assert cost.disagreement([("a", 1.3)]) is None
-    assert cost.disagreement([]) is None
-    text = cost.disagreement([("b", 1.31), ("a", 2.0), ("b", 4.0), ("b", 3.0)])
-    assert text == ("readings of cost disagree: their median is above the least, which is taken, for b (4 times), a (2 "
-                    "times); other programs run at the same time, and costs that lie closer are not told apart; run again "
-                    "on an idle machine")  # fmt: skip
-    assert " and 1 more; " in cost.disagreement([(f"m{i}", 2.0 + i) for i in range(7)])
-    assert " more" not in cost.disagreement([(f"m{i}", 2.0 + i) for i in range(6)])
-    head = "CPU time of one thread, the least of several readings; their median is at most "
-    assert cost.agreement_text([1.0, 2.345, math.inf]) == f"{head}2.35 times that"
-    assert cost.agreement_text([]) == cost.agreement_text([math.nan]) == f"{head}1.00 times that"
-
-
-def test_readings_near_the_least():
-    nan = np.nan
-    ones = [Kind("a", 1.0), Kind("b", 1.0), Kind("c", 1.0)]
-    readings = np.array([[1.0, 1.05], [1.0, 1.051], [1.0, nan]])
-    assert cost.confirmed(ones, readings) == [True, False, False]
-    assert cost.confirmed([Kind("a", 1.0)], np.array([[1.0]])) == [False]
-    growing = [Kind("a", 1.0, True), Kind("a", 2.0, True)]
-    assert cost.confirmed(growing, np.array([[1.0, 3.0], [1.0, 3.0]])) == [True, False]
-    # Only readings of the very same step can disagree where longer ones are more work.
-    (_, short), (_, long) = cost.of_steps(growing, np.array([[1.0, 3.0, 3.0], [8.0, 8.0, 8.0]]))
-    assert (short, long) == (3.0, 1.0)
-
-
-def test_launches_are_long_enough_to_time():
-    """A step that costs `price` for each vehicle is launched so often that it takes two milliseconds."""
-    now, asked = SimpleNamespace(time=0.0), []
-
-    class Packets:
-        def __init__(self, plan, members):
-            assert members == ("members", 0, plan.ensemble.members)
-            self.plan = plan
-
-        def advance(self, first, stop):
-            asked.append((first, stop))
-            now.time += self.plan.price * (stop - first) * self.plan.ensemble.members
-
-    def plan(price, n=100, stages=1):
-        return SimpleNamespace(price=price, spec=SimpleNamespace(width=8), method=SimpleNamespace(stages=(1.0,) * stages),
-                               ensemble=SimpleNamespace(members=n, select=lambda a, b: ("members", a, b)))  # fmt: skip
-
-    calls, steps = cost.launches([plan(20e-9), plan(1.0), plan(1e-15), plan(20e-9, 100, 10), plan(20e-9, 2)],
-                                 make=Packets, clock=lambda: now.time)  # fmt: skip
-    assert [stop for _, stop in asked] == [200, 200, 200, 20, 2500]
-    assert all(first == 0 for first, _ in asked)
-    assert steps[:, 0] == pytest.approx([1000 * 100, 10 * 100, 100_000 * 100, 1000 * 100, 50_000 * 2], rel=1e-2)
-    begun = now.time
-    calls[0]()
-    assert now.time - begun == pytest.approx(2e-3, rel=1e-2)
+def test_many_are_told_few_by_name():
+    text = cost.disagreement([(f"m{i}", 2.0 + i) for i in range(9)])
+    says(text, "m8 (10 times), m7 (9 times)", "and 3 more")
+    assert "m0" not in text
 
 
 def test_calls_are_timed_in_turn_after_one_that_is_not_counted():

@@ -12,7 +12,7 @@ from lgvi_warp.engine.step_warnings import COARSE, PRECISION
 from lgvi_warp.engine.survey import frame_of
 from lgvi_warp.methods import limits
 from lgvi_warp.methods.method import Method
-from lgvi_warp.physics import hydrostatics
+from lgvi_warp.physics import hydrostatics, terms
 from lgvi_warp.runs.settle import make_plan
 from tests.support.tools import one, random_states, scene_of
 
@@ -103,7 +103,7 @@ def test_rotation_on_the_way():
     h, J, seen, limit = 0.01, 2.5, 256, limits.TURNS
     moment = np.array([1.2, 0.6]) * limit / h * J / (seen * h)
     scene = scene_of(**PLAIN)
-    scene = lw.Scene(scene.vehicle, scene.environment, [lw.terms.Wrench(torque=(0.0, 0.0, 1.0))])
+    scene = lw.Scene(scene.vehicle, scene.environment, [terms.Wrench(torque=(0.0, 0.0, 1.0))])
     fleet = one(scene, parameters={"wrench.torque": np.outer(moment, [0.0, 0.0, 1.0])})
     result = lw.solve(fleet, "psi_x", h=h, t1=seen * h, checks="all")
     assert warned(result, Warnings.ROTATION) == [True, False]
@@ -119,9 +119,9 @@ def test_explicit_methods_have_their_limits_on_the_imaginary_axis():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("method", "law"), [
-    ("rk4", lambda linear, q: lw.terms.Drag(linear=[linear] * 6, quadratic=[q] * 6)),
-    ("rk4", lambda linear, q: lw.terms.DragMatrix(linear=linear * np.eye(6), quadratic=q * np.eye(6))),
-    ("psi", lambda linear, q: lw.terms.Drag(linear=[linear] * 6, quadratic=[q] * 6)),
+    ("rk4", lambda linear, q: terms.Drag(linear=[linear] * 6, quadratic=[q] * 6)),
+    ("rk4", lambda linear, q: terms.DragMatrix(linear=linear * np.eye(6), quadratic=q * np.eye(6))),
+    ("psi", lambda linear, q: terms.Drag(linear=[linear] * 6, quadratic=[q] * 6)),
 ])  # fmt: skip
 def test_stiff_drag_of_explicit_methods(method, law):
     # h (l + 2 q|v|) / I of surge, M = 2, v = 1.5.
@@ -237,7 +237,7 @@ def test_stiff_drag_of_splittings(method, checks):
     scene = scene_of((M, M, M), (30.0, 30.0, 30.0))
     for part in BOTH:
         linear = part * step_warnings.SPLIT_DRAG_NUMBER * M / h - 2.0 * q * v
-        laws = [lw.terms.Drag(linear=[linear] * 6, quadratic=[q] * 6), lw.terms.Current(velocity=[0.5, 0.0, 0.0])]
+        laws = [terms.Drag(linear=[linear] * 6, quadratic=[q] * 6), lw.terms.Current(velocity=[0.5, 0.0, 0.0])]
         stiff = lw.Scene(scene.vehicle, scene.environment, terms=laws)
         result = lw.solve(one(stiff, nu=[v + 0.5, 0.0, 0.0]), method, h=h, t1=h, checks=checks)
         assert warned(result, Warnings.DRAG_STIFF) == [part > 1.0]
@@ -303,7 +303,7 @@ def test_inertia_that_no_rigid_body_has():
 def unstable():
     free = scene_of((30.0, 30.0, 31.0), **LAWS)
     # Of water that is nearly the same everywhere, so that the kernel is that of the test of the result's energy.
-    laws = [lw.terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=1.0), lw.terms.Stratification(gradient=1e-12)]
+    laws = [terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=1.0), terms.Stratification(gradient=1e-12)]
     scene = lw.Scene(free.vehicle, free.environment, terms=laws)
     b, R = np.array([[1.0, 0.0, 0.0]] * 2), np.broadcast_to(np.eye(3), (2, 3, 3))
     stiffness = 30.0 * np.array([0.5, 2.1]) ** 2
@@ -337,8 +337,8 @@ def test_energy_of_healthy_scenes_is_quiet():
     # Falls from rest with and without a spring, a swing, drag: no look may take exchange for creation.
     vehicle = scene_of((1.0, 2.0, 3.0), (1.0, 2.0, 2.5), net=0.5, moment=(0.0, 0.0, -0.3))
     R = lw.notation.matrix_from_rotation_vector(np.array([0.5, 0.2, 0.0]))
-    tether = lw.terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=0.2, rest_length=1.0)
-    for laws in ([], [tether], [lw.terms.Drag(linear=[0.1] * 6)], [lw.terms.Current(velocity=[0.3, 0.0, 0.0])]):
+    tether = terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=0.2, rest_length=1.0)
+    for laws in ([], [tether], [terms.Drag(linear=[0.1] * 6)], [terms.Current(velocity=[0.3, 0.0, 0.0])]):
         scene = lw.Scene(vehicle.vehicle, vehicle.environment, terms=laws)
         for dtype in ("float64", "float32"):
             result = lw.solve(one(scene, R=R), "psi_s", h=0.05, t1=50.0, dtype=dtype, checks="all")
@@ -363,8 +363,8 @@ def test_energy_is_that_of_the_result(method, monkeypatch):
     # Kernel against host: with a limit that round-off alone crosses, the value noted is that of the samples.
     monkeypatch.setattr(step_warnings, "ENERGY", 1e-12)
     base = scene_of((1.0, 2.0, 3.0), (1.0, 2.0, 2.5), net=0.5, moment=(0.1, 0.0, -0.3))
-    laws = [lw.terms.Tether(anchor=[0.0, 0.0, 0.5], stiffness=0.4, rest_length=0.7, attachment=[0.1, 0.0, 0.05]),
-            lw.terms.Stratification(gradient=0.2, reference_depth=0.3)]  # fmt: skip
+    laws = [terms.Tether(anchor=[0.0, 0.0, 0.5], stiffness=0.4, rest_length=0.7, attachment=[0.1, 0.0, 0.05]),
+            terms.Stratification(gradient=0.2, reference_depth=0.3)]  # fmt: skip
     scene = lw.Scene(base.vehicle, base.environment, terms=laws)
     h = 0.1
     fleet = one(scene, *random_states(11, 6, 0.4, 0.4))
@@ -415,10 +415,10 @@ def test_energy_where_the_forces_have_another_origin(monkeypatch):
 
 
 @pytest.mark.parametrize(("laws", "conservative"), [
-    ([], True), ([lw.terms.Drag(linear=[0.1] * 6)], True), ([lw.terms.Wrench(force=[1.0, 0.0, 0.0])], False),
-    ([lw.terms.Current(velocity=[1.0, 0.0, 0.0])], True), ([lw.terms.Current(velocity=[1.0, 0.0, 0.1])], False),
-    ([lw.terms.Current(velocity=[1.0, 0.0, 0.0]), lw.terms.Tether(anchor=[0.0] * 3, stiffness=1.0)], False),
-    ([lw.terms.BodyLift(matrix=np.eye(6))], False), ([lw.terms.Stratification(gradient=0.01)], True),
+    ([], True), ([terms.Drag(linear=[0.1] * 6)], True), ([terms.Wrench(force=[1.0, 0.0, 0.0])], False),
+    ([terms.Current(velocity=[1.0, 0.0, 0.0])], True), ([terms.Current(velocity=[1.0, 0.0, 0.1])], False),
+    ([terms.Current(velocity=[1.0, 0.0, 0.0]), terms.Tether(anchor=[0.0] * 3, stiffness=1.0)], False),
+    ([terms.BodyLift(matrix=np.eye(6))], False), ([terms.Stratification(gradient=0.01)], True),
 ])  # fmt: skip
 def test_energy_is_watched_where_no_force_creates_any(laws, conservative):
     base = scene_of((2.0, 2.0, 2.0))
@@ -430,8 +430,8 @@ def test_energy_is_watched_where_no_force_creates_any(laws, conservative):
 def test_drag_that_arises_in_backward_stages():
     # From rest, so that nothing is refused; thrust then drives it to where the stages that go back lose their meaning.
     base = scene_of((2.0, 2.0, 2.0), (1.0, 2.0, 2.5))
-    law = lw.terms.Drag(quadratic=[2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    scene = lw.Scene(base.vehicle, base.environment, terms=[law, lw.terms.Wrench(force=[40.0, 0.0, 0.0])])
+    law = terms.Drag(quadratic=[2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    scene = lw.Scene(base.vehicle, base.environment, terms=[law, terms.Wrench(force=[40.0, 0.0, 0.0])])
     back = 0.70624617255763935981
     h = 0.4
     result = lw.solve(one(scene), "kl6(psi_s)", h=h, t1=10.0, save=lw.SaveAt(every=h))

@@ -230,7 +230,7 @@ def test_where_a_path_of_noise_is_too_rough_statistics_are_compared(scene):
     assert found.growth is None
     assert found.until == 4.0
     assert all(one.errors == {} and one.trusted == {} and one.biases for one in found.measurements)
-    # A difference falls by half at each refinement; ten are made.
+    # Steps are halved at each of ten refinements.
     reference = [h for name, _, h in runs.settings if name == "psi_x"]
     assert np.allclose(np.divide(reference[:-1], reference[1:]), 2.0)
     assert len(reference) == 10

@@ -148,7 +148,7 @@ def w_case(rng, spin, slip):
 
 
 def two_form(x):
-    """The canonical form at p, pi, left-trivialised; rows and columns (v, w, dp, dpi). See test_reference_structure."""
+    """The canonical form at p, pi, left-trivialised; rows and columns (v, w, dp, dpi). See tests/support/two_form.py."""
     S = np.zeros((12, 12))
     S[6:, :6], S[:6, 6:] = np.eye(6), -np.eye(6)
     S[3:6, :3] = S[:3, 3:6] = hat(x.p)

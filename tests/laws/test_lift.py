@@ -234,31 +234,6 @@ def test_the_remus_lift_is_prestero_s():
 
 
 FIN = WING | {"drag": 0.1}
-UNSORTED = {"times": [0.0, 0.0], "command_schedule": [[0.1], [0.2]]}
-TWICE = {"times": [0.0], "command_schedule": [[0.1]], "command": [0.3]}
-REFUSED = [
-    (terms.Fins, FIN | {"chord": [[0.0] * 3]}, "fins.chord[0] = [0.0, 0.0, 0.0]: has zero length; give the direction"),
-    (terms.Fins, FIN | {"normal": [[0.0] * 3]}, "fins.normal[0] = [0.0, 0.0, 0.0]: has zero length; give a direction"),
-    (terms.Fins, FIN | {"normal": [[-3.0, 0.0, 0.0]]}, "fins.normal[0] = [-3.0, 0.0, 0.0]: is along the chord; give"),
-    (terms.Fins, FIN | {"area": [-0.01]}, "fins.area = [-0.01]: is out of bounds; give numbers from 0 [m2]"),
-    (terms.Fins, FIN | {"drag": [0.1, 0.2]}, "fins.drag = [0.1, 0.2]: has shape (2,); give 1 numbers [1]"),
-    (terms.Fins, FIN | {"drag": "thick"}, "fins.drag = ['thick']: is not numeric; give numbers [1]"),
-    (terms.ControlFins, FIN | {"limit": -0.1}, "fins.limit = [-0.1]: is out of bounds; give numbers from 0 [rad]"),
-    (terms.ControlFins, FIN | {"rate_limit": np.inf}, "rate_limit = [inf]: is not finite; give numbers [rad/s]"),
-    (terms.ControlFins, FIN | UNSORTED, "control_fins.times = [0.0, 0.0]: is not rising; sort the table"),
-    (terms.ControlFins, FIN | TWICE, "control_fins.command = [0.3]: is given beside command_schedule; keep one of"),
-    (terms.CrossFlow, HULL | {"stations": (0, 1, 1, 2, 3)}, "stations = (0, 1, 1, 2, 3): is not rising; sort"),
-    (terms.CrossFlow, {key: [0.1] for key in HULL}, "cross_flow.stations = [0.1]: has one station; give two or more"),
-    (terms.CrossFlow, HULL | {"diameters": (-0.1,) * 5}, "-0.1): is out of bounds; give numbers from 0 [m]"),
-    (terms.BodyLift, {"matrix": [[np.nan] * 6] * 6}, "is not finite; give numbers of shape (6, 6) [kg/m, kg, kg m]"),
-]
-
-
-@pytest.mark.parametrize(("kind", "numbers", "message"), REFUSED)
-def test_what_is_refused(kind, numbers, message):
-    with pytest.raises(lw.SceneError) as caught:
-        kind(**numbers)
-    assert any(message in fault for fault in caught.value.faults), caught.value.faults
 
 
 @pytest.mark.parametrize(("term", "name", "values"), [

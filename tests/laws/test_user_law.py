@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_kernels.advance.kernel import make_advance
 from lgvi_warp.physics import terms
 from lgvi_warp.scene import scene as scenes
 from tests.support.refusals import says
@@ -105,13 +104,6 @@ def test_numbers_vary_by_member():
     np.testing.assert_array_equal(whole[7], single[0])
 
 
-def test_a_second_solve_builds_no_kernel():
-    solve([own_law.Dock(**DOCK), own_law.Mud(**MUD)], t1=0.1)
-    before = make_advance.cache_info().misses
-    solve([own_law.Dock(**DOCK | {"energy": 3.0}), own_law.Mud(**MUD | {"linear": 1.0})], t1=0.2)
-    assert make_advance.cache_info().misses == before
-
-
 SCENE = """
 environment = { gravity = 9.8 }
 terms = [
@@ -152,16 +144,6 @@ def test_a_type_is_taken_once(monkeypatch):
     for kind in (taken, type("Nameless", (own_law.Dock,), {}), type("Heavy", (lw.laws.Term,), {"type": "weight"})):
         with pytest.raises(ValueError, match="no other term has"):
             lw.laws.register(kind)
-
-
-def test_a_class_made_again_replaces_the_former(monkeypatch):
-    monkeypatch.setattr(lw.laws.Term, "kinds", dict(lw.laws.Term.kinds))
-    first, second = (type("Cell", (lw.laws.Term,), {"type": "cell"}) for _ in range(2))
-    assert first is not second
-    assert lw.laws.Term.kinds["cell"] is second
-    # A subclass without a type of its own replaces nothing.
-    assert type("Mine", (lw.terms.Drag,), {}).type == "drag"
-    assert lw.laws.Term.kinds["drag"] is lw.terms.Drag
 
 
 def test_the_law_on_the_page_is_right(tmp_path):

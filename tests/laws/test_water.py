@@ -297,28 +297,6 @@ def test_energy_in_stratified_water():
     assert slope(np.array([0.02, 0.01, 0.005]), changes) == pytest.approx(2.0, abs=0.1)
 
 
-BAD = {
-    "current_harmonics.periods = .*-7.0.*is not positive; give numbers above 0": (
-        terms.CurrentHarmonics, HARMONICS | {"periods": (-7.0, 3.0, 1.0)}),
-    r"current_harmonics.periods = .*has shape \(2,\); give 3 numbers \[s\]": (
-        terms.CurrentHarmonics, HARMONICS | {"periods": (7.0, 3.0)}),
-    "waves.periods = .*is not positive; give numbers above 0": (terms.Waves, WAVES | {"periods": (0.0, 3.0, 1.0)}),
-    "waves.amplitudes = .*is out of bounds; give numbers from 0": (terms.Waves, WAVES | {"amplitudes": (-0.1, 3.0, 1.0)}),
-    r"waves.headings_deg = .*has shape \(1,\); give 3 numbers \[deg\]": (terms.Waves, WAVES | {"headings_deg": (1.0,)}),
-    "gauss_markov_current.time_constant = .*is not positive; give numbers above 0": (
-        terms.GaussMarkovCurrent, WANDER | {"time_constant": 0.0}),
-    "gauss_markov_current.start = 'sometime': is not known": (terms.GaussMarkovCurrent, WANDER | {"start": "sometime"}),
-    "wrench_noise.force = .*is out of bounds; give numbers from 0": (terms.WrenchNoise, {"force": (-1.0, 0.0, 0.0)}),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("message", BAD)
-def test_faults_name_key_value_and_remedy(message):
-    kind, numbers = BAD[message]
-    with pytest.raises(lw.SceneError, match=message):
-        kind(**numbers)
-
-
 def test_waves_want_gravity():
     drifter = lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0), added_mass=(1.0, 1.0, 1.0))
     here = lw.Scene(drifter, lw.Environment(gravity=0.0), terms=[terms.Waves(**WAVES)])

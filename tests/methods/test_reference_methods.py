@@ -20,8 +20,8 @@ from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
 from lgvi_warp.reference.terms.wrench import Wrench
-from tests.methods.test_reference_structure import change, coordinates, moved, two_form
 from tests.support.tools import TURN, difference, expected, from_state, slope
+from tests.support.two_form import change, coordinates, moved, two_form
 
 M = TURN @ np.diag([1.0, 2.0, 3.0]) @ TURN.T
 J = np.diag([1.0, 2.0, 2.5])
@@ -160,26 +160,6 @@ def test_gauss_coefficients(s):
     np.testing.assert_allclose(g.ahead @ g.c ** (s - 1), (1.0 + g.c) ** (s - 1), rtol=1e-10)
 
 
-STEPS = {
-    "rk4": (explicit.stepper(tableaux.RK4), 4, (0.05, 0.025, 0.0125)),
-    "rk5": (explicit.stepper(tableaux.DOPRI5), 5, (0.125, 0.1, 0.0625, 0.05)),
-    "rk5_ck": (explicit.stepper(tableaux.CASH_KARP), 5, (0.125, 0.1, 0.0625, 0.05)),
-    "rk8": (explicit.stepper(tableaux.DOP853), 8, (0.2, 0.125, 0.1)),
-    "rkmk4": (munthe_kaas.rkmk4, 4, (0.1, 0.05, 0.025)),
-    "cg3": (munthe_kaas.cg3, 3, (0.05, 0.025, 0.0125)),
-}
-
-
-@pytest.mark.parametrize("name", STEPS)
-def test_order(name, body, start, example):
-    # Against the quad-precision truth; the next term still shows by up to 6 % of the order.
-    step, order, steps = STEPS[name]
-    truth = expected(example["truth"]["5"])
-    measured = np.array([errors(explicit.advance(step, start, body, h, round(5 / h)), body, truth) for h in steps])
-    for quantity in range(4):
-        assert slope(np.array(steps), measured[:, quantity]) == pytest.approx(order, abs=0.07 * order)
-
-
 @pytest.mark.slow_for("2-*", "4-*")
 @pytest.mark.parametrize(
     ("s", "steps"), [(2, (0.1, 0.05)), (3, (0.25, 0.125)), (4, (0.5, 0.25)), (5, (1.0, 0.5)), (6, (1.0, 0.5))]
@@ -209,14 +189,6 @@ def test_gauss_keeps_quadratic_invariants():
     # The energy is quadratic as well; L = R pi + b x R p is not, and moves with the error of the method.
     assert change([energy.energy(x, body) for x in states]) < 1e-14
     assert 1e-9 < change([energy.angular_momentum(x) for x in states]) < 1e-1
-
-
-def test_rk8_keeps_them_to_its_error_only():
-    body, step = body_of(), explicit.stepper(tableaux.DOP853)
-    states = [begin(body)]
-    for _ in range(10):
-        states.append(explicit.advance(step, states[-1], body, 0.2, 20))
-    assert 1e-10 < change([x.p @ x.p for x in states]) < 1e-4
 
 
 def test_methods_agree_with_all_laws():
@@ -266,30 +238,6 @@ def test_coupled_inertia_keeps_energy():
     kinetic = [0.5 * P @ np.linalg.solve(body.I6, P) for P in (np.append(z.p, z.pi) for z in (x, y))]
     assert kinetic[1] == pytest.approx(kinetic[0], rel=1e-13)
     np.testing.assert_allclose(energy.angular_momentum(y), energy.angular_momentum(x), atol=1e-12)
-
-
-def test_lie_group_methods_stay_on_the_group(body, start):
-    # Exact products: round-off of 200 steps, where RK4 on the rows of R leaves SO(3) by its error.
-    for step in (munthe_kaas.rkmk4, munthe_kaas.cg3):
-        x = explicit.advance(step, start, body, 0.05, 200)
-        assert np.abs(x.R.T @ x.R - np.eye(3)).max() < 1e-13
-    x = explicit.advance(explicit.stepper(tableaux.RK4), start, body, 0.05, 200)
-    assert np.abs(x.R.T @ x.R - np.eye(3)).max() > 1e-8
-
-
-@pytest.mark.parametrize("name", ["rk5", "rk5_ck", "rk8"])
-def test_adaptive(name, body, start, example):
-    # The states are those at the times, the error follows the tolerance, and so does the number of steps.
-    truth, tolerances, times = expected(example["truth"]["5"]), (1e-6, 1e-8, 1e-10), [0.0, 1.0, 2.5, 5.0]
-    ends = []
-    for tolerance in tolerances:
-        states = explicit.adaptive(start, body, times, tolerance, tolerance, EXPLICIT[name])
-        assert [x.t for x in states] == times
-        ends.append(states[-1])
-    measured = [errors(x, body, truth).max() for x in ends]
-    assert all(e < 10.0 * tolerance for e, tolerance in zip(measured, tolerances, strict=True))
-    assert slope(tolerances, measured) == pytest.approx(1.0, abs=0.35)
-    assert slope(tolerances, [x.step for x in ends]) == pytest.approx(-1.0 / EXPLICIT[name].estimate, abs=0.06)
 
 
 def test_adaptive_follows_time_scales():
@@ -393,40 +341,6 @@ def test_order_of_the_coefficients(name, counts):
     measured = [np.abs(pendulum(program, n) - truth).max() for n in counts]
     order = near_integrable.ORDERS[name]
     assert slope(1.0 / np.array(counts), measured) == pytest.approx(order, abs=0.1 * order)
-
-
-def run(name, x, body, steps, t1=5.0, order=10):
-    for _ in range(steps):
-        x = near_integrable.step(x, body, near_integrable.PROGRAMS[name], t1 / steps, order)
-    return x
-
-
-@pytest.mark.parametrize(
-    ("name", "steps", "printed"),
-    [("strang", 500, 8.6e-5), ("rkn4_6", 40, 6.1e-8), ("rkn6_11", 16, 5.1e-8), ("rkn6_14", 16, 1.2e-9)],
-)
-def test_splitting_against_truth(name, steps, printed, body, start, example):
-    # Errors of the attitude at t = 5 (two digits, as measured when the coefficients were verified); kl8(psi_s) with 544
-    # rotations makes 2e-7 or so where rkn6_14 has 224.
-    measured = errors(run(name, start, body, steps), body, expected(example["truth"]["5"]))
-    assert measured[1] < 1.1 * printed
-    assert measured.max() < 3.0 * printed
-
-
-def test_splitting_keeps_momenta_and_energy():
-    body = body_of()
-    x = begin(body)
-    y = run("rkn6_14", x, body, 100, t1=100.0)
-    np.testing.assert_allclose(energy.linear_momentum(y), energy.linear_momentum(x), atol=1e-12)
-    np.testing.assert_allclose(energy.angular_momentum(y), energy.angular_momentum(x), atol=1e-9)
-    body = body_of(CONSERVATIVE[1])
-    x, energies = begin(body), []
-    for _ in range(40):
-        energies.append(energy.energy(x, body))
-        x = run("rkn4_6", x, body, 12, t1=10.0)
-    # Bounded over 400 s: no larger than twice that of the first half.
-    assert change(energies) < 2.0 * change(energies[:20])
-    assert 1e-9 < change(energies) < 1e-3
 
 
 def test_the_rotation_refuses_large_steps():

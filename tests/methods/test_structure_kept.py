@@ -6,9 +6,9 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import energy as invariants
-from tests.methods.test_reference_structure import coordinates, moved, two_form
 from tests.support import tools
 from tests.support.tools import EQUAL, METHODS, difference, free_scene, last, one, random_states, scene_of, slope
+from tests.support.two_form import coordinates, moved, two_form
 
 # One kernel for each method: masses that differ, weight and a restoring moment.
 FREE = {"general": free_scene(), "isotropic": free_scene(EQUAL)}

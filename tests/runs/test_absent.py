@@ -228,21 +228,6 @@ def test_unphysical_members_are_counted():
         lw.Ensemble(scene(), 50, 1, {"current.velocty": lw.distributions.Normal(std=0.1)})
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-def test_the_same_bits_for_any_number_of_threads(dtype):
-    everything = scene_of(CASES["all together"])
-    fleet = lw.Ensemble(
-        everything,
-        700,
-        3,
-        {"current.velocity": lw.distributions.Normal(std=0.1), "vehicle.mass": lw.distributions.Normal(relative=0.01)},
-    )
-    runs = [lw.solve(fleet, h=0.02, t1=0.5, dtype=dtype, threads=threads) for threads in (1, 2, 4)]
-    for name in ("position", "attitude", "velocity", "angular_velocity"):
-        assert len({getattr(run, name).tobytes() for run in runs}) == 1
-
-
 def test_a_controller_that_is_absent_is_no_code(tmp_path):
     wanted = lw.Controller(
         period=0.1, guidance=[lw.control.SetPoint(heading=0.5)], laws=[lw.control.HeadingPID(kp=1.0)]

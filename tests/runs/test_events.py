@@ -360,14 +360,3 @@ def test_an_event_in_a_step_that_was_divided():
 def test_events_need_checks():
     with pytest.raises(lw.SceneError, match="events"):
         lw.solve(fleet(4, [lw.events.Surface()]), h=0.05, t1=1.0, checks="none")
-
-
-@pytest.mark.parametrize(("event", "words"), [
-    ({"type": "box", "lower": [0, 0, 0], "upper": [1, -1, 1]}, ("upper", "lower")),
-    ({"type": "flor", "depth": 3}, ("flor", "floor")), ({"type": "floor"}, ("depth", "missing")),
-    ({"type": "time", "at": -1.0}, ("at", "-1.0", "from 0")), ("surface", ("surface",)),
-])  # fmt: skip
-def test_a_bad_event_is_refused(event, words):
-    with pytest.raises(lw.SceneError) as error:
-        lw.Scene(VEHICLE, events=[event])
-    assert all(word in str(error.value) for word in words)

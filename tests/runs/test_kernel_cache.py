@@ -22,6 +22,8 @@ import warp as wp
 from lgvi_warp.common import warp_setup
 from lgvi_warp.engine import kernel_cache
 from tests.conftest import ROOT
+from tests.support import hostile
+from tests.support.disks import files_of_at_most
 
 
 @wp.kernel(module="unique", enable_backward=False)
@@ -73,9 +75,7 @@ def emptied(cache):
 
 
 def flipped(cache):
-    data = bytearray(only(cache, ".o").read_bytes())
-    data[len(data) // 2] ^= 0x55
-    only(cache, ".o").write_bytes(data)
+    hostile.flipped(only(cache, ".o"), None)
 
 
 def without_code(cache):
@@ -223,13 +223,9 @@ def test_code_of_other_processors_stays(cache):
 
 
 def test_a_full_disk_is_told_before_llvm_ends_the_process(cache):
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
-    try:
-        with pytest.raises(OSError, match=r"has no room for a new kernel.*WARP_CACHE_PATH") as caught:
-            works()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    no_room = r"has no room for a new kernel.*WARP_CACHE_PATH"
+    with files_of_at_most(100_000), pytest.raises(OSError, match=no_room) as caught:
+        works()
     assert caught.value.errno == errno.EFBIG
     assert caught.value.filename == str(cache)
     assert [path.name for path in cache.iterdir()] == [kernel_cache.LOCKS]

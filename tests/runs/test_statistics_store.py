@@ -18,6 +18,7 @@ from lgvi_warp.store.folder import Folder
 from lgvi_warp.store.solve import request_of
 from lgvi_warp.store.state import state
 from tests.conftest import ROOT
+from tests.support import hostile
 from tests.support.refusals import says
 from tests.support.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, forked, markers, tree
 
@@ -66,9 +67,7 @@ def test_it_is_exported_with_its_statistics(whole, memory, tmp_path):
 def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
     path = shutil.copytree(whole, tmp_path / "run.zarr")
     part = path / "parts" / "000000256.npy"
-    data = bytearray(part.read_bytes())
-    data[len(data) // 2] ^= 1
-    part.write_bytes(data)
+    hostile.flipped(part, None)
     with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
         lw.open_run(path)
     (path / "blocks" / "000000256.json").unlink()
@@ -76,13 +75,10 @@ def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
         lw.open_run(path)
 
 
-@pytest.mark.parametrize("harm", ["flip", "tear", "remove"])
+@pytest.mark.parametrize("harm", [hostile.flipped, hostile.torn(0.99), hostile.removed])
 def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, whole, memory, tmp_path):
     path = shutil.copytree(whole, tmp_path / "run.zarr")
-    part = path / "parts/000000512.npy"
-    data = bytearray(part.read_bytes())
-    data[len(data) // 2] ^= 1
-    {"flip": lambda: part.write_bytes(data), "tear": lambda: part.write_bytes(data[:-7]), "remove": part.unlink}[harm]()
+    harm(path / "parts/000000512.npy", None)
     assert any("parts/000000512.npy" in text for text in state(path)["damage"])
     before = markers(path)
     assert bits(lw.resume(path)) == bits(memory)

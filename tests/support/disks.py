@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A disk that is slow, full or broken: the one place where tests stand between the program and the system's files."""
 
+import contextlib
 import errno
 import os
 from pathlib import Path
@@ -27,6 +28,19 @@ def refused(number, *ends):
 def full(*ends):
     """A disk without room for the files whose names end so."""
     return refused(errno.ENOSPC, *ends)
+
+
+@contextlib.contextmanager
+def files_of_at_most(size):
+    """A system that lets no file of this process grow beyond so many bytes."""
+    import resource  # not on Windows
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 class Disk:

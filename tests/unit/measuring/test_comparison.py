@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparisons of settings whose runs are made by hand: errors of known size, references, fronts, suggestions, reports."""
+"""lw.tradeoff and lw.suggest on runs that are made by hand: errors of known size, references, fronts, suggestions, words."""
 
-import copy
+import contextlib
 import dataclasses
+import itertools
 import json
 import math
 import time
@@ -15,45 +16,31 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.accuracy import suggest
 from lgvi_warp.accuracy import tradeoff as tradeoffs
-from lgvi_warp.accuracy.tradeoff import Measurement, Tradeoff
 from lgvi_warp.common.status import Status
-from lgvi_warp.measuring import comparison, cost
+from lgvi_warp.measuring import cost
 from lgvi_warp.measuring import distance as compared
 from lgvi_warp.measuring.budget import Budget
-from lgvi_warp.measuring.comparison import Candidate, Sample
-from lgvi_warp.measuring.ladders import Ladders, lengthened
-from lgvi_warp.measuring.reference import (
-    PRECISE,
-    Growth,
-    Reference,
-    extrapolated,
-    fitted,
-    make_reference,
-    measured_growth,
-    more_seconds,
-    paired,
-    time_over,
-)
+from lgvi_warp.measuring.comparison import Sample
+from lgvi_warp.measuring.ladders import Ladders
+from lgvi_warp.measuring.reference import PRECISE, extrapolated, make_reference, more_seconds, paired
 from lgvi_warp.measuring.speed import void
-from lgvi_warp.measuring.trials import PRECISIONS, Trial, between, is_dominated, trials_of, tried
-from lgvi_warp.methods.method import Method
-from lgvi_warp.physics import energy as invariants
-from lgvi_warp.physics import notation
+from lgvi_warp.measuring.trials import Trial, between, is_dominated
 from lgvi_warp.runs.default_method import h_rates
 from lgvi_warp.runs.step_error import rates
+from lgvi_warp.studies import Candidate, Growth, Measurement, Suggestion, Tradeoff
 from tests.conftest import ROOT
-from tests.support.made import made
+from tests.support.made import made, turned
 
 ENOUGH = 1e4
 CURRENT = lw.terms.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
 # No method on the front.
 BAD = dict.fromkeys((*suggest.CANDIDATES, *PRECISE), 1e12)
-NAMES = ["position", "attitude", "velocity", "angular_velocity", "energy"]
+QUANTITIES = ("position", "attitude", "velocity", "angular_velocity", "energy")
 
 
 @pytest.fixture(scope="module")
 def scene():
-    """The paper's vehicle; samples are at equal times, five unless a test says more."""
+    """The paper's vehicle; samples are at equal times, twenty unless a test says otherwise."""
     paper = lw.Scene.load(ROOT / "examples" / "paper.toml")
     return dataclasses.replace(paper, run=dataclasses.replace(paper.run, save_every=None))
 
@@ -68,14 +55,18 @@ def exact(t, n):
 class Runs:
     """Stands for the kernels: a run's error along x is size[method] h^order times time times (1 + index of the member).
 
-    An infinite size is a failure. A step costs `prices[method, dtype]` microseconds; float32 adds `round_off` to the error.
+    Its heading is off by half as much [rad]. An infinite size is a failure. late: method -> time from which it is off by a
+    metre a second. A step costs `prices[method, dtype]` microseconds; float32 adds `round_off` to the error. grows: how a
+    difference of two starts grows with time. stops: members that a floor stops, and when.
     """
 
-    def __init__(self, sizes, prices=None, round_off=1e-5):
+    def __init__(self, sizes, prices=None, round_off=1e-5, late=None, grows=None, stops=None):
         self.sizes, self.prices, self.round_off, self.settings = sizes, prices or {}, round_off, []
+        self.late, self.grows, self.stops = late or {}, grows, stops or {}
+        self.results, self.plans, self.priced = {}, [], []
 
     def compile(self, plan):
-        return 0.0
+        return 0.25 * (plan.dtype == "float64") + plan.grid.h
 
     def clock(self):
         return 0.0
@@ -83,132 +74,415 @@ class Runs:
     def run(self, plan):
         name, h, n = plan.method.name, plan.grid.h, plan.ensemble.members
         self.settings.append((name, plan.dtype, h))
+        self.plans.append(plan)
         t = plan.grid.times
         path, single, size = exact(t, n), plan.dtype != "float64", self.sizes.get(name, 0.0)
-        fails = {"status": np.full(n, Status.NON_FINITE), "end": np.full(n, t[1])} if size == math.inf else {}
-        if not fails:
-            path[..., 0] += (size * h**plan.method.order + single * self.round_off) * np.outer(t, 1.0 + np.arange(n))
-        result = made(path, t, dtype=np.float32 if single else np.float64, **fails)
-        return dataclasses.replace(
+        end = np.array([self.stops.get(i, np.nan) for i in range(n)])
+        ended = {"status": np.where(np.isnan(end), Status.OK, Status.FLOOR), "end": end}
+        off = np.zeros((len(t), n))
+        if size == math.inf:
+            ended = {"status": np.full(n, Status.NON_FINITE), "end": np.full(n, t[1])}
+        else:
+            off = (size * h**plan.method.order + single * self.round_off) * np.outer(t, 1.0 + np.arange(n))
+            off += (t * (t >= self.late.get(name, np.inf)))[:, None]
+        if self.grows:
+            # A turn of the start is seen in the path alone.
+            turned_by = np.linalg.norm(plan.ensemble.select(0, n).attitude - self.start(plan), axis=(1, 2)) / math.sqrt(
+                2.0
+            )
+            off = off + np.outer(self.grows(t), turned_by)
+        path[..., 0] += off
+        attitude = turned(np.zeros_like(off) if self.grows else 0.5 * off)
+        result = made(path, t, dtype=np.float32 if single else np.float64, attitude=attitude, **ended)
+        result = dataclasses.replace(
             result, provenance=result.provenance | {"step": h}, compile_seconds=0.0, run_seconds=0.0
         )
+        self.results[name, plan.dtype, h, plan.method.solver] = result
+        return result
+
+    def start(self, plan):
+        """The attitudes of the first run of as many members."""
+        first = next(one for one in self.plans if one.ensemble.members == plan.ensemble.members)
+        return first.ensemble.select(0, plan.ensemble.members).attitude
 
     def costs(self, plans, rounds=5):
+        self.priced += plans
         return [cost.Cost(self.prices.get((p.method.name, p.dtype), 1.0) / p.grid.h, 1.0) for p in plans]
 
 
-def on(sample, kernels):
-    """The same sample, whose runs are made by others: by sizes of errors, or by what stands for the kernels."""
-    sample = copy.copy(sample)
-    sample.kernels = Runs(kernels) if isinstance(kernels, dict) else kernels
-    return sample
+@contextlib.contextmanager
+def made_by(kernels):
+    """Comparisons whose runs are made by others than this machine's kernels."""
+    with mock.patch.dict(Sample.__init__.__kwdefaults__, kernels=kernels):
+        yield
 
 
-def tradeoff_by(runs, fleet, of="position", methods=None, members=128, seconds=ENOUGH, **parts):
-    """A trade-off up to 4 s whose runs are made by `runs`."""
-    sample, names = Sample(fleet, 4.0, members, kernels=runs), tradeoffs.chosen_methods(methods)
-    parts = {"grown": lambda *_: GROWN} | parts
-    return tradeoffs.tradeoff_on(sample, compared.compared_in(of), names, seconds, void, methods is not None, **parts)
+def tradeoff_by(runs, fleet, of="position", methods=None, members=128, seconds=ENOUGH, t1=4.0):
+    with made_by(runs):
+        return lw.tradeoff(fleet, t1, of, methods, members, seconds)
 
 
-def suggestion_by(runs, fleet, error, methods=suggest.CANDIDATES, seconds=ENOUGH, named=False, **settings):
-    """A suggestion for an error of position up to 4 s whose runs are made by `runs`."""
-    sample = Sample(fleet, 4.0, 128, suggest.TIMES, kernels=runs)
-    of = compared.compared_in("position")
-    return suggest.suggestion_on(sample, of, error, methods, seconds, void, named, **settings)
+def suggestion_by(runs, fleet, error, methods=None, seconds=ENOUGH, t1=4.0, **more):
+    with made_by(runs):
+        return lw.suggest(fleet, error, t1=t1, methods=methods, seconds=seconds, **more)
 
 
-def fleet_of(scene, n=4):
-    return lw.Ensemble(scene, n, 1, scene.ensemble_settings.vary)
+def fleet_of(scene, n=4, every=None, **changes):
+    """Members of a scene with other parts, saved at other times."""
+    run = dataclasses.replace(scene.run, save_every=every)
+    return lw.Ensemble(dataclasses.replace(scene, run=run, **changes), n, 1, scene.ensemble_settings.vary)
 
 
-# Samples
+def noisy(scene, noise_step=None):
+    return fleet_of(scene, 2, terms=[dataclasses.replace(CURRENT, noise_step=noise_step)])
 
 
-def test_a_sample_takes_the_scenes_times_where_they_divide(scene):
-    def sample(every, t1=4.0, samples=5):
-        one = dataclasses.replace(scene, run=dataclasses.replace(scene.run, save_every=every))
-        return Sample(lw.Ensemble(one, 4, 1), t1, 2, samples)
-
-    assert sample(0.5).spacing == 1 / 2
-    assert sample(0.5).times.tolist() == [0.0, 1.0, 1.5, 2.5, 3.0, 4.0]
-    assert (sample(0.5).index.tolist(), sample(4.0).times.tolist()) == ([0, 2, 3, 5, 6, 8], [0.0, 4.0])
-    for every in (0.3, 8.0, None):
-        assert float(sample(every).spacing) == 0.8
-        assert sample(every).times == pytest.approx(0.8 * np.arange(6))
-    one = sample(0.5)
-    assert (one.members, one.whole.members, one.t1, one.draws, one.fixed_draws) == (2, 4, 4.0, 0, 0)
-    more = one.more(3)
-    assert (more.members, more.t1, more.samples) == (3, 4.0, 5)
-    assert Sample(one.whole, 4.0).members == 4
-    assert one.h(4) == 0.125
-    assert one.candidate("rk4", 2, "float32") == Candidate("rk4", 0.25, "float32")
-    assert one.candidate("psi", 2, solver=("newton", 3)) == Candidate("psi", 0.25, "float64", "newton", 3)
-    plan = one.plan(Candidate("rk4", 0.125))
-    assert plan.grid.steps == 32
-    assert plan.grid.times.tolist() == one.times.tolist()
-    assert (plan.method.name, plan.dtype, plan.ensemble.members) == ("rk4", "float64", 2)
+def refusal(call, *arguments, **named):
+    with pytest.raises(lw.SceneError) as caught:
+        call(*arguments, **named)
+    return str(caught.value)
 
 
-def test_the_end_of_a_sample_is_the_scenes_or_given(scene):
-    fleet = lw.Ensemble(scene, 2)
-    assert (Sample(fleet).t1, Sample(fleet, 3.0).t1) == (scene.run.duration, 3.0)
-    endless = lw.Ensemble(dataclasses.replace(scene, run=dataclasses.replace(scene.run, duration=None)), 2)
-    with pytest.raises(
-        lw.SceneError, match=r"t1 = None: is missing; give the end in seconds: t1=150.0 or \[run\] duration"
-    ):
-        Sample(endless)
+# What is run
+
+
+@pytest.mark.parametrize(("every", "times"), [
+    (None, 0.2 * np.arange(21)), (0.3, 0.2 * np.arange(21)), (8.0, 0.2 * np.arange(21)), (0.5, 0.5 * np.arange(9)),
+    (4.0, [0.0, 4.0]), (0.1, 0.2 * np.arange(21)), (0.125, 0.125 * np.round(np.linspace(0, 32, 21))),
+])  # fmt: skip
+def test_runs_are_compared_at_the_scenes_times_where_they_divide(scene, every, times):
+    runs = Runs({"psi_s": 1.0})
+    found = tradeoff_by(runs, fleet_of(scene, every=every), methods=["psi_s"], members=2, seconds=1e-6)
+    spacing = {0.5: 0.5, 4.0: 4.0, 0.1: 0.1, 0.125: 0.125}.get(every, 0.2)
+    assert (found.members, found.t1) == (2, 4.0)
+    for plan in runs.plans:
+        assert plan.grid.times == pytest.approx(times)
+        assert plan.grid.steps == round(4.0 / plan.grid.h)
+        assert spacing / plan.grid.h == pytest.approx(round(spacing / plan.grid.h))
+    # The coarsest step turns no member by more than a radian at the start; here a turn in t1 is the fastest.
+    coarsest = max(h for name, _, h in runs.settings if name == "psi_s")
+    assert coarsest == pytest.approx(spacing / math.ceil(spacing * 2.0 * math.pi / 4.0))
 
 
 def test_the_coarsest_step_turns_by_an_angle(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    rates = np.linalg.norm(sample.ensemble.select(0, 4).angular_velocity, axis=1)
-    slowest = 2.0 * math.pi / 4.0
-    assert sample.rate == max(rates.max(), slowest) == slowest
-    fast = dataclasses.replace(scene, start=dataclasses.replace(scene.start, angular_velocity=[0.0, 3.0, 4.0]))
-    assert Sample(lw.Ensemble(fast, 1), 4.0, samples=5).rate == 5.0
-    assert sample.coarsest(0.5) == math.ceil(0.8 * slowest / 0.5) == 3
-    assert (sample.coarsest(100.0), sample.allowed(7)) == (1, 7)
-    noisy = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0, samples=5).on_grid(12)
-    assert [noisy.allowed(m) for m in (1, 4, 5, 7, 12, 13)] == [1, 4, 6, 12, 12, 12]
-    assert noisy.draws == 12
-    assert noisy.ensemble.scene.terms[0].noise_step == pytest.approx(0.8 / 12)
+    fast = fleet_of(scene, start=dataclasses.replace(scene.start, angular_velocity=[0.0, 30.0, 40.0]))
+    runs = Runs({"psi_s": 1.0})
+    tradeoff_by(runs, lw.Ensemble(fast.scene, 1), methods=["psi_s"], seconds=1e-6)
+    assert max(h for name, _, h in runs.settings if name == "psi_s") == pytest.approx(0.2 / 10)
+    assert max(h for name, _, h in runs.settings if name == "kl8(psi_x)") == pytest.approx(0.2 / 20)
 
 
-def test_draws_that_the_scene_fixes(scene):
-    def sample(*steps):
-        terms = [dataclasses.replace(CURRENT, noise_step=step, name=f"c{i}") for i, step in enumerate(steps)]
-        return Sample(lw.Ensemble(dataclasses.replace(scene, terms=terms), 2), 4.0, samples=5)
-
-    assert [sample(*steps).fixed_draws for steps in ((None,), (0.1,), (0.1, 0.2), (0.8,))] == [0, 8, 4, 1]
-    with pytest.raises(lw.SceneError) as caught:
-        sample(0.3)
-    words = "c0.noise_step = 0.3: does not divide the 0.8 s between the times of the comparison; give run.save_every"
-    assert words in str(caught.value)
-    own = lw.Ensemble(dataclasses.replace(scene, terms=[dataclasses.replace(CURRENT, noise_step=0.1)]), 2)
-    assert comparison.drawn_every(own, 0.05).scene.terms[0].noise_step == 0.1
-    assert comparison.drawn_every(own, 0.05, own_grid=False).scene.terms[0].noise_step == 0.05
-    assert own.scene.terms[0].noise_step == 0.1
-
-
-def test_noise_is_none_or_on_a_grid(scene):
-    assert Sample(fleet_of(scene), 4.0).noise("psi_s") == "none"
-    assert Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0).noise("psi_s") == "grid"
+def test_the_end_is_the_scenes_or_given(scene):
+    assert tradeoff_by(Runs({}), fleet_of(scene), methods=["rk4"], t1=None, seconds=1e-6).t1 == scene.run.duration
+    endless = fleet_of(dataclasses.replace(scene, run=dataclasses.replace(scene.run, duration=None)))
+    words = "t1 = None: is missing; give the end in seconds: t1=150.0 or [run] duration"
+    assert words in refusal(lw.tradeoff, endless)
 
 
 def test_methods_are_taken_refused_or_the_same_as_others(scene):
-    sample = Sample(fleet_of(scene), 4.0)
-    names = ["psi_x", "rk4", "psi_s"]
-    assert sample.accepted(names) == (names, {})
-    assert sample.accepted(names, most=2)[0] == names[:2]
-    damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)]), 2), 4.0)
-    taken, refused = damped.accepted(["gauss4", "rk4"])
-    assert taken == ["rk4"]
-    assert list(refused) == ["gauss4"]
-    assert "gauss4" in refused["gauss4"]
-    same, refused = sample.accepted(["rk4", "rk4", "cg3"])
-    assert same == ["rk4", "cg3"]
-    assert refused == {"rk4": "method rk4: in this scene it is rk4"}
+    damped = fleet_of(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)])
+    found = tradeoff_by(Runs({"rk4": 1e-3}), damped, methods=["gauss4", "rk4", "rk4"])
+    assert list(found.refused) == ["gauss4", "rk4"]
+    assert "gauss4" in found.refused["gauss4"]
+    assert found.refused["rk4"] == "method rk4: in this scene it is rk4"
+    assert {one.setting.method for one in found.measurements} == {"rk4"}
+    assert refusal(tradeoff_by, Runs({}), damped, methods=["gauss4"]).startswith("method gauss4: ")
+
+
+# Noise
+
+
+def test_runs_in_noise_share_its_draws(scene):
+    runs = Runs({})
+    found = tradeoff_by(runs, noisy(scene), methods=["psi_s"])
+    # 3 2^k draws, at first sixteen in the longest step: here 12, and 24 in the finer run.
+    assert found.reference == "psi_s at h = 0.008333 s against psi_x at h = 0.01667 s"
+    path = "noise acts: all runs see one path of it, drawn every 0.008333 s; errors by paths are of order 1"
+    assert found.messages[0] == path
+    assert {plan.ensemble.scene.terms[0].noise_step for plan in runs.plans} == {0.2 / 24}
+    assert {24 % round(0.2 / h) for _, _, h in runs.settings} == {0}
+    # A step is priced as a run of it draws: once.
+    assert [plan.ensemble.scene.terms[0].noise_step for plan in runs.priced] == pytest.approx(
+        [plan.grid.h for plan in runs.priced]
+    )
+
+
+def test_a_scenes_own_draws_are_kept(scene):
+    runs = Runs({"psi_s": 1e-3})
+    found = tradeoff_by(runs, noisy(scene, 0.05), methods=["psi_s"])
+    assert found.reference == "psi_s at h = 0.05 s against psi_x at h = 0.1 s"
+    assert {plan.ensemble.scene.terms[0].noise_step for plan in (*runs.plans, *runs.priced)} == {0.05}
+    assert {round(0.2 / h) for _, _, h in runs.settings} <= {1, 2, 4}
+    words = "noise_step = 0.3: does not divide the 0.2 s between the times of the comparison; give run.save_every"
+    assert words in refusal(tradeoff_by, Runs({}), noisy(scene, 0.3))
+    two = [dataclasses.replace(CURRENT, noise_step=step, name=f"c{step:g}") for step in (0.05, 0.1)]
+    runs = Runs({"psi_s": 1e-3})
+    tradeoff_by(runs, fleet_of(scene, 2, terms=two), methods=["psi_s"])
+    assert {round(0.2 / h) for _, _, h in runs.settings} <= {1, 2}
+
+
+def test_where_a_path_of_noise_is_too_rough_statistics_are_compared(scene):
+    runs = Runs({}, late={"psi_x": 0.1})
+    found = tradeoff_by(runs, noisy(scene), methods=["psi_s"])
+    assert found.reference == "the finest run's statistics, since noise acts"
+    assert found.messages[1].endswith(": only statistics are compared")
+    assert found.reference_error == {}
+    assert found.growth is None
+    assert found.until == 4.0
+    assert all(one.errors == {} and one.trusted == {} and one.biases for one in found.measurements)
+    # Steps are halved at each of ten refinements.
+    reference = [h for name, _, h in runs.settings if name == "psi_x"]
+    assert np.allclose(np.divide(reference[:-1], reference[1:]), 2.0)
+    assert len(reference) == 10
+
+
+# Errors
+
+
+def apart(of, run, truth, i, j):
+    """The distance of two results at a time, of a member."""
+    if of == "attitude":
+        one, other = (math.atan2(each.attitude[i, j, 1, 0], each.attitude[i, j, 0, 0]) for each in (run, truth))
+        return abs(one - other)
+    if of == "position[0]":
+        return abs(run.position[i, j, 0] - truth.position[i, j, 0])
+    one, other = (np.atleast_1d(np.asarray(getattr(each, of)[i, j], float)) for each in (run, truth))
+    return math.dist(one, other)
+
+
+def errors_by_hand(of, run, truth, until):
+    """The four errors, member by member and time by time, of those that were not stopped."""
+    rows = [
+        [apart(of, run, truth, i, j) for j in range(run.members) if not run.time[i] >= run.failure_time[j]]
+        for i in range(until + 1)
+    ]
+    path, end = list(itertools.chain(*rows)), rows[-1]
+    rms = lambda values: math.sqrt(sum(value**2 for value in values) / len(values))  # noqa: E731
+    return {"end_max": max(end), "end_rms": rms(end), "path_max": max(path), "path_rms": rms(path)}
+
+
+def bias_by_hand(run, truth):
+    """Differences of mean and spread of positions in standard errors: root mean squares over components and times."""
+    means, spreads, n = [], [], run.members
+    for i in range(1, len(run.time)):
+        for c in range(3):
+            a, b = run.position[i, :, c].astype(float), truth.position[i, :, c]
+            if np.ptp(b) > 1e-6:
+                size = b.std(ddof=1)
+                means.append((a.mean() - b.mean()) / (size / math.sqrt(n)))
+                spreads.append((a.std(ddof=1) - size) / (size / math.sqrt(2 * (n - 1))))
+    return {f"position_{name}": math.sqrt(np.mean(np.square(v))) for name, v in (("mean", means), ("std", spreads))}
+
+
+def test_every_measurement_is_as_by_hand(scene):
+    """Errors to the last time at which the reference agrees with itself; one member is stopped before."""
+    runs = Runs({"psi_s": 2e-2, "psi_x": 1e-2, "rk4": math.inf}, {("psi_s", "float32"): 0.5, ("psi_s", "float64"): 3.0},
+                late={"kl8(psi_x)": 3.0}, stops={1: 1.1})  # fmt: skip
+    found = tradeoff_by(runs, fleet_of(scene), "position[0]", ["psi_s", "psi_x", "rk4"])
+    truth = next(run for (name, _, _, _), run in runs.results.items() if name == "rk8")
+    assert found.until == pytest.approx(2.8)
+    assert found.messages[0] == ("errors of single members are up to 2.8 s, where the reference still agrees with itself; "
+                                 "beyond it only statistics are meaningful")  # fmt: skip
+    assert found.units == dict(zip(QUANTITIES, ("m", "rad", "m/s", "rad/s", "J"), strict=True)) | {"position[0]": "m"}
+    assert list(found.reference_error) == [*QUANTITIES, "position[0]"]
+    assert set(found.missing) == {"rk4"}
+    assert len(found.measurements) > 30
+    for one in found.measurements:
+        s = one.setting
+        run = runs.results[s.method, s.dtype, s.h, s.solver]
+        for of in (*QUANTITIES, "position[0]"):
+            for kind, value in errors_by_hand(of, run, truth, 14).items():
+                assert one.error(of, kind) == pytest.approx(value, rel=1e-6, abs=3e-8), (of, kind)
+            assert one.trusted[of] == (one.error(of) >= 10.0 * found.reference_error[of])
+        assert one.us_per_vehicle_second == pytest.approx(runs.prices.get((s.method, s.dtype), 1.0) / s.h)
+        assert (one.order, one.cost_spread) == (2, 1.0)
+        assert one.energy_drift == pytest.approx(np.abs(run.energy - run.energy[0]).max(), rel=1e-6)
+        expected = bias_by_hand(run, truth)
+        assert {name: one.biases[name] for name in expected} == pytest.approx(expected, rel=1e-4, abs=1e-6)
+    wanted = {"position", "velocity", "attitude", "energy", "linear_momentum", "angular_momentum", "position[0]"}
+    coarse = max(found.measurements, key=lambda one: one.setting.h)
+    assert {name.rpartition("_")[0] for name in coarse.biases} <= wanted
+    assert {f"{name}_mean" for name in ("position", "velocity", "energy", "linear_momentum")} <= set(coarse.biases)
+    # The longest that a kernel took to load stands at all of its settings.
+    assert len({(one.setting.name, one.setting.dtype, one.compile_seconds) for one in found.measurements}) == len(
+        {(one.setting.name, one.setting.dtype) for one in found.measurements})  # fmt: skip
+    assert max(one.compile_seconds for one in found.measurements) == pytest.approx(0.25 + 0.2)
+
+
+def test_one_member_has_no_statistics_and_an_angle_is_the_short_way_round(scene):
+    runs = Runs({"psi_s": 2.0 * 3.1 / 0.04 / 4.0})
+    found = tradeoff_by(runs, fleet_of(scene, 1), methods=["psi_s"], seconds=1e-6)
+    assert all(one.biases == {} for one in found.measurements)
+    (coarse,) = found.measurements
+    assert coarse.error("attitude", "end_max") == pytest.approx(3.1)
+    over = tradeoff_by(Runs({"psi_s": 2.0 * 3.2 / 0.04 / 4.0}), fleet_of(scene, 1), methods=["psi_s"], seconds=1e-6)
+    (coarse,) = over.measurements
+    assert coarse.error("attitude", "end_max") == pytest.approx(2.0 * math.pi - 3.2)
+
+
+def test_a_mean_is_compared_by_the_end_of_its_interval(scene):
+    found = tradeoff_by(Runs({"psi_s": 1.0}), fleet_of(scene), "mean position[0]", ["psi_s"], seconds=1e-6)
+    (one,) = found.measurements
+    members = 4.0 * one.setting.h**2 * np.arange(1.0, 5.0)
+    expected = members.mean() + 2.0 * members.std(ddof=1) / 2.0
+    assert one.error("mean position[0]", "end_max") == pytest.approx(expected, rel=1e-6)
+    alone = tradeoff_by(Runs({"psi_s": 1.0}), fleet_of(scene, 1), "mean position[0]", ["psi_s"], seconds=1e-6)
+    (coarse,) = alone.measurements
+    assert coarse.error("mean position[0]") == pytest.approx(4.0 * coarse.setting.h**2)
+    assert (found.of, found.units[found.of]) == ("mean position[0]", "m")
+
+
+@pytest.mark.parametrize(("of", "words"), [
+    ("mean attitude", "of = 'mean attitude': is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"),
+    ("mean mean depth", "is no mean of numbers"),
+    (("depth", "speed"), "of = ('depth', 'speed'): is several quantities; errors are of one of them: give its name"),
+    ("max(depth)", "looks over the path, and errors are of a quantity at each time; give 'depth', whose largest error"),
+])  # fmt: skip
+def test_quantities_that_cannot_be_compared_are_refused(of, words):
+    assert words in refusal(lw.tradeoff, lw.Scene.named("sphere"), 1.0, of)
+
+
+# References
+
+
+def test_a_reference_is_refined_until_it_agrees(scene):
+    sizes = {"rk8": 1.0, "kl8(psi_x)": 3.0, "psi_s": 1e-3}
+    runs = Runs(BAD | sizes)
+    found = suggestion_by(runs, fleet_of(scene), 0.1, ["psi_s"])
+    m = math.ceil(0.8 * 0.5 * math.pi / 0.5)
+    while (error := 4.0 * 4.0 * abs((0.8 / max(m + 1, round(1.5 * m))) ** 8 - 3.0 * (0.8 / m) ** 8)) > 0.1 / 30.0:
+        m *= 2
+    h, H = 0.8 / max(m + 1, round(1.5 * m)), 0.8 / m
+    assert found.reference == f"rk8 at h = {h:.4g} s against kl8(psi_x) at h = {H:.4g} s"
+    assert found.reference_error == pytest.approx(error, rel=1e-6)
+    assert [one for one in runs.settings if one[0] in ("rk8", "kl8(psi_x)")][:2] == [
+        ("kl8(psi_x)", "float64", pytest.approx(0.8 / 3)), ("rk8", "float64", pytest.approx(0.8 / 4))]  # fmt: skip
+    # A trade-off refines until that gains nothing twice, or the time is over.
+    runs = Runs(sizes)
+    best = tradeoff_by(runs, fleet_of(scene), methods=["psi_s"])
+    assert best.reference_error["position"] < 1e-12
+    steps = [h for name, _, h in runs.settings if name == "kl8(psi_x)"]
+    assert np.allclose(np.divide(steps[:-1], steps[1:]), 2.0)
+    assert len(steps) > 5
+
+
+def test_two_methods_of_a_reference_are_of_like_order():
+    assert paired(["rk8", "kl8(psi_x)"]) == ("rk8", "kl8(psi_x)")
+    assert paired(["kl6(psi_x)", "rk4"]) == ("kl6(psi_x)", "rk4")
+    assert paired(["rk8", "rk5"]) == ("rk8", "rk8")
+    assert paired(["rk8"]) == ("rk8", "rk8")
+
+
+def test_extrapolation_takes_out_two_orders(scene):
+    def cubic(plan):
+        h, t = plan.grid.h, plan.grid.times
+        path = exact(t, 4)
+        path[..., 0] += (2.0 * h**2 + 5.0 * h**3) * t[:, None]
+        return dataclasses.replace(made(path, t), compile_seconds=h)
+
+    sample = Sample(fleet_of(scene), 4.0, samples=5, kernels=SimpleNamespace(run=cubic))
+    found = extrapolated(sample, "psi_s", 2)
+    np.testing.assert_allclose(found.position, exact(sample.times, 4), atol=1e-13)
+    assert found.compile_seconds == pytest.approx(0.4 + 0.2 + 0.1)
+    for plain in (extrapolated(sample, "rk4", 2), extrapolated(sample.on_grid(8), "psi_s", 2)):
+        assert plain.compile_seconds == 0.4
+        assert np.abs(plain.position - exact(sample.times, 4)).max() > 1.0
+
+
+def test_a_scene_without_a_precise_method_has_no_reference(scene):
+    class Refusing(Sample):
+        def accepted(self, *_, **__):
+            return [], {}
+
+    said = refusal(make_reference, Refusing(fleet_of(scene), 4.0))
+    assert "method: the scene takes none of kl8(psi_x), rk8, " in said
+    assert "name one that it takes: methods=[...]" in said
+
+
+def test_a_reference_too_rough_is_refused_with_what_would_do(scene):
+    """From the first time on; later than the time asked for; and where time was short."""
+    early, late, busy = Runs({}, late={"rk8": 0.1}), Runs({}, late={"rk8": 1.5}), Runs({"rk8": 1e6})
+    said = refusal(tradeoff_by, early, fleet_of(scene), methods=["rk4"])
+    assert said.startswith("no reference: rk8 at h = ")
+    assert said.endswith(
+        "differ by 0.2 m after 0.2 s, and agree no better with shorter steps; give a shorter t1 (--duration)"
+    )
+    said = refusal(suggestion_by, late, fleet_of(scene), 1e-2, ["rk4"])
+    assert said.startswith("error = 0.01 m of position up to 4 s cannot be checked: rk8 at h = ")
+    assert "differ by 4.0e+00 m, and agree no better with shorter steps; " in said
+    assert said.endswith("; ask for t1 (--duration) up to 0.8 s, or for a larger error")
+    said = refusal(suggestion_by, early, fleet_of(scene), 1e-2, ["rk4"])
+    assert "; ask for a shorter t1 (--duration), or for a larger error" in said
+    said = refusal(suggestion_by, busy, fleet_of(scene), 1e-9, ["rk4"], seconds=1e-6)
+    assert said.startswith("1e-06 s were over; ")
+    assert " of position up to 4 s cannot be checked yet: rk8 at h" in said
+    said = refusal(tradeoff_by, busy, fleet_of(scene), methods=["rk4"], seconds=1e-6)
+    assert said.startswith("1e-06 s were over; give more seconds. There is no reference: rk8 at h")
+    failing = Runs({"rk8": math.inf})
+    assert "differ by inf m after 0.2 s" in refusal(tradeoff_by, failing, fleet_of(scene), methods=["rk4"])
+
+
+def test_a_reference_says_how_much_time_would_do():
+    # Errors fall by 4 a halving, the last two runs took 1 s: from 1e-2 to 1e-4 four halvings, of 2, 4, 8 and 16 s.
+    assert more_seconds(1e-2, 1e-4, 4.0, 1.0) == 2.0 + 4.0 + 8.0 + 16.0
+    for unknown in ((math.inf, 1e-4, 4.0, 1.0), (1e-2, 1e-4, 1.0, 1.0), (1e-2, 0.0, 4.0, 1.0)):
+        assert more_seconds(*unknown) == math.inf
+
+
+# Growth
+
+
+T = 0.5 * np.arange(21)
+# How a difference grows, and what is told of it: power, rate, and the times at which a round-off is 0.01.
+GROWTHS = {
+    "an exponential": (lambda t: np.exp(0.5 * t), None, 0.5, math.log(1e-2 * 2.0**53) / 0.5, math.log(1e-2 * 2.0**24) / 0.5),
+    "a fast one": (lambda t: np.exp(3.0 * t), None, 3.0, math.log(1e-2 * 2.0**53) / 3.0, 4.5),
+    "a power": (lambda t: t**1.5, 1.5, None, math.inf, math.inf),
+    "a steep power": (lambda t: t**4.0, None, None, None, None),
+    "one that falls": (lambda t: 1.0 / (1.0 + t), -1.0, None, math.inf, math.inf),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", GROWTHS)
+def test_growth_is_that_of_two_runs_whose_attitudes_differ(scene, name):
+    grows, power, rate, double, single = GROWTHS[name]
+    runs = Runs({}, grows=grows)
+    fleet = fleet_of(scene, 3)
+    found = tradeoff_by(runs, fleet, methods=["psi_s", "rk4"], t1=10.0).growth
+    kept = (grows(T) > 0.0) & (grows(T) < 1e7)
+    np.testing.assert_allclose(found.times, T[kept], atol=1e-12)
+    np.testing.assert_allclose(found.curve, grows(T)[kept], rtol=1e-4)
+    assert found.factor == pytest.approx(grows(found.times[-1]), rel=1e-4)
+    if power is None:
+        assert found.power is None
+        assert found.doubling == pytest.approx(math.log(2.0) / found.rate)
+    else:
+        assert found.doubling == math.inf
+        assert found.power == pytest.approx(power, rel=0.4 if power < 0.0 else 1e-3)
+    if rate:
+        assert found.rate == pytest.approx(rate, rel=1e-4)
+    if double:
+        assert found.predictable == pytest.approx({"float64": double, "float32": single}, rel=1e-3)
+    # Of all methods that of highest order runs, with the same members but for the turn.
+    one, other = (plan.ensemble for plan in [p for p in runs.plans if p.method.name == "rk4"][:2])
+    states = [ensemble.select(0, 3) for ensemble in (one, other, fleet)]
+    turn = np.swapaxes(states[0].attitude, 1, 2) @ states[1].attitude
+    assert np.linalg.norm(turn - np.eye(3), axis=(1, 2)) / math.sqrt(2.0) == pytest.approx(np.full(3, 1e-8), rel=1e-6)
+    for field in ("position", "velocity", "angular_velocity"):
+        np.testing.assert_array_equal(getattr(states[0], field), getattr(states[1], field))
+        assert getattr(states[0], field) == pytest.approx(getattr(states[2], field), abs=1e-15)
+    assert all(each.seed == 1 and list(each.indices) == [0, 1, 2] for each in (one, other))
+
+
+def test_growth_beyond_measure_and_growth_in_noise(scene):
+    lost = tradeoff_by(Runs({}, grows=lambda t: 1e9 * t), fleet_of(scene), methods=["rk4"]).growth
+    assert all(math.isnan(value) for value in (lost.rate, lost.doubling, lost.factor))
+    assert (lost.power, lost.predictable) == (None, {"float64": 0.0, "float32": 0.0})
+    rough = tradeoff_by(Runs({}, grows=lambda t: 1.0 + t), noisy(scene), methods=["psi_s"]).growth
+    assert len(rough.times) == 21
+
+
+# Trade-offs
 
 
 def test_settings_in_words_and_as_options():
@@ -224,326 +498,6 @@ def test_settings_in_words_and_as_options():
     assert not few.plain
     assert few.options()["method"].iterations == 2
     assert newton.options()["method"].solver == "newton"
-
-
-# Distances and errors
-
-
-def test_distances_of_two_results():
-    path = exact(np.arange(3.0), 2)
-    turn = notation.matrix_from_rotation_vector(np.array([0.0, 0.3, 0.0]))
-    attitude = np.broadcast_to(np.eye(3), (3, 2, 3, 3)).copy()
-    attitude[1, 0], attitude[2, 1] = turn, np.diag([-1.0, -1.0, 1.0])
-    moved = path + np.array([3.0, 4.0, 0.0])
-    one, other = made(path), made(moved, attitude=attitude)
-    apart = comparison.distances(one, other)
-    assert list(apart) == NAMES
-    assert np.allclose(apart["position"], 5.0)
-    assert apart["attitude"] == pytest.approx(np.array([[0.0, 0.0], [0.3, 0.0], [0.0, np.pi]]))
-    assert apart["energy"] == pytest.approx(np.abs(one.energy - other.energy))
-    asked = comparison.distances(one, other, compared.compared_in("position[1]"))
-    assert np.allclose(asked["position[1]"], 4.0)
-    assert list(asked) == [*NAMES, "position[1]"]
-    assert list(comparison.distances(one, other, compared.compared_in("position"))) == NAMES
-    stopped = made(moved, status=[0, Status.FLOOR], end=[np.nan, 1.0])
-    for pair in ((one, stopped), (stopped, one)):
-        apart = comparison.distances(*pair)["position"]
-        assert np.isnan(apart[1:, 1]).all()
-        assert np.isfinite(apart[:, 0]).all()
-        assert np.isfinite(apart[0, 1])
-
-
-def test_errors_are_four_norms_up_to_a_time():
-    values = np.array([[0.0, 0.0], [3.0, 1.0], [2.0, np.nan], [np.nan, np.nan], [9.0, 8.0]])
-    norms = comparison.errors({"x": values}, 3)["x"]
-    assert norms == pytest.approx({"end_max": 2.0, "end_rms": 2.0, "path_max": 3.0, "path_rms": np.sqrt(14.0 / 5.0)})
-    early = comparison.errors({"x": values}, 1)["x"]
-    assert early == pytest.approx(
-        {"end_max": 3.0, "end_rms": np.sqrt(5.0), "path_max": 3.0, "path_rms": np.sqrt(10.0 / 4.0)})  # fmt: skip
-    assert comparison.errors({"x": values}, 4)["x"]["end_rms"] == pytest.approx(np.sqrt(72.5))
-
-
-def test_agreement_rises_and_is_infinite_where_a_run_failed():
-    path = exact(np.arange(4.0), 2)
-    apart = np.zeros_like(path)
-    apart[1, 0, 0], apart[2, 1, 0], apart[3, 0, 0] = 3.0, 1.0, 5.0
-    one, other = made(path), made(path + apart)
-    assert comparison.agreement(one, other)["position"].tolist() == [0.0, 3.0, 3.0, 5.0]
-    stopped = made(path + apart, status=[Status.FLOOR, 0], end=[3.0, np.nan])
-    assert comparison.agreement(one, stopped)["position"].tolist() == [0.0, 3.0, 3.0, 3.0]
-    failed = made(path, status=[0, Status.NON_FINITE], end=[np.nan, 2.0])
-    asked = compared.compared_in("depth")
-    for pair in ((one, failed), (failed, one)):
-        found = comparison.agreement(*pair, asked)
-        assert list(found) == [*NAMES, "depth"]
-        assert all(v.tolist() == [0.0, *[np.inf] * 3] for v in found.values())
-    assert list(comparison.agreement(one, failed)) == NAMES
-    lost = made(np.where(np.arange(4.0)[:, None, None] == 2.0, np.inf, path))
-    with np.errstate(all="ignore"):
-        found = comparison.agreement(one, lost)
-    assert found["position"].tolist() == [0.0, 0.0, np.inf, np.inf]
-    assert not comparison.failed(stopped)
-    assert comparison.failed(failed)
-
-
-def test_a_reference_reaches_as_far_as_it_agrees():
-    reference = Reference(None, "", {"x": np.array([0.0, 1e-3, 1e-2, 1e-2, 1.0])}, None)
-    assert [reference.reaches("x", error) for error in (1e-4, 1e-3, 5e-3, 1e-2, 2.0)] == [0, 1, 1, 3, 4]
-    assert (reference.error("x"), reference.error("x", 2)) == (1.0, 1e-2)
-
-
-def test_two_methods_of_a_reference_are_of_like_order():
-    assert paired(["rk8", "kl8(psi_x)"]) == ("rk8", "kl8(psi_x)")
-    assert paired(["kl6(psi_x)", "rk4"]) == ("kl6(psi_x)", "rk4")
-    assert paired(["rk8", "rk5"]) == ("rk8", "rk8")
-    assert paired(["rk8"]) == ("rk8", "rk8")
-
-
-def test_extrapolation_takes_out_two_orders(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-
-    def cubic(plan):
-        h, t = plan.grid.h, plan.grid.times
-        path = exact(t, 4)
-        path[..., 0] += (2.0 * h**2 + 5.0 * h**3) * t[:, None]
-        return dataclasses.replace(made(path, t), compile_seconds=h)
-
-    sample = on(sample, SimpleNamespace(run=cubic))
-    found = extrapolated(sample, "psi_s", 2)
-    np.testing.assert_allclose(found.position, exact(sample.times, 4), atol=1e-13)
-    assert found.compile_seconds == pytest.approx(0.4 + 0.2 + 0.1)
-    plain = extrapolated(sample, "rk4", 2)
-    assert plain.compile_seconds == 0.4
-    assert np.abs(plain.position - exact(sample.times, 4)).max() > 1.0
-    noisy = extrapolated(sample.on_grid(8), "psi_s", 2)
-    assert noisy.compile_seconds == 0.4
-
-
-def test_a_reference_is_refined_until_it_agrees(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    sizes = {"rk8": 1.0, "kl8(psi_x)": 3.0}
-    shares = []
-    runs = Runs(sizes)
-    sample = on(sample, runs)
-    coarse = make_reference(sample, goal=1e-3, seconds=ENOUGH, report=shares.append)
-    m = sample.coarsest(0.5)
-    while True:
-        finer = max(m + 1, round(1.5 * m))
-        h, H = sample.h(finer), sample.h(m)
-        error = 4.0 * 4.0 * abs(1.0 * h**8 - 3.0 * H**8)
-        if error <= 1e-3:
-            break
-        m *= 2
-    assert coarse.error("position") == pytest.approx(error, rel=1e-6)
-    assert coarse.methods == ("kl8(psi_x)", "rk8")
-    assert coarse.text == f"rk8 at h = {h:.4g} s against kl8(psi_x) at h = {H:.4g} s"
-    assert coarse.asked.name == "position"
-    assert runs.settings[-2:] == [("kl8(psi_x)", "float64", H), ("rk8", "float64", h)]
-    assert len(shares) >= 1
-    assert coarse.result.provenance["step"] == h
-    assert coarse.sample is sample
-    best = make_reference(sample, "position[0]", seconds=ENOUGH, methods=["rk8", "rk4", "psi_s"])
-    assert best.methods == ("rk8", "psi_s")
-    assert best.asked.name == "position[0]"
-    assert best.error("position") < 1e-12
-    # No better twice, and it ends.
-    runs = Runs({})
-    make_reference(on(sample, runs), seconds=ENOUGH, methods=["rk8", "rk5"], goal=-1.0)
-    assert len(runs.settings) == 2 * 3
-    runs = Runs(sizes)
-    make_reference(on(sample, runs), seconds=0.0)
-    assert len(runs.settings) == 2
-
-
-def test_a_reference_in_noise_shares_its_draws(scene):
-    noisy = lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2)
-    sample = Sample(noisy, 4.0, samples=5)
-    runs = Runs({})
-    reference = make_reference(on(sample, runs), seconds=0.0)
-    m = 3 * 2 ** math.ceil(math.log2(8.0 * sample.coarsest(0.5) / 3.0))
-    assert reference.methods == ("psi_x", "psi_s")
-    assert reference.sample.draws == 2 * m
-    assert [h for _, _, h in runs.settings] == [sample.h(m), sample.h(2 * m)]
-    fixed = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[dataclasses.replace(CURRENT, noise_step=0.1)]), 2), 4.0,
-                   samples=5)  # fmt: skip
-    runs = Runs({})
-    reference = make_reference(on(fixed, runs), seconds=ENOUGH)
-    assert [h for _, _, h in runs.settings] == [fixed.h(4), fixed.h(8)]
-    assert reference.sample.draws == 8
-
-
-def test_a_scene_without_a_precise_method_has_no_reference(scene):
-    class Refusing(Sample):
-        def accepted(self, *_, **__):
-            return [], {}
-
-    with pytest.raises(lw.SceneError) as caught:
-        make_reference(Refusing(fleet_of(scene), 4.0))
-    assert "method: the scene takes none of kl8(psi_x), rk8, " in str(caught.value)
-    assert "name one that it takes: methods=[...]" in str(caught.value)
-
-
-# Growth and statistics
-
-
-def test_growth_needs_two_times_and_counts_only_those_later():
-    t = np.array([0.0, 1.0])
-    few = fitted(t, np.array([1.0, 2.0]), 1.0)
-    assert all(np.isnan(value) for value in (few.rate, few.doubling, few.factor))
-    assert few.power is None
-    assert few.predictable == {"float64": 0.0, "float32": 0.0}
-    assert few.times is t
-    two = fitted(np.array([0.0, 1.0, 2.0]), np.array([7.0, 2.0, 4.0]), 2.0)
-    assert two.rate == pytest.approx(math.log(2.0))
-    assert two.factor == 4.0
-    # Between an exponential and a power that fit alike the power is taken, but no steep one.
-    assert two.power == pytest.approx(1.0)
-    assert two.doubling == math.inf
-    steep = fitted(np.array([0.0, 1.0, 2.0]), np.array([1.0, 2.0, 20.0]), 2.0)
-    assert steep.power is None
-    assert steep.doubling == pytest.approx(math.log(2.0) / math.log(10.0))
-    falling = fitted(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 0.5, 0.3, 0.2]), 3.0)
-    assert falling.power < 0.0
-    assert falling.predictable["float64"] == math.inf
-    t = np.linspace(0.0, 10.0, 11)
-    fast = fitted(t, np.exp(3.0 * t), 10.0)
-    assert (fast.power, fast.doubling) == (None, pytest.approx(math.log(2.0) / 3.0))
-    assert fast.predictable["float32"] == t[np.flatnonzero(np.exp(3.0 * t) * 2.0**-24 > 1e-2)[0]] == 5.0
-    assert fast.predictable["float64"] == pytest.approx(max(10.0, math.log(1e-2 / 2.0**-53) / 3.0))
-
-
-def test_growth_is_of_two_runs_whose_attitudes_differ(scene):
-    fleet = fleet_of(scene, 3)
-    sample = Sample(fleet, 4.0, samples=5)
-    starts = []
-
-    def run(plan):
-        state = plan.ensemble.select(0, 3)
-        starts.append((plan.ensemble, state))
-        t = plan.grid.times
-        path = exact(t, 3)
-        if len(starts) == 2:
-            path[..., 0] += 1e-8 * np.exp(0.5 * t)[:, None]
-        return made(path, t, attitude=np.broadcast_to(state.attitude, (len(t), 3, 3, 3)))
-
-    grown = measured_growth(on(sample, SimpleNamespace(run=run)), sample.candidate("rk4", 2))
-    assert np.hypot(np.exp(0.5 * grown.times), 1.0) == pytest.approx(grown.curve, rel=1e-6)
-    turn = np.swapaxes(starts[0][1].attitude, 1, 2) @ starts[1][1].attitude
-    angle = np.linalg.norm(turn - np.eye(3), axis=(1, 2)) / math.sqrt(2.0)
-    assert angle == pytest.approx(np.full(3, 1e-8), rel=1e-6)
-    for name in ("position", "velocity", "angular_velocity"):
-        assert getattr(starts[0][1], name) == pytest.approx(getattr(fleet.select(0, 3), name), abs=1e-15)
-        assert np.array_equal(getattr(starts[0][1], name), getattr(starts[1][1], name))
-    assert all(one.seed == 1 and list(one.indices) == [0, 1, 2] for one, _ in starts)
-
-
-def test_biases_are_in_standard_errors():
-    rng = np.random.default_rng(3)
-    n = 50
-    path = np.cumsum(rng.normal(size=(3, n, 3)), axis=0)
-    one = made(path)
-    scaled = path.copy()
-    center = path.mean(axis=1, keepdims=True)
-    scaled = center + 1.3 * (path - center) + 0.5 * path.std(axis=1, ddof=1, keepdims=True)
-    found = comparison.biases(made(scaled), one)
-    assert found["position_mean"] == pytest.approx(0.5 * math.sqrt(n))
-    assert found["position_std"] == pytest.approx(0.3 * math.sqrt(2.0 * (n - 1)))
-    # What does not vary has no standard error; neither has one member, nor one that failed.
-    assert "attitude_mean" not in found
-    assert "angular_velocity_std" not in found
-    assert comparison.biases(made(path[:, :1]), made(path[:, :1])) == {}
-    assert (
-        comparison.biases(made(path, status=[Status.NON_FINITE] + [0] * (n - 1), end=[1.0] + [np.nan] * (n - 1)), one)
-        == {}
-    )
-    assert set(comparison.biases(made(path[:, :2]), made(path[:, :2]))) >= {"position_mean", "position_std"}
-    asked = comparison.biases(made(scaled), one, compared.compared_in("depth"))
-    assert asked["depth_mean"] == pytest.approx(0.5 * math.sqrt(n))
-    assert "depth_mean" not in found
-
-
-def test_statistics_are_of_vectors_energies_and_momenta():
-    path = exact(np.arange(3.0), 2)
-    turn = np.broadcast_to(notation.matrix_from_rotation_vector(np.array([0.1, 0.2, 0.3])), (3, 2, 3, 3))
-    result = made(path, attitude=turn)
-    values = comparison.quantities_of(result)
-    names = ["position", "velocity", "angular_velocity", "attitude", "energy", "linear_momentum", "angular_momentum"]
-    assert (list(values), values["energy"].shape) == (names, (3, 2, 1))
-    np.testing.assert_array_equal(values["attitude"], turn[..., 2, :])
-    np.testing.assert_array_equal(values["linear_momentum"], invariants.linear_momentum(result))
-    np.testing.assert_array_equal(values["angular_momentum"], invariants.angular_momentum(result))
-    assert "depth" in comparison.quantities_of(result, compared.compared_in("depth"))
-    angle = comparison.quantities_of(result, compared.Distance("heading", "rad", None))
-    assert "heading" not in angle
-    assert len(comparison.quantities_of(result, compared.Distance("position", "m"))) == len(names)
-
-
-def test_part_of_a_result_in_memory():
-    result = made(exact(np.arange(3.0), 4))
-    some = comparison.part(result, [2, 0])
-    np.testing.assert_array_equal(some.position, result.position[:, [2, 0]])
-
-
-# Quantities
-
-
-def test_a_quantitys_distance_and_size():
-    path = exact(np.arange(3.0), 2)
-    one, other = made(path), made(path + np.array([0.0, 3.0, 4.0]))
-    assert np.allclose(compared.compared_in(" position ").distance(one, other), 5.0)
-    assert compared.compared_in("position").largest(other) == np.abs(path + np.array([0.0, 3.0, 4.0])).max()
-    attitude = compared.compared_in("attitude")
-    assert attitude.unit == "rad"
-    assert attitude.functional is None
-    assert attitude.values(one).shape == (3, 2, 9)
-    asked = compared.compared_in("depth")
-    assert compared.compared_in(asked) is asked
-    assert asked.unit == "m"
-    assert not asked.mean
-    assert compared.compared_in("norm(velocity)").unit == "m/s"
-
-
-def test_angles_differ_the_short_way_round():
-    one, other = (made(np.full((2, 1, 3), angle)) for angle in (3.1, -3.1))
-    heading = compared.Distance("heading", "rad", lambda samples, members: samples["position"][..., :1])
-    assert heading.distance(one, other) == pytest.approx(np.full((2, 1), 2.0 * np.pi - 6.2))
-    plain = dataclasses.replace(heading, unit="m")
-    assert plain.distance(one, other) == pytest.approx(np.full((2, 1), 6.2))
-
-
-def test_a_mean_is_compared_by_the_end_of_its_interval():
-    n = 9
-    path = exact(np.arange(3.0), n)
-    apart = np.zeros_like(path)
-    apart[1, :, 0] = np.arange(n) - 2.0
-    entry = compared.compared_in("mean position[0]")
-    assert entry.name == "mean position[0]"
-    assert entry.mean
-    assert entry.unit == "m"
-    found = entry.distance(made(path + apart), made(path))
-    error = 2.0 * np.std(np.arange(n), ddof=1) / 3.0
-    assert found.shape == (3, n)
-    assert np.allclose(found[1], 2.0 + error)
-    assert np.allclose(found[[0, 2]], 0.0)
-    alone = entry.distance(made((path + apart)[:, :1]), made(path[:, :1]))
-    assert alone[1] == pytest.approx([2.0])
-    whole = compared.compared_in("mean position").distance(made(path + apart), made(path))
-    assert np.allclose(whole[1], 2.0 + error)
-
-
-@pytest.mark.parametrize(("of", "words"), [
-    ("mean attitude", "of = 'mean attitude': is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"),
-    ("mean mean depth", "is no mean of numbers"),
-    (("depth", "speed"), "of = ('depth', 'speed'): is several quantities; errors are of one of them: give its name"),
-    ("max(depth)", "looks over the path, and errors are of a quantity at each time; give 'depth', whose largest error"),
-])  # fmt: skip
-def test_quantities_that_cannot_be_compared_are_refused(of, words):
-    with pytest.raises(lw.SceneError) as caught:
-        compared.compared_in(of)
-    assert words in str(caught.value)
-
-
-# Trade-offs
 
 
 def measured(name, price, error, dtype="float64", h=0.1, **more):
@@ -680,108 +634,60 @@ def test_biases_in_words():
     assert tradeoffs.bias_lines(traded(ones[4], measured("psi_s", 1.0, 1.0))) == []
 
 
-def reference_of(sample, sizes, goal=0.0):
-    return make_reference(on(sample, sizes), goal=goal, seconds=ENOUGH)
+@pytest.mark.parametrize(("methods", "words"), [
+    (["psi_z"], "methods = 'psi_z': is not known; known: "), ([], "methods = []: is empty; name one method or more"),
+])  # fmt: skip
+def test_methods_that_are_none_are_refused(scene, methods, words):
+    assert words in refusal(lw.tradeoff, fleet_of(scene), 4.0, methods=methods)
 
 
-def test_a_trial_has_the_errors_of_its_run(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    reference = reference_of(sample, {})
-    sample = on(sample, {"psi_s": 2.0})
-    trial = tried(sample, sample.candidate("psi_s", 4), reference)
-    early = tried(sample, sample.candidate("psi_s", 4), reference, 2)
-    blind = tried(sample, sample.candidate("psi_s", 4), None)
-    size = 2.0 * sample.h(4) ** 2
-    assert trial.error("position") == pytest.approx(4 * 4.0 * size)
-    assert early.error("position") == pytest.approx(4 * 1.6 * size)
-    assert (blind.error("position"), blind.errors) == (math.inf, {})
-    assert trial.candidate == sample.candidate("psi_s", 4)
-    assert trial.plan.grid.h == sample.h(4)
-    assert trial.plan.method.name == "psi_s"
-    assert tried(on(sample, {"psi_s": math.inf}), sample.candidate("psi_s", 4), reference).errors == {}
-    noisy = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0, samples=5).on_grid(12)
-    plan = tried(on(noisy, {}), noisy.candidate("psi_s", 4), None).plan
-    assert plan.ensemble.scene.terms[0].noise_step == pytest.approx(noisy.h(4))
-
-
-def test_a_sweep_halves_steps_until_round_off(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
-    shares = []
-    runs, budgets = Runs({"psi_s": 1e-2, "psi_x": 1e-2}), (Budget(ENOUGH), Budget(ENOUGH))
-    trials, skipped = trials_of(
-        on(sample, runs), ["psi_s"], reference, 5, *budgets, shares.append, solvers=[("newton", None)]
-    )
-    assert skipped == []
-    assert shares[:4] == pytest.approx([0.0, 0.125, 0.25, 0.375])
-    assert min(shares[4:]) >= 0.5
+def test_steps_are_halved_until_round_off_and_between_near_the_front(scene):
+    runs, shares = Runs({"psi_s": 1e-2}), []
+    with made_by(runs):
+        found = lw.tradeoff(fleet_of(scene), 4.0, methods=["psi_s"], seconds=ENOUGH, progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
     ladders = {}
-    for trial in trials:
-        ladders.setdefault((trial.candidate.name, trial.candidate.dtype), []).append(trial)
-    assert list(ladders) == [("psi_s", "float64"), ("psi_s", "float32"), ("psi_s newton", "float64"),
-                             ("psi_s", "float32_compensated")]  # fmt: skip
-    first = ladders["psi_s", "float64"]
-    halved = [trial.candidate.h for trial in first]
-    # Steps between, near the front, follow.
-    rise = np.flatnonzero(np.diff(halved) > 0.0)
-    halved = halved[: rise[0] + 1] if len(rise) else halved
-    assert halved[0] == sample.h(sample.coarsest(1.0))
-    assert np.allclose(np.divide(halved[:-1], halved[1:]), 2.0)
-    # The finest step is the first whose error is below ten times the reference's.
-    finest = min(first, key=lambda trial: trial.candidate.h)
-    assert finest.error("position") < 1e-8 < 4.001 * finest.error("position")
-    coarse = [t.candidate.h for t in ladders["psi_s", "float32"]]
+    for name, dtype, h in runs.settings:
+        if name == "psi_s":
+            ladders.setdefault(dtype, []).append(h)
+    assert list(ladders) == ["float64", "float32", "float32_compensated"]
+    names = [one.setting.name for one in found.measurements]
+    assert list(dict.fromkeys(names)) == ["psi_s", "psi_s quartic 1", "psi_s cayley", "psi_s newton"]
+    steps = sorted({one.setting.h for one in found.measurements if one.setting.text == "psi_s float64"}, reverse=True)
+    halved = [0.2 / 2**i for i in range(len(steps))]
+    assert set(halved[:8]) <= set(steps)
     # Round-off ends a series after two steps that gain nothing.
-    assert len(coarse) < len(halved)
-    assert len(runs.settings) == len(trials)
+    coarse = {one.setting.h for one in found.measurements if one.setting.text == "psi_s float32"}
+    assert len(coarse & set(halved)) < len(set(steps) & set(halved))
+    assert len(runs.results) == len(set(runs.results))
 
 
 def test_every_method_has_a_coarse_setting_before_any_step_is_halved(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
-    methods = ["psi_x", "psi_s", "rk4", "rk8"]
+    methods = ["psi_x", "psi_s", "rk4", "su4(psi_x)"]
     runs = Runs(dict.fromkeys(methods, 1e-2))
-    trials_of(on(sample, runs), methods, reference, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
-    coarsest = sample.h(sample.coarsest(1.0))
-    firsts = [name for name, dtype, h in runs.settings[:4] if (dtype, h) == ("float64", coarsest)]
-    assert firsts == methods
+    tradeoff_by(runs, fleet_of(scene), methods=methods)
+    # After the reference, and the two runs of the growth.
+    settings, coarsest = [one for one in runs.settings if one[0] in methods][2:], 0.2
+    assert [name for name, dtype, h in settings[:4] if (dtype, h) == ("float64", coarsest)] == methods
     # Then in turn: no series is more than one halving ahead of another that still goes on.
-    halved = [h for _, _, h in runs.settings if h < coarsest]
-    assert {name for name, _, h in runs.settings if h == 0.5 * coarsest} == set(methods)
+    halved = [h for _, _, h in settings if h < coarsest]
+    assert {name for name, _, h in settings if h == 0.5 * coarsest} == set(methods)
     assert halved[: len(methods)] == [0.5 * coarsest] * len(methods)
 
 
-def spent(seconds, of):
-    """A budget of which so much is spent."""
-    now = iter([0.0])
-    return Budget(of, clock=lambda: next(now, seconds))
-
-
-def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    reference = reference_of(sample, {})
-
-    def swept(runs, whole, **more):
-        trials, skipped = trials_of(
-            sample, ["psi_x", "rk4"], reference, 5, runs, whole, lambda part: None, compensated=(), **more
-        )
-        return [trial.candidate.text for trial in trials], skipped
-
-    sample = on(sample, {"psi_x": 1.0, "rk4": 1.0})
-    rest = ["psi_x float32", "rk4 float32"]
-    # Nobody named them: the first begins always.
-    assert swept(spent(2.0, 1.0), Budget(ENOUGH)) == (["psi_x float64"],
-                                                      ["rk4 float64", *rest, "psi_x float64 at fine steps"])  # fmt: skip
-    assert swept(Budget(ENOUGH), spent(2.0, 1.0))[0][:2] == ["psi_x float64"] * 2
-    assert swept(spent(2.0, 1.0), spent(2.0, 1.0), named=True) == (
-        ["psi_x float64", "rk4 float64"],
-        [*rest, "psi_x float64 at fine steps", "rk4 float64 at fine steps"],
+def test_without_time_what_was_asked_for_by_name_is_tried(scene):
+    fleet = fleet_of(scene)
+    runs = Runs({"psi_x": 1.0, "rk4": 1.0})
+    asked = tradeoff_by(runs, fleet, methods=["psi_x", "rk4"], seconds=1e-6)
+    assert {one.setting.text for one in asked.measurements} == {"psi_x float64", "rk4 float64"}
+    (note,) = asked.messages
+    assert note.startswith(
+        "no time for psi_x float32, rk4 float32, psi_x float32_compensated, psi_x float64 at fine steps"
     )
-    statistics, _ = trials_of(
-        sample, ["psi_x"], None, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None, compensated=()
-    )
-    assert len(statistics) == 2 * 5
-    assert all(trial.errors == {} for trial in statistics)
+    assert note.endswith(": run again, the kernels are compiled now, or give more seconds")
+    unasked = tradeoff_by(Runs({}), fleet, seconds=1e-6)
+    assert {one.setting.text for one in unasked.measurements} == {"kl8(psi_x) float64"}
 
 
 @pytest.mark.slow_but("suggest")
@@ -801,7 +707,7 @@ def test_time_that_other_programs_take_does_not_end_a_search(scene, study):
         runs = kind(BAD | sizes)
         if study == "suggest":
             # Enough processor time for the arithmetic of a search, and less than its runs wait.
-            one = suggestion_by(runs, fleet_of(scene), 1e-4, methods, seconds=1.0, named=True)
+            one = suggestion_by(runs, fleet_of(scene), 1e-4, methods, seconds=1.0)
             found.append((one.settings, one.expected))
         else:
             one = tradeoff_by(runs, fleet_of(scene), methods=methods, seconds=1.0)
@@ -837,21 +743,34 @@ def test_what_was_asked_for_and_has_no_reading_is_named(scene):
     plt.close(figure)
 
 
-def test_a_reference_says_how_much_time_would_do(scene):
-    sample = Sample(fleet_of(scene), 4.0, 128, 5)
-    of = compared.compared_in("position")
-    # Errors fall by 4 a halving, the last two runs took 1 s: from 1e-2 to 1e-4 four halvings, of 2, 4, 8 and 16 s.
-    assert more_seconds(1e-2, 1e-4, 4.0, 1.0) == 2.0 + 4.0 + 8.0 + 16.0
-    for unknown in ((math.inf, 1e-4, 4.0, 1.0), (1e-2, 1e-4, 1.0, 1.0), (1e-2, 0.0, 4.0, 1.0)):
-        assert more_seconds(*unknown) == math.inf
-    assert time_over(20.0, 20.0, 0.4) == ("20 s were over", "seconds=50 would do")
-    assert time_over(20.0, math.inf, 0.4) == ("20 s were over", "give more seconds")
-    rough = dataclasses.replace(reference_of(sample, {}), own={"position": np.full(6, 1.0)}, text="a and b", more=20.0)
-    with pytest.raises(lw.SceneError) as caught:
-        suggest.checked_reference(sample, of, 1e-2, 20.0, ["rk4"], make_reference=lambda *_, **__: rough)
-    assert str(caught.value).startswith("20 s were over; seconds=50 would do. error = 0.01 m of position")
-    with pytest.raises(lw.SceneError, match=r"^20 s were over; seconds=\d+ would do\. There is no reference: a and b"):
-        tradeoffs.trusted_until(rough, of, 20.0)
+def trial(seconds, position, attitude=0.0, h=0.1, method="psi_s"):
+    errors = {"position": {"path_max": position}, "attitude": {"path_max": attitude}}
+    return Trial(Candidate(method, h), None, None, errors, seconds)
+
+
+def test_a_setting_is_hopeless_where_a_tenth_of_its_time_does_better():
+    slow = trial(10.0, 1e-3)
+    assert is_dominated(slow, [slow, trial(0.9, 1e-4)])
+    assert not is_dominated(slow, [slow, trial(1.0, 1e-4)])
+    assert not is_dominated(slow, [trial(0.9, 1e-3)])
+    assert not is_dominated(slow, [trial(0.9, 1e-4, 1e-2)])
+    assert is_dominated(trial(10.0, 1e-6, 1e-3), [trial(0.9, 1e-4)])
+    assert not is_dominated(trial(10.0, math.inf), [trial(0.9, 1e-4)])
+
+
+def test_steps_between_are_tried_near_the_front(scene):
+    sample = Sample(fleet_of(scene), 4.0, samples=5)
+    trials = [trial(1.0, 1e-2, h=sample.h(1)), trial(2.0, 1e-3, h=sample.h(10)), trial(3.0, 1e-1, h=sample.h(20))]
+
+    def run(candidate):
+        return trial(1.0, 1.0, h=candidate.h)
+
+    more = between(sample, trials, Budget(ENOUGH), run)
+    assert sorted(one.candidate.h for one in more) == sorted(sample.h(m) for m in (7, 14))
+    assert between(sample, trials[:2], Budget(-1.0), run) == []
+
+
+# Suggestions
 
 
 @pytest.mark.parametrize("law", [
@@ -880,118 +799,6 @@ def test_a_tail_of_few_or_of_equal_errors():
     assert suggest.largest_in_fleet(np.zeros(1000), 10**6) == 0.0
 
 
-def trial(seconds, position, attitude=0.0, h=0.1, method="psi_s"):
-    errors = {"position": {"path_max": position}, "attitude": {"path_max": attitude}}
-    return Trial(Candidate(method, h), None, None, errors, seconds)
-
-
-def test_a_setting_is_hopeless_where_a_tenth_of_its_time_does_better():
-    slow = trial(10.0, 1e-3)
-    assert is_dominated(slow, [slow, trial(0.9, 1e-4)])
-    assert not is_dominated(slow, [slow, trial(1.0, 1e-4)])
-    assert not is_dominated(slow, [trial(0.9, 1e-3)])
-    assert not is_dominated(slow, [trial(0.9, 1e-4, 1e-2)])
-    assert is_dominated(trial(10.0, 1e-6, 1e-3), [trial(0.9, 1e-4)])
-    assert not is_dominated(trial(10.0, math.inf), [trial(0.9, 1e-4)])
-
-
-def test_steps_between_are_tried_near_the_front(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    trials = [trial(1.0, 1e-2, h=sample.h(1)), trial(2.0, 1e-3, h=sample.h(10)), trial(3.0, 1e-1, h=sample.h(20))]
-
-    def run(candidate):
-        return trial(1.0, 1.0, h=candidate.h)
-
-    more = between(sample, trials, Budget(ENOUGH), run)
-    assert sorted(one.candidate.h for one in more) == sorted(sample.h(m) for m in (7, 14))
-    assert between(sample, trials[:2], Budget(-1.0), run) == []
-
-
-def test_measurements_are_of_trials_that_did_not_fail(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-3) for name in NAMES})
-    sample = on(sample, Runs({"psi_s": 1.0}, {("psi_s", "float64"): 3.0}))
-    trials = [tried(sample, sample.candidate("psi_s", m), reference) for m in (4, 40)]
-    lost = dataclasses.replace(trials[0], errors={})
-    slow = dataclasses.replace(trials[1], result=dataclasses.replace(trials[1].result, compile_seconds=7.0))
-    both = tradeoffs.measurements(sample, [trials[0], slow, lost], reference, reference.result, 5)
-    blind = tradeoffs.measurements(sample, [lost], None, reference.result, 5)
-    assert [one.setting for one in both] == [trials[0].candidate, trials[1].candidate]
-    assert [one.us_per_vehicle_second for one in both] == pytest.approx([3.0 / sample.h(4), 3.0 / sample.h(40)])
-    assert all(one.compile_seconds == 7.0 and one.order == 2 and one.cost_spread == 1.0 for one in both)
-    limit = [one.errors["position"]["path_max"] >= 1e-2 for one in both]
-    assert [one.trusted["position"] for one in both] == limit == [True, False]
-    drift = invariants.drift(trials[0].result)["energy"]
-    assert both[0].energy_drift == drift
-    assert both[0].biases == comparison.biases(trials[0].result, reference.result)
-    assert len(blind) == 1
-    assert blind[0].trusted == {}
-
-
-def test_a_tradeoff_says_how_far_its_reference_reaches(scene):
-    runs = Runs({"psi_s": 1e-2, "rk8": 1.0, "kl8(psi_x)": 1.0})
-    found = tradeoff_by(runs, fleet_of(scene), methods=["psi_s", "gauss4"], members=3)
-    late = {name: np.array([0.0, *[1e-9] * 10, *[1.0] * 10]) for name in (*NAMES, "depth")}
-    part = dataclasses.replace(reference_of(Sample(fleet_of(scene), 4.0), runs), own=late)
-    short = tradeoff_by(runs, fleet_of(scene), "depth", ["psi_s"], make_reference=lambda *_, **__: part)
-    assert (found.members, found.t1, found.until, found.of) == (3, 4.0, 4.0, "position")
-    assert (found.messages, found.units) == ((), compared.QUANTITIES)
-    assert found.growth is GROWN
-    assert list(found.reference_error) == NAMES
-    assert found.front()
-    assert (short.until, short.units["depth"]) == (2.0, "m")
-    assert short.messages[0] == ("errors of single members are up to 2 s, where the reference still agrees with itself; "
-                                 "beyond it only statistics are meaningful")  # fmt: skip
-
-
-@pytest.mark.parametrize(("methods", "words"), [
-    (["psi_z"], "methods = 'psi_z': is not known; known: "), ([], "methods = []: is empty; name one method or more"),
-])  # fmt: skip
-def test_methods_that_are_none_are_refused(methods, words):
-    assert tradeoffs.chosen_methods(None, ("a",)) == ("a",)
-    assert tradeoffs.chosen_methods(["rk4"]) == ("rk4",)
-    with pytest.raises(lw.SceneError) as caught:
-        tradeoffs.chosen_methods(methods)
-    assert words in str(caught.value)
-
-
-def test_a_reference_too_rough_for_members(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    of = compared.compared_in("position")
-
-    def reference(*own):
-        result = SimpleNamespace(time=sample.times)
-        return Reference(result, "a and b", {"position": np.array(own)}, sample)
-
-    good = reference(0.0, 1e-4, 1e-4, 1e-3, 1.0, 1.0)
-    assert tradeoffs.trusted_until(good, of, 1.0) == 2
-    assert not tradeoffs.reaches_nothing(good, of)
-    bad = reference(0.0, 0.0123, 1.0, 1.0, 1.0, 1.0)
-    assert tradeoffs.reaches_nothing(bad, of)
-    with pytest.raises(lw.SceneError) as caught:
-        tradeoffs.trusted_until(bad, of, 1.0)
-    assert str(caught.value) == ("no reference: a and b differ by 0.012 m after 0.8 s, and agree no better with shorter "
-                                 "steps; give a shorter t1 (--duration)")  # fmt: skip
-    noisy = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0, samples=5).on_grid(16)
-    text = "noise acts: all runs see one path of it, drawn every 0.05 s; errors by paths are of order 1"
-    assert tradeoffs.noise_text(noisy) == text
-
-
-def test_growth_is_measured_at_the_references_step(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    result = SimpleNamespace(provenance={"step": 0.1})
-    for one, often in ((sample, 20), (sample.on_grid(16), 5)):
-        seen, candidate = tradeoffs.growth_of(
-            one, ["psi_s", "rk8", "rk4"], Reference(result, "", {}, one), measure=lambda *given: given
-        )
-        assert candidate.method == "rk8"
-        assert len(seen.times) == often + 1
-        assert seen.members == 4
-        assert candidate.h == pytest.approx(0.1)
-
-
-# Suggestions
-
 SIZES = {"rk8": 20.0, "kl8(psi_x)": 0.2, "psi_x": 0.05, "psi_1": 0.2}
 PRICES = {("rk8", "float64"): 8.0, ("kl8(psi_x)", "float64"): 17.0, ("psi_x", "float64"): 1.0, ("psi_1", "float64"): 1.2,
           ("psi_x", "float32"): 0.6, ("psi_1", "float32"): 0.7, ("rk8", "float32"): 5.0}  # fmt: skip
@@ -999,7 +806,7 @@ PRICES = {("rk8", "float64"): 8.0, ("kl8(psi_x)", "float64"): 17.0, ("psi_x", "f
 
 def longest(name, error, n=4, t1=4.0):
     """The step at which the largest error is this one."""
-    return (error / (SIZES[name] * t1 * n)) ** (1.0 / Method(name).order)
+    return (error / (SIZES[name] * t1 * n)) ** (1.0 / lw.Method(name).order)
 
 
 @pytest.mark.parametrize("error", [1e-1, 1e-3, 1e-7])
@@ -1027,7 +834,7 @@ def test_a_suggestion_is_the_cheapest_by_arithmetic(scene, error):
 
 def test_a_suggestion_that_no_step_keeps_is_refused(scene):
     with pytest.raises(lw.SceneError) as caught:
-        suggestion_by(Runs({"psi_x": 1e12, "rk8": 0.0}), fleet_of(scene), 1e-3, ["psi_x"], named=True)
+        suggestion_by(Runs({"psi_x": 1e12, "rk8": 0.0}), fleet_of(scene), 1e-3, ["psi_x"])
     assert str(caught.value) == ("error = 0.001 m of position: no step of psi_x kept it; ask for a larger error or a shorter "
                                  "t1")  # fmt: skip
 
@@ -1036,79 +843,79 @@ def test_others_are_tried_where_the_short_list_fails(scene):
     """Of the few none keeps the error; psi_s does."""
     sizes = dict.fromkeys(("rk8", "kl8(psi_x)", "psi_x", "psi_1"), 0.0) | {"psi_s": 1e-3}
     bad = {"psi_x": 1e12, "psi_1": 1e12}
-    reference = reference_of(Sample(fleet_of(scene), 4.0, 128, suggest.TIMES), {})
-    names = [name for name in suggest.CANDIDATES if name in ("psi_x", "psi_1", "psi_s")]
-    runs = Runs(sizes | bad)
-    known = dataclasses.replace(reference, sample=on(reference.sample, runs))
-    found = suggestion_by(runs, fleet_of(scene), 1e-3, names, make_reference=lambda *_, **__: known)
+    of, names = compared.compared_in("position"), ("psi_x", "psi_1", "psi_s")
+    known = make_reference(
+        Sample(fleet_of(scene), 4.0, 128, suggest.TIMES, kernels=Runs({})), goal=1e-4, seconds=ENOUGH
+    )
+    known.sample.kernels = Runs(sizes | bad)
+    sample = Sample(fleet_of(scene), 4.0, 128, suggest.TIMES, kernels=known.sample.kernels)
+    found = suggest.suggestion_on(sample, of, 1e-3, names, ENOUGH, void, False, make_reference=lambda *_, **__: known)
     assert found.setting.method == "psi_s"
 
 
-def test_a_reference_that_is_too_rough_names_what_to_ask(scene):
-    sample = Sample(fleet_of(scene), 4.0, 128, 5)
-    of = compared.compared_in("position")
-
-    def refusal(own):
-        rough = dataclasses.replace(reference_of(sample, {}), own={"position": np.array(own)}, text="a and b")
-        make, grown = mock.Mock(return_value=rough), dataclasses.replace(GROWN, power=2.0)
-        with pytest.raises(lw.SceneError) as caught:
-            suggest.checked_reference(sample, of, 1e-2, 3.0, ["rk4"], make_reference=make, grown=lambda *_: grown)
-        assert make.call_args.kwargs == {"goal": 1e-2 / 30.0, "seconds": 0.4 * 3.0}
-        return str(caught.value)
-
-    head = "error = 0.01 m of position up to 4 s cannot be checked: a and b differ by 1.0e+00 m, and agree no better"
-    assert refusal([0.0, 1e-3, 1e-2, 1.0, 1.0, 1.0]).startswith(head)
-    assert refusal([0.0, 1e-3, 1e-2, 1.0, 1.0, 1.0]).endswith(
-        "; ask for t1 (--duration) up to 0.8 s, or for a larger error")  # fmt: skip
-    assert "; ask for a shorter t1 (--duration), or for a larger error" in refusal([0.0, 1e-2, 1.0, 1.0, 1.0, 1.0])
-    good = dataclasses.replace(reference_of(sample, {}), own={"position": np.full(6, 1e-3)})
-    make = lambda *_, **__: good  # noqa: E731
-    assert suggest.checked_reference(sample, of, 1e-2, 3.0, ["rk4"], make_reference=make) is good
-
-
-def test_a_step_is_lengthened_as_far_as_the_target_allows(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    reference = reference_of(sample, {})
-    sample = on(sample, {"psi_s": 0.1})
-
-    def at(m):
-        return tried(sample, sample.candidate("psi_s", m), reference)
-
-    target = 4.0 * 4.0 * 0.1 * sample.h(45) ** 2 * 1.0001
-    low = at(32).error("position")
-    best = lengthened(sample, at(64), 64, low, reference, "position", target)
-    assert best.candidate.h == sample.h(45)
-    good = at(64)
-    for before in (math.inf, 0.5 * target, math.nan):
-        assert lengthened(sample, good, 64, before, reference, "position", target) is good
-    one = at(1)
-    assert lengthened(sample, one, 1, 1e9, reference, "position", 1e8) is one
-    # A step that misses the target is shortened by its order, at most twice each time.
-    short, size = suggest.refined(sample, sample.candidate("psi_s", 32), reference, "position", target, 4)
-    assert size == short.error("position") <= target
-    assert short.candidate.h == sample.h(46)
-    same, _ = suggest.refined(sample, sample.candidate("psi_s", 45), reference, "position", target, 4)
-    assert same.candidate.h == sample.h(45)
-    far, _ = suggest.refined(sample, sample.candidate("psi_s", 1), reference, "position", target, 4)
-    assert far.candidate.h == sample.h(46) or far.error("position") <= target
-    runs = Runs({"psi_s": math.inf})
-    suggest.refined(on(sample, runs), sample.candidate("psi_s", 10), reference, "position", target, 4)
-    assert [round(float(sample.spacing) / h) for _, _, h in runs.settings] == [10, 15, 23, 35, 53, 80, 120]
+def test_what_is_too_dear_or_too_fine_is_not_tried(scene):
+    """A method whose steps cost twice what the cheapest setting does; a precision whose round-off is near the error."""
+    prices = {
+        ("psi_s", "float64"): 3.0,
+        ("psi_s", "float32"): 9.0,
+        ("psi_x", "float64"): 1e4,
+        ("psi_x", "float32"): 1e4,
+    }
+    runs = Runs({"psi_s": 1e-2, "psi_x": 1e-2}, prices)
+    found = suggestion_by(runs, fleet_of(scene), 1e-3, ["psi_s", "psi_x"])
+    assert found.setting.method == "psi_s"
+    assert [rival.method for rival, _, _ in found.rivals] == []
+    assert min(h for name, _, h in runs.settings if name == "psi_x") > found.setting.h
+    # Paths are 16 m long: 4 units in the last place of float32 are 3.8e-6 m.
+    for error, tried in (
+        (4.0 * 2.0**-24 * 16.0 * suggest.SAFETY, False),
+        (4.1 * 2.0**-24 * 16.0 * suggest.SAFETY, True),
+    ):
+        runs = Runs({"psi_s": 1e-9}, round_off=0.0)
+        suggestion_by(runs, fleet_of(scene), error, ["psi_s"])
+        assert ("float32" in {dtype for _, dtype, _ in runs.settings}) == tried
+    near = {("psi_s", "float64"): 1.0, ("psi_x", "float64"): 1.49, ("psi_w", "float64"): 1.51}
+    found = suggestion_by(Runs(dict.fromkeys(("psi_s", "psi_x", "psi_w"), 1.0), near), fleet_of(scene), 1e-6,
+                          ["psi_s", "psi_x", "psi_w"])  # fmt: skip
+    assert [rival.method for rival, _, _ in found.rivals] == ["psi_x"]
 
 
-def test_the_worst_members_are_named_first(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    reference = reference_of(sample, {})
-    one = tried(on(sample, {"psi_s": 1.0}), sample.candidate("psi_s", 4), reference)
-    assert suggest.worst_of(one, reference, "position") == (3, 2, 1, 0)
-    assert suggest.worst_of(one, reference, "position", 2) == (3, 2)
+def test_a_precision_whose_error_ceases_to_fall_is_given_up(scene):
+    runs = Runs({"psi_s": 1e-2}, {("psi_s", "float32"): 0.01}, round_off=2e-3)
+    found = suggestion_by(runs, fleet_of(scene), 1e-3, ["psi_s"])
+    assert found.setting.dtype == "float64"
+    coarse = [h for _, dtype, h in runs.settings if dtype == "float32"]
+    assert 2 <= len(coarse) <= 6
+
+
+def test_damping_limits_a_step_above_twice_its_rate(scene):
+    damped = Sample(fleet_of(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)]), 4.0, kernels=Runs({}))
+    reference, of = make_reference(damped, seconds=ENOUGH), compared.compared_in("position")
+    rate = h_rates(rates(damped.ensemble), 1.0)["drag"]
+    one = Ladders(damped, reference, of, 1e-3, Budget(ENOUGH))
+    assert one.limited_by_damping
+    for ratio, limited in ((1.99, False), (2.01, True)):
+        one.priced = [(1.0, SimpleNamespace(candidate=Candidate("psi_s", ratio / rate)))]
+        assert one.limited_by_damping is limited
+
+
+def test_a_step_that_more_members_need_shorter_is_shortened_by_its_order(scene):
+    """Of 256 members 128 are searched; the error grows with the member."""
+    runs = Runs(BAD | {"rk8": 0.0, "kl8(psi_x)": 0.0, "psi_s": 0.1})
+    found = suggestion_by(runs, fleet_of(scene, 256), 1e-2, ["psi_s"])
+    assert found.members == 256
+    assert found.expected <= 1e-2
+    assert found.worst[:3] == (255, 254, 253)
+    assert len(found.worst) == 32
+    longest_step = math.sqrt(1e-2 / (0.1 * 4.0 * 256))
+    assert 0.6 * longest_step < found.setting.h < longest_step
 
 
 def suggested(**more):
     fields = {"settings": {}, "setting": Candidate("psi_s", 0.0123456789), "error": 1e-3, "of": "position", "unit": "m",
               "expected": 4e-4, "us_per_vehicle_second": 2.0, "run_seconds": 1.234, "threads": 2, "memory_bytes": 3_400_000,
               "members": 64, "t1": 150.0, "reference": "a against b", "reference_error": 1e-9}  # fmt: skip
-    return suggest.Suggestion(**fields | more)
+    return Suggestion(**fields | more)
 
 
 def test_a_suggestion_in_words():
@@ -1128,8 +935,7 @@ def test_a_suggestion_in_words():
 
 
 def test_memory_and_time_are_those_of_all_members(scene):
-    run = dataclasses.replace(scene.run, save_every=0.5)
-    fleet = lw.Ensemble(dataclasses.replace(scene, run=run), 1000, 1)
+    fleet = fleet_of(scene, 1000, every=0.5)
     for dtype, size in (("float64", 8), ("float32", 4)):
         candidate = Candidate("psi_s", 0.1, dtype)
         assert suggest.memory_of(fleet, candidate, 4.0) == 1000 * (9 * 18 * size + suggest.BYTES_OF_A_MEMBER)
@@ -1163,48 +969,3 @@ def test_a_finished_run_is_checked_with_half_the_step(scene):
     assert (one.grid.h, one.grid.steps, one.dtype, one.method.name) == (0.05, 80, "float64", "psi_s")
     # The finer run is exact here: all of the error is seen, and more is concluded of order 2.
     assert error == pytest.approx(100 * 4.0 * 0.1**2 / (1.0 - 2.0**-2))
-
-
-def test_ladders_give_up_what_is_dear_or_stalls(scene):
-    sample = Sample(fleet_of(scene), 4.0, samples=5)
-    reference = reference_of(sample, {})
-    of = compared.compared_in("position")
-
-    def ladders(target, seconds=ENOUGH):
-        return Ladders(sample, reference, of, target, Budget(seconds))
-
-    def longest(one, method, dtype):
-        steps = one.longest(method, dtype)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as end:
-                return end.value
-
-    assert ladders(1e-3).dtypes == list(PRECISIONS)
-    assert ladders(1e-12).dtypes == ["float64"]
-    size = of.largest(reference.result)
-    assert ladders(4.0 * 2.0**-24 * size).dtypes == ["float64"]
-    assert ladders(4.1 * 2.0**-24 * size).dtypes != ["float64"]
-    assert ladders(1e-30).dtypes == ["float64"]
-    prices = {("psi_s", "float64"): 3.0, ("psi_x", "float64"): 100.0}
-    sample = on(sample, Runs({"psi_s": 1e-2, "psi_x": 1e-2, "rk4": 1e12}, prices, round_off=1e-3))
-    one = ladders(1e-3)
-    h = (1e-3 / (1e-2 * 16.0)) ** 0.5
-    price = longest(one, "psi_s", "float64")
-    assert price == one.priced[0][0] == 3.0 / sample.h(math.ceil(0.8 / h))
-    assert longest(one, "psi_x", "float64") == math.inf
-    assert longest(one, "psi_s", "float32") is None
-    assert one.cheapest() == [one.priced[0][1]]
-    assert len(one.priced) == 1
-    assert longest(ladders(1e-3, -1.0), "rk4", "float64") is None
-    one.priced += [(1.49 * price, "near"), (1.5 * price, "far"), (1.2 * price, "nearer")]
-    assert one.cheapest()[1:] == ["nearer", "near"]
-    assert ladders(1e-3).limited_by_damping
-    assert ladders(1e-3).cheapest() == []
-    damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)]), 2), 4.0, samples=5)
-    rate = h_rates(rates(damped.ensemble), 1.0)["drag"]
-    for ratio, limited in ((1.99, False), (2.01, True)):
-        one = Ladders(damped, reference, of, 1e-3, Budget(ENOUGH))
-        one.priced = [(1.0, SimpleNamespace(candidate=Candidate("psi_s", ratio / rate)))]
-        assert one.limited_by_damping is limited

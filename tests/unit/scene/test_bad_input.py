@@ -15,7 +15,6 @@ from lgvi_kernels.lanes.arithmetic import add, lane, mul  # noqa: F401
 from lgvi_kernels.lanes.state import struct
 from lgvi_warp.physics.terms import TYPES
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.terms import Current, Drag, Weight
@@ -30,6 +29,7 @@ POINT, AHEAD = [[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]]
 THRUSTER = {"type": "thrusters", "position": POINT, "direction": AHEAD, "coefficient": [1.0]}
 FIN = {"type": "fins", "position": POINT, "chord": AHEAD, "normal": [[0.0, 0.0, 1.0]], "area": 1.0, "lift_slope": 3.0,
        "drag": 0.1}  # fmt: skip
+STEERED = FIN | {"type": "control_fins", "command": 0.1}
 PROFILE = {"type": "current_profile", "depths": [0.0, 9.0], "velocities": [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]}
 SCHEDULE = {"type": "wrench_schedule", "times": [0.0, 1.0], "force": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]}
 TIDE = {"type": "current_harmonics", "amplitudes": AHEAD, "periods": [10.0]}
@@ -92,6 +92,10 @@ TERMS = [
      "keep one of them"),
     (FIN | {"chord": POINT}, "fins.chord[0] = [0.0, 0.0, 0.0]", "zero length", "trailing to leading edge"),
     (FIN | {"normal": AHEAD}, "fins.normal[0] = [1.0, 0.0, 0.0]", "along the chord", "across the fin's plane"),
+    (FIN | {"drag": [0.1, 0.2]}, "fins.drag = [0.1, 0.2]", "shape (2,)", "give 1 numbers [1]"),
+    (STEERED | {"rate_limit": INF}, "control_fins.rate_limit", "not finite", "give numbers [rad/s]"),
+    (STEERED | {"times": [0.0], "command_schedule": [[0.3]]}, "control_fins.command", "keep one of"),
+    ({"type": "body_lift", "matrix": [[NAN] * 6] * 6}, "body_lift.matrix", "not finite", "shape (6, 6)"),
     # names and types
     ({"type": "dragg"}, "terms[0].type = 'dragg'", "not known", "did you mean 'drag'?"),
     ({"type": ["drag"]}, "terms[0].type = ['drag']", "not known", "did you mean 'drag'?"),
@@ -302,30 +306,6 @@ YAML = [
 ]
 
 
-def test_all_faults_of_a_scene_file_at_once():
-    text = """
-    [vehicle]
-    mass = -10
-    inertia = [1, 2, 2.5]
-    [run]
-    method = "psi_q"
-    dtype = "float64"
-    [[terms]]
-    type = "drag"
-    linear = [-1, 0, 0, 0, 0, 0]
-    [[terms]]
-    type = "harpoon"
-    [[events]]
-    type = "box"
-    lower = [1, 1, 1]
-    upper = [0, 0, 0]
-    """
-    found = faults(scenes.loads, text)
-    keys = ("vehicle.mass = -10", "run.method = 'psi_q'", "drag.linear", "terms[1].type = 'harpoon'", "box.upper")
-    assert len(found) == len(keys)
-    assert all(any(one.startswith(key) for one in found) for key in keys)
-
-
 PATHS = [(path, str(path), "give the path of a TOML file") for path in ("missing.toml", None)]
 FAR, NEAR = lw.distributions.Normal(std=100.0), lw.distributions.Uniform(0.1, 0.2)
 VARIED = [(PROFILE, "current_profile.depths"), (SCHEDULE, "wrench_schedule.times"),
@@ -340,7 +320,6 @@ NAMES = [({"type": "drag"}, "drag.quadrtic", "did you mean 'drag.quadratic'?"),
 
 
 SCHEDULED = THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}
-STEERED = FIN | {"type": "control_fins", "command": 0.1}
 IDLE = [
     (SCHEDULED, "thrusters.command", "vary thrusters.command_schedule"),
     (THRUSTER, "thrusters.command_schedule", "vary thrusters.command"),

@@ -5,10 +5,7 @@ Each row of a table below is a file, or an argument, that somebody may meet. doc
 """
 
 import io
-import os
 import resource
-import subprocess
-import sys
 import time
 import zipfile
 from pathlib import Path
@@ -342,38 +339,6 @@ def test_a_scene_whose_name_means_another_folder_writes_below_runs():
         out, scene = None, "...toml"
 
     assert (str(out_of(Chosen())), str(out_of(Chosen(), "_x"))) == ("runs/scene", "runs/scene_x")
-
-
-# The command, here and as a process: exit code, a line, no traceback.
-COMMANDS = {
-    "device": (["run", "/dev/zero"], "is a device"),
-    "pipe": (["check", "pipe"], "is a named pipe"),
-    "deep": (["run", "deep.toml"], "nested"),
-    "seconds": (["tradeoff", PAPER, "--seconds", "nan"], "seconds = nan"),
-}
-
-
-def in_a_process(arguments):
-    """Exit code, output and errors of the command in a process of its own."""
-    command = [sys.executable, "-m", "lgvi_warp.cli", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    return done.returncode, done.stdout, done.stderr
-
-
-@pytest.mark.slow_for("process-device", "process-deep", "process-seconds")
-@pytest.mark.parametrize("name", COMMANDS)
-@pytest.mark.parametrize("where", ["here", "process"])
-def test_the_command_refuses_in_a_line(where, name, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    os.mkfifo("pipe")
-    Path("deep.toml").write_text("a = " + "[" * 100_000)
-    arguments, words = COMMANDS[name]
-    code, out, error = (main(arguments), *capsys.readouterr()) if where == "here" else in_a_process(arguments)
-    assert code == 2
-    assert words in error
-    assert out == ""
-    assert len(error.splitlines()) == 1
-    assert "Traceback" not in error
 
 
 # Faults are counted.

@@ -144,19 +144,6 @@ def test_toml_errors_name_the_file_and_line(tmp_path):
         lw.Scene.load(path)
 
 
-@pytest.mark.parametrize("name", ["absent.toml", "."])
-def test_files_that_cannot_be_read(tmp_path, name):
-    with pytest.raises(lw.SceneError, match="give the path"):
-        lw.Scene.load(tmp_path / name)
-
-
-def test_bytes_that_are_no_text(tmp_path):
-    path = tmp_path / "binary.toml"
-    path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(lw.SceneError, match="give the path"):
-        lw.Scene.load(path)
-
-
 @pytest.mark.parametrize("line, start", [
     ("[ensemble]\nvary = 3", "ensemble.vary = 3"),
     ('[ensemble.vary]\n"vehicle.mass" = 3', 'ensemble.vary."vehicle.mass" = 3'),
@@ -240,11 +227,3 @@ def test_solver_settings_of_a_run():
     assert scenes.loads(SOLVING + 'iterations = "auto"').run.method_of().iterations == "auto"
     # Another method, named later, does not inherit what was said of this one.
     assert run.method_of("psi_s") == lw.Method("psi_s")
-
-
-@pytest.mark.parametrize(("text", "fault"), [
-    ("rtol = 1e-9\natol = 1e-9", "run.rtol, atol = 'psi_s': estimates no error"), ("rtl = 1e-9", "run.rtl.*rtol"),
-])  # fmt: skip
-def test_solver_settings_are_refused(text, fault):
-    with pytest.raises(lw.SceneError, match=fault):
-        scenes.loads(SOLVING + text)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings read back: poses, colours, counts and texts are those of the result; each odd run has one that fits."""
+"""Recordings read back, beyond what is recorded: two together, odd runs, what is refused, viewers, sizes and times."""
 
 import dataclasses
 import re
@@ -16,9 +16,10 @@ from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.common.status import Status, failed, stop_time, under_way
+from lgvi_warp.common.status import Status, failed, under_way
+from lgvi_warp.views import drawn
 from lgvi_warp.views.fleet import OUTCOME_STYLES
-from lgvi_warp.views.recording import drawn, layout, viewer, world
+from lgvi_warp.views.recording import layout, viewer, world
 from lgvi_warp.views.recording import words as ten_words
 from tests.support.made import made
 from tests.support.viewer import started_by
@@ -95,49 +96,6 @@ def path(mixed, tmp_path_factory):
     return lw.record(mixed, tmp_path_factory.mktemp("recording") / "fleet.rrd")
 
 
-def test_poses_are_those_of_the_members_shown(mixed, path):
-    choice = lw.select_members(mixed)
-    seen = {}
-    for code in ("ok", "non_finite", "surface", "floor"):
-        positions = rows(path, f"/world/bodies/{code}", "translations")
-        turns = rows(path, f"/world/bodies/{code}", "quaternions")
-        scales = rows(path, f"/world/bodies/{code}", "scales")
-        for t in positions:
-            some = [scale[0] == 1.0 for scale in scales[t]] if scales else [True] * len(positions[t])
-            poses = zip(positions[t], turns[t], some, strict=True)
-            seen.setdefault(t, []).extend((*map(float, [*p, *q]), code) for p, q, good in poses if good)
-    for frame, t in zip(choice.frames, mixed.time[choice.frames], strict=True):
-        quaternion = lw.notation.quaternion_from_matrix(mixed.attitude[frame, choice.members])[:, [1, 2, 3, 0]]
-        pose = np.concatenate([mixed.position[frame, choice.members], quaternion], axis=1).astype(np.float32)
-        got = np.array([row[:7] for row in sorted(seen[t])], np.float32)
-        np.testing.assert_array_equal(got, pose[np.lexsort(pose.T[::-1])])
-
-
-def test_colours_change_when_members_end(mixed, path):
-    end, spacing = stop_time(mixed), np.diff(mixed.time).max()
-    for code in (Status.NON_FINITE, Status.SURFACE, Status.FLOOR):
-        scales = rows(path, f"/world/bodies/{code.name.lower()}", "scales")
-        count = {t: sum(scale[0] == 1.0 for scale in scales[t]) for t in scales}
-        for member in np.flatnonzero(mixed.status == code):
-            before, after = (max(t for t in count if t <= end[member] + side) for side in (-1e-9, spacing + 1e-9))
-            ended = (end[mixed.status == code] < after - 1e-9).sum()
-            assert count[after] == ended
-            assert count[before] < ended
-        assert count[mixed.time[-1]] == (mixed.status == code).sum()
-
-
-def test_curves_are_quantiles_of_those_under_way(mixed, path):
-    counted = under_way(mixed)
-    for frame in (0, 7, 20, 30):
-        t, depth = mixed.time[frame], mixed.position[frame, counted[frame], 2]
-        assert rows(path, "/curves/height/median", "scalars")[t] == pytest.approx([-np.median(depth)], rel=1e-5)
-        middle, variance = (rows(path, "/curves/height/90_percent", end)[t][0] for end in (":values", "variances"))
-        low, high = np.quantile(-depth, [0.05, 0.95])
-        assert (middle, variance) == pytest.approx((0.5 * (low + high), (0.5 * (high - low)) ** 2), rel=1e-4, abs=1e-6)
-        share = rows(path, "/members/under_way", "scalars")[t]
-        assert share == pytest.approx([100.0 * counted[frame].mean()])
-
-
 def test_what_filters_believe_is_drawn_beside_their_errors(tmp_path):
     run = fleet()
     rng, shape = np.random.default_rng(3), run.position.shape[:2]
@@ -202,18 +160,6 @@ def test_headings_are_circular():
     assert heading.name == "heading"
     np.testing.assert_allclose(heading.levels[-1] - heading.levels[0], 40.0, atol=1e-3)
     np.testing.assert_allclose(np.diff(heading.levels[3]), 20.0, atol=1e-3)
-
-
-def test_quantiles_are_those_of_numpy():
-    rng = np.random.default_rng(2)
-    values, counted = rng.normal(size=(5, 101)), rng.uniform(size=(5, 101)) < 0.7
-    counted[3] = False
-    got = drawn.at_levels(values, counted, (0.0, 0.1, 0.5, 1.0))
-    for row in (0, 1, 2, 4):
-        np.testing.assert_allclose(
-            got[:, row], np.quantile(values[row, counted[row]], [0.0, 0.1, 0.5, 1.0]), rtol=1e-12
-        )
-    assert np.isnan(got[:, 3]).all()
 
 
 def test_extremes_are_of_all_members_and_quantiles_of_many():

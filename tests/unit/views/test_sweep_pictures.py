@@ -8,7 +8,6 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.robustness.sweeps.summary import against_baseline
 from lgvi_warp.views.plots import sweep_pictures as sweeps
 from tests.support.swept import ByHand, N, swept
 
@@ -22,40 +21,6 @@ def bars(container):
     """Values of error bars, and their ends (n, 2, 2)."""
     line, _, (segments,) = container
     return line, np.array(segments.get_segments())
-
-
-@pytest.mark.parametrize(("names", "turned"), [("abcdef", 0.0), ("abcdefg", 90.0)])
-def test_success_is_that_of_the_sweep_and_many_names_stand_upright(names, turned):
-    sweep = swept(lambda i: i / 8, cases=names)
-    (axes,) = sweeps.plot_success(sweep)
-    line, ends = bars(*axes.containers)
-    expected = 100.0 * np.array([sweep.success(name) for name in names])
-    np.testing.assert_allclose(line.get_ydata(), expected[:, 0])
-    np.testing.assert_allclose(ends[:, :, 1], expected[:, 1:])
-    assert axes.get_xticklabels()[0].get_rotation() == turned
-
-
-def test_differences_are_those_to_the_baseline():
-    sweep = swept((0.2, 0.95, 0.225).__getitem__, cases="abc")
-    (axes,) = sweeps.plot_differences(sweep)
-    rows = [row.difference for row in against_baseline(sweep) if row.of == "success"]
-    for container, row in zip(axes.containers, rows, strict=True):
-        line, ends = bars(container)
-        np.testing.assert_allclose(
-            (*line.get_xdata(), *ends[0, :, 0]), 100.0 * np.array([row.value, row.lower, row.upper])
-        )
-
-
-def test_boxes_are_quantiles_of_members_that_did_not_fail():
-    sweep = swept(half, {"delay": [1, 2]}, failed=3, refused=(3,))
-    (axes,) = sweeps.plot_metrics(sweep)
-    assert len(axes.patches) == 3
-    for i, box in enumerate(axes.patches):
-        numbers = np.arange(3, N) * (1.0 + i)
-        corners = box.get_path().vertices[:, 1]
-        np.testing.assert_allclose((corners.min(), corners.max()), np.quantile(numbers, (0.25, 0.75)))
-        whiskers = np.concatenate([line.get_ydata() for line in axes.lines[5 * i : 5 * i + 5]])
-        np.testing.assert_allclose((whiskers.min(), whiskers.max()), np.quantile(numbers, (0.05, 0.95)))
 
 
 def test_boxes_beyond_the_most_are_counted():
@@ -96,16 +61,6 @@ ALIKE = "some members pass and some do not, or nothing varies"
 def test_a_sweep_with_nothing_to_draw_says_why(draw, sweep, words):
     with pytest.raises(NothingToDraw, match=words):
         draw(sweep)
-
-
-def test_responses_are_run_again_at_every_tick_with_what_is_tracked():
-    sweep = swept(half, {"k": [1, 2]}, cases="abcd")
-    panels = sweeps.plot_responses(sweep, members=7)
-    save = lw.SaveAt(every=0.5, fields=("position", "reference_depth"))
-    assert sweep.asked == [(name, range(7), {"k": 1}, save) for name in "abcd"]
-    lines = {line.get_label(): line for line in panels[0].lines}
-    np.testing.assert_allclose(lines["median"].get_ydata(), np.arange(5.0) + 13.0)
-    np.testing.assert_allclose(lines["wanted"].get_ydata(), np.arange(5.0) + 15.0)
 
 
 def test_responses_are_drawn_where_cases_differ_and_of_what_differs():

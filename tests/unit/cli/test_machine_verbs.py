@@ -182,55 +182,19 @@ def test_comments_of_a_new_scene_stand_in_a_column(tmp_path, capsys):
     assert "# Weight and buoyancy always act.\n" in (tmp_path / "b.toml").read_text()
 
 
-VERBS = [
-    completion.CompletedVerb("go", "Go: it's on.", {"-q": ("quiet [a]: b", None), "--to": ("where", ("x", "y")),
-                                           "--out": ("a file", ())}, ("up", "down")),
-    completion.CompletedVerb("see", "See.", {"--all": ("all", None)}, ()),
-]  # fmt: skip
-
-
-def test_scripts_for_shells_in_full():
-    values, _, rest = completion.bash(VERBS).partition("        *) case")
-    assert values.endswith(
-        '    case "$verb $before" in\n        "go --to") words="x y" ;;\n        " --color") words="auto always never" ;;\n'
-    )
-    assert "if" not in values
-    assert '[[ " go see " == *" $each "* ]]' in values
-    cases = ('go) words="up down -q --to --out" ;;', 'see) words="--all" files=1 ;;',
-             '*) words="go see --help --version -q --quiet -v --verbose --json --color" ;;')  # fmt: skip
-    assert rest.startswith(' "$verb" in\n' + "".join(f"            {case}\n" for case in cases))
-    assert completion.zsh(VERBS) == completion.ZSH.format(
-        names="        'go:Go: it'\\''s on.'\n        'see:See.'",
-        verbs="        go) _arguments -s '*-q[quiet (a); b]' '*--to[where]:value:(x y)' '*--out[a file]:value:_files'"
-        " '*:word:(up down)' ;;\n        see) _arguments -s '*--all[all]' '*:file:_files' ;;",
-    )
-    head = "complete -c lgvi-warp -n"
-    assert completion.fish(VERBS) == (
-        f"{head} __fish_use_subcommand -f -a go -d 'Go: it'\\''s on.'\n{head} __fish_use_subcommand -f -a see -d 'See.'\n"
-        f"{head} '__fish_seen_subcommand_from go' -f -a 'up down'\n"
-        f"{head} '__fish_seen_subcommand_from go' -s q -d 'quiet [a]: b'\n"
-        f"{head} '__fish_seen_subcommand_from go' -l to -x -a 'x y' -d 'where'\n"
-        f"{head} '__fish_seen_subcommand_from go' -l out -r -d 'a file'\n"
-        f"{head} '__fish_seen_subcommand_from see' -l all -d 'all'\n"
-    )
-
-
-def test_verbs_are_read_from_the_parser():
-    known = {verb.name: verb for verb in completion.verbs(cli.parser())}
-    assert known["list"].words == ("methods", "vehicles", "terms", "laws")
-    assert known["run"].words == ()
-    options = known["run"].options
-    assert set(options["--method"][1]) >= {"psi_s", "rk4", "gauss6"}
-    assert options["--dtype"][1][0] == "float64"
-    assert known["new"].options["--vehicle"][1] == tuple(lw.vehicles.names())
-    assert known["export"].options["--to"][1] == ("netcdf", "parquet")
-    assert known["help"].words == tuple(known)
-    assert options["--store"][1] == ("npz", "zarr")
-    assert options["--out"][1] == ()
-    assert options["--live"][1] is None
-    assert options["--quiet"] == options["-q"]
-    assert options["--out"][0].startswith("folder for the files")
-    assert known["list"].text == "Names of methods, vehicles, terms, or laws of controllers."
+def test_a_parser_that_completes_has_the_values_of_options():
+    parser = cli.parser()
+    completion.add_values(parser, "a file")
+    actions = {name: {(action.option_strings or [action.dest])[-1]: action for action in verb._actions}
+               for name, verb in parser.verbs.items()}  # fmt: skip
+    run = actions["run"]
+    assert set(run["--method"].choices) >= {"psi_s", "rk4", "gauss6"}
+    assert run["--dtype"].choices[0] == "float64"
+    assert actions["new"]["--vehicle"].choices == tuple(lw.vehicles.names())
+    assert actions["export"]["--to"].choices == ("netcdf", "parquet")
+    assert run["scene"].complete == run["--out"].complete == "a file"
+    assert run["--members"].choices is None
+    assert not any(hasattr(run[option], "complete") for option in ("--members", "--live", "--store", "--method"))
 
 
 def test_values_become_plain():

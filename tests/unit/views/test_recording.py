@@ -17,8 +17,9 @@ from rerun.chunk import RrdReader
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, failed, stop_time, under_way
+from lgvi_warp.views import drawn
 from lgvi_warp.views.fleet import OUTCOME_STYLES
-from lgvi_warp.views.recording import drawn, layout, viewer, world
+from lgvi_warp.views.recording import layout, viewer, world
 from lgvi_warp.views.recording import words as ten_words
 from tests.support.made import made
 from tests.support.viewer import started_by

@@ -29,24 +29,23 @@ from tests.unit.cli.test_terminal import document
 PAPER = str(ROOT / "examples" / "paper.toml")
 
 
-def test_info_of_the_machine(tuned_widths, capsys):
-    widths.keep({"plain float64": 8, "plain float32": 16})
+def test_info_of_the_machine(capsys):
     peak = {"float64": 1.25e10, "float32": 2.5e10}
     content = document(["info"], capsys, peak_of=peak.get)
     assert content["machine"] == machine.describe()
     assert content["memory"] == machine.memory_bytes()
     assert content["versions"] == machine.versions()
     assert content["peak"] == peak
-    assert content["packets"]["plain float32"] == {"vehicles": 16, "source": "tuned"}
+    assert content["packets"] == {kernel: {"vehicles": width.lanes, "source": width.source} for kernel in widths.KERNELS
+                                  for width in [widths.of_table(*widths.parts(kernel))]}  # fmt: skip
     assert main(["info"], peak_of=peak.get) == 0
     said = capsys.readouterr().out
     limits = container.cpu_quota(), machine.affinity(), machine.physical_memory()
     assert said.split("\n")[:-1] == list(machine_lines(content, *limits))
-    assert f"packets     vehicles, tuned ({tuned_widths}): plain float64 8, plain float32 16\n" in said
 
 
 def test_a_machine_in_words():
-    sources = {"plain": "tuned", "dense": "table"}
+    sources = {"plain": "table: avx2", "dense": "another"}
     content = {
         "machine": {"cpu": "a cpu", "simd": "avx2", "threads": 4}, "memory": 3 * 2**30,
         "versions": {"numpy": "2", "warp": "1"}, "peak": {"float64": 1.25e10, "float32": 2.5e10},
@@ -59,8 +58,8 @@ def test_a_machine_in_words():
         "versions    numpy 2, warp 1",
         "float64     one core's peak 12.5 GFMA/s",
         "float32     one core's peak 25.0 GFMA/s",
-        f"packets     vehicles, tuned ({widths.path()}): plain float64 8, plain float32 8",
-        "packets     vehicles, table: dense float64 8",
+        "packets     vehicles, table: avx2: plain float64 8, plain float32 8",
+        "packets     vehicles, another: dense float64 8",
     ]
     for memory, physical in ((0, 1), (2**30, 2**30), (2**30, None)):
         said = list(machine_lines(content | {"memory": memory}, None, 4, physical))
@@ -71,7 +70,7 @@ def test_a_machine_in_words():
         assert next(machine_lines(content, quota, 4, None)) == "cpu         a cpu, avx2, 4 threads"
 
 
-def test_bench_and_calibrate_in_full(tuned_widths, capsys):
+def test_bench_in_full(capsys):
     lines = ['{"a": 1}', '{"a": 2}']
     measure = Study([lines, lines])
     assert main(["bench"], measure=measure) == 0
@@ -79,17 +78,6 @@ def test_bench_and_calibrate_in_full(tuned_widths, capsys):
     given = ["bench", "--members", "5", "--steps", "7"]
     assert document(given, capsys, measure=measure)["readings"] == [{"a": 1}, {"a": 2}]
     assert [values for values, _ in measure.calls] == [(4096, 1000), (5, 7)]
-    readings = [("plain float64", {8: 2.0, 16: 1.525}, 8, 16), ("dense float64", {8: 1.0}, 8, 8)]
-    assert main(["calibrate"], measure=lambda: readings) == 0
-    assert widths.tuned() == {"plain float64": 16, "dense float64": 8}
-    assert capsys.readouterr().out == (
-        "plain float64       8: 2.00 ns, 16: 1.52 ns: 16, 8 by the table\n"
-        "dense float64       8: 1.00 ns: 8, as by the table\n"
-        f"kept in {tuned_widths}, for runs from now on; without that file the table counts\n"
-    )
-    content = document(["calibrate"], capsys, measure=lambda: readings)
-    assert content["kernels"]["plain float64"] == {"ns": {"8": 2.0, "16": 1.525}, "table": 8, "best": 16}
-    assert content["file"] == str(tuned_widths)
 
 
 def test_warm_in_full(capsys):

@@ -3,7 +3,10 @@
 
 import time
 from collections.abc import Callable, Sequence
+from statistics import median
 from typing import Any
+
+from lgvi_warp.measuring.cost import in_turn
 
 
 def least(
@@ -29,3 +32,11 @@ def least(
             call()
             best[i] = min(best[i], clock() - begun)
     return best
+
+
+def interleaved(
+    calls: Sequence[Callable[[], None]], rounds: int = 5, *, clock: Callable[[], float] = time.perf_counter
+) -> list[float]:
+    """Median wall time of calls in turn [s], after one call of each to warm up."""
+    in_turn(calls, 1, clock)
+    return [median(seconds) for seconds in in_turn(calls, rounds, clock)]

@@ -1,5 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
 # The public names of this door, one a line.
 
-from lgvi_warp.measuring.scaling import scaling as scaling
-from lgvi_warp.measuring.scaling import term_cost as term_cost
+from lgvi_warp.measuring.term_cost import term_cost as term_cost

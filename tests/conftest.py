@@ -105,17 +105,17 @@ def refuse(module, *_, **__):
 
 @pytest.fixture(scope="session", autouse=True)
 def widths_of_the_table(tmp_path_factory):
-    """Packets as on a machine where `lgvi-warp calibrate` never ran."""
+    """Packets as on a machine where no width was measured."""
     with mock.patch.object(widths, "path", lambda: tmp_path_factory.getbasetemp() / widths.FILE):
         yield
 
 
 @pytest.fixture
-def tuned_widths(widths_of_the_table):
-    """The file of tuned widths, in which a test may keep some."""
+def measured_widths(widths_of_the_table):
+    """The file of measured widths, in which a test may keep some."""
     yield widths.path()
     widths.path().unlink(missing_ok=True)
-    widths.read.cache_clear()
+    widths.read_hashes.cache_clear()
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ import numpy as np
 
 import lgvi_warp as lw
 from benchmarks.pages import line, markdown, stamp
+from benchmarks.timing import interleaved
 from lgvi_warp.measuring import speed
 from lgvi_warp.physics import notation, terms
 from lgvi_warp.runs.settle import make_plan
@@ -64,7 +65,7 @@ def table(dtype, members):
             known.append((method, make_plan(members, method, h=STEP, t1=100 * STEP, dtype=dtype)))
         except lw.SceneError as error:
             print(error, file=sys.stderr)
-    seconds = speed.interleaved([speed.stepper(plan) for _, plan in known], 7)
+    seconds = interleaved([speed.stepper(plan) for _, plan in known], 7)
     rows = []
     for (method, _), one in zip(known, seconds, strict=True):
         rows.append([f"`{method}`", *row(method, dtype, members), f"{1e9 * one / (100 * MEMBERS):.1f}"])

@@ -76,8 +76,8 @@ def main():
     terms, driven, methods = tables(rows(case.run(quick=False)))
     return TEXT.format(
         members=4096,
-        width64=widths.default_width("plain", "float64").lanes,
-        width32=widths.default_width("plain", "float32").lanes,
+        width64=widths.of_table("plain", "float64").lanes,
+        width32=widths.of_table("plain", "float32").lanes,
         step=case.STEP,
         stamp=stamp("term"),
         terms=terms,

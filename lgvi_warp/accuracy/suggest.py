@@ -61,6 +61,8 @@ SHARE = 0.4
 FINALISTS = 4
 # Bytes of a member besides its samples: state, parameters, status, and the arrays they are made from.
 BYTES_OF_A_MEMBER = 2000
+# Members that are timed for the time of all.
+TIMED_MEMBERS = 256
 
 
 @dataclass(frozen=True)
@@ -429,11 +431,11 @@ def refined(
 
 
 def seconds_of(
-    fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256, *, kernels: Kernels = KERNELS,
+    fleet: Ensemble, candidate: Candidate, t1: float, *, kernels: Kernels = KERNELS,
     timed: Callable[..., np.ndarray] = cost.timed,
 ) -> float:  # fmt: skip
     """Predict the CPU time of a run of all members from that of a few, with the scene's samples and without compiling [s]."""
-    n = min(members, fleet.members)
+    n = min(TIMED_MEMBERS, fleet.members)
     plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
     kernels.compile(plan)
     return float(timed([lambda: kernels.run(plan)], 2).min()) * fleet.members / n

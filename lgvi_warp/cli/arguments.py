@@ -14,7 +14,7 @@ from lgvi_warp.cli.completion import completion
 from lgvi_warp.cli.derivatives import derivatives
 from lgvi_warp.cli.lists import list_names, new, schema, show_help
 from lgvi_warp.cli.loops import margins, trim, worst_case
-from lgvi_warp.cli.machine import bench, calibrate, info
+from lgvi_warp.cli.machine import bench, info
 from lgvi_warp.cli.plot import plot
 from lgvi_warp.cli.rare import rare
 from lgvi_warp.cli.runs import predict, resume, run
@@ -27,7 +27,7 @@ from lgvi_warp.common.errors import closest
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
-          derivatives, margins, worst_case, trim, view, info, bench, warm, calibrate, new, list_names, schema, plot,
+          derivatives, margins, worst_case, trim, view, info, bench, warm, new, list_names, schema, plot,
           completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)

@@ -171,7 +171,7 @@ def schema(chosen: argparse.Namespace) -> int:
 
 def help_arguments(verb: Any) -> None:
     """Add the arguments of the verb help."""
-    verb.add_argument("of", metavar="VERB", nargs="?", choices=verb.verbs, help="a verb")
+    verb.add_argument("of", metavar="VERB", nargs="?", choices=tuple(verb.verbs), help="a verb")
 
 
 @as_verb("help", "print the options of a verb; without one, all verbs", help_arguments, reads=True)

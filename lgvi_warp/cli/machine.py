@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verbs info, without a folder about this machine, bench and calibrate."""
+"""The verbs info, without a folder about this machine, and bench."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.folders import info_of_folder
 from lgvi_warp.cli.output import Part, say, tell
 from lgvi_warp.cli.progress import progress_bar
-from lgvi_warp.cli.settings import load_scene, overrides
-from lgvi_warp.cli.verb import add_shared, as_verb
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.peak import fma_peak
@@ -39,7 +37,7 @@ def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_pe
 
     with progress_bar(chosen.quiet, "measuring"):
         peaks = {dtype: peak_of(dtype) for dtype in ("float64", "float32")}
-    packets = {kernel: widths.default_width(*widths.parts(kernel)) for kernel in widths.KERNELS}
+    packets = {kernel: widths.of_table(*widths.parts(kernel)) for kernel in widths.KERNELS}
     document = {
         "machine": machine.describe(),
         "memory": machine.memory_bytes(),
@@ -71,8 +69,7 @@ def machine_lines(document: dict[str, Any], quota: float | None, cores: int, phy
     for kernel, width in document["packets"].items():
         by_source.setdefault(width["source"], []).append(f"{kernel} {width['vehicles']}")
     for source, texts in by_source.items():
-        where = f" ({widths.path()})" if source == "tuned" else ""
-        yield f"packets     vehicles, {source}{where}: {', '.join(texts)}"
+        yield f"packets     vehicles, {source}: {', '.join(texts)}"
 
 
 def bench_arguments(verb: Any) -> None:
@@ -91,50 +88,4 @@ def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
         readings.append(parsed(line))
         say(chosen, line)
     tell(chosen, lambda: {"readings": readings}, str)
-    return 0
-
-
-def calibrate_arguments(verb: Any) -> None:
-    """Add the arguments of the verb calibrate."""
-    verb.add_argument("scene", nargs="?", metavar="SCENE", help="a scene file: measure the kernel of its run alone")
-    add_shared(verb, "--method --dtype --step --duration --members --set")
-
-
-@as_verb(
-    "calibrate",
-    "measure how many vehicles a packet should hold on this machine, for runs from now on",
-    calibrate_arguments,
-    reads=True,
-)
-def calibrate(chosen: argparse.Namespace, *, measure: Part = None) -> int:
-    """Run the verb calibrate: measure the widths of packets on this machine, and keep the best ones for later runs."""
-    from lgvi_warp.measuring import packet_width as tuning
-    from lgvi_warp.runs.request import Request
-    from lgvi_warp.scene.ensemble import Ensemble
-
-    if chosen.scene is not None:
-        plan = Request(Ensemble.from_scene(load_scene(chosen))).plan()
-        return _told(chosen, [(measure or tuning.calibrate_scene)(plan)], lambda kernels: widths.path())
-    if given := overrides(chosen):
-        raise SceneError(
-            [f"calibrate: {', '.join(given)} is of a scene, and none is given; write calibrate SCENE.toml"]
-        )
-    return _told(
-        chosen,
-        (measure or tuning.calibrate)(),
-        lambda kernels: widths.keep({kernel: result["best"] for kernel, result in kernels.items()}),
-    )
-
-
-def _told(chosen: argparse.Namespace, readings: Iterable[Any], keep: Callable[[dict[str, Any]], Path]) -> int:
-    """Print the speeds of kernels, and where the best widths are kept."""
-    kernels: dict[str, dict[str, Any]] = {}
-    for kernel, ns, of_table, fastest in readings:
-        speeds = ", ".join(f"{width}: {result:.2f} ns" for width, result in ns.items())
-        remark = "as by the table" if fastest == of_table else f"{of_table} by the table"
-        say(chosen, f"{kernel:19} {speeds}: {fastest}, {remark}")
-        kernels[kernel] = {"ns": ns, "table": of_table, "best": fastest}
-    path = keep(kernels)
-    tell(chosen, lambda: {"kernels": kernels, "file": path},
-         lambda: f"kept in {path}, for runs from now on; without that file the table counts")  # fmt: skip
     return 0

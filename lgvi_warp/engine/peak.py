@@ -9,12 +9,14 @@ import numpy as np
 
 from lgvi_warp.common.machine import register_width
 
+# Launches of the kernel, and passes of its loop in each.
+ROUNDS, LOOPS = 5, 1_000_000
 
-def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, loops: int = 1_000_000) -> float:
+
+def fma_peak(dtype: str = "float64", width: int | None = None) -> float:
     """Measure how many fused multiply-adds one core makes per second.
 
     width: lanes of a packet; None (default) for what suits this machine's registers.
-    loops: passes of the kernel's loop per launch (default 1,000,000).
     Returns: Fused multiply-adds per second of one core [1/s].
     """
     import warp as wp
@@ -30,10 +32,10 @@ def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, 
     values = np.full((CHAINS + 3, width), 0.5, dtype=dtype)
     data = wp.array(values, dtype=Lane, device="cpu")
     kernel_cache.load(kernel.module)
-    command = wp.launch(kernel, dim=1, inputs=[data, loops], device="cpu", record_cmd=True)
+    command = wp.launch(kernel, dim=1, inputs=[data, LOOPS], device="cpu", record_cmd=True)
     best = 0.0
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         start = time.perf_counter()
         command.launch()
-        best = max(best, CHAINS * width * loops / (time.perf_counter() - start))
+        best = max(best, CHAINS * width * LOOPS / (time.perf_counter() - start))
     return best

@@ -30,7 +30,7 @@ from lgvi_warp.engine.sample_layout import SampleLayout
 from lgvi_warp.engine.shared import MEMBERS, SEED, SharedResultsCache
 from lgvi_warp.engine.state_lanes import kernel_for
 from lgvi_warp.engine.survey import Survey, survey, survey_of
-from lgvi_warp.engine.widths import default_width, measured
+from lgvi_warp.engine.widths import measured, of_table
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.terms.base import Term
@@ -203,7 +203,7 @@ def choose_plan(
     check_ticks(choice, grid, ensemble.final is not None)
     chosen = width is None
     if width is None:
-        width, width_source = default_width(kind_of(method, choice), dtype)
+        width, width_source = of_table(kind_of(method, choice), dtype)
     layout = SampleLayout(choice, ordered(fields), dtype == COMPENSATED, read_at_ticks)
     spec = spec_of(choice, method, layout, width, dtype, checks, on_failure)
     if ensemble.copies is not None:

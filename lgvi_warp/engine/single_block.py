@@ -42,11 +42,9 @@ def run_single_block(
     return samples, outcome, rows
 
 
-def run_for_samples(
-    plan: Plan, advanced: Callable[[Block, int], None] = lambda block, steps: None
-) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
+def run_for_samples(plan: Plan) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
     """Advance all members; their samples, and their status (n,), None where all reached the end."""
-    samples, packets = _advanced(plan, plan.fields, advanced, False)
+    samples, packets = _advanced(plan, plan.fields, lambda block, steps: None, False)
     status = None if packets.untroubled else packets.outcome(warned=False).status
     packets.leave()
     return samples, status

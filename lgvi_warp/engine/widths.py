@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How many vehicles a packet holds: by a table for each kind of processor, or as it was measured on this machine.
 
-What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> kind of kernel
--> width, and under HASHES the hash of one kernel -> its width.
+What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> HASHES -> hash
+of a kernel -> its width.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import contextlib
 import functools
 import json
 import os
-from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -46,10 +45,7 @@ MOST_HASHES = 1_000
 
 
 class Width(NamedTuple):
-    """Vehicles in a packet, and what says so: "asked for", "measured", "tuned", or "table" and the kind of processor.
-
-    measured: for this very kernel; tuned: for its kind.
-    """
+    """Vehicles in a packet, and what says so: "asked for", "measured", or "table" and the kind of processor."""
 
     lanes: int
     source: str
@@ -66,12 +62,6 @@ def kernel_kind(kind: str, dtype: str) -> str:
     return dtype if dtype == "float32_compensated" else f"{kind} {dtype}"
 
 
-def default_width(kind: str, dtype: str) -> Width:
-    """Choose the width of a kernel on this machine."""
-    lanes = tuned().get(kernel_kind(kind, dtype))
-    return Width(lanes, "tuned") if lanes else of_table(kind, dtype)
-
-
 def of_table(kind: str, dtype: str, *, cpu: str | None = None, simd: str | None = None) -> Width:
     """Look up the width of a kernel for this kind of processor, or another one's name and SIMD extension."""
     simd = simd or machine.simd()
@@ -82,7 +72,7 @@ def of_table(kind: str, dtype: str, *, cpu: str | None = None, simd: str | None 
 
 
 def path() -> Path:
-    """Place of the file of tuned widths."""
+    """Place of the file of measured widths."""
     return _path(os.environ.get("WARP_CACHE_PATH"))
 
 
@@ -93,68 +83,34 @@ def _path(folder: str | None) -> Path:
     return Path(folder or appdirs.user_cache_dir(appname="warp", appauthor="NVIDIA")) / FILE
 
 
-def tuned() -> dict[str, int]:
-    """Read the widths that were tuned on this machine with these versions."""
-    return read(path())
-
-
 def measured() -> dict[str, int]:
     """Read the widths that were measured for single kernels on this machine, by the kernel's hash."""
     return read_hashes(path())
 
 
 @functools.cache
-def read(file: Path) -> dict[str, int]:
-    """Read a file of tuned widths once in a process."""
-    return {name: width for name, width in _of_this_machine(file).items() if name in KERNELS and _is_width(width)}
-
-
-@functools.cache
 def read_hashes(file: Path) -> dict[str, int]:
     """Read the widths of single kernels in a file once in a process."""
-    known = _of_this_machine(file).get(HASHES)
-    return {name: width for name, width in known.items() if _is_width(width)} if isinstance(known, dict) else {}
+    return {name: width for name, width in _hashes(_content(file)).items() if type(width) is int and width in WIDTHS}
 
 
-def keep(widths: Mapping[str, int], *, of: str | None = None) -> Path:
-    """Keep widths of kinds for this machine and these versions, or others that `of` names, in place of those it had."""
-    machine_kept = of or this_machine()
-    return _change(machine_kept, lambda known: dict(widths) | {key: known[key] for key in known if key == HASHES})
-
-
-def keep_measured(kernel: str, width: int) -> Path:
+def keep_measured(kernel: str, width: int) -> None:
     """Keep the width of one kernel, given by its hash, for this machine and these versions, beside those of others."""
-
-    def changed(known: dict[str, object]) -> dict[str, object]:
-        hashes = known.get(HASHES)
-        # The newest last: of a full file the oldest go.
-        others = {key: value for key, value in hashes.items() if key != kernel} if isinstance(hashes, dict) else {}
-        kept = list(others.items())[1 - MOST_HASHES :]
-        return known | {HASHES: dict([*kept, (kernel, width)])}
-
-    return _change(this_machine(), changed)
-
-
-def _change(machine_kept: str, changed: Callable[[dict[str, object]], dict[str, object]]) -> Path:
     file = path()
     file.parent.mkdir(parents=True, exist_ok=True)
     with files.locked(file.parent, wait=True):
         content = _content(file)
-        known = content.get(machine_kept)
-        content[machine_kept] = changed(known if isinstance(known, dict) else {})
+        others = [(key, value) for key, value in _hashes(content).items() if key != kernel]
+        # The newest last: of a full file the oldest go.
+        content[this_machine()] = {HASHES: dict([*others[1 - MOST_HASHES :], (kernel, width)])}
         files.write_whole(file, json.dumps(content, indent=1).encode())
-    read.cache_clear()
     read_hashes.cache_clear()
-    return file
 
 
-def _is_width(value: object) -> bool:
-    return type(value) is int and value in WIDTHS
-
-
-def _of_this_machine(file: Path) -> dict[str, Any]:
-    known = _content(file).get(this_machine())
-    return known if isinstance(known, dict) else {}
+def _hashes(content: dict[str, Any]) -> dict[str, Any]:
+    known = content.get(this_machine())
+    hashes = known.get(HASHES) if isinstance(known, dict) else None
+    return hashes if isinstance(hashes, dict) else {}
 
 
 def this_machine() -> str:
@@ -163,8 +119,8 @@ def this_machine() -> str:
     return f"{machine.cpu_name()}, {machine.simd()}, lgvi-warp {versions['lgvi-warp']}, Warp {versions['warp-lang']}"
 
 
-def _content(file: Path) -> dict[str, object]:
-    """What a file of tuned widths holds; nothing, if it is none."""
+def _content(file: Path) -> dict[str, Any]:
+    """What a file of measured widths holds; nothing, if it is none."""
     with contextlib.suppress(OSError, ValueError, SceneError):
         content = safe_files.parsed(safe_files.read(file.parent, file.name, MOST_BYTES))
         return content if isinstance(content, dict) else {}

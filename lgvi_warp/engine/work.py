@@ -16,7 +16,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.control.signals import SIGNALS
 from lgvi_warp.engine.block import Block
-from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper, PacketsKeeper
+from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import TABLE, Field
 from lgvi_warp.physics.inertia import Frame
@@ -173,8 +173,8 @@ def run_block(
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome(warned)
         for block_keeper in block_keepers:
-            if isinstance(block_keeper, PacketsKeeper):
-                block_keeper.take_packets(packets)
+            if take_packets := getattr(block_keeper, "take_packets", None):
+                take_packets(packets)
         results = tuple(block_keeper.close(outcome) for block_keeper in block_keepers)
         packets.leave()
         return results

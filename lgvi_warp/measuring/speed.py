@@ -7,7 +7,6 @@ import dataclasses
 import json
 import time
 from collections.abc import Callable, Iterator, Sequence
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,6 @@ from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.peak import fma_peak
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.measuring.cost import in_turn
-from lgvi_warp.methods.method import COMPOSITIONS, HALVES, Method
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.runs.settle import make_plan
@@ -24,40 +22,8 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment, Start
 
-# Operations of one step of the example: additions and multiplications, two for a fused pair; divisions are not counted.
-# `python -m benchmarks run operations` counts them at a step of 0.01 s, where the start value of (24) is within its tolerance.
-OPERATIONS = {
-    "phi": 269, "phi_adjoint": 269, "psi": 471, "psi_s": 459, "psi_1": 305, "psi_x": 299, "psi_x8": 377,
-    "psi_w": 1375, "rkn4_6": 2125, "rkn6_11": 3895, "rkn6_14": 4959, "gauss4": 2288, "gauss6": 3279, "gauss8": 4146,
-    "gauss10": 5080, "gauss12": 5387, "rk4": 529, "rk5": 946, "rk5_ck": 904, "rk8": 2170, "rkw3": 529, "cg3": 1315,
-    "rkmk4": 1081,
-}  # fmt: skip
-SOLVES = {"phi": 1, "phi_adjoint": 1, "psi": 2, "psi_s": 2, "psi_1": 1}
-# Of one Newton step of a solve, and of the test against its tolerance, which a fixed number of steps does without.
-NEWTON, RESIDUAL = 15, 9
-# Of one length of a stage: what a single step forms once, before the first.
-LENGTH = 4.75
-
-
-def operations(method: str, iterations: int | None = None) -> int | None:
-    """Arithmetic operations of one step of the example, a fused pair as two; None for methods that were not counted.
-
-    iterations: Newton steps of a solve; None for as many as its tolerance asks for, none at short steps.
-    """
-    composition, _, base = method.rstrip(")").rpartition("(")
-    if base not in OPERATIONS:
-        return None
-    of_solve = 0 if iterations is None else NEWTON * iterations - RESIDUAL
-    count = OPERATIONS[base] + SOLVES.get(base, 0) * of_solve
-    if not composition:
-        return count
-    lengths = 2 if composition in HALVES else 1
-    return round(stages_of(composition) * (count + LENGTH * lengths))
-
-
-def stages_of(composition: str) -> int:
-    """How many steps of its base a composition makes."""
-    return len(COMPOSITIONS[composition][1] if composition in COMPOSITIONS else HALVES[composition][1])
+# Operations of a step of the example by psi_s: additions and multiplications, two for a fused pair; divisions do not count.
+OPERATIONS = 459
 
 
 def example() -> Scene:
@@ -94,14 +60,6 @@ def void(_: Any) -> None:
     """Accept any value and return nothing."""
 
 
-def interleaved(
-    calls: Sequence[Callable[[], None]], rounds: int = 5, *, clock: Callable[[], float] = time.perf_counter
-) -> list[float]:
-    """Median wall time of calls in turn [s], after one call of each to warm up."""
-    in_turn(calls, 1, clock)
-    return [median(seconds) for seconds in in_turn(calls, rounds, clock)]
-
-
 def least(
     calls: Sequence[Callable[[], None]], rounds: int = 15, *, clock: Callable[[], float] = time.perf_counter
 ) -> list[float]:
@@ -111,26 +69,23 @@ def least(
 
 def measure(
     members: int = 4096, steps: int = 1000, *, prepare: Callable[[Plan], Callable[[], None]] = stepper,
-    timed: Callable[[Sequence[Callable[[], None]]], list[float]] = interleaved, peak_of: Callable[[str], float] = fma_peak,
+    timed: Callable[[Sequence[Callable[[], None]]], list[float]] = least, peak_of: Callable[[str], float] = fma_peak,
 ) -> Iterator[str]:  # fmt: skip
     """Measure psi_s in both precisions next to the peak of the core."""
     for dtype in ("float64", "float32"):
         plan = make_plan(fleet(members), "psi_s", h=0.01, t1=0.01 * steps, dtype=dtype)
         seconds = timed([prepare(plan)])[0] / (members * steps)
-        peak = peak_of(dtype)
-        yield json.dumps(record(plan.method, dtype, plan.spec.width, seconds, peak))
+        yield json.dumps(record(plan, seconds, peak_of(dtype), OPERATIONS))
 
 
-def record(method: Method, dtype: str, width: int, seconds: float, peak: float) -> dict[str, Any]:
+def record(plan: Plan, seconds: float, peak: float, operations: int | None) -> dict[str, Any]:
     """Describe one measurement of a kernel, `seconds` a vehicle and step, next to the core's peak [1/s]."""
-    iterations = None if method.iterations is None else int(method.iterations)
-    count = None if method.adaptive else operations(method.name, iterations)
     return {
-        "method": method.name,
-        "dtype": dtype,
-        "width": width,
+        "method": plan.method.name,
+        "dtype": plan.dtype,
+        "width": plan.spec.width,
         "ns_per_vehicle_step": round(1e9 * seconds, 2),
-        "operations": count,
+        "operations": operations,
         "peak_gfma": round(peak / 1e9, 1),
-        "part_of_peak": None if count is None else round(float(np.divide(count / seconds, 2.0 * peak)), 3),
+        "part_of_peak": None if operations is None else round(float(np.divide(operations / seconds, 2.0 * peak)), 3),
     }

@@ -28,33 +28,33 @@ def xarray() -> Any:
 
 
 @contextlib.contextmanager
-def data_set(source: Any, key: str = "file") -> Iterator[Any]:
+def data_set(source: Any) -> Iterator[Any]:
     """An xarray Dataset as `opened` gives it, closed at the end where it is that of a file."""
-    ds = opened(source, key)
+    ds = opened(source)
     try:
         yield ds
     except OSError as error:  # of what is read when it is needed
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise SceneError([f"{key} = {brief(os.fspath(source))}: is damaged: {reason}; {REMEDY}"]) from error
+        raise SceneError([f"file = {brief(os.fspath(source))}: is damaged: {reason}; {REMEDY}"]) from error
     finally:
         if ds is not source:
             ds.close()
 
 
-def opened(source: Any, key: str = "file") -> Any:
+def opened(source: Any) -> Any:
     """An xarray Dataset: the one that is given, or that of a NetCDF file, of which nothing but coordinates is read yet."""
     library = xarray()
     if isinstance(source, library.Dataset):
         return source
     if isinstance(source, library.DataArray):
-        raise refusal(key, type(source).__name__, "is one variable", "give the Dataset that has it")
+        raise refusal("file", type(source).__name__, "is one variable", "give the Dataset that has it")
     with contextlib.ExitStack() as stack:
-        path, file = stack.enter_context(regular_file(source, key))
+        path, file = stack.enter_context(regular_file(source, "file"))
         begin = file.read(8)
         file.seek(0)
         try:
             if begin == HDF5:
-                _check_closed(file, key, path)
+                _check_closed(file, path)
                 whole = library.open_dataset(file, engine="h5netcdf", cache=False, phony_dims="access")
             elif begin.startswith(CLASSIC):
                 _check_whole(path, os.fstat(file.fileno()).st_size)
@@ -69,10 +69,10 @@ def opened(source: Any, key: str = "file") -> Any:
             raise
         except Exception as error:  # whatever the library makes of a damaged file
             reason = " ".join(str(error).split())[:200] or type(error).__name__
-            raise SceneError([f"{key} = {path}: is damaged, or no NetCDF file: {reason}; {REMEDY}"]) from error
+            raise SceneError([f"file = {path}: is damaged, or no NetCDF file: {reason}; {REMEDY}"]) from error
 
 
-def _check_closed(file: BinaryIO, key: str, path: str) -> None:
+def _check_closed(file: BinaryIO, path: str) -> None:
     """Refuse an HDF5 file that is not all there is."""
     try:
         import h5py
@@ -81,7 +81,7 @@ def _check_closed(file: BinaryIO, key: str, path: str) -> None:
     with h5py.File(file, "r") as content:
         problem = leads_elsewhere(content)
     if problem:
-        raise refusal(key, path, problem, "give a file that holds all its numbers, packed by filters of HDF5 itself")
+        raise refusal("file", path, problem, "give a file that holds all its numbers, packed by filters of HDF5 itself")
 
 
 def _check_whole(path: str, size: int) -> None:

@@ -17,6 +17,8 @@ from lgvi_warp.ocean.s_levels import at_depths
 ROUND_OFF = 1e-6
 # How far inside the edge of its data a grid that is not told stays, as a part of its size: edges are curved in the plane.
 MARGIN = 1e-6
+# Places along each side of a box.
+ON_EDGE = 21
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +146,11 @@ def directions(placed: Placed, along: str) -> np.ndarray:
     return vectors
 
 
-def edge_of(box: np.ndarray, count: int = 21) -> tuple[np.ndarray, np.ndarray]:
+def edge_of(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places along the edge of a box (2, 2) in the plane [m]."""
-    north, east = (np.linspace(float(low), float(high), count) for low, high in box[:2])
+    north, east = (np.linspace(float(low), float(high), ON_EDGE) for low, high in box[:2])
     sides = np.meshgrid(north, east, indexing="ij")
-    rim = np.ones((count, count), bool)
+    rim = np.ones((ON_EDGE, ON_EDGE), bool)
     rim[1:-1, 1:-1] = False
     return sides[0][rim], sides[1][rim]
 

@@ -19,9 +19,9 @@ from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.toml_text import parsed
 
 
-def tables_of_file(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def tables_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read the tables of a scene file (TOML)."""
-    return tables_and_text(path, overrides)[0]
+    return tables_and_text(path)[0]
 
 
 def tables_and_text(

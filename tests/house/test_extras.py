@@ -2,11 +2,13 @@
 """Without the libraries of an extra, what needs them says which extra installs them, and in no other error."""
 
 import sys
+from argparse import Namespace
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp import cli
 from lgvi_warp.common import yaml_text
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.sampling.designs.space import Space
@@ -34,6 +36,7 @@ DOORS = {
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (canvas.figure_class, "matplotlib.figure", "viz"),
     "reports": (lambda: run_again.toml_of({}), "tomlkit", "viz"),
+    "completion": (lambda: cli.arguments.VERBS["completion"](Namespace(shell="bash")), "shtab", "shell"),
     "recordings": (lambda: rerun.record(None, "x"), "rerun", "viz"),
 }
 

@@ -13,7 +13,7 @@ from tests.conftest import ROOT
 
 HEAVY = {
     "scipy", "warp", "matplotlib", "rerun", "xarray", "pandas", "zarr", "distributed", "dask", "h5py", "netCDF4", "pyarrow",
-    "SALib", "gymnasium", "tqdm", "control", "stable_baselines3", "torch", "fmpy",
+    "SALib", "gymnasium", "tqdm", "control", "stable_baselines3", "torch", "fmpy", "shtab",
 }  # fmt: skip
 PRINT = "; import sys, json; print(json.dumps(sorted(sys.modules)))"
 

@@ -5,7 +5,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.engine import widths
-from lgvi_warp.measuring import packet_width, speed
+from lgvi_warp.measuring import speed
 from lgvi_warp.runs.measured_width import candidates, measure, with_best_width
 from lgvi_warp.runs.settle import make_plan
 
@@ -26,14 +26,14 @@ def plan_of(members=64, steps=8, **named):
     return make_plan(speed.fleet(members), "psi_s", h=0.01, t1=0.01 * steps, **named)
 
 
-def test_a_short_run_measures_nothing(tuned_widths):
+def test_a_short_run_measures_nothing(measured_widths):
     clock = Clock(1.0)
     plan = plan_of()
     assert with_best_width(plan, 1, clock) is plan
     assert clock.readings == 0
 
 
-def test_a_run_that_turns_out_short_keeps_its_width(tuned_widths):
+def test_a_run_that_turns_out_short_keeps_its_width(measured_widths):
     plan = plan_of(members=2_000_000)
     # 16 million vehicle-steps of 1 us.
     clock = Clock(1e-6 * 512 * 8)
@@ -42,7 +42,7 @@ def test_a_run_that_turns_out_short_keeps_its_width(tuned_widths):
 
 
 @pytest.mark.parametrize("asked", [{"width": 8}, {"method": "rk5"}])
-def test_a_width_that_was_asked_for_and_steps_that_are_chosen_stay(tuned_widths, asked):
+def test_a_width_that_was_asked_for_and_steps_that_are_chosen_stay(measured_widths, asked):
     method = lw.Method("rk5", rtol=1e-6, atol=1e-9) if "method" in asked else "psi_s"
     plan = make_plan(speed.fleet(2_000_000), method, h=0.01, t1=0.1, width=asked.get("width"))
     clock = Clock(1e3)
@@ -50,7 +50,7 @@ def test_a_width_that_was_asked_for_and_steps_that_are_chosen_stay(tuned_widths,
     assert clock.readings == 0
 
 
-def test_a_long_run_measures_two_widths_and_later_runs_know(tuned_widths):
+def test_a_long_run_measures_two_widths_and_later_runs_know(measured_widths):
     plan = plan_of(members=2_000_000)
     # 16 million vehicle-steps of 10 us, on each width alike: the width stays, and is known to be measured.
     chosen = with_best_width(plan, 1, Clock(1e-5 * 512 * 8))
@@ -61,16 +61,16 @@ def test_a_long_run_measures_two_widths_and_later_runs_know(tuned_widths):
     assert clock.readings == 0
 
 
-def test_a_run_goes_on_where_its_width_cannot_be_kept(tuned_widths):
-    tuned_widths.mkdir()  # a file cannot stand here
+def test_a_run_goes_on_where_its_width_cannot_be_kept(measured_widths):
+    measured_widths.mkdir()  # a file cannot stand here
     try:
         chosen = with_best_width(plan_of(members=2_000_000), 1, Clock(1e-5 * 512 * 8))
         assert chosen.width_source == "measured"
     finally:
-        tuned_widths.rmdir()
+        measured_widths.rmdir()
 
 
-def test_the_faster_width_is_taken(tuned_widths):
+def test_the_faster_width_is_taken(measured_widths):
     plan = plan_of()
     (one,), (two,) = candidates(plan, (1,)), candidates(plan, (2,))
     assert (one, two) == (plan.spec.width // 2, plan.spec.width) or (one, two) == (plan.spec.width, 2 * plan.spec.width)
@@ -94,12 +94,3 @@ class Ticks(Clock):
         self.readings += 1
         self.now += next(self.times) if self.readings % 2 == 0 else 0.0
         return self.now
-
-
-@pytest.mark.slow
-def test_a_scene_is_calibrated(tuned_widths):
-    plan = plan_of()
-    reading = packet_width.calibrate_scene(plan, rounds=2)
-    assert set(reading.ns) == set(candidates(plan, (1, 2, 4)))
-    assert plan_of().width_source == "measured"
-    assert plan_of().spec.width == reading.best

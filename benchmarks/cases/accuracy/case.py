@@ -8,6 +8,7 @@ import numpy as np
 
 import lgvi_warp as lw
 from benchmarks.problems import difference
+from benchmarks.timing import interleaved
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
@@ -62,7 +63,7 @@ def run(quick):
             plan.compile()
             runs.append(Packets(plan, plan.ensemble.select(0, members)))
         calls = [partial(packets.advance, 0, packets.plan.grid.steps) for packets in runs]
-        seconds = speed.interleaved([partial(call_only, call) for call in calls], 3 if quick else 5)
+        seconds = interleaved([partial(call_only, call) for call in calls], 3 if quick else 5)
         for method, (steps, made), packets, one in zip(methods, found, runs, seconds, strict=True):
             if packets.outcome().status.any():
                 continue  # a member that failed costs nothing: no time of a method

@@ -7,6 +7,7 @@ Also the drift from orthogonality after all steps, neither renormalised.
 import numpy as np
 import warp as wp
 
+from benchmarks.timing import interleaved
 from lgvi_kernels.lanes import native
 from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     add,
@@ -249,7 +250,7 @@ def run(quick):
     q = end["quaternion"][:, 9:].transpose(0, 2, 1).reshape(-1, 4)
     drift = {"rows": np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(), "quaternion": np.abs((q * q).sum(1) - 1).max()}
     apart = np.abs(end["rows"][:, :3] - end["quaternion"][:, :3]).max()
-    seconds = speed.interleaved(calls)
+    seconds = interleaved(calls)
     for name, one in zip(variants, seconds, strict=True):
         yield {
             "attitude": name,

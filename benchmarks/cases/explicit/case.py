@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from benchmarks.timing import interleaved
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.measuring import speed
 from lgvi_warp.methods.method import Method
@@ -27,7 +28,7 @@ def run(quick):
     fixed = [(Method(name), h) for name, steps in STEPS.items() for h in steps]
     chosen = [(Method("rk8", rtol=one, atol=one), t1) for one in TOLERANCES]
     plans = [make_plan(fleet, method, h=h, t1=t1) for method, h in (*fixed, *chosen)]
-    seconds = speed.interleaved([speed.stepper(plan) for plan in plans])
+    seconds = interleaved([speed.stepper(plan) for plan in plans])
     for plan, one in zip(plans, seconds, strict=True):
         errors = np.abs(attitudes(plan) - truth).max(axis=1)
         yield {

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """ns per vehicle and step of every method, dtype and width on one core, beside the core's peak."""
 
+from benchmarks.counted import operations
+from benchmarks.timing import interleaved
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.engine.peak import fma_peak
 from lgvi_warp.measuring import speed
@@ -19,6 +21,6 @@ def run(quick):
             fleet = speed.fleet(members)
             names = QUICK[0] if quick else PROGRAMS
             plans = [make_plan(fleet, name, h=0.01, t1=0.01 * steps, dtype=dtype, width=width) for name in names]
-            seconds = speed.interleaved([speed.stepper(plan) for plan in plans])
+            seconds = interleaved([speed.stepper(plan) for plan in plans])
             for plan, one in zip(plans, seconds, strict=True):
-                yield speed.record(plan.method, dtype, width, one / (members * steps), peak)
+                yield speed.record(plan, one / (members * steps), peak, operations(plan.method))

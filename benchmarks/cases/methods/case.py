@@ -6,6 +6,7 @@ alone, at that width (fma_peak). `off` is time times that rate, over the same at
 width is used as well as the default is, and 10 where vectorisation fell off a cliff.
 """
 
+from benchmarks.timing import interleaved
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.peak import fma_peak
@@ -63,7 +64,7 @@ def one_method(name, dtype, rates, members, steps):
         yield {"method": name, "dtype": dtype, "refused": error.faults[0]}
         return
     compiled = {width: plan.compile() for width, plan in plans.items()}
-    seconds = speed.interleaved([speed.stepper(plan) for plan in plans.values()])
+    seconds = interleaved([speed.stepper(plan) for plan in plans.values()])
     ns = {width: 1e9 * one / (members * steps) for width, one in zip(plans, seconds, strict=True)}
     operations = {width: ns[width] * rates[width] * 1e-9 for width in ns}
     for width in ns:

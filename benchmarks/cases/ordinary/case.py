@@ -4,6 +4,8 @@
 import numpy as np
 
 from benchmarks.cases.ordinary.kernel import command
+from benchmarks.counted import operations
+from benchmarks.timing import interleaved
 from lgvi_warp.engine.peak import fma_peak
 from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
@@ -22,8 +24,8 @@ def run(quick):
             ordinary = command(states, vehicle.mass_matrix, vehicle.inertia, net, moment, 0.01, steps, method, dtype)[1]
             ordinary()
             plan = make_plan(fleet, method, h=0.01, t1=0.01 * steps, dtype=dtype)
-            slow, fast = speed.interleaved([ordinary, speed.stepper(plan)])
-            record = speed.record(plan.method, dtype, plan.spec.width, fast / (members * steps), fma_peak(dtype))
+            slow, fast = interleaved([ordinary, speed.stepper(plan)])
+            record = speed.record(plan, fast / (members * steps), fma_peak(dtype), operations(plan.method))
             yield record | {
                 "ordinary_ns_per_vehicle_step": round(1e9 * slow / (members * steps), 1),
                 "times_faster": round(float(np.divide(slow, fast)), 1),

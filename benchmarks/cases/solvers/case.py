@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 import lgvi_warp as lw
+from benchmarks.timing import interleaved
 from lgvi_warp.measuring import speed
 from lgvi_warp.methods.method import SOLVERS, Method
 from lgvi_warp.reference import riccati, rotation
@@ -102,7 +103,7 @@ def steps(quick):
     fleet = speed.fleet(members)
     for dtype in ("float64", "float32"):
         plans = [make_plan(fleet, method, h=0.01, t1=0.01 * count, dtype=dtype) for method in methods("psi_s", quick)]
-        seconds = speed.interleaved([speed.stepper(plan) for plan in plans])
+        seconds = interleaved([speed.stepper(plan) for plan in plans])
         for method, one in zip(methods("psi_s", quick), seconds, strict=True):
             yield {
                 "solver": method.solver,
@@ -121,7 +122,7 @@ def single_solves(quick):
     shapes = ("paper",) if quick else tuple(SHAPES)
     for dtype in ("float64", "float32"):
         plans = [make_plan(spin, method, h=0.01, t1=0.01 * count, dtype=dtype) for method in methods("psi_1", quick)]
-        seconds = speed.interleaved([speed.stepper(plan) for plan in plans])
+        seconds = interleaved([speed.stepper(plan) for plan in plans])
         for method, one in zip(methods("psi_1", quick), seconds, strict=True):
             for shape in shapes:
                 found = qualities(partial(by_kernel, method, dtype), shape, dtype, 16)

@@ -9,6 +9,7 @@ terms" are without noise.
 from benchmarks import problems
 from benchmarks.peers.plot import DRIVEN
 from benchmarks.peers.problem import driven_scene
+from benchmarks.timing import interleaved
 from lgvi_warp.measuring import speed
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.sampling.distributions.basic import Normal, Uniform
@@ -55,7 +56,7 @@ def run(quick):
             make_plan(Ensemble(scene, members, 1, spread(name)), method, h=STEP, t1=STEP * steps, dtype=dtype)
             for name, method, scene in chosen
         ]
-        seconds = speed.interleaved([speed.stepper(plan) for plan in plans], rounds)
+        seconds = interleaved([speed.stepper(plan) for plan in plans], rounds)
         times = [1e9 * one / (members * steps) for one in seconds]
         none = {method: ns for (name, method, _), ns in zip(chosen, times, strict=True) if name == "none"}
         for (name, method, scene), plan, ns in zip(chosen, plans, times, strict=True):

@@ -11,6 +11,7 @@ import itertools
 import os
 from pathlib import Path
 
+from benchmarks.timing import interleaved
 from lgvi_warp.common import machine
 from lgvi_warp.measuring import speed
 from lgvi_warp.runs.run import run_plan
@@ -71,7 +72,7 @@ def run(quick):
 
         return call
 
-    seconds = speed.interleaved([solve(n, cores) for _, n, cores in kinds], 1 if quick else 3)
+    seconds = interleaved([solve(n, cores) for _, n, cores in kinds], 1 if quick else 3)
     for (name, threads, _), one in zip(kinds, seconds, strict=True):
         yield {
             "placement": name,

@@ -14,8 +14,7 @@ from lgvi_kernels.laws.driven import make_driven
 # reference place, from there to the center of turns, direction of sliding, axis of turns; then the path, from that place.
 CHANNEL_ROWS = 3
 WEIGHT, MASS, REFERENCE, CENTER, DIRECTION, AXIS, PATH = 0, 1, 2, 5, 8, 11, 14
-# Memory behind the places of all channels: the mean velocity in the vehicle over the last step [m/s].
-VELOCITY_ROWS = 3
+# Memory behind the places of all channels, three rows: the mean velocity in the vehicle over the last step [m/s].
 
 
 def path_params(width, real):

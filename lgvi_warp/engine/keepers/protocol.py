@@ -14,7 +14,6 @@ from lgvi_warp.statistics.values.samples import Fields
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.outcome import MemberStatus
-    from lgvi_warp.engine.packets import Packets
     from lgvi_warp.engine.plan import Plan
     from lgvi_warp.sampling.members import Members
 
@@ -25,18 +24,11 @@ class BlockKeeper(Protocol):
     def take(self, when: slice, samples: Fields) -> None:
         """Receive samples of the block (times, members, ...) by field; each time comes once, in order."""
 
-    # One that has `take_ticks(when, samples)` as well receives with that the samples at all ticks, before those to keep.
+    # One that has `take_ticks(when, samples)` as well receives with that the samples at all ticks, before those to keep. One
+    # that has `take_packets(packets)` looks at the packets after the last step; what it wants of them it copies.
 
     def close(self, outcome: MemberStatus) -> Any:
         """Return the block's result, small and picklable."""
-
-
-@runtime_checkable
-class PacketsKeeper(Protocol):
-    """A keeper of one block that looks at its packets as well, after the last step and before it closes."""
-
-    def take_packets(self, packets: Packets) -> None:
-        """Take what is wanted of them; copies, since the next block uses them."""
 
 
 class Keeper(Protocol):

@@ -58,14 +58,14 @@ class Bias:
         return self.value * self.value + 0.25 * self.half * self.half
 
 
-def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0, *, in_replicates: bool = True) -> StepChange:
-    """The paired difference of two settings' contributions (n,); in_replicates: whether they are of replicates.
+def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0) -> StepChange:
+    """The paired difference of two settings' contributions (n,), of replicates where these are enough.
 
     least: as of `estimators.plain`; where none of n members differs, up to 3 / n of them may, with 95 %.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of steps that are too long may be huge
         apart, n = coarse - fine, len(coarse)
-        part = replicated(apart) if in_replicates and n >= 2 * REPLICATES else plain(apart)
+        part = replicated(apart) if n >= 2 * REPLICATES else plain(apart)
         half = part.half_width(0.95)
         a, b = float(np.std(coarse)), float(np.std(fine))
         left = slope(fine, coarse)[1]

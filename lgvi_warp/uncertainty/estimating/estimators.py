@@ -137,7 +137,7 @@ def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceM
     return VarianceModel(plain(y, least).variance * len(y), cost)
 
 
-def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replicates: int = REPLICATES) -> VarianceModel:
+def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceModel:
     """How the variance of a replicated design's mean falls, from some of its members (n,), in the order of the design.
 
     Variances of 16 replicates are known to a third. Where they gain less than three times over independent members, as where
@@ -145,11 +145,11 @@ def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0, replica
     falls, and half of what exceeds the power 1 is taken.
     """
     n = len(y)
-    variance, alone, power = replicated(y, least, replicates).variance, plain(y, least).variance, 1.0
+    variance, alone, power = replicated(y, least).variance, plain(y, least).variance, 1.0
     if alone <= SMOOTH * variance:
         variance = alone ** (1.0 - BELIEVED) * variance**BELIEVED
-    elif n >= 8 * replicates:
-        fewer = replicated(y[: n // 4], least, replicates).variance
+    elif n >= 8 * REPLICATES:
+        fewer = replicated(y[: n // 4], least).variance
         seen = math.log(fewer / variance) / math.log(4.0) if variance > 0.0 and fewer > 0.0 else 1.0
         power = float(np.clip(0.5 + 0.5 * seen, 1.0, STEEPEST))
     return VarianceModel(variance * n**power, cost, power)

@@ -202,12 +202,6 @@ def share_variance(happens: np.ndarray, chains: int) -> float:
     return float(own.var(ddof=1)) / (share**2 * chains) if chains > 1 else math.inf
 
 
-def first_levels(limit: Limit, d: int, size: int, generators: Sequence[np.random.Generator]) -> list[ChainLevel]:
-    """Independent members of the first level of several runs, as one batch."""
-    u = np.concatenate([rng.standard_normal((size, d)) for rng in generators])
-    return levels_of(u, limit(u), size)
-
-
 def levels_of(u: np.ndarray, limits: np.ndarray, size: int) -> list[ChainLevel]:
     """First levels of several runs from the members of all."""
     return [ChainLevel(u[i : i + size], limits[i : i + size], size) for i in range(0, len(u), size)]

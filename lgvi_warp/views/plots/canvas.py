@@ -71,9 +71,9 @@ def printed_size(size: tuple[float, float]) -> tuple[float, float]:
     return size if style is None else (WIDTHS[style], max(size[1] / size[0], LEAST_SHAPE) * WIDTHS[style])
 
 
-def save_figure(figure: Any, path: FilePath, dpi: int | None = None) -> Path:
+def save_figure(figure: Any, path: FilePath) -> Path:
     """Write a picture in the format of the file's ending; the file is there whole or not at all."""
-    dpi = dpi or (DPI if STYLE.get() is None else PRINTED_DPI)
+    dpi = DPI if STYLE.get() is None else PRINTED_DPI
     of_kind("figure", figure, "savefig", "a figure of Matplotlib", "give one, as axes.figure")
     target = file_path("path", path)
     with durable.placed(target) as beside, durable.new_file(beside) as file:

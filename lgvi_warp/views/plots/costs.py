@@ -30,8 +30,8 @@ def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> 
     A dotted line says what as many threads would cost if each were as fast as one alone.
 
     Args:
-        rows: Rows of `lw.bench.scaling`, or a file of JSON lines that `python -m benchmarks run members threads` printed; rows
-            of other measurements are left out.
+        rows: Rows that `python -m benchmarks run members threads` prints, or a file of them in JSON lines; rows of other
+            measurements are left out.
 
     Returns:
         The axes of members and of threads, shape (2,).
@@ -40,7 +40,7 @@ def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> 
         NothingToDraw: There is no row with members, threads and a cost.
         OSError: A file cannot be read or written.
     """
-    points = measured(rows, ("members", "threads"), "lw.bench.scaling(fleet)")
+    points = measured(rows, ("members", "threads"), "`python -m benchmarks run members threads`")
     with panels(figure, path, (1, 2), (12.0, 5.6)) as grid:
         for axes, across, of_line in ((grid[0, 0], "members", "threads"), (grid[0, 1], "threads", "members")):
             for i, count in enumerate(sorted({point[of_line] for point in points})):

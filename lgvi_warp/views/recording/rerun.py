@@ -110,7 +110,6 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
     # The viewer reads the file after this returns; the system clears its folder for temporary files.
     path = Path(tempfile.mkdtemp(prefix="lgvi_warp_")) / "fleet.rrd"
     record(result, path, members=members)
-    viewer.is_open()
     viewer.start([path], f"the recording is {path}: open it where there is a display")
 
 

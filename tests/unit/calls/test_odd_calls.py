@@ -17,7 +17,7 @@ from tests.unit.measuring.test_cost import found as tradeoff_of
 # What a call may end with: the refusal, a picture of nothing, a library that is not installed, a file that is not there.
 DELIBERATE = (lw.SceneError, NothingToDraw, MissingExtra, OSError)
 # Studies and trials of the disk: seconds each where an odd argument is taken, as None is.
-LONG = {"stability_map", "suggest", "term_cost", "scaling", "linearize", "trim", "tradeoff", "margins", "sweep", "tune_gains",
+LONG = {"stability_map", "suggest", "term_cost", "linearize", "trim", "tradeoff", "margins", "sweep", "tune_gains",
         "worst_case", "rare_event", "estimate", "derivatives", "assimilate", "predict", "record", "report", "statistics",
         "summary"}  # fmt: skip
 PACKAGE = str(Path(lw.__file__).parent)

@@ -40,7 +40,7 @@ def test_every_way_of_giving_a_sequence_has_the_same_bits(path):
 # Read by what other tests try: members, in test_members; lists of what long studies take by `listed`, `items_of` and
 # `quantities`, below; arrays of classes that a user makes for the engine, and of records that the library makes.
 ELSEWHERE = {
-    "assimilate": {"series", "learn"}, "bench.scaling": {"members", "threads"}, "derivatives": {"of", "by"},
+    "assimilate": {"series", "learn"}, "derivatives": {"of", "by"},
     "estimate": {"cheaper"}, "export": {"members", "origin"}, "gym.VectorEnv": {"observe", "outputs", "instead_of"},
     "linear.margins": {"of", "by", "to"}, "linear.mpc": {"tracked"}, "linear.trim": {"free"}, "merge": {"paths"},
     "open_run": {"members", "statistics"}, "plots.pairs": {"of"}, "plots.phase": {"of"}, "rare_event": {"cheaper"},

@@ -29,24 +29,23 @@ from tests.unit.cli.test_terminal import document
 PAPER = str(ROOT / "examples" / "paper.toml")
 
 
-def test_info_of_the_machine(tuned_widths, capsys):
-    widths.keep({"plain float64": 8, "plain float32": 16})
+def test_info_of_the_machine(capsys):
     peak = {"float64": 1.25e10, "float32": 2.5e10}
     content = document(["info"], capsys, peak_of=peak.get)
     assert content["machine"] == machine.describe()
     assert content["memory"] == machine.memory_bytes()
     assert content["versions"] == machine.versions()
     assert content["peak"] == peak
-    assert content["packets"]["plain float32"] == {"vehicles": 16, "source": "tuned"}
+    assert content["packets"] == {kernel: {"vehicles": width.lanes, "source": width.source} for kernel in widths.KERNELS
+                                  for width in [widths.of_table(*widths.parts(kernel))]}  # fmt: skip
     assert main(["info"], peak_of=peak.get) == 0
     said = capsys.readouterr().out
     limits = container.cpu_quota(), machine.affinity(), machine.physical_memory()
     assert said.split("\n")[:-1] == list(machine_lines(content, *limits))
-    assert f"packets     vehicles, tuned ({tuned_widths}): plain float64 8, plain float32 16\n" in said
 
 
 def test_a_machine_in_words():
-    sources = {"plain": "tuned", "dense": "table"}
+    sources = {"plain": "table: avx2", "dense": "another"}
     content = {
         "machine": {"cpu": "a cpu", "simd": "avx2", "threads": 4}, "memory": 3 * 2**30,
         "versions": {"numpy": "2", "warp": "1"}, "peak": {"float64": 1.25e10, "float32": 2.5e10},
@@ -59,8 +58,8 @@ def test_a_machine_in_words():
         "versions    numpy 2, warp 1",
         "float64     one core's peak 12.5 GFMA/s",
         "float32     one core's peak 25.0 GFMA/s",
-        f"packets     vehicles, tuned ({widths.path()}): plain float64 8, plain float32 8",
-        "packets     vehicles, table: dense float64 8",
+        "packets     vehicles, table: avx2: plain float64 8, plain float32 8",
+        "packets     vehicles, another: dense float64 8",
     ]
     for memory, physical in ((0, 1), (2**30, 2**30), (2**30, None)):
         said = list(machine_lines(content | {"memory": memory}, None, 4, physical))
@@ -71,7 +70,7 @@ def test_a_machine_in_words():
         assert next(machine_lines(content, quota, 4, None)) == "cpu         a cpu, avx2, 4 threads"
 
 
-def test_bench_and_calibrate_in_full(tuned_widths, capsys):
+def test_bench_in_full(capsys):
     lines = ['{"a": 1}', '{"a": 2}']
     measure = Study([lines, lines])
     assert main(["bench"], measure=measure) == 0
@@ -79,17 +78,6 @@ def test_bench_and_calibrate_in_full(tuned_widths, capsys):
     given = ["bench", "--members", "5", "--steps", "7"]
     assert document(given, capsys, measure=measure)["readings"] == [{"a": 1}, {"a": 2}]
     assert [values for values, _ in measure.calls] == [(4096, 1000), (5, 7)]
-    readings = [("plain float64", {8: 2.0, 16: 1.525}, 8, 16), ("dense float64", {8: 1.0}, 8, 8)]
-    assert main(["calibrate"], measure=lambda: readings) == 0
-    assert widths.tuned() == {"plain float64": 16, "dense float64": 8}
-    assert capsys.readouterr().out == (
-        "plain float64       8: 2.00 ns, 16: 1.52 ns: 16, 8 by the table\n"
-        "dense float64       8: 1.00 ns: 8, as by the table\n"
-        f"kept in {tuned_widths}, for runs from now on; without that file the table counts\n"
-    )
-    content = document(["calibrate"], capsys, measure=lambda: readings)
-    assert content["kernels"]["plain float64"] == {"ns": {"8": 2.0, "16": 1.525}, "table": 8, "best": 16}
-    assert content["file"] == str(tuned_widths)
 
 
 def test_warm_in_full(capsys):
@@ -182,55 +170,19 @@ def test_comments_of_a_new_scene_stand_in_a_column(tmp_path, capsys):
     assert "# Weight and buoyancy always act.\n" in (tmp_path / "b.toml").read_text()
 
 
-VERBS = [
-    completion.CompletedVerb("go", "Go: it's on.", {"-q": ("quiet [a]: b", None), "--to": ("where", ("x", "y")),
-                                           "--out": ("a file", ())}, ("up", "down")),
-    completion.CompletedVerb("see", "See.", {"--all": ("all", None)}, ()),
-]  # fmt: skip
-
-
-def test_scripts_for_shells_in_full():
-    values, _, rest = completion.bash(VERBS).partition("        *) case")
-    assert values.endswith(
-        '    case "$verb $before" in\n        "go --to") words="x y" ;;\n        " --color") words="auto always never" ;;\n'
-    )
-    assert "if" not in values
-    assert '[[ " go see " == *" $each "* ]]' in values
-    cases = ('go) words="up down -q --to --out" ;;', 'see) words="--all" files=1 ;;',
-             '*) words="go see --help --version -q --quiet -v --verbose --json --color" ;;')  # fmt: skip
-    assert rest.startswith(' "$verb" in\n' + "".join(f"            {case}\n" for case in cases))
-    assert completion.zsh(VERBS) == completion.ZSH.format(
-        names="        'go:Go: it'\\''s on.'\n        'see:See.'",
-        verbs="        go) _arguments -s '*-q[quiet (a); b]' '*--to[where]:value:(x y)' '*--out[a file]:value:_files'"
-        " '*:word:(up down)' ;;\n        see) _arguments -s '*--all[all]' '*:file:_files' ;;",
-    )
-    head = "complete -c lgvi-warp -n"
-    assert completion.fish(VERBS) == (
-        f"{head} __fish_use_subcommand -f -a go -d 'Go: it'\\''s on.'\n{head} __fish_use_subcommand -f -a see -d 'See.'\n"
-        f"{head} '__fish_seen_subcommand_from go' -f -a 'up down'\n"
-        f"{head} '__fish_seen_subcommand_from go' -s q -d 'quiet [a]: b'\n"
-        f"{head} '__fish_seen_subcommand_from go' -l to -x -a 'x y' -d 'where'\n"
-        f"{head} '__fish_seen_subcommand_from go' -l out -r -d 'a file'\n"
-        f"{head} '__fish_seen_subcommand_from see' -l all -d 'all'\n"
-    )
-
-
-def test_verbs_are_read_from_the_parser():
-    known = {verb.name: verb for verb in completion.verbs(cli.parser())}
-    assert known["list"].words == ("methods", "vehicles", "terms", "laws")
-    assert known["run"].words == ()
-    options = known["run"].options
-    assert set(options["--method"][1]) >= {"psi_s", "rk4", "gauss6"}
-    assert options["--dtype"][1][0] == "float64"
-    assert known["new"].options["--vehicle"][1] == tuple(lw.vehicles.names())
-    assert known["export"].options["--to"][1] == ("netcdf", "parquet")
-    assert known["help"].words == tuple(known)
-    assert options["--store"][1] == ("npz", "zarr")
-    assert options["--out"][1] == ()
-    assert options["--live"][1] is None
-    assert options["--quiet"] == options["-q"]
-    assert options["--out"][0].startswith("folder for the files")
-    assert known["list"].text == "Names of methods, vehicles, terms, or laws of controllers."
+def test_a_parser_that_completes_has_the_values_of_options():
+    parser = cli.parser()
+    completion.add_values(parser, "a file")
+    actions = {name: {(action.option_strings or [action.dest])[-1]: action for action in verb._actions}
+               for name, verb in parser.verbs.items()}  # fmt: skip
+    run = actions["run"]
+    assert set(run["--method"].choices) >= {"psi_s", "rk4", "gauss6"}
+    assert run["--dtype"].choices[0] == "float64"
+    assert actions["new"]["--vehicle"].choices == tuple(lw.vehicles.names())
+    assert actions["export"]["--to"].choices == ("netcdf", "parquet")
+    assert run["scene"].complete == run["--out"].complete == "a file"
+    assert run["--members"].choices is None
+    assert not any(hasattr(run[option], "complete") for option in ("--members", "--live", "--store", "--method"))
 
 
 def test_values_become_plain():

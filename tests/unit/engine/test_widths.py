@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles per packet: by the table, as tuned on this machine, or as asked for; files of others are ignored."""
+"""Vehicles per packet: by the table, as measured on this machine, or as asked for; files of others are ignored."""
 
 import json
 import os
@@ -10,7 +10,6 @@ from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_warp.common import machine
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.widths import path as path_of_users
-from lgvi_warp.measuring import packet_width as tuning
 from lgvi_warp.measuring import speed
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.runs.settle import make_plan
@@ -20,9 +19,9 @@ DTYPES = ("float64", "float32", "float32_compensated")
 
 
 @pytest.fixture
-def file(tuned_widths):
-    """A file of tuned widths that does not exist yet."""
-    return tuned_widths
+def file(measured_widths):
+    """A file of measured widths that does not exist yet."""
+    return measured_widths
 
 
 @pytest.mark.parametrize(
@@ -53,15 +52,15 @@ def test_kernels_have_these_widths():
     assert widths.WIDTHS == WIDTHS
 
 
-def test_kept_widths_count_on_this_machine_alone(file):
-    assert (widths.tuned(), widths.keep({"plain float64": 4})) == ({}, file)
-    assert widths.default_width("plain", "float64") == (4, "tuned")
-    assert widths.default_width("plain", "float32").source.startswith("table")
-    widths.keep({"plain float64": 8, "float32_compensated": 32}, of=f"another {widths.this_machine()}")
-    assert widths.tuned() == {"plain float64": 4}
-    widths.keep({"float32_compensated": 32})
-    assert widths.tuned() == {"float32_compensated": 32}
-    assert widths.default_width("chained", "float32_compensated") == (32, "tuned")
+def test_kept_widths_count_on_this_machine_alone(file, monkeypatch):
+    assert widths.measured() == {}
+    widths.keep_measured("a", 4)
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setattr(widths, "this_machine", lambda: "another")
+        widths.keep_measured("a", 8)
+        assert widths.measured() == {"a": 8}
+        widths.read_hashes.cache_clear()
+    assert widths.measured() == {"a": 4}
     assert len(json.loads(file.read_bytes())) == 2
 
 
@@ -74,10 +73,6 @@ def test_the_width_of_one_kernel_counts_for_that_kernel_alone(file):
     assert (chosen.spec.width, chosen.width_source) == (4, "measured")
     assert make_plan(speed.fleet(2), "psi_s", h=0.01, t1=0.1, width=2).spec.width == 2
     assert make_plan(speed.fleet(2), "psi_x", h=0.01, t1=0.1).width_source.startswith("table")
-    # Widths of kinds come and go beside it.
-    widths.keep({"plain float64": 8})
-    assert widths.measured()[plan.kernel.hash] == 4
-    assert widths.tuned() == {"plain float64": 8}
 
 
 def test_a_full_file_loses_the_oldest_kernel(file, monkeypatch):
@@ -90,10 +85,9 @@ def test_a_full_file_loses_the_oldest_kernel(file, monkeypatch):
 def contents():
     """Contents of a file that are no widths, or none of this machine's."""
     key = widths.this_machine()
-    odd = [{"plain float64": width} for width in (3, 0, -8, True, 8.0, "8", None, [8], 2**70)]
-    odd += [{"other float64": 8}, [8], 8, None, "plain float64"]
-    odd += [{widths.HASHES: kernels} for kernels in ({"a": 3}, {"a": "8"}, [8], 8, None, "a")]
-    texts = [json.dumps({key: one}) for one in odd] + [json.dumps({"another": {"plain float64": 4}})]
+    odd = [{widths.HASHES: {"a": width}} for width in (3, 0, -8, True, 8.0, "8", None, [8], 2**70)]
+    odd += [{"a": 8}, [8], 8, None, "a", *({widths.HASHES: kernels} for kernels in ([8], 8, None, "a"))]
+    texts = [json.dumps({key: one}) for one in odd] + [json.dumps({"another": {widths.HASHES: {"a": 4}}})]
     return [
         *map(str.encode, texts), b"", b"[]", b"8", b"{", b"\xff\xfe", b"[" * 100_000, b" " * (widths.MOST_BYTES + 1),
     ]  # fmt: skip
@@ -102,28 +96,27 @@ def contents():
 def test_foreign_files_are_ignored(file):
     for content in contents():
         file.write_bytes(content)
-        widths.read.cache_clear()
         widths.read_hashes.cache_clear()
-        assert (widths.tuned(), widths.measured()) == ({}, {}), content[:100]
-    # What is whole beside them counts, and what is kept replaces all.
-    file.write_text(json.dumps({widths.this_machine(): {"plain float64": 3, "dense float32": 8}}))
-    widths.read.cache_clear()
-    assert widths.tuned() == {"dense float32": 8}
+        assert widths.measured() == {}, content[:100]
+    # What is whole beside them counts.
+    file.write_text(json.dumps({widths.this_machine(): {widths.HASHES: {"a": 3, "b": 8}}}))
+    widths.read_hashes.cache_clear()
+    assert widths.measured() == {"b": 8}
 
 
 def test_what_is_no_file_is_ignored(file):
     file.mkdir()
-    widths.read.cache_clear()
-    assert widths.tuned() == {}
+    widths.read_hashes.cache_clear()
+    assert widths.measured() == {}
     file.rmdir()
     os.mkfifo(file)
-    widths.read.cache_clear()
-    assert widths.tuned() == {}
+    widths.read_hashes.cache_clear()
+    assert widths.measured() == {}
     file.unlink()
-    file.write_text(json.dumps({widths.this_machine(): {"plain float64": 4}}))
+    file.write_text(json.dumps({widths.this_machine(): {widths.HASHES: {"a": 4}}}))
     file.chmod(0)
-    widths.read.cache_clear()
-    assert widths.tuned() == ({"plain float64": 4} if os.geteuid() == 0 else {})
+    widths.read_hashes.cache_clear()
+    assert widths.measured() == ({"a": 4} if os.geteuid() == 0 else {})
 
 
 def test_beside_the_kernel_caches(monkeypatch, tmp_path):
@@ -139,21 +132,8 @@ def test_provenance_says_what_chose(file):
         return make_plan(speed.fleet(2), "psi_s", h=0.01, t1=0.1, **named)
 
     assert provenance(plan())["machine"]["width_source"].startswith("table")
-    widths.keep({"plain float64": 4})
+    widths.keep_measured(plan().kernel.hash, 4)
     chosen = provenance(plan())
-    assert (chosen["width"], chosen["machine"]["width_source"]) == (4, "tuned")
+    assert (chosen["width"], chosen["machine"]["width_source"]) == (4, "measured")
     asked = provenance(plan(width=2))
     assert (asked["width"], asked["machine"]["width_source"]) == (2, "asked for")
-
-
-@pytest.mark.kernel
-@pytest.mark.slow
-def test_every_kind_is_measured():
-    readings = list(tuning.calibrate(rounds=1))
-    assert [reading.kernel for reading in readings] == list(widths.KERNELS)
-    for _, ns, of_table, best in readings:
-        assert of_table in ns
-        assert best in ns
-        assert set(ns) <= set(WIDTHS)
-        assert all(one > 0.0 for one in ns.values())
-        assert best == of_table or ns[best] < ns[of_table]

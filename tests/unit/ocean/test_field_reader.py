@@ -36,16 +36,6 @@ def nodes(field):
     return np.meshgrid(*axes, indexing="ij")
 
 
-def in_plane(function):
-    """A function of latitude and longitude from one of north, east, depth and time [m, s]."""
-
-    def u(lat, lon, z, t):
-        north, east = PLANE.local(lat, lon)
-        return function(north, east, z, t)
-
-    return u
-
-
 # A flow of constant direction in true axes, whose parts grow with depth and time.
 EAST = lambda lat, lon, z, t: 0.3 + 0.004 * z + 2e-5 * t + 0.0 * lat  # noqa: E731
 NORTH = lambda lat, lon, z, t: -0.1 + 0.002 * z + 0.0 * (lat + t)  # noqa: E731

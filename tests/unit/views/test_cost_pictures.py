@@ -39,7 +39,7 @@ def test_files_of_the_benchmarks_are_read_and_pictures_written(tmp_path):
 
 
 def test_rows_of_another_kind_are_refused():
-    with pytest.raises(NothingToDraw, match=r"give rows of lw.bench.scaling\(fleet\)"):
+    with pytest.raises(NothingToDraw, match="give rows of `python -m benchmarks run members threads`"):
         lw.plots.scaling(TERMS)
     with pytest.raises(NothingToDraw, match=r"give rows of lw.bench.term_cost\(scene\)"):
         lw.plots.term_cost(RUNS)
@@ -48,19 +48,11 @@ def test_rows_of_another_kind_are_refused():
 def test_what_cannot_be_measured_is_refused(scene):
     with pytest.raises(lw.SceneError, match="terms: is empty"):
         lw.bench.term_cost(scene, h=0.1)
-    fleet = lw.Ensemble(scene, 10)
-    with pytest.raises(lw.SceneError, match="from 1 to 10") as caught:
-        lw.bench.scaling(fleet, members=[11], threads=[0], h=0.1, t1=1.0)
-    assert len(caught.value.faults) == 2
 
 
 @pytest.mark.kernel
 @pytest.mark.slow
 def test_measured_rows_fit_the_pictures(scene):
-    rows = lw.bench.scaling(lw.Ensemble(scene, 300), threads=[1, 2], h=0.1, t1=1.0, rounds=1)
-    assert [(row["members"], row["threads"]) for row in rows] == [(n, k) for n in (1, 10, 100, 300) for k in (1, 2)]
-    assert all(row["steps"] == 10 and row["ns_per_vehicle_step"] > 1.0 for row in rows)
-    lw.plots.scaling(rows)
     waves = {"type": "waves", "amplitudes": [0.5], "periods": [8.0], "headings_deg": [0.0]}
     drag = {"type": "drag", "linear": [1.0] * 6}
     named = lw.Scene(scene.vehicle, scene.environment, [drag, waves], scene.start)

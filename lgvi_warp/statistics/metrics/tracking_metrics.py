@@ -313,11 +313,11 @@ class OverTime(Total, OfTracking):
     """A metric that is an integral over time, by the trapezoidal rule between ticks. Abstract."""
 
     # The integrand of times (k, 1) [s] and errors (k, n).
-    integrand: ClassVar[Any]
+    _integrand: ClassVar[Any]
 
     def added(self, state: State, ticks: Ticks) -> np.ndarray:
         t, dt = ticks.t[:, None], ticks.dt[:, None]
-        return np.asarray(0.5 * dt * (self.integrand(t - dt, ticks.before[:, 0]) + self.integrand(t, ticks.x[:, 0])))
+        return np.asarray(0.5 * dt * (self._integrand(t - dt, ticks.before[:, 0]) + self._integrand(t, ticks.x[:, 0])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,7 +340,7 @@ class IAE(OverTime):
 
     type: ClassVar[str] = "iae"
     form: ClassVar[str] = "{0} s"
-    integrand = staticmethod(lambda t, e: np.abs(e))
+    _integrand = staticmethod(lambda t, e: np.abs(e))
 
 
 @dataclass(frozen=True, eq=False)
@@ -349,7 +349,7 @@ class ISE(OverTime):
 
     type: ClassVar[str] = "ise"
     form: ClassVar[str] = "{0}^2 s"
-    integrand = staticmethod(lambda t, e: e * e)
+    _integrand = staticmethod(lambda t, e: e * e)
 
 
 @dataclass(frozen=True, eq=False)
@@ -358,7 +358,7 @@ class ITAE(OverTime):
 
     type: ClassVar[str] = "itae"
     form: ClassVar[str] = "{0} s^2"
-    integrand = staticmethod(lambda t, e: t * np.abs(e))
+    _integrand = staticmethod(lambda t, e: t * np.abs(e))
 
 
 @dataclass(frozen=True, eq=False)

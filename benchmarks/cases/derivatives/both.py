@@ -101,7 +101,7 @@ def _slopes(scene, t1, h=0.02, increment=1e-5):
 
 
 def _paths(vehicle, lever, y, h, steps):
-    """Depths at the end of R' = R hat(Om), b' = R nu, M nu' = M nu x Om + net z, J Om' = J Om x Om + M nu x nu - B r x z."""
+    """Depths at the end, by DOP853's weights."""
     mass = np.diag(vehicle.mass_matrix).astype(np.longdouble)
     inertia = np.diag(vehicle.inertia).astype(np.longdouble)
     net, moment = np.longdouble(vehicle.mass) * GRAVITY - np.longdouble(vehicle.buoyancy), vehicle.buoyancy * lever

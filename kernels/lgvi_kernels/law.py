@@ -5,6 +5,10 @@ A law that writes + - * / between lanes imports `add`, `sub`, `mul`, `div` too: 
 before a lane or a 3-vector needs none.
 """
 
+import functools
+
+import warp as wp
+
 from lgvi_kernels.lanes.arithmetic import (
     absolute,
     add,
@@ -66,3 +70,14 @@ from lgvi_kernels.lanes.view import (
     to_inertial,
     velocity_at,
 )
+
+
+def make_params(name, **groups):
+    """The struct of a law as a function of (width, real), from names of its `lanes`, `vectors` and whole `words`, in order."""
+
+    @functools.cache
+    def params(width, real):
+        kinds = {"lanes": lane(width, real), "vectors": lane3(width, real), "words": wp.int32}
+        return struct(name, **{field: kinds[kind] for kind, names in groups.items() for field in names.split()})
+
+    return params

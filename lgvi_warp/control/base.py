@@ -225,7 +225,12 @@ class Part(Term):
             raise NotImplementedError(
                 f"{name} must define packed(numbers, context): see docs/develop/add_a_controller.md"
             )
-        return Packed({item.name: numbers[word_of(item)] for item in self.number_fields() if word_of(item) in numbers})
+        values = {item.name: numbers[word_of(item)] for item in self.number_fields() if word_of(item) in numbers}
+        return Packed(values | self.words(), memory=self.first_memory)
+
+    def words(self) -> dict[str, Any]:
+        """Return the fields of the device struct beside the numbers; by default there are none."""
+        return {}
 
 
 AnyPart = TypeVar("AnyPart", bound=Part)
@@ -371,7 +376,7 @@ class IntegralLaw(ControlLaw):
         if self.limits:
             values |= zip(self.limits, values.pop("integral_limit").T, strict=True)
         words = {"unmet": self.bus.unmet, "conditional": int(self.anti_windup == "conditional")}
-        return Packed(values | words, memory=np.zeros((1, self.memory_rows)))
+        return Packed(values | words, memory=self.first_memory)
 
 
 # What a law of the pose adds to its demand.

@@ -75,8 +75,8 @@ class Callback(ControlLaw):
             key: value for key, value in options.items() if value is not None
         }
 
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        return Packed({"answer": self.bus.answer})
+    def words(self) -> dict[str, Any]:
+        return {"answer": self.bus.answer}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

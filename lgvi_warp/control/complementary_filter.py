@@ -6,10 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from lgvi_warp.control.base import MeasuringPart
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.base import number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -28,8 +26,6 @@ class ComplementaryFilter(MeasuringPart):
     """
 
     type: ClassVar[str] = "complementary_filter"
+    memory_rows: ClassVar[int] = 12
 
     time_constant: Any = number((), "s", least=0.0)
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        return Packed(dict(numbers), memory=np.zeros((1, 12)))

@@ -6,8 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from lgvi_warp.common.declared import word
 from lgvi_warp.control.base import MeasuringPart
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
@@ -36,6 +34,7 @@ class DeadReckoning(MeasuringPart):
     """
 
     type: ClassVar[str] = "dead_reckoning"
+    memory_rows: ClassVar[int] = 6
 
     rule: str = word("trapezoid", known=RULES)
     velocity: str = word("velocity", known=VELOCITIES)
@@ -50,4 +49,4 @@ class DeadReckoning(MeasuringPart):
             "measured_depth": int(self.depth == "measured"),
         }
         values = {"weight": last, "weight_now": now, "start_error": numbers["start_error"], **words}
-        return Packed(values, memory=np.zeros((1, 6)))
+        return Packed(values, memory=self.first_memory)

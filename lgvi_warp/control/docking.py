@@ -54,6 +54,7 @@ class Docking(Guidance):
     """
 
     type: ClassVar[str] = "docking"
+    memory_rows: ClassVar[int] = 3
 
     position: Any = number((3,), "m")
     heading: Any = number((), "rad")
@@ -88,4 +89,4 @@ class Docking(Guidance):
         # Cosine and sine of the heading, the tangent of the funnel; memory of what it does, of J, and of changes.
         values = {name: value for name, value in numbers.items() if name not in ("heading", "funnel")}
         angles = {"c": np.cos(numbers["heading"]), "s": np.sin(numbers["heading"]), "slope": np.tan(numbers["funnel"])}
-        return Packed(values | angles, memory=np.zeros((1, 3)))
+        return Packed(values | angles, memory=self.first_memory)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.declared import flag
-from lgvi_warp.control.base import Guidance, Numbers, Packed, PackingContext
+from lgvi_warp.control.base import Guidance
 from lgvi_warp.physics.terms.base import number
 
 
@@ -46,5 +46,5 @@ class Loiter(Guidance):
     def gives(self) -> tuple[str, ...]:
         return ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
 
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        return Packed({**numbers, "sense": np.full(1, 1.0 if self.clockwise else -1.0)})
+    def words(self) -> dict[str, Any]:
+        return {"sense": np.full(1, 1.0 if self.clockwise else -1.0)}

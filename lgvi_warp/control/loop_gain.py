@@ -31,9 +31,9 @@ class LoopBegin(ControlLaw):
         # What the laws demand, whose gain is measured.
         return tuple(self.asks)
 
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+    def words(self) -> dict[str, Any]:
         # The rows that both share.
-        return Packed(dict(numbers) | {"demand": self.bus.answer})
+        return {"demand": self.bus.answer}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,7 +48,7 @@ class LoopGain(LoopBegin):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         factor, added = numbers["factor"], numbers["added"]
         factors = {"of_force": factor[:, :3], "of_torque": factor[:, 3:]}
-        return Packed(factors | {"force": added[:, :3], "torque": added[:, 3:], "demand": self.bus.answer})
+        return Packed(factors | {"force": added[:, :3], "torque": added[:, 3:]} | self.words())
 
 
 def of_all(factor: np.ndarray) -> np.ndarray:

@@ -6,11 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from lgvi_warp.common.declared import word
 from lgvi_warp.control.base import READINGS, MeasuringPart
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.base import number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -36,5 +34,6 @@ class LowPass(MeasuringPart):
     def device_in(self, aligned: bool) -> Any:
         return f"low_pass:{self.of}"
 
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        return Packed(dict(numbers), memory=np.zeros((1, 9 if self.of == "attitude" else READINGS[self.of])))
+    @property
+    def memory_rows(self) -> int:  # type: ignore[override]
+        return 9 if self.of == "attitude" else READINGS[self.of]

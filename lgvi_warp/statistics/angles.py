@@ -41,11 +41,6 @@ class CircularMean(Statistic):
 
     Args:
         of: A quantity in rad, such as "euler[2]" (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
     """
 
     type: ClassVar[str] = "circular_mean"
@@ -156,11 +151,6 @@ class MeanAttitude(Statistic):
 
     Args:
         of: "attitude", the default.
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
     """
 
     type: ClassVar[str] = "mean_attitude"

@@ -9,6 +9,8 @@ R replicates of a sampling design.
 from __future__ import annotations
 
 import dataclasses
+import inspect
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from functools import partial, reduce
@@ -96,15 +98,13 @@ class Statistic:
     Members that failed are left out from their failure on.
 
     Args:
-        of: a quantity (see lw.statistics.Quantity): "position", "position[2]", "depth", "speed", "euler[0]", "energy", ..., a
-            function of (samples, members), or a list of these taken together; or one number of each member's path,
-            "max(depth)", for statistics of numbers.
-        name: key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: whether a member that an event stopped counts with the state that it stopped in ("held", the default),
-            or not from then on ("left_out").
-        at: an outcome ("floor", the name of an event, or "stopped"). The statistic is then over the members that ended
-            so, each in its final state, and has one row. By default None: all sample times.
+        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
+            (see lw.statistics.Quantity).
+        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
+        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
+        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
+        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
+            By default None: all sample times.
 
     Raises:
         SceneError: with every fault.
@@ -135,6 +135,8 @@ class Statistic:
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         settles_first(cls)
+        if cls.type:
+            cls.__doc__ = with_arguments(cls)
         if cls.__module__.startswith(__package__.partition(".")[0]):
             explained(cls)
         registry.add(TYPES, cls)
@@ -390,3 +392,18 @@ def from_table(where: str, entry: Any) -> Statistic:
         return kind(**table)
     except SceneError as error:
         raise error.prefixed(f"{where}: ") from None
+
+
+def with_arguments(kind: type) -> str | None:
+    """The docstring of a class with the arguments that its bases describe, before its own."""
+    if kind.__doc__ is None:
+        return None
+    blocks = inspect.cleandoc(kind.__doc__).split("\n\n")
+    entries: dict[str, str] = {}
+    for text in (*(base.__doc__ or "" for base in reversed(kind.__mro__[1:])), "\n\n".join(blocks)):
+        for block in inspect.cleandoc(text).split("\n\n"):
+            if block.startswith("Args:\n"):
+                entries |= {entry.partition(":")[0]: entry for entry in re.split(r"\n    (?=\w)", block[5:])[1:]}
+    rest = [block for block in blocks if not block.startswith("Args:\n")]
+    place = next((i for i, block in enumerate(rest) if block.startswith(("Raises:", "Examples:"))), len(rest))
+    return "\n\n".join([*rest[:place], "\n    ".join(["Args:", *entries.values()]), *rest[place:]])

@@ -54,13 +54,6 @@ class Histogram(Counted):
     * below, above (k, d): number of members outside the edges.
 
     Args:
-        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
-            (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
         edges: rising edges of the bins, in the quantity's unit.
         bins: number of equal bins.
         limits: (low, high) of equal bins, in the quantity's unit; or "run", from the first to the last sample time, for
@@ -210,13 +203,6 @@ class Exceedance(Condition, Counted):
     """Probability that a condition holds at each sample time: value (k, d), with Wilson's interval.
 
     Args:
-        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
-            (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
         above: one number, or one for each component, in the quantity's unit.
         below: the same for the upper limit; with both, the quantity lies between them.
 

@@ -91,15 +91,6 @@ class Mean(Statistic):
     * standard_deviation (k, d): of the members.
     * standard_error (k, d): of the mean.
 
-    Args:
-        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
-            (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
-
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
@@ -171,11 +162,6 @@ class Covariance(Statistic):
 
     Args:
         of: a quantity, or several: of=("position", "speed") takes four components together.
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
     """
 
     type: ClassVar[str] = "covariance"

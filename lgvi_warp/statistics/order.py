@@ -39,15 +39,6 @@ class Extremes(Statistic):
     * minimum_member, maximum_member (k, d): indices of the members that have them; -1 where no member counts.
     * beyond (k,): with the statistic's confidence, at most this fraction of all members that could be drawn lies above
       the maximum, and at most this fraction below the minimum.
-
-    Args:
-        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
-            (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
     """
 
     type: ClassVar[str] = "extremes"
@@ -115,13 +106,6 @@ class Quantiles(Statistic):
       times smaller.
 
     Args:
-        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
-            (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
         levels: fractions between 0 and 1; by default (0.05, 0.25, 0.5, 0.75, 0.95).
         size: number of values that each level of the sketch keeps, a power of two from 64; by default 2048. Below 256
             no block is exact, however few its members.

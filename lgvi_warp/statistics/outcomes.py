@@ -117,7 +117,6 @@ class Outcome(OfEnds):
         of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
             any).
         name: Key of the estimate in the result; by default the type and the outcome, as in "outcome floor".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
         levels: fractions of members between 0 and 1; by default (0.05, 0.5, 0.95).
 
     Examples:
@@ -290,7 +289,6 @@ class EndTime(OfEnds, MemberStatistic):
         of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
             any).
         name: Key of the estimate in the result; by default the type and the outcome, as in "outcome floor".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
         then: a statistic, or a list, without `of`; by default the mean, quantiles and a histogram of 20 bins over the
             run: "mean end_time floor", "quantiles end_time floor", "histogram end_time floor".
     """

@@ -137,9 +137,6 @@ class FirstPassage(Condition, Counted):
 
     Args:
         of: A quantity of one component, such as "depth" or "position[2]" (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
         above: the lower limit, in the quantity's unit.
         below: the upper limit; with both, the quantity lies between them.
         levels: fractions of members between 0 and 1; by default (0.05, 0.5, 0.95).

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a derivative by dual lanes costs beside the run without: plain simulations a tangent, kernels alone.
+"""Cost of a derivative by dual lanes beside the run without: plain simulations a tangent, kernels alone.
 
 The paper's vehicle and REMUS 100, one thread, by its time, in turn; with one tangent and with two. Central differences cost
 2. heyoka's variational equations in its batch integrator, on the paper's vehicle, where that package is there.
+
+Then both ways to derivatives, differences of whole runs and tangents, on five scenes whose derivatives are known: the error,
+the member-steps, and the time of the whole call beside that of the run, all in turn.
 """
 
 import time
@@ -10,6 +13,7 @@ import time
 import numpy as np
 
 import lgvi_warp as lw
+from benchmarks.cases.derivatives.both import SCENES
 from lgvi_warp.measuring import speed
 from lgvi_warp.runs import tangents
 from lgvi_warp.runs.settle import make_plan
@@ -22,6 +26,8 @@ NAMES = {
 ENTRIES = (("paper", "psi_s", 0.01), ("paper", "psi_x", 0.01), ("paper", "rk4", 0.05), ("paper", "rk8", 0.1),
            ("remus_100", "rk4", 0.02))  # fmt: skip
 HEYOKA_TOLERANCE, END = 1e-9, 20.0
+# Of both ways: members of the fleet, and the step [s].
+MEMBERS, STEP = 256, 0.02
 
 
 def fleet_of(name, members):
@@ -49,6 +55,35 @@ def run(quick):
             "compile_seconds": [round(sum(each.phases), 1) for each in (plan, *dual)],
         }
     yield heyoka(quick)
+    for name in ("drag",) if quick else SCENES:
+        yield both_ways(name, 8 if quick else MEMBERS, 1 if quick else 3)
+
+
+def both_ways(name, members, rounds):
+    """Two derivatives of a place at the end: of one member against the truth, and the cost for a fleet."""
+    scene, truth, t1, axis = SCENES[name]()
+    by, run = list(truth), {"method": "rk8", "h": STEP, "t1": t1, "threads": 1}
+    last, wanted = lw.SaveAt(every=t1), np.array(list(truth.values()))
+    fleet = lw.Ensemble(scene, members, vary={"start.position": lw.distributions.Normal(std=0.1)})
+    moved = lw.derivatives(scene, f"position[{axis}]", by, **run)
+    carried = lw.solve(scene, tangents=by, save=last, **run).jacobian["position"][-1, 0, axis]
+    copies = lw.derivatives(fleet, f"position[{axis}]", by, **run).members
+    calls = [
+        lambda: lw.solve(fleet, save=last, **run),
+        lambda: lw.derivatives(fleet, f"position[{axis}]", by, **run),
+        lambda: lw.solve(fleet, tangents=by, save=last, **run),
+    ]
+    plain, *seconds = speed.least(calls, rounds, clock=time.process_time)
+    steps = round(t1 / STEP)
+    return {
+        "scene": f"both ways: {name}",
+        "steps": steps,
+        "relative_error": [float(f"{np.max(np.abs(one / wanted - 1.0)):.1e}") for one in (moved.jacobian[0], carried)],
+        "told": float(f"{np.max(moved.error[0] / np.abs(wanted)):.1e}"),
+        "copies_of_one": moved.members,
+        "member_steps": [copies * steps, members * steps],
+        "times_the_run": [round(one / plain, 1) for one in seconds],
+    }
 
 
 def heyoka(quick):

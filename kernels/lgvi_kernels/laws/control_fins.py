@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Control fins: fins that turn about their span to a command, within a limit and no faster than a rate."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -17,15 +16,10 @@ RATE = fins.ROWS + 1
 ROWS = fins.ROWS + 2
 
 
-@functools.cache
-def params(width, real):
-    """Params: count of fins and of knots of their commands; first row of the table and of the memory.
-
-    Rows: for each fin ROWS numbers, then for each its table of commands over time (see view.table1).
-    Memory: one row a fin, its deflection; none unless `limited`. Work: two rows a fin.
-    """
-    places = {"first": wp.int32, "memory": wp.int32, "work": wp.int32}
-    return struct("ControlFins", **places, count=wp.int32, knots=wp.int32, limited=wp.int32)
+# Count of fins and of knots of their commands; first row of the table and of the memory.
+# Rows: for each fin ROWS numbers, then for each its table of commands over time (see view.table1).
+# Memory: one row a fin, its deflection; none unless `limited`. Work: two rows a fin.
+params = make_params("ControlFins", words="first memory work count knots limited")
 
 
 schedule, commanded = make_commanded(ROWS, LIMIT)

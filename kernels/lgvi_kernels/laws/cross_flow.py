@@ -1,22 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cross-flow drag of a slender hull: -c_i |w| w at each strip, w the flow across the hull's axis."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params: a, b, the unit vectors across the axis, axis x a = b; their arms r0 x a, r0 x b, r0 the station 0.
-
-    Rows: for each of `count` strips its station [m] and rho / 2 times drag coefficient, breadth and length.
-    """
-    Lane3 = lane3(width, real)
-    return struct("CrossFlow", a=Lane3, b=Lane3, a_arm=Lane3, b_arm=Lane3, first=wp.int32, count=wp.int32)
+# A, b, the unit vectors across the axis, axis x a = b; their arms r0 x a, r0 x b, r0 the station 0.
+# Rows: for each of `count` strips its station [m] and rho / 2 times drag coefficient, breadth and length.
+params = make_params("CrossFlow", vectors="a b a_arm b_arm", words="first count")
 
 
 @wp.func

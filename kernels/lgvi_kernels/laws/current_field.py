@@ -13,18 +13,15 @@ from lgvi_kernels.law import *
 FLOW = "varying"
 
 
-@functools.cache
-def params(width, real):
-    """Params: origin, inverse spacing and last node along north, east and depth, and the same in time; which scenario.
-
-    Rows: velocities (scenario, time, north, east, depth, 3), of which north, east, depth, time and scenario are the distances
-    in rows, 0 along an axis of one node.
-    """
-    Lane, Lane3 = lane(width, real), lane3(width, real)
-    lanes = dict.fromkeys(("start", "inverse_time", "last_time", "chosen"), Lane)
-    vectors = dict.fromkeys(("origin", "inverse", "last"), Lane3)
-    words = ("first", "north", "east", "depth", "time", "scenario")
-    return struct("CurrentField", **lanes, **vectors, **dict.fromkeys(words, wp.int32))
+# Origin, inverse spacing and last node along north, east and depth, and the same in time; which scenario.
+# Rows: velocities (scenario, time, north, east, depth, 3), of which north, east, depth, time and scenario are the distances
+# in rows, 0 along an axis of one node.
+params = make_params(
+    "CurrentField",
+    lanes="start inverse_time last_time chosen",
+    vectors="origin inverse last",
+    words="first north east depth time scenario",
+)
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A uniform current that is a sum of harmonics in time, such as tides: u(t) = sum_j a_j cos(omega_j t + phase_j)."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -14,10 +13,8 @@ FLOW = "uniform"
 ROWS = 5
 
 
-@functools.cache
-def params(width, real):
-    """Params: first row of its table, ROWS for each harmonic, and count of harmonics."""
-    return struct("CurrentHarmonics", first=wp.int32, count=wp.int32)
+# First row of its table, ROWS for each harmonic, and count of harmonics.
+params = make_params("CurrentHarmonics", words="first count")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A current that varies with depth: u(b3) by linear interpolation of a table, constant above and below it."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -11,10 +10,8 @@ from lgvi_kernels.law import *
 FLOW = "varying"
 
 
-@functools.cache
-def params(width, real):
-    """Params: first row of its table and count of knots after the first; rows as for view.table3."""
-    return struct("CurrentProfile", first=wp.int32, count=wp.int32)
+# First row of its table and count of knots after the first; rows as for view.table3.
+params = make_params("CurrentProfile", words="first count")
 
 
 @wp.func

@@ -16,10 +16,8 @@ from lgvi_kernels.law import *
 PARTS = ("linear_force", "linear_torque", "quadratic_force", "quadratic_torque")
 
 
-@functools.cache
-def params(width, real):
-    """Params: l / I [1/s] of force and torque, and q / I per momentum divided by max J, as it is kept."""
-    return struct("Drag", **{part: lane3(width, real) for part in PARTS})
+# L / I [1/s] of force and torque, and q / I per momentum divided by max J, as it is kept.
+params = make_params("Drag", vectors="linear_force linear_torque quadratic_force quadratic_torque")
 
 
 @functools.cache

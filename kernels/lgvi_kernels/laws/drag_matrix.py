@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drag by 6x6 matrices: force_i = -sum_j (linear_ij + quadratic_ij |nu_j|) nu_j, advanced by the linearly implicit step V."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -9,11 +8,8 @@ import warp as wp
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.patterns import less_whole, squares
 
-
-@functools.cache
-def params(width, real):
-    """Params: first row of its table; constant, quadratic: whether there is such a matrix. Rows: both (36 each)."""
-    return struct("DragMatrix", first=wp.int32, constant=wp.int32, quadratic=wp.int32)
+# First row of its table; constant, quadratic: whether there is such a matrix. Rows: both (36 each).
+params = make_params("DragMatrix", words="first constant quadratic")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drag by 6x6 matrices (drag_matrix) where the axes or the origin are not those of the kernel."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -10,14 +9,9 @@ from lgvi_kernels.law import *
 from lgvi_kernels.laws.drag_matrix import add_three
 from lgvi_kernels.laws.patterns import less_whole
 
-
-@functools.cache
-def params(width, real):
-    """Params: first row of its table; constant, whether there is a linear matrix; count of columns of the quadratic one.
-
-    Rows: the linear matrix (36), then for each column the twist that measures its velocity (6) and its wrench (6).
-    """
-    return struct("DragMatrixTurned", first=wp.int32, constant=wp.int32, count=wp.int32)
+# First row of its table; constant, whether there is a linear matrix; count of columns of the quadratic one.
+# Rows: the linear matrix (36), then for each column the twist that measures its velocity (6) and its wrench (6).
+params = make_params("DragMatrixTurned", words="first constant count")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The account of the energy that a vehicle uses, and what all but its actuators take."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -11,10 +10,8 @@ from lgvi_kernels.law import *
 ACCOUNT = True
 
 
-@functools.cache
-def params(width, real):
-    """Params: the hotel load [W]; where the energy used lies in the memory."""
-    return struct("EnergyUse", hotel=lane(width, real), memory=wp.int32)
+# The hotel load [W]; where the energy used lies in the memory.
+params = make_params("EnergyUse", lanes="hotel", words="memory")
 
 
 @wp.func

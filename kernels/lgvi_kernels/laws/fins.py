@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fixed fins: lift and drag of small wings, from the flow in the plane of their chord and normal."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -19,10 +18,8 @@ MATRICES = (15, 24, 42)
 STILL = 1e-30
 
 
-@functools.cache
-def params(width, real):
-    """Params: first row of its table, ROWS a fin, and count of fins; work: first of two rows a fin to work with."""
-    return struct("Fins", first=wp.int32, count=wp.int32, work=wp.int32)
+# First row of its table, ROWS a fin, and count of fins; work: first of two rows a fin to work with.
+params = make_params("Fins", words="first count work")
 
 
 @wp.func

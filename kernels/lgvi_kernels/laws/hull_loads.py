@@ -10,7 +10,6 @@ alpha = Du/Dt of the water, U the strip's velocity through it along the axis, an
 kernel has all of it but drag (maps/water.py): strips add the difference.
 """
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -23,15 +22,9 @@ from lgvi_kernels.laws.cross_flow import add_across
 ROWS = 5
 
 
-@functools.cache
-def params(width, real):
-    """Params: axis, the unit vector along the hull, a and b across it, axis x a = b; origin, the user's.
-
-    The origin is taken from that of the forces; a_arm, b_arm: origin x a and b. Rows: ROWS for each of `count` strips.
-    """
-    Lane3 = lane3(width, real)
-    vectors = dict.fromkeys(("axis", "origin", "a", "b", "a_arm", "b_arm"), Lane3)
-    return struct("HullLoads", **vectors, first=wp.int32, count=wp.int32)
+# Axis, the unit vector along the hull, a and b across it, axis x a = b; origin, the user's.
+# The origin is taken from that of the forces; a_arm, b_arm: origin x a and b. Rows: ROWS for each of `count` strips.
+params = make_params("HullLoads", vectors="axis origin a b a_arm b_arm", words="first count")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lift of a hull: force_i = -u sum_j matrix_ij nu_j, u the speed ahead."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -9,11 +8,8 @@ import warp as wp
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.patterns import less_whole
 
-
-@functools.cache
-def params(width, real):
-    """Params: first row of its table. Rows: the twist that measures the speed ahead u (6), the matrix (36)."""
-    return struct("Lift", first=wp.int32)
+# First row of its table. Rows: the twist that measures the speed ahead u (6), the matrix (36).
+params = make_params("Lift", words="first")
 
 
 @wp.func

@@ -12,11 +12,8 @@ import warp as wp
 from lgvi_kernels import device
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params: first row of its table. Rows: what gives the user's velocities from those of the forces (36), the values."""
-    return struct("QuadraticForm", first=wp.int32)
+# First row of its table. Rows: what gives the user's velocities from those of the forces (36), the values.
+params = make_params("QuadraticForm", words="first")
 
 
 def entries_of(words):

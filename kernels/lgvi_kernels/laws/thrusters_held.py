@@ -7,20 +7,15 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
-from lgvi_kernels.law import add, lane, lane3, struct  # noqa: F401
+from lgvi_kernels.law import add, make_params  # noqa: F401
 from lgvi_kernels.laws.wrench import law
 
-
-@functools.cache
-def params(width, real):
-    """Params: the sum of all thrusters' forces, and of their torques, in the kernel's axes."""
-    return struct("ThrustersHeld", force=lane3(width, real), torque=lane3(width, real))
+# The sum of all thrusters' forces, and of their torques, in the kernel's axes.
+params = make_params("ThrustersHeld", vectors="force torque")
 
 
-@functools.cache
-def powered_params(width, real):
-    """Params: also the power of all thrusters."""
-    return struct("ThrustersHeldPowered", force=lane3(width, real), torque=lane3(width, real), power=lane(width, real))
+# Also the power of all thrusters.
+powered_params = make_params("ThrustersHeldPowered", vectors="force torque", lanes="power")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Linear waves in deep water, a sum of components (Faltinsen 1990, table 2.1; Newman 1977, 6.2)."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -15,10 +14,8 @@ FLOW = "varying"
 ROWS = 8
 
 
-@functools.cache
-def params(width, real):
-    """Params: first row of its table, ROWS for each component, and count of components."""
-    return struct("Waves", first=wp.int32, count=wp.int32)
+# First row of its table, ROWS for each component, and count of components.
+params = make_params("Waves", words="first count")
 
 
 @wp.func

@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A wrench in body axes that follows a table over time."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params: first row of its tables, of force and then of torque (see view.table3), and count of knots after the first."""
-    return struct("WrenchSchedule", first=wp.int32, count=wp.int32)
+# First row of its tables, of force and then of torque (see view.table3), and count of knots after the first.
+params = make_params("WrenchSchedule", words="first count")
 
 
 @wp.func

@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The energy used reaches the capacity of a battery."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params: capacity [J]; where the energy used lies in the memory."""
-    return struct("Battery", capacity=lane(width, real), account_row=wp.int32)
+# Capacity [J]; where the energy used lies in the memory.
+params = make_params("Battery", lanes="capacity", words="account_row")
 
 
 @wp.func

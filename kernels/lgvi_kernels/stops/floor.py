@@ -10,11 +10,8 @@ from lgvi_kernels import device
 from lgvi_kernels.cells import floor_at, grid_fields
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params of a flat floor: where members stop."""
-    return struct("numbers_floor", depth=lane(width, real))
+# Params of a flat floor: where members stop.
+params = make_params("numbers_floor", lanes="depth")
 
 
 @wp.func

@@ -216,6 +216,8 @@ class Term:
     following: ClassVar[tuple[str, ...]] = ()
     # Numbers with whose sizes the diagonal of `braking` grows, as it does with the speeds and the density where there are any.
     braking_grows_with: ClassVar[tuple[str, ...]] = ()
+    # Rows of memory, at first 0, that the device code of a term has which does not define `packed`.
+    memory_rows: ClassVar[int] = 0
 
     name: str = ""
 
@@ -426,7 +428,7 @@ class Term:
     @property
     def memory(self) -> bool:
         """Whether its device code remembers something from step to step."""
-        return False
+        return self.memory_rows > 0
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -505,9 +507,13 @@ class Term:
         # An event sees the body's origin, whatever that of the forces is.
         point = frame.point if self.acts else frame.vector
         turned: dict[str | None, Any] = {"vector": frame.vector, "point": point, None: np.asarray}
-        return Packed(
-            {item.name: turned[item.metadata["axes"]](numbers[word_of(item)]) for item in self.number_fields()}
-        )
+        values = {item.name: turned[item.metadata["axes"]](numbers[word_of(item)]) for item in self.number_fields()}
+        return Packed(values, memory=self.first_memory)
+
+    @property
+    def first_memory(self) -> np.ndarray | None:
+        """The memory at the start, as `memory_rows` says; None for none."""
+        return np.zeros((1, self.memory_rows)) if self.memory_rows else None
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray | None:
         """Velocity of the water that this term moves; by default it moves none.

@@ -24,9 +24,6 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots,
 from lgvi_warp.physics.terms.fins import Fins, fin_rows, unit_directions
 from lgvi_warp.physics.terms.wrench import at_start, commands
 
-# Rows of one fin that its forces need where the flow has no angle: those before the matrices of `fin_rows`.
-STRAIGHT_ROWS = 15
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ControlFins(Commanded, Fins):
@@ -177,8 +174,7 @@ class ControlFins(Commanded, Fins):
         if self.device_in(context.aligned) == "fins":
             return super().packed(self._turned(numbers), context)
         if self.device_in(context.aligned) != "control_fins":
-            blocks = fin_rows(numbers, context)
-            blocks = blocks if self.flow_angle else blocks[..., :STRAIGHT_ROWS]
+            blocks = fin_rows(numbers, context, matrices=self.flow_angle)
             table, size = None, 0
             if self.lift_angles is not None:
                 angles, lifts = numbers["lift_angles"], numbers["lift_coefficients"]

@@ -6,9 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
-from lgvi_warp.physics.terms.base import CONSERVED, Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.base import CONSERVED, Term, number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -34,18 +32,12 @@ class EnergyUse(Term):
     type: ClassVar[str] = "energy_use"
     accounts: ClassVar[bool] = True
     unique: ClassVar[bool] = True
+    # The energy used, and the digits that it cannot hold.
+    memory_rows: ClassVar[int] = 2
 
     hotel: Any = number((), "W", 0.0, least=0.0)
-
-    @property
-    def memory(self) -> bool:
-        # The energy used, and the digits that it cannot hold.
-        return True
 
     @property
     def conserves(self) -> frozenset[str]:
         # It does nothing to the motion.
         return CONSERVED
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        return Packed({"hotel": numbers["hotel"]}, memory=np.zeros((1, 2)))

@@ -104,15 +104,19 @@ def unit_directions(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     return chord, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 
 
-def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
+def fin_rows(numbers: Numbers, context: PackingContext, matrices: bool = True) -> np.ndarray:
     """Device rows (members, fins, 51) of fins: their twists c and n, rho A/2 times the three coefficients, and S and W.
 
-    S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py).
+    S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py). matrices: whether S and W are among
+    them, which forces need where the flow has an angle.
     """
     chord, normal = unit_directions(numbers)
     half = 0.5 * context.parameters["environment.water_density"][:, None] * numbers["area"]
     sizes = [half * numbers[name] for name in ("lift_slope", "drag", "drag_normal")]
     c, n = (twist(context.frame, numbers["position"], direction) for direction in (chord, normal))
+    first = (c, n, *(size[..., None] for size in sizes))
+    if not matrices:
+        return side_by_side(*first)
     cc, nn, nc = (a[..., :, None] * b[..., None, :] for a, b in ((c, c), (n, n), (n, c)))
     S, W = cc + nn, nc - np.swapaxes(nc, -1, -2)
     off = ([1, 2, 0], [2, 0, 1])
@@ -121,7 +125,7 @@ def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
         s, w = S[..., half_twist, half_twist], W[..., half_twist, half_twist]
         blocks.append(np.concatenate([np.diagonal(s, axis1=-2, axis2=-1), s[..., *off], w[..., *off]], axis=-1))
     between = [matrix[..., :3, 3:].reshape(*matrix.shape[:-2], 9) for matrix in (S, W)]
-    return side_by_side(c, n, *(size[..., None] for size in sizes), blocks[0], *between, blocks[1])
+    return side_by_side(*first, blocks[0], *between, blocks[1])
 
 
 def _twist(point: np.ndarray, direction: np.ndarray) -> np.ndarray:

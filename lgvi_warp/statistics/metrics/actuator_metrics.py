@@ -15,7 +15,7 @@ from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.control.signals import CHANNELS, ENERGY_USED, SAVED, SIGNALS, ordered
 from lgvi_warp.physics.fields import TABLE
-from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
+from lgvi_warp.statistics.metrics.metric import Metric, OfOne, State, Ticks, Total
 from lgvi_warp.statistics.values.quantity import Quantity, named
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def _nothing(samples: Fields, members: Members) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class OfChannels(Metric):
+class OfChannels(Total):
     """A metric of all channels of a signal, or of one. Abstract.
 
     Args:
@@ -63,12 +63,6 @@ class OfChannels(Metric):
             raise refusal(f"{self.type}.of", self.of, "is no signal of actuators", closest(str(self.of), names))
         return named(f"{self.type}.of", self.of, self.of)
 
-    def begin(self, x: np.ndarray) -> State:
-        return {"sum": np.zeros(x.shape[1])}
-
-    def finish(self, state: State) -> np.ndarray:
-        return state["sum"]
-
 
 _ALL = {name: all_of(name) for name in CHANNELS}
 
@@ -81,16 +75,14 @@ class Effort(OfChannels):
 
     Args:
         of: "command" (the default), "actuator", or one channel, "command[2]".
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "effort"
     form: ClassVar[str] = "{0} s"
     default: ClassVar[str | None] = "command"
 
-    def follow(self, state: State, ticks: Ticks) -> State:
-        size = np.abs(ticks.before).sum(axis=1) * ticks.dt[:, None]
-        return {"sum": accumulated(state["sum"], ticks, size)}
+    def added(self, state: State, ticks: Ticks) -> np.ndarray:
+        return np.abs(ticks.before).sum(axis=1) * ticks.dt[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +91,13 @@ class Travel(OfChannels):
 
     Args:
         of: "actuator" (the default: where they are, after delay, fault, limit and lag), "command", or one channel.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "travel"
     default: ClassVar[str | None] = "actuator"
 
-    def follow(self, state: State, ticks: Ticks) -> State:
-        return {"sum": accumulated(state["sum"], ticks, np.abs(ticks.x - ticks.before).sum(axis=1))}
+    def added(self, state: State, ticks: Ticks) -> np.ndarray:
+        return np.abs(ticks.x - ticks.before).sum(axis=1)
 
 
 def _saturated(samples: Fields, members: Members) -> np.ndarray:
@@ -120,33 +111,26 @@ def _saturated(samples: Fields, members: Members) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class SaturationShare(OfChannels):
+class SaturationShare(OfOne, Total):
     """The share of each member's time under way in which some command is at its limit or beyond [1]; then statistics of it.
 
     Limits are those of the terms that take the commands, `limit`; one without a limit never saturates.
 
     Args:
         of: "command", the default.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "saturation_share"
     form: ClassVar[str] = "1"
     default: ClassVar[str | None] = "command"
+    called: ClassVar[str] = "the command"
+    meaning: ClassVar[Quantity] = Quantity("command", _saturated, "1", ("command",))
 
-    def meant(self) -> Quantity:
-        if not among(self.of, ("command",)):
-            raise refusal("saturation_share.of", self.of, "is not the command", "leave it out")
-        return _SATURATED
-
-    def follow(self, state: State, ticks: Ticks) -> State:
-        return {"sum": accumulated(state["sum"], ticks, ticks.before[:, 0] * ticks.dt[:, None])}
+    def added(self, state: State, ticks: Ticks) -> np.ndarray:
+        return ticks.before[:, 0] * ticks.dt[:, None]
 
     def finish(self, state: State) -> np.ndarray:
         return state["sum"] / state["until"]
-
-
-_SATURATED = Quantity("command", _saturated, "1", ("command",))
 
 
 def _wrench_and_twist(samples: Fields, members: Members) -> np.ndarray:
@@ -160,7 +144,7 @@ def _wrench_and_twist(samples: Fields, members: Members) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class ActuatorEnergy(OfChannels):
+class ActuatorEnergy(OfOne, Total):
     """The integral over time of |power| that the actuators' wrench gives to the motion [J]; then statistics of it.
 
     The power is exerted . (velocity, angular velocity): of the forces that the actuators exert after limits, lags, the loss by
@@ -170,36 +154,29 @@ class ActuatorEnergy(OfChannels):
 
     Args:
         of: "exerted", the default.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "energy"
     form: ClassVar[str] = "J"
     default: ClassVar[str | None] = "exerted"
+    called: ClassVar[str] = "the actuators' wrench"
+    meaning: ClassVar[Quantity] = Quantity(
+        "exerted",
+        _wrench_and_twist,
+        "W",
+        ("velocity", "angular_velocity", "exerted"),
+        tuple(f"exerted {i}" for i in range(13)),
+    )
 
-    def meant(self) -> Quantity:
-        if not among(self.of, ("exerted",)):
-            raise refusal("energy.of", self.of, "is not the actuators' wrench", "leave it out")
-        return _POWER
-
-    def follow(self, state: State, ticks: Ticks) -> State:
+    def added(self, state: State, ticks: Ticks) -> np.ndarray:
         before, after = ticks.before, ticks.x
         last = np.where(after[:, 12:] > 0.0, before[:, :6], after[:, :6])
         powers = [np.abs((w * v).sum(axis=1)) for w, v in ((before[:, :6], before[:, 6:12]), (last, after[:, 6:12]))]
-        return {"sum": accumulated(state["sum"], ticks, 0.5 * (powers[0] + powers[1]) * ticks.dt[:, None])}
-
-
-_POWER = Quantity(
-    "exerted",
-    _wrench_and_twist,
-    "W",
-    ("velocity", "angular_velocity", "exerted"),
-    tuple(f"exerted {i}" for i in range(13)),
-)
+        return 0.5 * (powers[0] + powers[1]) * ticks.dt[:, None]
 
 
 @dataclass(frozen=True, eq=False)
-class ElectricalEnergy(OfChannels):
+class ElectricalEnergy(OfOne, Total):
     """The energy that each member uses [J], by the account of `lw.terms.EnergyUse`; then statistics of it.
 
     It is what was used between the first tick and the last: electrical, with the hotel load and all losses that terms tell. A
@@ -207,23 +184,19 @@ class ElectricalEnergy(OfChannels):
 
     Args:
         of: "energy_used", the default.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "electrical_energy"
     default: ClassVar[str | None] = ENERGY_USED
+    called: ClassVar[str] = "the energy used"
+    meaning: ClassVar[Quantity] = named("electrical_energy.of", ENERGY_USED, ENERGY_USED)
 
-    def meant(self) -> Quantity:
-        if not among(self.of, (ENERGY_USED,)):
-            raise refusal("electrical_energy.of", self.of, "is not the energy used", "leave it out")
-        return named("electrical_energy.of", self.of, self.of)
-
-    def follow(self, state: State, ticks: Ticks) -> State:
-        return {"sum": accumulated(state["sum"], ticks, ticks.x[:, 0] - ticks.before[:, 0])}
+    def added(self, state: State, ticks: Ticks) -> np.ndarray:
+        return ticks.x[:, 0] - ticks.before[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
-class TimeToFailure(Metric):
+class TimeToFailure(OfOne):
     """When each member failed or an event stopped it [s], infinite for those that went on to the end; then statistics of it.
 
     Only lw.statistics.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed.
@@ -237,22 +210,16 @@ class TimeToFailure(Metric):
     type: ClassVar[str] = "time_to_failure"
     form: ClassVar[str] = "s"
     default: ClassVar[str | None] = "end"
+    called: ClassVar[str] = "the end"
+    meaning: ClassVar[Quantity] = Quantity("end", _nothing, "s", ())
 
     def then_default(self) -> Sequence[Any]:
         from lgvi_warp.statistics.paths.member_values import MemberValues
 
         return [MemberValues()]
 
-    def meant(self) -> Quantity:
-        if not among(self.of, ("end",)):
-            raise refusal("time_to_failure.of", self.of, "is not the end", "leave it out")
-        return _END
-
     def finish(self, state: State) -> np.ndarray:
         return state["ended"]
-
-
-_END = Quantity("end", _nothing, "s", ())
 
 
 class TickSamples(dict[str, np.ndarray]):
@@ -273,7 +240,6 @@ class CustomMetric(Metric):
 
     Args:
         of: the function; its name is the metric's.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
         fields: names of the samples that the function reads, as for lw.SaveAt.
         last: function of the last state that returns the metric (n,); by default the state itself.
         unit_of: unit of the metric, a text; by default "1".

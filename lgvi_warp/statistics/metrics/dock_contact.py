@@ -37,7 +37,6 @@ class DockContact(Metric):
     Args:
         of: "speed": ahead along the centre line, over ground [m/s]; "offset": distance of the origin from the centre line [m];
             "heading_error": heading less that of the dock, in [-pi, pi] [rad]; "time": when [s].
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
         docking: name of the guidance; by default "docking".
 
     Raises:

@@ -14,13 +14,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, among
+from lgvi_warp.common.errors import Faults, among, refusal
 from lgvi_warp.common.status import failed
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic, numbered, part_of
 from lgvi_warp.statistics.paths.member_values import MemberValues
+from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
 
 State = dict[str, np.ndarray]
@@ -113,9 +114,9 @@ class Metric(MemberStatistic):
 
     Args:
         of: what is tracked; see the classes derived from it.
-        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
-            0.99)), lw.statistics.MemberValues().
-        measured: whether the actual number is what sensors measure, in place of the truth; by default False.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
+        stopped: has no meaning for a metric: leave it out.
     """
 
     of_numbers: ClassVar[bool] = False
@@ -179,6 +180,58 @@ class Metric(MemberStatistic):
 
     def open(self, time: np.ndarray, count: int) -> _Follow:
         return _Follow(self, time)
+
+
+@dataclass(frozen=True, eq=False)
+class OfOne(Metric):
+    """A metric of one quantity alone, its default. Abstract."""
+
+    # The quantity, and its name in a refusal.
+    meaning: ClassVar[Quantity]
+    called: ClassVar[str]
+
+    def meant(self) -> Quantity:
+        if not among(self.of, (self.default,)):
+            raise refusal(f"{self.type}.of", self.of, f"is not {self.called}", "leave it out")
+        return self.meaning
+
+
+@dataclass(frozen=True, eq=False)
+class Total(Metric):
+    """A metric that sums numbers over ticks. Abstract."""
+
+    def added(self, state: State, ticks: Ticks) -> np.ndarray:
+        """Return the addend of each tick, (k, n)."""
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"sum": np.zeros(x.shape[1])}
+
+    def follow(self, state: State, ticks: Ticks) -> State:
+        return {"sum": accumulated(state["sum"], ticks, self.added(state, ticks))}
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["sum"]
+
+
+@dataclass(frozen=True, eq=False)
+class Largest(Metric):
+    """A metric of the largest of some numbers over ticks. Abstract."""
+
+    def size(self, state: State, x: np.ndarray) -> np.ndarray:
+        """Return the number (..., n) at ticks, of their numbers x (..., d, n)."""
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+    def begin(self, x: np.ndarray) -> State:
+        state = super().begin(x)
+        return state | {"most": self.size(state, x)}
+
+    def follow(self, state: State, ticks: Ticks) -> State:
+        sizes = ticks.of_living(self.size(state, ticks.x), -np.inf)
+        return {"most": np.maximum(state["most"], sizes.max(axis=0))}
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["most"]
 
 
 def accumulated(total: np.ndarray, ticks: Ticks, parts: np.ndarray) -> np.ndarray:

@@ -88,7 +88,6 @@ class Nearest(Metric):
 
     Args:
         of: name of an event of the scene, "floor".
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
         kind: type of the event, "floor", "surface" or "box"; by default its name.
 
     Raises:

@@ -14,7 +14,7 @@ import numpy as np
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.statistics import tracking
-from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
+from lgvi_warp.statistics.metrics.metric import Largest, Metric, State, Ticks, Total
 from lgvi_warp.statistics.values.quantity import Quantity
 
 # Times that differ by less than this part of the run are the same.
@@ -46,7 +46,8 @@ class OfCourse(Metric):
     (the step); what is below or beyond is meant in the direction of the step, upward if the step is 0.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east".
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
+            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
     """
 
     tracks: ClassVar[bool] = True
@@ -60,9 +61,9 @@ class OfCourse(Metric):
         step = self._difference(goal, x[0])
         return {"goal": goal, "step": np.abs(step), "sign": np.where(step < 0.0, -1.0, 1.0)}
 
-    def left(self, state: State, ticks: Ticks) -> np.ndarray:
-        """Return the way to the goal (k, n) in the direction of the step: below 0 beyond the goal."""
-        return state["sign"] * self._difference(state["goal"], ticks.x[:, 0])
+    def left(self, state: State, x: np.ndarray) -> np.ndarray:
+        """Return the way to the goal (..., n) in the direction of the step, of x (..., d, n): below 0 beyond the goal."""
+        return state["sign"] * self._difference(state["goal"], x[..., 0, :])
 
     def _difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return tracking.CHANNELS[False][self.quantity.name].difference(a, b)
@@ -89,14 +90,10 @@ class OfStep(OfCourse):
 
 
 @dataclass(frozen=True, eq=False)
-class Overshoot(OfStep):
+class Overshoot(Largest, OfStep):
     """How far each member goes beyond its goal at most [unit, or % of the step], 0 if it never does; then statistics of it.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
-            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         percent: whether in percent of the step; by default False.
 
     Examples:
@@ -115,39 +112,25 @@ class Overshoot(OfStep):
 
     type: ClassVar[str] = "overshoot"
 
-    def begin(self, x: np.ndarray) -> State:
-        state = super().begin(x)
-        return state | {"least": state["step"]}
-
-    def follow(self, state: State, ticks: Ticks) -> State:
-        distance = ticks.of_living(self.left(state, ticks), np.inf)
-        return {"least": np.minimum(state["least"], distance.min(axis=0))}
+    def size(self, state: State, x: np.ndarray) -> np.ndarray:
+        return -self.left(state, x)
 
     def finish(self, state: State) -> np.ndarray:
-        return self.percent_of_step(state, np.maximum(0.0, -state["least"]))
+        return self.percent_of_step(state, np.maximum(0.0, state["most"]))
 
 
 @dataclass(frozen=True, eq=False)
-class Undershoot(OfStep):
+class Undershoot(Largest, OfStep):
     """How far each member goes the wrong way from its start at most [unit, or % of the step]; then statistics of it.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
-            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         percent: whether in percent of the step; by default False.
     """
 
     type: ClassVar[str] = "undershoot"
 
-    def begin(self, x: np.ndarray) -> State:
-        state = super().begin(x)
-        return state | {"most": state["step"]}
-
-    def follow(self, state: State, ticks: Ticks) -> State:
-        distance = ticks.of_living(self.left(state, ticks), -np.inf)
-        return {"most": np.maximum(state["most"], distance.max(axis=0))}
+    def size(self, state: State, x: np.ndarray) -> np.ndarray:
+        return self.left(state, x)
 
     def finish(self, state: State) -> np.ndarray:
         return self.percent_of_step(state, state["most"] - state["step"])
@@ -155,14 +138,7 @@ class Undershoot(OfStep):
 
 @dataclass(frozen=True, eq=False)
 class PeakTime(OfCourse):
-    """When each member is farthest in the direction of its step [s], the first such tick; then statistics of it.
-
-    Args:
-        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
-            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
-    """
+    """When each member is farthest in the direction of its step [s], the first such tick; then statistics of it."""
 
     type: ClassVar[str] = "peak_time"
     form: ClassVar[str] = "s"
@@ -172,7 +148,7 @@ class PeakTime(OfCourse):
         return state | {"least": state["step"], "at": np.zeros(len(state["step"]))}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        distance = ticks.of_living(self.left(state, ticks), np.inf)
+        distance = ticks.of_living(self.left(state, ticks.x), np.inf)
         i = distance.argmin(axis=0)
         least = np.take_along_axis(distance, i[None], axis=0)[0]
         farther = least < state["least"]
@@ -187,18 +163,12 @@ class Peak(Overshoot):
     """The number that each member has where it is farthest in the direction of its step [unit]; then statistics of it.
 
     That of a heading is not wrapped: it lies within pi of the goal. It is step_info's Peak for a step from 0.
-
-    Args:
-        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
-            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "peak"
 
     def finish(self, state: State) -> np.ndarray:
-        return np.asarray(state["goal"] - state["sign"] * state["least"])
+        return np.asarray(state["goal"] + state["sign"] * state["most"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,10 +179,6 @@ class RiseTime(OfCourse):
     gets there.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
-            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         limits: the two parts of the step; by default (0.1, 0.9).
     """
 
@@ -233,7 +199,7 @@ class RiseTime(OfCourse):
         return state | {"low": np.where(self.limits[0] == 0.0, 0.0, done), "high": done}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        distance = ticks.of_living(self.left(state, ticks), np.inf)
+        distance = ticks.of_living(self.left(state, ticks.x), np.inf)
         times = {}
         for name, part in zip(("low", "high"), self.limits, strict=True):
             done = state["step"] - distance >= part * state["step"]
@@ -253,10 +219,6 @@ class SettlingTime(OfCourse):
     at the last one.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
-            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         within: half the width of the band, in the unit of what it is of; by default 2 % of each member's step.
     """
 
@@ -276,7 +238,7 @@ class SettlingTime(OfCourse):
         return state | {"band": band, "since": np.where(state["step"] <= band, 0.0, np.inf)}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        outside, since = np.abs(self.left(state, ticks)) > state["band"], state["since"].copy()
+        outside, since = np.abs(self.left(state, ticks.x)) > state["band"], state["since"].copy()
         for t, out, alive in ticks.rows(outside):
             np.minimum(since, t, out=since, where=alive)
             np.copyto(since, np.inf, where=out & alive)
@@ -287,16 +249,12 @@ class SettlingTime(OfCourse):
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyStateError(OfTracking):
+class SteadyStateError(Total, OfTracking):
     """The mean error over the last part of the run [unit], of its ticks; then statistics of it.
 
     NaN for members that stopped or failed before the last tick.
 
     Args:
-        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
-            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         share: the part of the run's time, above 0 to 1; by default 0.1.
     """
 
@@ -311,39 +269,29 @@ class SteadyStateError(OfTracking):
             faults.add("share", self.share, "is no part of the run", "give a number above 0 and up to 1")
 
     def begin(self, x: np.ndarray) -> State:
-        return {"sum": np.zeros(x.shape[1]), "count": np.zeros(1)}
+        return super().begin(x) | {"count": np.zeros(1)}
+
+    def added(self, state: State, ticks: Ticks) -> np.ndarray:
+        return np.where(self._last(state, ticks)[:, None], ticks.x[:, 0], 0.0)
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        last = ticks.t >= state["end"] * (1.0 - self.share - ROUND_OFF)
-        part = np.where(last[:, None], ticks.x[:, 0], 0.0)
-        return {"sum": accumulated(state["sum"], ticks, part), "count": state["count"] + last.sum()}
+        return super().follow(state, ticks) | {"count": state["count"] + self._last(state, ticks).sum()}
+
+    def _last(self, state: State, ticks: Ticks) -> np.ndarray:
+        return ticks.t >= state["end"] * (1.0 - self.share - ROUND_OFF)
 
     def finish(self, state: State) -> np.ndarray:
         return np.where(state["until"] >= state["end"], state["sum"] / state["count"], np.nan)
 
 
 @dataclass(frozen=True, eq=False)
-class MaxError(OfTracking):
-    """The largest |e| of each member [unit]; then statistics of it.
-
-    Args:
-        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
-            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
-    """
+class MaxError(Largest, OfTracking):
+    """The largest |e| of each member [unit]; then statistics of it."""
 
     type: ClassVar[str] = "max_error"
 
-    def begin(self, x: np.ndarray) -> State:
-        return {"most": np.abs(x[0])}
-
-    def follow(self, state: State, ticks: Ticks) -> State:
-        size = ticks.of_living(np.abs(ticks.x[:, 0]), 0.0)
-        return {"most": np.maximum(state["most"], size.max(axis=0))}
-
-    def finish(self, state: State) -> np.ndarray:
-        return state["most"]
+    def size(self, state: State, x: np.ndarray) -> np.ndarray:
+        return np.abs(x[..., 0, :])
 
 
 @dataclass(frozen=True, eq=False)
@@ -354,8 +302,6 @@ class CrossTrack(MaxError):  # noqa: N818  (no exception)
 
     Args:
         of: "cross_track", the default.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "cross_track"
@@ -363,34 +309,20 @@ class CrossTrack(MaxError):  # noqa: N818  (no exception)
 
 
 @dataclass(frozen=True, eq=False)
-class OverTime(OfTracking):
+class OverTime(Total, OfTracking):
     """A metric that is an integral over time, by the trapezoidal rule between ticks. Abstract."""
 
-    def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
-        """Return what is integrated over time, of times (k, 1) [s] and errors (k, n)."""
-        raise TypeError(f"{type(self).__name__} is abstract")
+    # The integrand of times (k, 1) [s] and errors (k, n).
+    _integrand: ClassVar[Any]
 
-    def begin(self, x: np.ndarray) -> State:
-        return {"sum": np.zeros(x.shape[1])}
-
-    def follow(self, state: State, ticks: Ticks) -> State:
+    def added(self, state: State, ticks: Ticks) -> np.ndarray:
         t, dt = ticks.t[:, None], ticks.dt[:, None]
-        ends = self.integrand(t - dt, ticks.before[:, 0]), self.integrand(t, ticks.x[:, 0])
-        return {"sum": accumulated(state["sum"], ticks, 0.5 * dt * (ends[0] + ends[1]))}
-
-    def finish(self, state: State) -> np.ndarray:
-        return state["sum"]
+        return np.asarray(0.5 * dt * (self._integrand(t - dt, ticks.before[:, 0]) + self._integrand(t, ticks.x[:, 0])))
 
 
 @dataclass(frozen=True, eq=False)
 class IAE(OverTime):
     """The integral of |e| over time [unit s]; then statistics of it.
-
-    Args:
-        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
-            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -408,57 +340,30 @@ class IAE(OverTime):
 
     type: ClassVar[str] = "iae"
     form: ClassVar[str] = "{0} s"
-
-    def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
-        return np.abs(e)
+    _integrand = staticmethod(lambda t, e: np.abs(e))
 
 
 @dataclass(frozen=True, eq=False)
 class ISE(OverTime):
-    """The integral of e^2 over time [unit^2 s]; then statistics of it.
-
-    Args:
-        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
-            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
-    """
+    """The integral of e^2 over time [unit^2 s]; then statistics of it."""
 
     type: ClassVar[str] = "ise"
     form: ClassVar[str] = "{0}^2 s"
-
-    def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
-        return e * e
+    _integrand = staticmethod(lambda t, e: e * e)
 
 
 @dataclass(frozen=True, eq=False)
 class ITAE(OverTime):
-    """The integral of t |e| over time [unit s^2]; then statistics of it.
-
-    Args:
-        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
-            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
-    """
+    """The integral of t |e| over time [unit s^2]; then statistics of it."""
 
     type: ClassVar[str] = "itae"
     form: ClassVar[str] = "{0} s^2"
-
-    def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
-        return t * np.abs(e)
+    _integrand = staticmethod(lambda t, e: t * np.abs(e))
 
 
 @dataclass(frozen=True, eq=False)
 class RMSError(ISE):
-    """The root of the mean of e^2 over the time under way [unit]; then statistics of it. |e| where that time is 0.
-
-    Args:
-        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
-            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
-    """
+    """The root of the mean of e^2 over the time under way [unit]; then statistics of it. |e| where that time is 0."""
 
     type: ClassVar[str] = "rms"
     form: ClassVar[str] = "{0}"

@@ -67,9 +67,6 @@ class OfPath(MemberStatistic):
     Args:
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
             (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
         then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
             0.99)), lw.statistics.Exceedance(above=2.0).
     """
@@ -93,15 +90,6 @@ class PathMaximum(OfPath):
     Members that failed are left out: the rest of their path is not known. The name of an estimate has both types: "mean
     path_maximum speed". Its one row is at the time of the end.
 
-    Args:
-        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
-            (see lw.statistics.Quantity).
-        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
-            0.99)), lw.statistics.Exceedance(above=2.0).
-
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
@@ -117,12 +105,7 @@ class PathMaximum(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathMinimum(OfPath):
-    """The smallest value of a quantity over all sample times of each member, then statistics of it.
-
-    Args:
-        of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
-    """
+    """The smallest value of a quantity over all sample times of each member, then statistics of it."""
 
     type: ClassVar[str] = "path_minimum"
     _reduction: ClassVar[Reduction] = reductions.MINIMUM
@@ -130,12 +113,7 @@ class PathMinimum(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathRange(OfPath):
-    """The largest less the smallest value of a quantity over all sample times of each member, then statistics of it.
-
-    Args:
-        of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
-    """
+    """The largest less the smallest value of a quantity over all sample times of each member, then statistics of it."""
 
     type: ClassVar[str] = "path_range"
     _reduction: ClassVar[Reduction] = reductions.RANGE
@@ -147,10 +125,6 @@ class PathMean(OfPath):
 
     Linear between samples: the trapezoidal rule over the sample times, divided by the time from the first to the last.
     With one sample it is that sample.
-
-    Args:
-        of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
     """
 
     type: ClassVar[str] = "path_mean"
@@ -162,10 +136,6 @@ class PathRms(OfPath):
     """The root of the average over time of a quantity's square for each member, then statistics of it.
 
     The square is taken as linear between samples.
-
-    Args:
-        of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
     """
 
     type: ClassVar[str] = "path_rms"
@@ -181,8 +151,6 @@ class PathTime(OfPath, Condition):
     it holds.
 
     Args:
-        of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
         above: one number, or one for each component, in the quantity's unit.
         below: the same for the upper limit; with both, the time between them.
     """

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One vocabulary for quantities: what one door knows, all do, by the same words and with the same numbers."""
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ import lgvi_warp as lw
 from lgvi_warp.measuring.distance import QUANTITIES, compared_in
 from lgvi_warp.physics import notation
 from lgvi_warp.results.quantities import quantities
+from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.values.functional import functional, quantity
 from lgvi_warp.statistics.values.quantity import KNOWN
 from tests.support.refusals import refused, says
@@ -170,3 +172,17 @@ def test_each_component_is_named_by_an_expression_for_it(of, labels):
     for label in labels:
         assert functional("of", label).labels == (label,)
         assert functional("of", label).size == 1
+
+
+def test_help_describes_every_argument_of_a_statistic():
+    """Arguments that a base describes stand in the docstring of each class that a user calls."""
+    doors = [getattr(door, name) for door in (lw.statistics, lw.metrics) for name in door.__all__]
+    kinds = [kind for kind in doors if isinstance(kind, type) and issubclass(kind, Statistic)]
+    assert len(kinds) > 30
+    missing = [
+        f"{kind.__name__}.{argument.name}"
+        for kind in kinds
+        for argument in dataclasses.fields(kind)
+        if f"\n    {argument.name}: " not in kind.__doc__
+    ]
+    assert missing == []

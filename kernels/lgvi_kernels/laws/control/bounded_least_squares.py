@@ -30,14 +30,12 @@ ROWS = EFFORTS + 7
 VECTORS, MATRICES = 30, 108
 
 
-@functools.cache
-def params(width, real):
-    """Params: first rows of the table, of the commands and of the scratch; count; shared: rows before the curves.
-
-    size: of a curve; sided: whether polynomials astern are others than those ahead; iterations: at most; unconverged: row.
-    """
-    words = ("first", "commands", "count", "shared", "size", "sided", "odd", "work", "iterations", "unconverged")
-    return struct("BoundedLeastSquares", **dict.fromkeys(words, wp.int32))
+# First rows of the table, of the commands and of the scratch; count; shared: rows before the curves.
+# size: of a curve; sided: whether polynomials astern are others than those ahead; iterations: at most; unconverged: row.
+params = make_params(
+    "BoundedLeastSquares",
+    words="first commands count shared size sided odd work iterations unconverged",
+)
 
 
 @wp.func

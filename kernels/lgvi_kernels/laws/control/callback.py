@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A demand that a function of the host writes into the memory, once a tick."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params: first of six rows of the memory, X Y Z K M N."""
-    return struct("Callback", answer=wp.int32)
+# First of six rows of the memory, X Y Z K M N.
+params = make_params("Callback", words="answer")
 
 
 @wp.func

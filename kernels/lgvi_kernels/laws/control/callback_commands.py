@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Commands of one actuator that a function of the host writes into the memory, once a tick."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params: first row of the answer and of the commands; count; first row of the table, the limit of each command."""
-    return struct("CallbackCommands", answer=wp.int32, commands=wp.int32, count=wp.int32, first=wp.int32)
+# First row of the answer and of the commands; count; first row of the table, the limit of each command.
+params = make_params("CallbackCommands", words="answer commands count first")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The attitude from measured rates, and in the long run from a measured attitude."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -17,11 +16,8 @@ from lgvi_kernels.laws.control.readings import (
     turned,
 )
 
-
-@functools.cache
-def params(width, real):
-    """Params: the time constant of each lane; first of its rows of the memory: attitude (9), angular velocity (3)."""
-    return struct("ComplementaryFilter", time_constant=lane(width, real), memory=wp.int32)
+# The time constant of each lane; first of its rows of the memory: attitude (9), angular velocity (3).
+params = make_params("ComplementaryFilter", lanes="time_constant", words="memory")
 
 
 @wp.func

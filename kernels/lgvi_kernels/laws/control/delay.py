@@ -1,23 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The way of commands to the actuators takes time: the commands of the last ticks, the latest first."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params: delay = periods * period + steps * h of each lane; first row of the sets; how many; commands in a set.
-
-    fresh, acting, before, begin: first row of the new commands, of those that act from a step on and before, of that step.
-    """
-    Lane = lane(width, real)
-    words = ("memory", "sets", "count", "fresh", "acting", "before", "begin")
-    return struct("Delay", periods=Lane, steps=Lane, **dict.fromkeys(words, wp.int32))
+# Delay = periods * period + steps * h of each lane; first row of the sets; how many; commands in a set.
+# fresh, acting, before, begin: first row of the new commands, of those that act from a step on and before, of that step.
+params = make_params("Delay", lanes="periods steps", words="memory sets count fresh acting before begin")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """PID of the depth by way of the pitch angle (successive loop closure): a moment about the body's y axis."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -9,13 +8,12 @@ import warp as wp
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import integral, keep_error
 
-
-@functools.cache
-def params(width, real):
-    """Params: gains; first of five rows of the memory, I and error of depth and of pitch, pitch beyond its limit; see Bus."""
-    names = ("kp", "ki", "pitch_limit", "kp_pitch", "ki_pitch", "kd_pitch", "k_heave", "depth_limit", "angle_limit")
-    gains = dict.fromkeys(names, lane(width, real))
-    return struct("DepthPID", **gains, memory=wp.int32, unmet=wp.int32, conditional=wp.int32)
+# Gains; first of five rows of the memory, I and error of depth and of pitch, pitch beyond its limit; see Bus.
+params = make_params(
+    "DepthPID",
+    lanes="kp ki pitch_limit kp_pitch ki_pitch kd_pitch k_heave depth_limit angle_limit",
+    words="memory unmet conditional",
+)
 
 
 @wp.func

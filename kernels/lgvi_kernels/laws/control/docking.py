@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guidance into a dock along its centre line, which goes round where the vehicle leaves the funnel."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -20,10 +19,13 @@ GOING_ROUND = 2.0
 DOCKED = 3.0
 
 
-@functools.cache
-def params(width, real):
-    """Params: the dock, cosine and sine of its heading and numbers of each lane; first of three rows of the memory."""
-    return struct("Docking", position=lane3(width, real), **dict.fromkeys(LANES, lane(width, real)), memory=wp.int32)
+# The dock, cosine and sine of its heading and numbers of each lane; first of three rows of the memory.
+params = make_params(
+    "Docking",
+    vectors="position",
+    lanes="c s speed contact_speed slowing look_ahead kappa approach judged mouth slope offset",
+    words="memory",
+)
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A fault of an actuator: from a time on its command is another one."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -9,16 +8,9 @@ import warp as wp
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.lost import since
 
-
-@functools.cache
-def params(width, real):
-    """Params: first step, gain and offset of each lane; rows of the command.
-
-    fresh: of the command; acting, before: where commands are delayed, of the one that acts and of the one before.
-    """
-    Lane = lane(width, real)
-    words = dict.fromkeys(("fresh", "acting", "before", "delayed"), wp.int32)
-    return struct("Fault", begin=Lane, gain=Lane, offset=Lane, **words)
+# First step, gain and offset of each lane; rows of the command.
+# fresh: of the command; acting, before: where commands are delayed, of the one that acts and of the one before.
+params = make_params("Fault", lanes="begin gain offset", words="fresh acting before delayed")
 
 
 @wp.func

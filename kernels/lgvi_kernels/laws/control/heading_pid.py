@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """PID of the heading: a moment about the body's z axis."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -9,12 +8,8 @@ import warp as wp
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import integral, keep_error
 
-
-@functools.cache
-def params(width, real):
-    """Params: gains; first of two rows of the memory, I and the error; row of the moment N that was not delivered."""
-    gains = dict.fromkeys(("kp", "ki", "kd", "integral_limit"), lane(width, real))
-    return struct("HeadingPID", **gains, memory=wp.int32, unmet=wp.int32, conditional=wp.int32)
+# Gains; first of two rows of the memory, I and the error; row of the moment N that was not delivered.
+params = make_params("HeadingPID", lanes="kp ki kd integral_limit", words="memory unmet conditional")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Integral sliding mode control of the heading."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -9,13 +8,12 @@ import warp as wp
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import integral, keep_error
 
-
-@functools.cache
-def params(width, real):
-    """Params: gains, `rate` is lambda; first of two rows of the memory, I and the error; row of the moment N not delivered."""
-    names = ("rate", "boundary", "k_sigma", "k_d", "nomoto_gain", "nomoto_time", "integral_limit")
-    return struct("HeadingSMC", **dict.fromkeys(names, lane(width, real)),
-                  memory=wp.int32, unmet=wp.int32, conditional=wp.int32)  # fmt: skip
+# Gains, `rate` is lambda; first of two rows of the memory, I and the error; row of the moment N not delivered.
+params = make_params(
+    "HeadingSMC",
+    lanes="rate boundary k_sigma k_d nomoto_gain nomoto_time integral_limit",
+    words="memory unmet conditional",
+)
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model predictive control: the best inputs over a horizon within their limits, by an interior-point method."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -25,14 +24,13 @@ DEMAND = 6
 OF_EACH = 8
 
 
-@functools.cache
-def params(width, real):
-    """Params: the gain of the disturbance; first rows of table, memory, scratch and of what was not delivered; counts.
-
-    rated: whether changes of inputs have limits.
-    """
-    words = ("first", "memory", "work", "unmet", "states", "inputs", "horizon", "iterations", "rated", "unconverged")
-    return struct("LinearMPC", gain=lane(width, real), **dict.fromkeys(words, wp.int32))
+# The gain of the disturbance; first rows of table, memory, scratch and of what was not delivered; counts.
+# rated: whether changes of inputs have limits.
+params = make_params(
+    "LinearMPC",
+    lanes="gain",
+    words="first memory work unmet states inputs horizon iterations rated unconverged",
+)
 
 
 @wp.func

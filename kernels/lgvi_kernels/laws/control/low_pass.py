@@ -13,10 +13,8 @@ from lgvi_kernels.laws.control.readings import make_reading, turn_to, turned
 TURN = 6.283185307179586
 
 
-@functools.cache
-def params(width, real):
-    """Params: the time constant of each lane; first of its rows of the memory."""
-    return struct("LowPass", time_constant=lane(width, real), memory=wp.int32)
+# The time constant of each lane; first of its rows of the memory.
+params = make_params("LowPass", lanes="time_constant", words="memory")
 
 
 @wp.func

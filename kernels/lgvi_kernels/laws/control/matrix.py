@@ -18,10 +18,8 @@ ROWS = 14
 REST = rest_rows
 
 
-@functools.cache
-def params(width, real):
-    """Params: first row of the table; first row of the commands; count."""
-    return struct("Matrix", first=wp.int32, commands=wp.int32, count=wp.int32)
+# First row of the table; first row of the commands; count.
+params = make_params("Matrix", words="first commands count")
 
 
 @functools.cache

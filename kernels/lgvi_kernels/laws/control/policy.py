@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A perceptron: layers of weighted sums and a function of each."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -18,15 +17,9 @@ CLIP = 2
 RELU = 3
 
 
-@functools.cache
-def params(width, real):
-    """Params: scale of force and torque; first row of the table; scratch rows; counts; functions of hidden and last layers.
-
-    The table has places of the inputs; of each layer its sizes, W line by line and b; then places of the outputs.
-    """
-    Lane3 = lane3(width, real)
-    words = ("first", "work", "inputs", "layers", "outputs", "widest", "hidden", "last")
-    return struct("Policy", force=Lane3, torque=Lane3, **dict.fromkeys(words, wp.int32))
+# Scale of force and torque; first row of the table; scratch rows; counts; functions of hidden and last layers.
+# The table has places of the inputs; of each layer its sizes, W line by line and b; then places of the outputs.
+params = make_params("Policy", vectors="force torque", words="first work inputs layers outputs widest hidden last")
 
 
 @wp.func

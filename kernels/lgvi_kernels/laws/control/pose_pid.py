@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Geometric PID of position and attitude."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -11,17 +10,18 @@ from lgvi_kernels.laws.control.pose_error import (
     attitude_error,
     attitude_integral,
     balance,
-    pose_params,
     position_integral,
     rate_error,
     velocity_error,
 )
 
-
-@functools.cache
-def params(width, real):
-    """Params: see pose_error.py."""
-    return pose_params("PosePID", ("kp", "ki", "kd", "kr", "ki_r", "kw"), width, real)
+# See pose_error.py.
+params = make_params(
+    "PosePID",
+    lanes="position_limit attitude_limit net_weight",
+    vectors="kp ki kd kr ki_r kw moment",
+    words="memory unmet conditional",
+)
 
 
 @wp.func

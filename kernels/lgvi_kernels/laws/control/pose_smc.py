@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sliding mode control of position and attitude."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -11,19 +10,18 @@ from lgvi_kernels.laws.control.pose_error import (
     attitude_error,
     attitude_integral,
     balance,
-    pose_params,
     position_integral,
     rate_error,
     velocity_error,
 )
 
-
-@functools.cache
-def params(width, real):
-    """Params: see pose_error.py; rate and rate_r are lambda and lambda_r."""
-    of_position = ("rate", "boundary", "k_sigma", "k_d")
-    of_attitude = ("lambda_r", "boundary_r", "k_sigma_r", "k_d_r")
-    return pose_params("PoseSMC", of_position + of_attitude, width, real)
+# See pose_error.py; rate and rate_r are lambda and lambda_r.
+params = make_params(
+    "PoseSMC",
+    lanes="position_limit attitude_limit net_weight",
+    vectors="rate boundary k_sigma k_d lambda_r boundary_r k_sigma_r k_d_r moment",
+    words="memory unmet conditional",
+)
 
 
 @wp.func

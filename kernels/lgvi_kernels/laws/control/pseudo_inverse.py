@@ -18,14 +18,9 @@ from lgvi_kernels.laws.control.rest import rest
 REST = rest_rows
 
 
-@functools.cache
-def params(width, real):
-    """Params: first rows of the table and of the commands; count; sets; shared: rows before the curves; size: of a curve.
-
-    sided: whether polynomials astern are others than those ahead; odd: whether they are the same, with odd powers alone.
-    """
-    words = ("first", "commands", "count", "sets", "shared", "size", "sided", "odd")
-    return struct("PseudoInverse", **dict.fromkeys(words, wp.int32))
+# First rows of the table and of the commands; count; sets; shared: rows before the curves; size: of a curve.
+# sided: whether polynomials astern are others than those ahead; odd: whether they are the same, with odd powers alone.
+params = make_params("PseudoInverse", words="first commands count sets shared size sided odd")
 
 
 @wp.func

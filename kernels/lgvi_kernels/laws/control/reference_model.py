@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A reference model of third order: what is wanted, led smoothly from the measured state."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -13,10 +12,8 @@ from lgvi_kernels.laws.control.integral import remember3, remembered3
 ROWS = 10
 
 
-@functools.cache
-def params(width, real):
-    """Params: first row of the table; first row of the memory, x, x' and x'' of each number; how many, 2 or 4."""
-    return struct("ReferenceModel", first=wp.int32, memory=wp.int32, count=wp.int32)
+# First row of the table; first row of the memory, x, x' and x'' of each number; how many, 2 or 4.
+params = make_params("ReferenceModel", words="first memory count")
 
 
 @wp.func

@@ -11,19 +11,12 @@ from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.readings import make_reading
 
-
-@functools.cache
-def params(width, real):
-    """Params: first step, gain and offset of each lane; number of the channel."""
-    Lane = lane(width, real)
-    return struct("SensorFault", begin=Lane, gain=Lane, offset=Lane, channel=wp.int32)
+# First step, gain and offset of each lane; number of the channel.
+params = make_params("SensorFault", lanes="begin gain offset", words="channel")
 
 
-@functools.cache
-def range_params(width, real):
-    """Params of an altimeter's fault: first step, gain and offset of each lane; row of the reading."""
-    Lane = lane(width, real)
-    return struct("RangeFault", begin=Lane, gain=Lane, offset=Lane, row=wp.int32)
+# Params of an altimeter's fault: first step, gain and offset of each lane; row of the reading.
+range_params = make_params("RangeFault", lanes="begin gain offset", words="row")
 
 
 @wp.func

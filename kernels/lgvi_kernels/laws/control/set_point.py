@@ -1,20 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A set-point: a place, a heading and a speed that are wanted all the time."""
 
-import functools
 from typing import Any
 
 import warp as wp
 
 from lgvi_kernels.law import *
 
-
-@functools.cache
-def params(width, real):
-    """Params: numbers, and whether place, depth (level), heading (turn) and speed (pace) are wanted."""
-    Lane = lane(width, real)
-    wanted = dict.fromkeys(("place", "level", "turn", "pace"), wp.int32)
-    return struct("SetPoint", position=lane3(width, real), depth=Lane, heading=Lane, speed=Lane, **wanted)
+# Numbers, and whether place, depth (level), heading (turn) and speed (pace) are wanted.
+params = make_params("SetPoint", vectors="position", lanes="depth heading speed", words="place level turn pace")
 
 
 @wp.func

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Linear feedback of the whole state."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -9,11 +8,8 @@ import warp as wp
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.pose_error import attitude_error, rate_error, velocity_error
 
-
-@functools.cache
-def params(width, real):
-    """Params: first row of the table, which has K (6, 12) line by line."""
-    return struct("StateFeedback", first=wp.int32)
+# First row of the table, which has K (6, 12) line by line.
+params = make_params("StateFeedback", words="first")
 
 
 @wp.func

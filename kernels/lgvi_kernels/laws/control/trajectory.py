@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A trajectory: position, heading and speed as polynomials of time, piece by piece."""
 
-import functools
 from typing import Any
 
 import warp as wp
@@ -13,10 +12,8 @@ from lgvi_kernels.laws.control.set_point import headed
 ROWS = 21
 
 
-@functools.cache
-def params(width, real):
-    """Params: first row of the table; pieces before the last one; whether headings, and speeds, are wanted."""
-    return struct("Trajectory", **dict.fromkeys(("first", "pieces", "turns", "paced"), wp.int32))
+# First row of the table; pieces before the last one; whether headings, and speeds, are wanted.
+params = make_params("Trajectory", words="first pieces turns paced")
 
 
 @wp.func

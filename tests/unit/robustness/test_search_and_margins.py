@@ -11,10 +11,11 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.criteria import risk
 from lgvi_warp.robustness.linear import loops
 from lgvi_warp.robustness.linear.edges import edges
 from lgvi_warp.robustness.linear.margins import Margins
-from lgvi_warp.robustness.search import box, numbers, risk, tune, worst_case
+from lgvi_warp.robustness.search import box, numbers, tune, worst_case
 from lgvi_warp.robustness.search.box import SearchBox
 
 SCENE = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), terms=[lw.terms.Drag(linear=[1.0] * 6)])

@@ -27,7 +27,7 @@ def rare_arguments(verb: Any) -> None:
     add("--by", choices=("chains", "splitting"), default="chains", help="chains of members, or splitting in time, for a scene "
         "with noise (default chains)")  # fmt: skip
     add(
-        "--looks",
+        "--intervals",
         metavar="N",
         type=int,
         default=50,
@@ -73,7 +73,7 @@ def rare(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -
     with progress_bar(chosen.quiet) as progress:
         # Quiet, a terminal is shown nothing however long it takes.
         found = (study or (inspect.unwrap(rare_event) if chosen.quiet else rare_event))(
-            scene, chosen.when, relative_error=chosen.error, by=chosen.by, cheaper=cheaper, looks=chosen.looks,
+            scene, chosen.when, relative_error=chosen.error, by=chosen.by, cheaper=cheaper, intervals=chosen.intervals,
             failed=chosen.failed, most=chosen.most, seed=int(seed), threads=chosen.threads, progress=progress,
             store=chosen.store,
         )  # fmt: skip

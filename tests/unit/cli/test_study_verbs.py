@@ -285,16 +285,16 @@ def test_arguments_of_a_rare_event(tmp_path, capsys):
     verb = ["rare", PAPER, "--when", "position[0] above 60", "--out", str(tmp_path)]
     assert main([*verb, "-q"], study=study, draw=draw) == 0
     more = ["--error", "0.2", "--cheaper", "h=0.1,dtype=float32", "--cheaper", "vehicle.mass = 5", "--failed", "refuse",
-            "--most", "50000", "--seed", "7", "--threads", "2", "--by", "splitting", "--looks", "20",
+            "--most", "50000", "--seed", "7", "--threads", "2", "--by", "splitting", "--intervals", "20",
             "--store", "kept"]  # fmt: skip
     assert main([*verb, *more], study=study, draw=draw) == 0
     ((_, when), plain), (_, others) = study.calls
     seed = lw.Scene.load(PAPER).ensemble_settings.seed
     assert when == "position[0] above 60"
-    assert plain == {"relative_error": 0.1, "by": "chains", "looks": 50, "cheaper": [], "failed": "event",
+    assert plain == {"relative_error": 0.1, "by": "chains", "intervals": 50, "cheaper": [], "failed": "event",
                      "most": 1_000_000, "seed": seed, "threads": None, "progress": None, "store": None}  # fmt: skip
     assert others.pop("progress") is not None
-    assert others == {"relative_error": 0.2, "by": "splitting", "looks": 20,
+    assert others == {"relative_error": 0.2, "by": "splitting", "intervals": 20,
                       "cheaper": [{"h": 0.1, "dtype": "float32"}, {"vehicle.mass": 5.0}],
                       "failed": "refuse", "most": 50_000, "seed": 7, "threads": 2, "store": "kept"}  # fmt: skip
     assert capsys.readouterr().out.startswith("the probability in words")

@@ -135,6 +135,9 @@ class StabilityMap(Saved):
         if not self.unit:  # a map written before `of` could be any quantity
             object.__setattr__(self, "unit", QUANTITIES.get(self.of, "1"))
 
+    def __str__(self) -> str:
+        return report_text(self)
+
     @property
     def methods(self) -> tuple[str, ...]:
         """Names of the methods that the map shows."""

@@ -15,7 +15,7 @@ import importlib
 import inspect
 import operator
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,7 +28,7 @@ from lgvi_warp.cli.settings import folder, load_scene
 from lgvi_warp.cli.verb import FOLDER, SHARED, Verb, add_shared, without
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.arguments import alternatives
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, SceneError
 
 PACKAGE = Path(__file__).parents[1]
 # Arguments of functions that are keys of a scene's [run] -> their options.
@@ -89,13 +89,14 @@ NUMBER = Form("X", float, "is no number", "give one, as 0.5")
 WHOLE = Form("N", whole, "is no whole number", "give one, as 24")
 COUNTS = Form("N", lambda text: tuple(map(whole, text.split(","))) if "," in text else whole(text), *WHOLE[2:4])
 TEXT = Form("TEXT", str)
+FLAG = Form("", bool)
 GROUPS = Form("NAME=A,B", functools.partial(pairs, read=names, several=False), "names nothing",
               "give NAME=A,B", True)  # fmt: skip
 NUMBERS = Form("NAME=X", functools.partial(pairs, read=float), "is no value", "give NAME=0.1", True)
 VALUES = Form("NAME=VALUE", pairs, "names no value", "give NAME=LOW:HIGH, or NAME=LOW:HIGH:log", True)
 # First word of an annotation -> form.
 FORMS = {
-    "float": NUMBER, "int": WHOLE, "str": TEXT, "OfInterest": TEXT, "Any": Form("VALUE", value),
+    "bool": FLAG, "float": NUMBER, "int": WHOLE, "str": TEXT, "OfInterest": TEXT, "Any": Form("VALUE", value),
     "Mapping[str, Sequence[str]]": GROUPS, "Mapping[str, float]": NUMBERS, "Mapping[str, Any]": VALUES,
     "Sequence[str]": Form("A,B", names, many=True),
     "Sequence[OfInterest]": Form("TEXT", lambda text: [text], many=True),
@@ -133,18 +134,17 @@ class Argument:
         """Its option."""
         return f"--{self.dest.replace('_', '-')}"
 
-    def add(self, parser: Any, only: str, form: Form | None) -> None:
+    def add(self, parser: Any, only: str, form: Form) -> None:
         """Add its option to a parser; only: text on the function that alone has it."""
         if self.name in RUN:
             add_shared(parser, self.option)
             return
         # What only points to another function is said here.
         text = SHARED[self.option]["help"] if re.match("[Aa]s of", self.text) else self.text
-        if form is not None and form not in (TEXT, NUMBER, WHOLE):
-            ways = [form.remedy, "may be given several times" if form.many else ""]
-            text = "; ".join([re.sub(r"(?<!\.)\.$", "", text), *filter(None, ways)])
+        ways = [form.remedy] * (form.metavar not in "NX") + ["may be given several times"] * form.many
+        text = "; ".join([re.sub(r"(?<!\.)\.$", "", text), *ways]) if any(ways) else text
         settings: dict[str, Any] = {"help": only + text.replace("%", "%%"), "required": self.required}
-        if form is None:
+        if form is FLAG:
             parser.add_argument(self.option, action=argparse.BooleanOptionalAction, **settings)
         else:
             parser.add_argument(
@@ -161,18 +161,16 @@ def described(place: str) -> tuple[str, dict[str, Argument]]:
     node: Any = ast.parse(text).body[0]
     document = ast.get_docstring(node) or ""
     texts = {key: " ".join(entry.split()) for key, entry in ENTRY.findall(document)}
-    plain, keyed = node.args.args[1:], zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
-    without = len(plain) - len(node.args.defaults)
-    every = [(each, i < without) for i, each in enumerate(plain)] + [(each, default is None) for each, default in keyed]
+    plain, keyed = node.args.args, node.args.kwonlyargs
+    defaults = [*[None] * (len(plain) - len(node.args.defaults)), *node.args.defaults, *node.args.kw_defaults]
     found = {
-        each.arg: Argument(each.arg, ast.literal_eval(kind) if (kind := ast.unparse(each.annotation))[0] in "'\"" else kind,
-                           texts[each.arg], required)
-        for each, required in every if each.arg != "progress"
-    }  # fmt: skip
+        each.arg: Argument(each.arg, ast.unparse(each.annotation), texts[each.arg], default is None)
+        for each, default in zip([*plain, *keyed], defaults, strict=True)
+    }
     if node.args.kwarg is not None:
-        further = {key: "str" for key in RUN} | {"threads": "int"}
+        further = dict.fromkeys(RUN, "str") | {"threads": "int"}
         found |= {key: Argument(key, kind, "As of solve", False) for key, kind in further.items() if key not in found}
-    known = {key: each for key, each in found.items() if each.kind == "bool" or form_of(each.kind)}
+    known = {key: each for key, each in found.items() if form_of(each.kind) and key != plain[0].arg}
     return document.partition(".\n")[0].rstrip("."), known
 
 
@@ -206,6 +204,10 @@ class Question:
             for place in self.places
         }  # fmt: skip
 
+    def form(self, argument: Argument) -> Form:
+        """The form of an argument."""
+        return self.forms.get(argument.name) or form_of(argument.kind) or TEXT
+
     def add(self, parser: Any) -> None:
         """Add the options to a parser, those without which nothing can be asked first."""
         functions = self.functions
@@ -217,7 +219,7 @@ class Question:
         for name, each in sorted(every.items(), key=lambda item: (not item[1].required, item[0] in RUN)):
             having = [key for key, arguments in functions.items() if name in arguments]
             only = f"{having[0]}: " if len(having) < len(functions) else ""
-            each.add(parser, only, self.forms.get(name) or form_of(each.kind))
+            each.add(parser, only, self.form(each))
         add_shared(parser, self.shared)
 
     def given(self, chosen: argparse.Namespace, function: str) -> dict[str, Any]:
@@ -228,19 +230,21 @@ class Question:
             for name in arguments[other].keys() - arguments[function].keys():
                 if getattr(chosen, name) is not None:
                     faults.add(
-                        f"--{name.replace('_', '-')}", getattr(chosen, name), f"is an option of {other}", "leave it out"
+                        arguments[other][name].option, getattr(chosen, name), f"is an option of {other}", "leave it out"
                     )
         for name, each in arguments[function].items():
             if (words := getattr(chosen, each.dest)) is None or name in RUN:
                 continue
             setattr(chosen, each.dest, None)  # of the function, and not of the scene's file
-            form = self.forms.get(name) or form_of(each.kind)
-            parts = []
-            for word in [words] if isinstance(words, str | bool) else words:
-                try:
-                    parts.append(form.read(word) if form else word)
-                except ValueError:
-                    faults.add(each.option, word, *form[2:4])
+            form, parts = self.form(each), []
+            for word in words if isinstance(words, list) else [words]:
+                with faults.including():
+                    try:
+                        parts.append(form.read(word))
+                    except ValueError as error:
+                        if isinstance(error, SceneError):
+                            raise
+                        faults.add(each.option, word, form.problem, form.remedy)
             if parts:
                 given[name] = functools.reduce(operator.or_ if isinstance(parts[0], dict) else operator.add, parts)
         faults.raise_if_any()

@@ -9,10 +9,10 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.cli.from_function import Form, Question, as_study, finish, pairs
+from lgvi_warp.cli.from_function import Form, Question, as_study, finish
 from lgvi_warp.cli.output import Part, tell
 from lgvi_warp.cli.progress import part_of, progress_bar
-from lgvi_warp.cli.settings import folder, load_scene
+from lgvi_warp.cli.settings import folder
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.verb import FOLDER, add_shared, as_verb
 from lgvi_warp.cli.writing import Written
@@ -36,6 +36,8 @@ def _recipe(path: str) -> Any:
 
 RISK = Form("R", _risk, "is no risk", "give mean, 0.95, or cvar:0.05")
 
+RECIPE = Form("FILE", _recipe, remedy="give the estimate.json of an answer")
+
 
 def _unmeasured(found: Any) -> list[str]:
     """Faults of a trade-off: methods that were asked for and have no measurement."""
@@ -44,7 +46,7 @@ def _unmeasured(found: Any) -> list[str]:
 
 tradeoff = as_study("tradeoff", "accuracy.tradeoff:tradeoff", shared="--seed --set", picture=True, faults=_unmeasured)
 estimate = as_study("estimate", "uncertainty.estimating.estimate:estimate", always=False,
-                    forms={"risk": RISK, "recipe": Form("FILE", _recipe, remedy="give the estimate.json of the answer")})  # fmt: skip
+                    forms={"risk": RISK, "recipe": RECIPE})  # fmt: skip
 sensitivity = as_study("sensitivity", "uncertainty.sensitivity.analyses:sobol", "uncertainty.sensitivity.analyses:morris",
                        help="rank the varied parameters by Sobol indices, or screen them by Morris' method",
                        picture=True)  # fmt: skip

@@ -179,7 +179,7 @@ def test_the_grid_of_densities_knows_reflection():
 
 def scored(make, seeds, p, error=0.1):
     """(probability over p, told spread) of whole searches, (len(seeds), 2)."""
-    answers = [SplitSearch(make(seed), error, seed).answer() for seed in seeds]
+    answers = [SplitSearch(make(seed), error, seed, 1_000_000).answer() for seed in seeds]
     return np.array([(each.probability / p, each.spread) for each in answers])
 
 

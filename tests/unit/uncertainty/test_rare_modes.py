@@ -13,9 +13,10 @@ from scipy.special import ndtr, ndtri
 from lgvi_warp.uncertainty.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
 from lgvi_warp.uncertainty.rare.mixture import fitted
 from lgvi_warp.uncertainty.rare.plain import sampled
-from lgvi_warp.uncertainty.rare.search import RareAnswer, RareSearch
+from lgvi_warp.uncertainty.rare.search import RareAnswer
 from lgvi_warp.uncertainty.rare.subset import NoProgress, climb, first_levels
 from lgvi_warp.uncertainty.rare.witness import Surroundings, wide_of, witnessed
+from tests.support.rare import RareSearch
 
 
 def two_modes(rate, share, p=1e-5, alone=False):

@@ -478,7 +478,7 @@ def test_worst_cases_are_read_back_from_their_files(value, which, tmp_path, caps
     assert cli.main(["report", str(tmp_path), "-q"]) == 0
 
 
-def test_a_trim_gives_the_start_of_a_scene(capsys):
+def test_a_trim_gives_the_start_of_a_scene(tmp_path, capsys):
     study = Study(steady())
     assert main(["trim", SCENE, "--method", "psi_s", "--step", "0.02"], study=study) == 0
     (((scene,), settings),) = study.calls
@@ -489,6 +489,8 @@ def test_a_trim_gives_the_start_of_a_scene(capsys):
     content = document(["trim", SCENE], capsys, study=study)
     assert (content["start"], content["commands"]) == (start, {"thrusters": [0.25, -0.5]})
     assert (content["method"], content["step"], len(content["residual"])) == ("psi_s", 0.02, 6)
+    content = document(["trim", SCENE, "--out", str(tmp_path)], capsys, name="trim with out", study=study)
+    assert content["content"]["trim"] == json.loads((tmp_path / "trim.json").read_text())
 
 
 def test_derivatives_of_a_fleet(tmp_path, capsys):

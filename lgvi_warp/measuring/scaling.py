@@ -14,13 +14,12 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.arguments import listed, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.criteria.members import scene_of
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.measuring.cost import Cost, costs
 from lgvi_warp.measuring.speed import least
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.terms.base import Term
-from lgvi_warp.runs.request import ensemble_of
+from lgvi_warp.runs.request import ensemble_of, scene_of
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
@@ -152,7 +151,7 @@ def term_cost(
         >>> [row["term"] for row in rows]
         ['none', 'drag']
     """
-    scene = scene_of(scene)
+    scene = scene_of(scene, "scene")
     faults = Faults()
     if h is not None:
         h = faults.positive("h", h)

@@ -288,7 +288,7 @@ def test_whose_members_a_study_is_about(scene):
     assert str(caught.value) == "fleet = 3: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"
     with pytest.raises(lw.SceneError) as caught:
         members.scene_of(3)
-    assert str(caught.value) == "scene = 3: is neither a Scene nor an Ensemble; give lw.Scene(...)"
+    assert str(caught.value) == "scene = 3: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"
 
 
 def test_speeds_beside_the_peak_of_the_core():

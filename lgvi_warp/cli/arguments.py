@@ -26,6 +26,7 @@ from lgvi_warp.cli.studies import (
     sweep,
     tradeoff,
     trim,
+    tune_gains,
     worst_case,
 )
 from lgvi_warp.cli.verb import COMMON
@@ -35,8 +36,8 @@ from lgvi_warp.common.errors import closest
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
-          derivatives, margins, worst_case, trim, view, info, bench, warm, calibrate, new, list_names, schema, plot,
-          completion, show_help)  # fmt: skip
+          derivatives, margins, worst_case, tune_gains, trim, view, info, bench, warm, calibrate, new, list_names, schema,
+          plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
 }
@@ -61,6 +62,7 @@ EPILOG = """examples:
   lgvi-warp derivatives examples/paper.toml --of "position[0]" --by vehicle.mass --by "start.angular_velocity[0]"
   lgvi-warp margins dive.toml --loop heading_pid --of gain --of disk
   lgvi-warp worst-case dive.toml --of "max(depth)" --within vehicle.buoyancy=297:302
+  lgvi-warp tune-gains dive.toml --over heading_pid.kp=0.1:10:log --minimise "iae heading"
   lgvi-warp trim dive.toml --speed 1.5
   lgvi-warp info runs/large
   lgvi-warp run examples/paper.toml --json -q

@@ -115,6 +115,8 @@ worst_case = as_study(
     report=lambda chosen, found, out: f"{found}\nagain       {run_again(chosen, (out or Path()) / 'worst_case.csv')}",
 )  # fmt: skip
 
+tune_gains = as_study("tune-gains", "robustness.search.tune:tune_gains", shared="--members --set", forms={"risk": RISK})
+
 
 def _start(chosen: argparse.Namespace, found: Any, out: Path | None) -> str:
     """A steady motion, and the section [start] of a scene file that begins in it."""

@@ -2,6 +2,7 @@
 """The page on the command has every verb with its options, and no other."""
 
 import re
+import shlex
 
 import pytest
 
@@ -45,7 +46,7 @@ def test_every_example_is_understood():
     lines = re.findall(r"^    lgvi-warp (.*?)(?: +#.*)?$", PAGE, re.MULTILINE)
     assert len(lines) >= len(SECTIONS)
     for line in lines:
-        verb, *words = line.replace('"', "").split()
+        verb, *words = shlex.split(line)
         old = {new: old for old, new in OLD.items()}.get(verb, verb)
         known = verb if verb in VERBS else old
         assert parser().parse_args([known, *words]).verb == known

@@ -19,6 +19,7 @@ from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from tests.conftest import ROOT
 from tests.house.test_defaults import ENTRY
+from tests.studies.test_saved_answers import tuned
 from tests.support.verbs import Study, main
 from tests.unit.cli.test_terminal import document, region, sobol
 from tests.unit.measuring.test_cost import found as tradeoff_of
@@ -32,7 +33,8 @@ VERBS = {
     "tradeoff": ([lw.tradeoff], set()), "estimate": ([lw.estimate], set()),
     "sensitivity": ([uq.sobol, uq.morris], {"vary"}), "stability": ([lw.stability_map], set()),
     "rare": ([lw.rare_event], set()), "derivatives": ([lw.derivatives], {"save"}),
-    "margins": ([lw.linear.margins], set()), "worst-case": ([lw.worst_case], set()), "trim": ([lw.linear.trim], set()),
+    "margins": ([lw.linear.margins], set()), "worst-case": ([lw.worst_case], set()), "tune-gains": ([lw.tune_gains], set()),
+    "trim": ([lw.linear.trim], set()),
 }  # fmt: skip
 # Options of verbs that are arguments of no function.
 OWN = {"-h", "-q", "-v", "--json", "--color", "--out", "--set", "--duration", "--method", "--step", "--dtype", "--threads",
@@ -117,6 +119,7 @@ def slopes():
 FOUND = {
     "tradeoff": lambda: tradeoff_of(4.0), "estimate": answer, "sensitivity": sobol, "stability": region, "rare": Rare,
     "derivatives": slopes, "margins": lambda: loops("", "", "does not settle", ""), "worst-case": worst, "trim": steady,
+    "tune-gains": tuned,
 }  # fmt: skip
 BOUNDS = {"vehicle.buoyancy": (297.0, 302.0)}
 RARE = {"limit": "position[0] above 60"}
@@ -162,6 +165,9 @@ CASES = [
      "--restarts 2 --seed 9 --threads 1",
      {"of": "depth", "within": BOUNDS | {"heading_pid.kp": (0.5, 5.0, "log")}, "worst": "smallest", "budget": 400,
       "restarts": 2, "seed": 9, "threads": 1}),
+    ("tune-gains", "--over heading_pid.kp=0.1:10:log --minimise depth --risk cvar:0.1 --fresh none --budget 1e3",
+     {"over": {"heading_pid.kp": (0.1, 10.0, "log")}, "minimise": "depth", "risk": lw.metrics.CVaR(0.1), "fresh": None,
+      "budget": 1000}),
     ("trim", "", {}),
     ("trim", "--speed 0.5 --fixed pitch=0 --fixed control_fins[0]=-0.1 --free roll,drift",
      {"speed": 0.5, "fixed": {"pitch": 0.0, "control_fins[0]": -0.1}, "free": ["roll", "drift"]}),

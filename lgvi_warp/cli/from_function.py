@@ -29,6 +29,7 @@ from lgvi_warp.cli.verb import FOLDER, SHARED, Verb, add_shared, without
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.arguments import alternatives
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.reading import file_text
 
 PACKAGE = Path(__file__).parents[1]
 # Arguments of functions that are keys of a scene's [run] -> their options.
@@ -76,13 +77,13 @@ def names(text: str) -> list[str]:
 
 def pairs(text: str, read: Callable[[str], Any] = bounds, several: bool = True) -> dict[str, Any]:
     """NAME=VALUE, or several of them between commas, as a dict. Raises ValueError."""
-    found = {}
+    table = {}
     for pair in COMMA.split(text) if several else [text]:
         name, _, content = (word.strip() for word in pair.partition("="))
         if not name or not content:
             raise ValueError(pair)
-        found[name] = read(content)
-    return found
+        table[name] = read(content)
+    return table
 
 
 NUMBER = Form("X", float, "is no number", "give one, as 0.5")
@@ -156,27 +157,29 @@ class Argument:
 def described(place: str) -> tuple[str, dict[str, Argument]]:
     """First sentence and arguments of a function, MODULE:NAME, whose options a command may have; all but the first."""
     module, _, name = place.partition(":")
-    source = PACKAGE.joinpath(*module.split(".")).with_suffix(".py").read_text(encoding="utf-8")
+    source = file_text(PACKAGE.joinpath(*module.split(".")).with_suffix(".py"), "module")
     (text,) = re.findall(rf"(?ms)^def {name}\(.*?(?=^[\w@#]|\Z)", source)
     node: Any = ast.parse(text).body[0]
     document = ast.get_docstring(node) or ""
     texts = {key: " ".join(entry.split()) for key, entry in ENTRY.findall(document)}
     plain, keyed = node.args.args, node.args.kwonlyargs
     defaults = [*[None] * (len(plain) - len(node.args.defaults)), *node.args.defaults, *node.args.kw_defaults]
-    found = {
+    arguments = {
         each.arg: Argument(each.arg, ast.unparse(each.annotation), texts[each.arg], default is None)
         for each, default in zip([*plain, *keyed], defaults, strict=True)
     }
     if node.args.kwarg is not None:
         further = dict.fromkeys(RUN, "str") | {"threads": "int"}
-        found |= {key: Argument(key, kind, "As of solve", False) for key, kind in further.items() if key not in found}
-    known = {key: each for key, each in found.items() if form_of(each.kind) and key != plain[0].arg}
+        arguments |= {
+            key: Argument(key, kind, "As of solve", False) for key, kind in further.items() if key not in arguments
+        }
+    known = {key: each for key, each in arguments.items() if form_of(each.kind) and key != plain[0].arg}
     return document.partition(".\n")[0].rstrip("."), known
 
 
 @dataclass(frozen=True)
-class Question:
-    """A question of a verb: the function of the package that answers it, MODULE:NAME, or one of several by --analysis.
+class FunctionOptions:
+    """Options of a verb: the function of the package that answers it, MODULE:NAME, or one of several by --analysis.
 
     Attributes:
         shared: options of the scene beside the functions' arguments.
@@ -191,7 +194,7 @@ class Question:
 
     @property
     def sentence(self) -> str:
-        """What the function does, as the list of verbs says it."""
+        """First sentence of the function, as the list of verbs says it."""
         text, _ = described(self.places[0])
         return text[0].lower() + text[1:]
 
@@ -222,9 +225,9 @@ class Question:
             each.add(parser, only, self.form(each))
         add_shared(parser, self.shared)
 
-    def given(self, chosen: argparse.Namespace, function: str) -> dict[str, Any]:
+    def values_of(self, chosen: argparse.Namespace, function: str) -> dict[str, Any]:
         """The arguments of a function that options give; they are taken from what was parsed. Raises SceneError."""
-        faults, given = Faults(), {}
+        faults, values = Faults(), {}
         arguments = self.functions
         for other in arguments:
             for name in arguments[other].keys() - arguments[function].keys():
@@ -246,20 +249,20 @@ class Question:
                             raise
                         faults.add(each.option, word, form.problem, form.remedy)
             if parts:
-                given[name] = functools.reduce(operator.or_ if isinstance(parts[0], dict) else operator.add, parts)
+                values[name] = functools.reduce(operator.or_ if isinstance(parts[0], dict) else operator.add, parts)
         faults.raise_if_any()
-        return given
+        return values
 
-    def asked(self, chosen: argparse.Namespace) -> tuple[Any, Callable[..., Any], dict[str, Any]]:
+    def call_of(self, chosen: argparse.Namespace) -> tuple[Any, Callable[..., Any], dict[str, Any]]:
         """The scene, the function, and the arguments that options give."""
         function = getattr(chosen, "analysis", None) or next(iter(self.functions))
-        given = self.given(chosen, function)
+        values = self.values_of(chosen, function)
         scene = load_scene(chosen)
         for name in RUN.keys() & self.functions[function].keys():
             if getattr(chosen, RUN[name]) is not None:
-                given[name] = getattr(scene.run, RUN[name])
+                values[name] = getattr(scene.run, RUN[name])
         module = next(place for place in self.places if place.endswith(f":{function}")).partition(":")[0]
-        return scene, getattr(importlib.import_module(f"lgvi_warp.{module}"), function), given
+        return scene, getattr(importlib.import_module(f"lgvi_warp.{module}"), function), values
 
 
 def as_study(
@@ -274,18 +277,18 @@ def as_study(
     the arguments to what is asked about, which may refuse them. picture: whether it has one, of its own name. always: whether
     files are written without --out, too. report: its text, from the answer and the folder. faults: of an answer.
     """
-    question = Question(places, shared, forms or {})
+    options = FunctionOptions(places, shared, forms or {})
     stem = name.replace("-", "_")
 
     def arguments(parser: Any) -> None:
         default = FOLDER.format(f"runs/NAME_{stem}") if always else FOLDER.format("none is written")
         add_shared(parser, "scene --out", out=default)
-        question.add(parser)
+        options.add(parser)
         more(parser)
 
     def call(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -> int:
-        scene, function, given = question.asked(chosen)
-        fleet = about(chosen, scene, given) if about else scene
+        scene, function, values = options.call_of(chosen)
+        fleet = about(chosen, scene, values) if about else scene
         out = folder(chosen, f"_{stem}") if always or chosen.out else None
         from lgvi_warp.calls.prepared import FailedMembers
 
@@ -294,23 +297,23 @@ def as_study(
             with progress_bar(chosen.quiet, "compiling" if watched else "running") as progress:
                 # None would show some of them on a terminal, quiet or not.
                 shown = {"progress": progress or False} if watched else {}
-                found = (study or function)(fleet, **given, **shown)
+                answer = (study or function)(fleet, **values, **shown)
         except FailedMembers as error:
             return len(print_faults([str(error)]))
-        text = report(chosen, found, out) if report else str(found)
+        text = report(chosen, answer, out) if report else str(answer)
         if out is None:
-            tell(chosen, found.to_dict, lambda: text)
+            tell(chosen, answer.to_dict, lambda: text)
             return 0
         with progress_bar(chosen.quiet, "writing"):
-            written = Written(found.save(out))
+            written = Written(answer.save(out))
             if picture:
                 from lgvi_warp import plots
 
-                written.draw(draw or getattr(plots, stem), found, out / f"{stem}.png")
-        code = finish(written, chosen, {stem: found.to_dict()}, text)
-        return 1 if faults and print_faults(faults(found)) else code
+                written.draw(draw or getattr(plots, stem), answer, out / f"{stem}.png")
+        code = finish(written, chosen, {stem: answer.to_dict()}, text)
+        return 1 if faults and print_faults(faults(answer)) else code
 
-    return Verb(call, name, help or question.sentence, arguments, not always, ())
+    return Verb(call, name, help or options.sentence, arguments, not always, ())
 
 
 def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:

@@ -9,7 +9,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.cli.from_function import Form, Question, as_study, finish
+from lgvi_warp.cli.from_function import Form, FunctionOptions, as_study, finish
 from lgvi_warp.cli.output import Part, tell
 from lgvi_warp.cli.progress import part_of, progress_bar
 from lgvi_warp.cli.settings import folder
@@ -39,9 +39,9 @@ RISK = Form("R", _risk, "is no risk", "give mean, 0.95, or cvar:0.05")
 RECIPE = Form("FILE", _recipe, remedy="give the estimate.json of an answer")
 
 
-def _unmeasured(found: Any) -> list[str]:
+def _unmeasured(answer: Any) -> list[str]:
     """Faults of a trade-off: methods that were asked for and have no measurement."""
-    return [f"--methods {name}: has no measurement: {why}" for name, why in found.missing.items()]
+    return [f"--methods {name}: has no measurement: {why}" for name, why in answer.missing.items()]
 
 
 tradeoff = as_study("tradeoff", "accuracy.tradeoff:tradeoff", shared="--seed --set", picture=True, faults=_unmeasured)
@@ -52,11 +52,11 @@ sensitivity = as_study("sensitivity", "uncertainty.sensitivity.analyses:sobol", 
                        picture=True)  # fmt: skip
 
 
-def _with_bound(chosen: argparse.Namespace, scene: Any, given: dict[str, Any]) -> Any:
+def _with_bound(chosen: argparse.Namespace, scene: Any, values: dict[str, Any]) -> Any:
     """The scene; in Python a quantity alone is an event above 0, which hardly anybody means who types it."""
     from lgvi_warp.uncertainty.rare.event import condition_of, has_bound
 
-    words = given["limit"].strip()
+    words = values["limit"].strip()
     condition_of(words, scene)
     if words not in {event.key for event in scene.events} and not has_bound(words):
         raise refusal("--limit", words, "is a quantity without a bound", f'write "{words} above 12.0"')
@@ -71,7 +71,7 @@ def _fleet_option(verb: Any) -> None:
     verb.add_argument("--fleet", action="store_true", help="of each member of [ensemble], in place of the scene alone")
 
 
-def _fleet(chosen: argparse.Namespace, scene: Any, given: dict[str, Any]) -> Any:
+def _fleet(chosen: argparse.Namespace, scene: Any, values: dict[str, Any]) -> Any:
     """The members of the scene, with --fleet."""
     from lgvi_warp.scene.ensemble import Ensemble
 
@@ -82,12 +82,12 @@ derivatives = as_study("derivatives", "uncertainty.derivatives.derivatives:deriv
                        shared="--members --set")  # fmt: skip
 
 
-def _failed(found: Any) -> list[str]:
+def _failed(answer: Any) -> list[str]:
     """Faults of margins: members that failed."""
     from lgvi_warp.robustness.linear.loops import FAILED
 
-    failed = found.reasons.get(FAILED, 0)
-    return [f"{failed:,} of {found.members:,} members failed"] if failed else []
+    failed = answer.reasons.get(FAILED, 0)
+    return [f"{failed:,} of {answer.members:,} members failed"] if failed else []
 
 
 margins = as_study("margins", "robustness.linear.margins:margins", shared="--members --seed --set", picture=True,
@@ -112,20 +112,20 @@ def run_again(chosen: argparse.Namespace, table: Path) -> str:
 
 worst_case = as_study(
     "worst-case", "robustness.search.worst_case:worst_case",
-    report=lambda chosen, found, out: f"{found}\nagain       {run_again(chosen, (out or Path()) / 'worst_case.csv')}",
+    report=lambda chosen, answer, out: f"{answer}\nagain       {run_again(chosen, (out or Path()) / 'worst_case.csv')}",
 )  # fmt: skip
 
 tune_gains = as_study("tune-gains", "robustness.search.tune:tune_gains", shared="--members --set", forms={"risk": RISK})
 
 
-def _start(chosen: argparse.Namespace, found: Any, out: Path | None) -> str:
+def _start(chosen: argparse.Namespace, answer: Any, out: Path | None) -> str:
     """A steady motion, and the section [start] of a scene file that begins in it."""
-    return "\n".join([f"{found}\n\n[start]", *(f"{name} = {value}" for name, value in found.start.to_dict().items())])
+    return "\n".join([f"{answer}\n\n[start]", *(f"{name} = {value}" for name, value in answer.start.to_dict().items())])
 
 
 trim = as_study("trim", "robustness.linear.trim:trim", always=False, report=_start)
 
-STABILITY = Question(("accuracy.stability.map:stability_map",))
+STABILITY = FunctionOptions(("accuracy.stability.map:stability_map",))
 
 
 def stability_arguments(verb: Any) -> None:
@@ -146,7 +146,7 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
         fault = "names the same axes as --x and --y; leave out --grid, or both of them"
         raise SceneError([f"--grid {chosen.grid}: {fault}"])
-    scene, stability_map, given = STABILITY.asked(chosen)
+    scene, stability_map, values = STABILITY.call_of(chosen)
     out = folder(chosen, "_stability")
     from lgvi_warp import plots
     from lgvi_warp.accuracy.stability.map import GRIDS
@@ -160,7 +160,7 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
         for i, (name, axes) in enumerate(maps.items()):
             try:
                 part = part_of(progress, i, len(maps)) or False
-                regions_by_name[name] = (study or stability_map)(scene, **axes, **given, progress=part)
+                regions_by_name[name] = (study or stability_map)(scene, **axes, **values, progress=part)
             except KeyboardInterrupt as error:
                 if not written.files:
                     raise
@@ -171,7 +171,9 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
     return finish(written, chosen, {name: regions.to_dict() for name, regions in regions_by_name.items()}, text)
 
 
-SWEEP = Question(("robustness.sweeps.sweep:sweep",), "", only=("members", "seed", "threads", "executor", "scheduler"))
+SWEEP = FunctionOptions(
+    ("robustness.sweeps.sweep:sweep",), "", only=("members", "seed", "threads", "executor", "scheduler")
+)
 
 
 def sweep_arguments(verb: Any) -> None:
@@ -199,7 +201,7 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
     from lgvi_warp.robustness.sweeps.sweep import sweep as run_sweep
     from lgvi_warp.views.plots.sweep_pictures import pictures
 
-    arguments = arguments_of_file(chosen.scene) | SWEEP.given(chosen, "sweep")
+    arguments = arguments_of_file(chosen.scene) | SWEEP.values_of(chosen, "sweep")
     if chosen.plan:
         threads = arguments.pop("threads", None)
         known = ("cases", "grid", "vary", "members", "seed", "sampling", "rare")

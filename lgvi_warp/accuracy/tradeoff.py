@@ -114,6 +114,9 @@ class Tradeoff(Saved):
     missing: dict[str, str] = field(default_factory=dict)
     study: ClassVar[str] = "tradeoff"
 
+    def __str__(self) -> str:
+        return report_text(self)
+
     def shown(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
         """List the measurements whose error the reference can resolve, the cheapest first.
 

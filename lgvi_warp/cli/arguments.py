@@ -11,15 +11,24 @@ from typing import NoReturn
 from lgvi_warp import __version__
 from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
-from lgvi_warp.cli.derivatives import derivatives
 from lgvi_warp.cli.lists import list_names, new, schema, show_help
-from lgvi_warp.cli.loops import margins, trim, worst_case
 from lgvi_warp.cli.machine import bench, info
 from lgvi_warp.cli.plot import plot
-from lgvi_warp.cli.rare import rare
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.stores import export, merge, report
-from lgvi_warp.cli.studies import estimate, sensitivity, stability, sweep, tradeoff
+from lgvi_warp.cli.studies import (
+    derivatives,
+    estimate,
+    margins,
+    rare,
+    sensitivity,
+    stability,
+    sweep,
+    tradeoff,
+    trim,
+    tune_gains,
+    worst_case,
+)
 from lgvi_warp.cli.verb import COMMON
 from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
@@ -27,8 +36,8 @@ from lgvi_warp.common.errors import closest
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
-          derivatives, margins, worst_case, trim, view, info, bench, warm, new, list_names, schema, plot,
-          completion, show_help)  # fmt: skip
+          derivatives, margins, worst_case, tune_gains, trim, view, info, bench, warm, new, list_names, schema,
+          plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
 }
@@ -49,10 +58,11 @@ EPILOG = """examples:
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
   lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
-  lgvi-warp rare examples/paper.toml --when "position[2] above 690"
+  lgvi-warp rare examples/paper.toml --limit "position[2] above 690"
   lgvi-warp derivatives examples/paper.toml --of "position[0]" --by vehicle.mass --by "start.angular_velocity[0]"
   lgvi-warp margins dive.toml --loop heading_pid --of gain --of disk
   lgvi-warp worst-case dive.toml --of "max(depth)" --within vehicle.buoyancy=297:302
+  lgvi-warp tune-gains dive.toml --over heading_pid.kp=0.1:10:log --minimise "iae heading"
   lgvi-warp trim dive.toml --speed 1.5
   lgvi-warp info runs/large
   lgvi-warp run examples/paper.toml --json -q

@@ -123,22 +123,9 @@ def _part(content: Content, chosen: argparse.Namespace, describe: Part) -> tuple
             document = documents.of_result(numbers)
             text = summary(numbers, shown_members(numbers), [], verbose=chosen.verbose)
         else:
-            document, text = {"content": numbers.to_dict()}, text_of(content.kind, numbers)
+            document, text = {"content": numbers.to_dict()}, str(numbers)
     report = f"{file_line(content.path)}\n{text}"
     return head | document, lambda: report
-
-
-def text_of(kind: str, study: Any) -> str:
-    """Describe what a study found."""
-    if kind == "tradeoff":
-        from lgvi_warp.accuracy.tradeoff import report_text
-
-        return report_text(study)
-    if kind == "stability":
-        from lgvi_warp.accuracy.stability import map as stability
-
-        return stability.report_text(study)
-    return str(study)
 
 
 def store_lines(contents: dict[str, Any], chosen: argparse.Namespace) -> Iterator[str]:

@@ -242,7 +242,7 @@ def _misfit(
         loose = parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD) or told is parameter.empty
         if loose or value is parameter.default:
             continue
-        kinds = [_resolved(word.strip(), function) for word in _alternatives(words)]
+        kinds = [_resolved(word.strip(), function) for word in alternatives(words)]
         if not any(_fits(kind, value) for kind in kinds):
             what = " or ".join(_WORDS.get(re.split(r"\W", kind.removeprefix("np."))[0], kind) for kind in kinds)
             return refusal(name, value, f"is not {what}", f"give what {function.__qualname__} takes")
@@ -256,7 +256,7 @@ def _misfit(
     return None
 
 
-def _alternatives(words: str) -> list[str]:
+def alternatives(words: str) -> list[str]:
     """The parts of an annotation that "|" joins, outside of brackets."""
     return re.split(r"\|(?![^\[]*\])", words)
 

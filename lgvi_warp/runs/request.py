@@ -183,10 +183,10 @@ class Request:
         return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
 
 
-def scene_of(fleet: Any) -> Any:
-    """The scene of an Ensemble, or a Scene itself."""
+def scene_of(fleet: Any, key: str = "fleet") -> Any:
+    """The scene of an Ensemble, or a Scene itself; key: name of the argument. Raises SceneError."""
     if not isinstance(fleet, Ensemble | Scene):
-        raise refusal("fleet", fleet, "is neither an Ensemble nor a Scene", "give lw.Scene(...) or lw.Ensemble(...)")
+        raise refusal(key, fleet, "is neither an Ensemble nor a Scene", "give lw.Scene(...) or lw.Ensemble(...)")
     return fleet.scene if isinstance(fleet, Ensemble) else fleet
 
 

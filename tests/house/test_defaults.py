@@ -9,7 +9,6 @@ import re
 import numpy as np
 import pytest
 
-import lgvi_warp as lw
 from lgvi_warp.cli.arguments import parser
 from tests.house.graph import ROOT
 from tests.support.public import NAMED
@@ -22,17 +21,6 @@ SAID = (
     re.compile(rf"[;,.] {LITERAL}(?:,)? by default"),
     re.compile(rf"\(default:? {LITERAL}\)"),
 )
-# The verb, the function, and options that are called otherwise than its arguments.
-VERBS = {
-    "tradeoff": (lw.tradeoff, {}),
-    "rare": (lw.rare_event, {"error": "relative_error"}),
-    "estimate": (lw.estimate, {}),
-    "derivatives": (lw.derivatives, {}),
-    "sensitivity": (lw.uq.sobol, {}),
-    "stability": (lw.stability_map, {}),
-    "margins": (lw.linear.margins, {}),
-    "worst-case": (lw.worst_case, {}),
-}
 # Rooms in which a folder belongs to one question.
 ROOMS_OF_FOLDERS = ("measuring", "uncertainty", "robustness", "accuracy")
 
@@ -112,22 +100,6 @@ def test_helps_name_the_defaults_of_options():
         for told in said(action.help or "")
         if action.default is not None and not same(action.default, told)
     ]
-    assert wrong == []
-
-
-def test_options_have_the_defaults_of_functions():
-    wrong = []
-    for verb, action in actions():
-        function, names = VERBS.get(verb, (None, {}))
-        if function is not None:
-            defaults = parameters(function)
-            name = names.get(action.dest, action.dest)
-            if (
-                name in defaults
-                and action.default not in (None, [], False)
-                and not same(action.default, defaults[name])
-            ):
-                wrong.append((verb, name, action.default, defaults[name]))
     assert wrong == []
 
 

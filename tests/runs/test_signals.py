@@ -151,7 +151,7 @@ def test_other_verbs_end_in_a_line(verb, tmp_path):
     scene = [] if verb == "bench" else [PAPER]
     out = [] if verb == "bench" else ["--out", str(tmp_path)]
     # Enough work that none has ended before it is told to.
-    more = {"bench": ["--members", "100000000"]}
+    more = {"bench": ["--members", "100000000"], "sensitivity": ["--duration", "2000", "--of", "depth"]}
     with begun([verb, *scene, *more.get(verb, ["--duration", "2000"]), *out], shown="") as process:
         time.sleep(4.0)
         process.terminate()

@@ -179,7 +179,7 @@ def test_the_grid_of_densities_knows_reflection():
 
 def scored(make, seeds, p, error=0.1):
     """(probability over p, told spread) of whole searches, (len(seeds), 2)."""
-    answers = [SplitSearch(make(seed), error, seed).answer() for seed in seeds]
+    answers = [SplitSearch(make(seed), error, seed, 1_000_000).answer() for seed in seeds]
     return np.array([(each.probability / p, each.spread) for each in answers])
 
 
@@ -492,8 +492,8 @@ def test_faulty_arguments():
     says(str(error.value), "cheaper", "relative_error = 2.0")
     with pytest.raises(lw.SceneError, match="by = 'levels'"):
         lw.rare_event(both(), "depth - 1.0", by="levels", **RUN)
-    with pytest.raises(lw.SceneError, match="looks = 1"):
-        lw.rare_event(both(), "depth - 1.0", by="splitting", looks=1, **RUN)
+    with pytest.raises(lw.SceneError, match="intervals = 1"):
+        lw.rare_event(both(), "depth - 1.0", by="splitting", intervals=1, **RUN)
     with pytest.raises(lw.SceneError, match="names times of a whole run"):
         lw.rare_event(both(), "depth - 1.0", by="splitting", save=lw.SaveAt(at=[1.0]), **RUN)
     still = lw.Ensemble(lw.Scene(VEHICLE), vary={"start.position[0]": lw.distributions.Normal(std=NORTH)})

@@ -27,7 +27,6 @@ from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
 from lgvi_warp.cli import documents, report
-from lgvi_warp.cli.folders import text_of
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.status import WarningArray
 from lgvi_warp.statistics.estimates.estimate import Estimates
@@ -307,9 +306,8 @@ def reports(folder):
     refused = dataclasses.replace(of_methods(), refused={"cg3": "remembers nothing", "psi": "draws no noise"})
     studies = {"tradeoff": of_methods(), "a refused method": refused, "stability": of_cells(), "a map": region(),
                "sobol": sobol(), "morris": morris()}  # fmt: skip
-    kinds = {"a refused method": "tradeoff", "a map": "stability", "sobol": "sensitivity", "morris": "sensitivity"}
     said = {f"summary: {name}": summed_up(result, folder) for name, result in summaries().items()}
-    said |= {f"study: {name}": text_of(kinds.get(name, name), found).splitlines() for name, found in studies.items()}
+    said |= {f"study: {name}": str(found).splitlines() for name, found in studies.items()}
     return said | {f"page: {name}": page(summaries()[name], folder) for name in ("followed", "warnings")}
 
 

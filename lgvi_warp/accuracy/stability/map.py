@@ -34,13 +34,13 @@ from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
 from lgvi_warp.criteria.files import Saved, finite_or_none
-from lgvi_warp.criteria.members import scene_of
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.measuring.distance import QUANTITIES, Distance, compared_in
 from lgvi_warp.measuring.speed import void
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.results.result import Result
+from lgvi_warp.runs.request import scene_of
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.scene import Scene
 
@@ -134,6 +134,9 @@ class StabilityMap(Saved):
     def __post_init__(self) -> None:
         if not self.unit:  # a map written before `of` could be any quantity
             object.__setattr__(self, "unit", QUANTITIES.get(self.of, "1"))
+
+    def __str__(self) -> str:
+        return report_text(self)
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -313,7 +316,7 @@ def stability_map(
                [0, 1, 2, 2]])
     """
     report = callback(progress) or void
-    scene = scene_of(scene)
+    scene = scene_of(scene, "scene")
     dtype = scene.run.dtype if dtype is None else dtype
     names = chosen_methods(methods, METHODS)
     faults = Faults()

@@ -17,7 +17,6 @@ from lgvi_warp.control.error_state_filter import ErrorStateFilter
 from lgvi_warp.control.imu import IMU
 from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.control.sensor import HANDED, Sensor
-from lgvi_warp.criteria.members import scene_of
 from lgvi_warp.criteria.running import step_of
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.fields import FIELDS
@@ -25,6 +24,7 @@ from lgvi_warp.physics.terms.control_wrench import COMPONENTS, ControlWrench
 from lgvi_warp.robustness.linear.bench import COORDINATES, Motion, MotionBench, calm, plant
 from lgvi_warp.robustness.linear.differences import STEP, Differences, Row, names_of
 from lgvi_warp.robustness.linear.trim import Trim
+from lgvi_warp.runs.request import scene_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
@@ -168,7 +168,7 @@ def linearize(
         >>> model.A.shape, model.B.shape
         ((20, 20), (20, 8))
     """
-    scene = scene_of(scene)
+    scene = scene_of(scene, "scene")
     calm(scene, "linear models")
     faults = Faults()
     faults.choice("inputs", inputs, INPUTS)

@@ -14,11 +14,11 @@ from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.near import near_names
 from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.criteria.files import Saved
-from lgvi_warp.criteria.members import scene_of
 from lgvi_warp.criteria.running import step_of
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics import notation
 from lgvi_warp.robustness.linear.bench import COORDINATES, Motion, MotionBench, calm, plant
+from lgvi_warp.runs.request import scene_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Start
@@ -134,7 +134,7 @@ def trim(
     """
     from scipy.optimize import least_squares
 
-    scene = scene_of(scene)
+    scene = scene_of(scene, "scene")
     calm(scene, "steady motions")
     h = step_of(scene, h)
     bench = MotionBench(

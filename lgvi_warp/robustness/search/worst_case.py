@@ -16,10 +16,10 @@ from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
-from lgvi_warp.criteria.members import scene_of
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, search
 from lgvi_warp.robustness.search.numbers import Numbers
+from lgvi_warp.runs.request import scene_of
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene

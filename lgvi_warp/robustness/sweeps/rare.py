@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,6 +28,8 @@ from lgvi_warp.uncertainty.rare.limit import VehicleLimit
 from lgvi_warp.uncertainty.rare.rare_event import check_asked, rare_event
 from lgvi_warp.uncertainty.rare.ratio import FailingMembers, RareRatio, Share, members_of, ratio_of, shared
 
+# Defaults of the function for what a case may leave out.
+DEFAULTS = {name: inspect.signature(rare_event).parameters[name].default for name in ("relative_error", "most")}
 # Folder of the answers, within that of the sweep.
 FOLDER = "rare"
 
@@ -102,7 +105,7 @@ class RareFailures:
         for case in self.setup.cases:
             if asked := self.asked(case):
                 own = Faults(f"case {case.name!r}: rare.")
-                check_asked(own, asked.get("relative_error", 0.1), asked.get("most", 1_000_000))
+                check_asked(own, **DEFAULTS | {name: asked[name] for name in DEFAULTS.keys() & asked.keys()})
                 with faults.including():
                     own.raise_if_any()
         faults.raise_if_any()
@@ -111,9 +114,8 @@ class RareFailures:
     def asked(case: Any) -> dict[str, Any]:
         """The arguments of `rare_event` that a case gives; empty where it does not ask."""
         rare = getattr(case, "rare", None)
-        if isinstance(rare, Mapping):
-            return {"relative_error": 0.1, **rare}
-        return {"relative_error": 0.1} if rare else {}
+        error = {"relative_error": DEFAULTS["relative_error"]}
+        return error | dict(rare) if isinstance(rare, Mapping) else error if rare else {}
 
     def of(self, cell: SweepCell) -> RareFailure | None:
         """What is known of a cell; None where nothing was asked."""

@@ -52,7 +52,7 @@ def estimate(
     relative_error: float | None = None,
     t1: float | None = None,
     risk: Any = "mean",
-    cheaper: Sequence[Any] = (),
+    cheaper: Sequence[Mapping[str, Any] | Scene] = (),
     method: str | Method | None = None,
     h: float | None = None,
     dtype: str | None = None,

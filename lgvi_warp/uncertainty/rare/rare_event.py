@@ -59,7 +59,7 @@ def rare_event(
     relative_error: float = 0.1,
     by: str = "chains",
     cheaper: Sequence[Mapping[str, Any]] = (),
-    looks: int = 50,
+    intervals: int = 50,
     failed: str = "event",
     most: int = 1_000_000,
     seed: int = 0,
@@ -83,8 +83,8 @@ def rare_event(
             end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
         cheaper: Settings that chains may use first, the answer being that of the scene's own: numbers and settings of the run
             that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by default.
-        looks: With by="splitting", into how many pieces the time is cut, at most, 2 to 1,000; 50 by default. More of them need
-            fewer members, and each costs a call. Pieces begin at samples and at ticks of a controller.
+        intervals: Splitting: number of time intervals, at most, 2 to 1,000; 50 by default. More intervals need fewer members,
+            and each costs a call. They begin at samples and at ticks of a controller.
         failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
         most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
         seed: Seed of all that is drawn; 0 by default.
@@ -125,11 +125,11 @@ def rare_event(
         if name in settings:
             faults.add(name, settings[name], "is what rare_event decides", "leave it out")
     faults.raise_if_any()
-    whole_number("seed", seed, 0), whole_number("looks", looks, 2, 1000)
+    whole_number("seed", seed, 0), whole_number("intervals", intervals, 2, 1000)
     condition = condition_of(limit, members.scene)
     report = callback(progress) or (lambda fraction: None)
     if by == "splitting":
-        return _by_splitting(members, condition, float(relative_error), looks, failed, most, seed, report, settings)
+        return _by_splitting(members, condition, float(relative_error), intervals, failed, most, seed, report, settings)
     faster = cheaper_of(cheaper, members, settings)
     asked = {"study": "rare_event", "limit": limit, "relative_error": relative_error, "most": most, "seed": seed,
              "cheaper": [each.name for each in faster], "failed": failed, **settings}  # fmt: skip
@@ -158,10 +158,10 @@ def rare_event(
 
 
 def _by_splitting(
-    fleet: Ensemble, condition: RareCondition, relative_error: float, looks: int, failed: str, most: int, seed: int,
+    fleet: Ensemble, condition: RareCondition, relative_error: float, intervals: int, failed: str, most: int, seed: int,
     report: Callable[[float], None], settings: Mapping[str, Any]) -> RareEvent:  # fmt: skip
     """The answer by splitting in time."""
-    walk = VehicleWalk(fleet, condition, settings, failed == "refuse", seed, looks)
+    walk = VehicleWalk(fleet, condition, settings, failed == "refuse", seed, intervals)
     search = SplitSearch(walk, relative_error, seed, most, report)
     try:
         found = search.answer()

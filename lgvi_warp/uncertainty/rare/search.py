@@ -202,9 +202,9 @@ class RareSearch:
 
     limit: Limit
     d: int
-    relative_error: float = 0.1
-    seed: int = 0
-    most: int = 1_000_000
+    relative_error: float
+    seed: int
+    most: int
     weighted: bool = True
     chained: Limit | None = None
     margin: float = 0.0

@@ -12,8 +12,8 @@ from lgvi_warp.common.arguments import ensemble_of, of_kind
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
 from lgvi_warp.common.real_numbers import whole_remedy
 from lgvi_warp.common.status import Status
-from lgvi_warp.criteria.members import scene_of
 from lgvi_warp.results.quantities import OfInterest
+from lgvi_warp.runs.request import scene_of
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.designs import Factors, Morris, Saltelli, salib_problem
 from lgvi_warp.scene.columns import as_given, columns_of
@@ -288,7 +288,9 @@ def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 
 
 def designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples: int) -> Ensemble:
     """The ensemble of a design with this number of groups; None for what the scene varies, and its seed."""
-    settings: Any = scene if isinstance(scene, Ensemble) else scene_of(scene).ensemble_settings or EnsembleSettings()
+    settings: Any = (
+        scene if isinstance(scene, Ensemble) else scene_of(scene, "scene").ensemble_settings or EnsembleSettings()
+    )
     scene = scene.scene if isinstance(scene, Ensemble) else scene
     vary, seed = dict(settings.vary) if vary is None else vary, settings.seed if seed is None else seed
     group = design.group_size(Ensemble(scene, None, seed, vary, design).space)

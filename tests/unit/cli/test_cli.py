@@ -164,8 +164,8 @@ def test_members_that_an_event_stopped_have_not_failed():
 
 def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
     (tmp_path / "file").write_text("")
-    for verb in ("run", "stability", "sensitivity", "tradeoff"):
-        assert cli.main([verb, PAPER, "--out", str(tmp_path / "file")]) == 2
+    for verb in (["run"], ["stability"], ["sensitivity", "--of", "depth"], ["tradeoff"]):
+        assert cli.main([*verb, PAPER, "--out", str(tmp_path / "file")]) == 2
         assert f"--out {tmp_path / 'file'}: is a file; give a folder" in capsys.readouterr().err
     for verb in (["info"], ["resume"], ["export", "--to", "netcdf"]):
         assert cli.main([*verb, str(tmp_path / "file")]) == 2

@@ -15,7 +15,6 @@ from lgvi_warp.cli.folders import Content, contents
 from lgvi_warp.cli.writing import Written
 from tests.support.verbs import Study, main
 from tests.unit.cli.test_run_summary import MACHINE, told
-from tests.unit.cli.test_terminal import region, sobol
 from tests.unit.measuring.test_cost import found as tradeoff_of
 
 
@@ -126,15 +125,6 @@ def test_verbose_info_of_a_result_says_how(tmp_path, capsys):
     told().save(tmp_path / "result.npz")
     assert cli.main(["info", str(tmp_path), "-v"]) == 0
     assert f"how         seed 1, checks {MACHINE['checks']}" in capsys.readouterr().out
-
-
-def test_studies_have_their_reports():
-    from lgvi_warp.accuracy.stability import map as stability
-    from lgvi_warp.accuracy.tradeoff import report_text
-
-    assert folders.text_of("tradeoff", tradeoff_of(4.0)) == report_text(tradeoff_of(4.0))
-    assert folders.text_of("stability", region()) == stability.report_text(region())
-    assert folders.text_of("sensitivity", sobol()) == str(sobol())
 
 
 def test_pictures_are_drawn_again(tmp_path, capsys):

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verbs of studies: what their arguments reach, what they write and how they end. No study runs."""
+"""The verbs of studies: what their options reach, what they write and how they end. No study runs."""
 
 import dataclasses
+import inspect
 import json
+import math
+import shlex
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,17 +18,231 @@ from lgvi_warp.cli import studies
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from tests.conftest import ROOT
+from tests.house.test_defaults import ENTRY
+from tests.studies.test_saved_answers import tuned
 from tests.support.verbs import Study, main
 from tests.unit.cli.test_terminal import document, region, sobol
 from tests.unit.measuring.test_cost import found as tradeoff_of
 from tests.unit.uncertainty.test_estimating import answer
 
 PAPER = str(ROOT / "examples" / "paper.toml")
+SCENE = str(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml")
+RUN = {"t1": "duration", "method": "method", "h": "step", "dtype": "dtype"}
+# Verb -> its functions, and those of their arguments that no option can be.
+VERBS = {
+    "tradeoff": ([lw.tradeoff], set()), "estimate": ([lw.estimate], set()),
+    "sensitivity": ([uq.sobol, uq.morris], {"vary"}), "stability": ([lw.stability_map], set()),
+    "rare": ([lw.rare_event], set()), "derivatives": ([lw.derivatives], {"save"}),
+    "margins": ([lw.linear.margins], set()), "worst-case": ([lw.worst_case], set()), "tune-gains": ([lw.tune_gains], set()),
+    "trim": ([lw.linear.trim], set()),
+}  # fmt: skip
+# Options of verbs that are arguments of no function.
+OWN = {"-h", "-q", "-v", "--json", "--color", "--out", "--set", "--duration", "--method", "--step", "--dtype", "--threads",
+       "--members", "--seed", "--analysis", "--grid", "--fleet"}  # fmt: skip
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_options_are_the_arguments_of_the_function(verb):
+    """An option is called as its argument, has no default of its own, and its help is the docstring's."""
+    functions, without = VERBS[verb]
+    actions = {
+        action.option_strings[0]: action for action in cli.parser().verbs[verb]._actions if action.option_strings
+    }
+    options = {
+        f"--{RUN.get(name, name).replace('_', '-')}": (function, parameter)
+        for function in reversed(functions)
+        for name, parameter in list(inspect.signature(function).parameters.items())[1:]
+        if parameter.kind is not parameter.VAR_KEYWORD and name not in without | {"progress"}
+    }
+    assert options.keys() - actions.keys() == set()
+    assert actions.keys() - options.keys() <= OWN
+    for name, (function, parameter) in options.items():
+        action = actions[name]
+        assert action.required == (parameter.default is parameter.empty), name
+        assert action.default in (None, []), name
+        text = " ".join(dict(ENTRY.findall(inspect.getdoc(function)))[parameter.name].split()).rstrip(".")
+        if parameter.name not in RUN and not text.lower().startswith("as of"):
+            assert text in action.help.replace("%%", "%"), name
 
 
 def draw(found, *, path):
     """Stands for what draws a picture."""
     path.write_text("a picture")
+
+
+def loops(*why):
+    """Margins of a fleet, of members with these reasons for none."""
+    lost = np.array([bool(text) for text in why])
+    upper = np.where(lost, np.nan, np.geomspace(2.0, 8.0, len(why)))
+    upper[-1] = math.inf
+    return lw.linear.Margins("heading_pid", {"gain_lower": 1.0 / upper, "gain_upper": upper}, {"delay": 0.1 * upper},
+                             np.array(why, dtype=object), 0.02, ("a message",))  # fmt: skip
+
+
+def worst(value=3.5, **others):
+    """A worst case."""
+    parameters = {"vehicle.buoyancy": 297.0, "drag_matrix.quadratic[1,1]": 1000.0}
+    settings = {"of": "max(depth)", "worst": "largest", "restarts": np.array([value, 3.0]), "runs": 64} | others
+    return lw.studies.WorstCase(parameters, value, at_bounds={"vehicle.buoyancy": "low", "drag_matrix.quadratic[1,1]": ""},
+                                fleet=None, **settings)  # fmt: skip
+
+
+def steady():
+    """A steady motion."""
+    start = lw.Start(velocity=[0.5, 0.0, 0.0], euler_deg=[0.0, 0.0, 90.0])
+    return lw.linear.Trim(start, {"thrusters": np.array([0.25, -0.5])}, {"thrusters[0]": 0.25, "thrusters[1]": -0.5},
+                          {"pitch": 0.0, "speed": 0.5}, np.full(6, 1e-15), lw.Method("psi_s"), 0.02)  # fmt: skip
+
+
+class Rare:
+    """What a search for a rare event found."""
+
+    def save(self, out):
+        (out / "rare.json").write_text("{}")
+        return [out / "rare.json"]
+
+    def to_dict(self):
+        return {"probability": 1e-5}
+
+    def __str__(self):
+        return "the probability in words"
+
+
+def slopes():
+    """Derivatives, of which there are none."""
+    return lw.studies.Derivatives(
+        ("depth",), ("m",), ("vehicle.mass",), np.ones(1), np.full((1, 1), np.nan), np.full((1, 1), np.nan),
+        np.full((1, 1), np.nan), {"depth by vehicle.mass": "there is none"},
+    )  # fmt: skip
+
+
+FOUND = {
+    "tradeoff": lambda: tradeoff_of(4.0), "estimate": answer, "sensitivity": sobol, "stability": region, "rare": Rare,
+    "derivatives": slopes, "margins": lambda: loops("", "", "does not settle", ""), "worst-case": worst, "trim": steady,
+    "tune-gains": tuned,
+}  # fmt: skip
+BOUNDS = {"vehicle.buoyancy": (297.0, 302.0)}
+RARE = {"limit": "position[0] above 60"}
+MASS = {"of": ["depth"], "by": ["vehicle.mass"]}
+# Options of a verb, and the arguments that its function is called with.
+CASES = [
+    ("tradeoff", "", {}),
+    ("tradeoff", "--of depth --methods rk4,kl8(psi_x) --methods psi --seconds 3 --members 7",
+     {"of": "depth", "methods": ["rk4", "kl8(psi_x)", "psi"], "seconds": 3.0, "members": 7}),
+    ("estimate", "--of depth --error 0.1", {"of": "depth", "error": 0.1}),
+    ("estimate", "--of max(depth) --relative-error 0.01 --risk cvar:0.1 --cheaper controller.delay=0 --step 0.1 --method rk4 "
+     "--seed 7 --threads 1 --dtype float32 --store kept --heavy-tail --duration 3",
+     {"of": "max(depth)", "relative_error": 0.01, "risk": lw.metrics.CVaR(0.1), "cheaper": [{"controller.delay": 0.0}],
+      "h": 0.1, "method": "rk4", "seed": 7, "threads": 1, "dtype": "float32", "store": "kept", "heavy_tail": True,
+      "t1": 3.0}),
+    ("estimate", "--of depth --risk 0.95 --error none --no-heavy-tail",
+     {"of": "depth", "risk": 0.95, "error": None, "heavy_tail": False}),
+    ("sensitivity", "--of depth", {"of": ["depth"]}),
+    ("sensitivity", "--of depth --of speed --no-second-order --samples 8 --replicates 4 --failed drop --threads 3 "
+     "--groups start=start.position,start.velocity --groups mass=vehicle.mass",
+     {"of": ["depth", "speed"], "second_order": False, "samples": 8, "replicates": 4, "failed": "drop", "threads": 3,
+      "groups": {"start": ["start.position", "start.velocity"], "mass": ["vehicle.mass"]}}),
+    ("sensitivity", "--of depth --analysis morris --levels 6", {"of": ["depth"], "levels": 6}),
+    ("stability", "", {}),
+    ("stability", "--x h=0.1:1 --y vehicle.mass --methods psi --points 5,4 --error 0.5 --of depth --duration 9 --seed 11",
+     {"x": "h=0.1:1", "y": "vehicle.mass", "methods": ["psi"], "points": (5, 4), "error": 0.5, "of": "depth", "t1": 9.0,
+      "seed": 11}),
+    ("rare", "--limit position[0]_above_60", RARE),
+    ("rare", "--limit position[0]_above_60 --relative-error 0.2 --cheaper h=0.1,dtype=float32 --cheaper vehicle.mass=5 "
+     "--failed refuse --most 5e4 --seed 7 --threads 2 --by splitting --intervals 20 --store kept",
+     RARE | {"relative_error": 0.2, "cheaper": [{"h": 0.1, "dtype": "float32"}, {"vehicle.mass": 5.0}],
+             "failed": "refuse", "most": 50_000, "seed": 7, "threads": 2, "by": "splitting", "intervals": 20,
+             "store": "kept"}),
+    ("derivatives", "--of depth --by vehicle.mass", MASS),
+    ("derivatives", "--of depth --by vehicle.mass,start.position[2] --smooth --threads 2 --seed 7",
+     {"of": ["depth"], "by": ["vehicle.mass", "start.position[2]"], "smooth": True, "threads": 2, "seed": 7}),
+    ("margins", "", {}),
+    ("margins", "--loop depth_pid --of disk,gain --of peak --to position[2] --by runs --skew -0.5 --tilt 1e-4 --most 20",
+     {"loop": "depth_pid", "of": ["disk", "gain", "peak"], "to": ["position[2]"], "by": ["runs"], "skew": -0.5,
+      "tilt": 1e-4, "most": 20.0}),
+    ("worst-case", "--of depth --within vehicle.buoyancy=297:302", {"of": "depth", "within": BOUNDS}),
+    ("worst-case", "--of depth --within vehicle.buoyancy=297:302,heading_pid.kp=0.5:5:log --worst smallest --budget 400 "
+     "--restarts 2 --seed 9 --threads 1",
+     {"of": "depth", "within": BOUNDS | {"heading_pid.kp": (0.5, 5.0, "log")}, "worst": "smallest", "budget": 400,
+      "restarts": 2, "seed": 9, "threads": 1}),
+    ("tune-gains", "--over heading_pid.kp=0.1:10:log --minimise depth --risk cvar:0.1 --fresh none --budget 1e3",
+     {"over": {"heading_pid.kp": (0.1, 10.0, "log")}, "minimise": "depth", "risk": lw.metrics.CVaR(0.1), "fresh": None,
+      "budget": 1000}),
+    ("trim", "", {}),
+    ("trim", "--speed 0.5 --fixed pitch=0 --fixed control_fins[0]=-0.1 --free roll,drift",
+     {"speed": 0.5, "fixed": {"pitch": 0.0, "control_fins[0]": -0.1}, "free": ["roll", "drift"]}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("verb", "options", "expected"), CASES)
+def test_options_reach_the_function(verb, options, expected, tmp_path, capsys):
+    """What is not given is not passed on: the function's own default holds."""
+    study = Study(FOUND[verb]())
+    words = [word.replace("_above_", " above ") for word in options.split()]
+    for loud in ([], ["-q"]):
+        assert main([verb, SCENE, *words, "--out", str(tmp_path), *loud], study=study, draw=draw) == 0
+    ((scene,), settings), (_, quiet) = study.calls
+    assert (bool(settings.pop("progress", True)), quiet.pop("progress", False)) == (True, False)
+    assert settings == quiet == expected
+    # A seed of the function leaves that of the members alone.
+    assert scene.ensemble_settings.seed == 1
+    said = capsys.readouterr().out
+    assert said.startswith(str(FOUND[verb]()).split("\n")[0])
+    stem = verb.replace("-", "_")
+    assert f"file        {tmp_path}/{stem}.json" in said
+    assert (tmp_path / f"{stem}.png").exists() == (verb in ("tradeoff", "sensitivity", "stability", "rare", "margins"))
+
+
+ESTIMATE = ["estimate", PAPER, "--of", "depth", "--error", "1"]
+
+
+@pytest.mark.parametrize(("given", "words"), [
+    (["sensitivity", PAPER, "--of", "depth", "--groups", "start"], ["--groups = 'start': names nothing; give NAME=A,B"]),
+    (["sensitivity", PAPER, "--of", "depth", "--levels", "4"], ["--levels = '4': is an option of morris; leave it out"]),
+    (["rare", PAPER, "--limit", "depth above 3", "--cheaper", "h"], ["--cheaper = 'h': names no value; give A=X,B=Y"]),
+    ([*ESTIMATE, "--risk", "large", "--cheaper", "a", "--seed", "1.5"],
+     ["--risk = 'large': is no risk", "--cheaper = 'a': names no value", "--seed = '1.5': is no whole number", "3 faults"]),
+    ([*ESTIMATE, "--risk", "cvar:2"], ["is no part"]),
+    (["stability", PAPER, "--points", "3,x", "--error", "low"],
+     ["--points = '3,x': is no whole number", "--error = 'low': is no number; give one, as 0.5"]),
+    *[(["stability", PAPER, "--grid", "mass", axis, "h"],
+       ["--grid mass: names the same axes as --x and --y; leave out --grid, or both of them"]) for axis in ("--x", "--y")],
+    (["worst-case", SCENE, "--of", "depth", "--within", "=1:2", "--within", "a"],
+     ["--within = '=1:2': names no value; give NAME=LOW:HIGH", "--within = 'a'"]),
+    (["worst-case", SCENE, "--of", "depth", "--within", "vehicle.mass=4", "--within", "vehicle.buoyancy=1:2:lg"],
+     ['within."vehicle.mass" = 4.0', 'within."vehicle.buoyancy"']),
+    (["worst-case", SCENE, "--of", "depth", "--within", "vehicle.buoyance=4:5"],
+     ["within.\"vehicle.buoyance\" = '...': does not name what the scene has; did you mean 'vehicle.buoyancy'?"]),
+    (["worst-case", SCENE, "--of", "depth", "--within", "start.velocity=4:5"],
+     ["within.\"start.velocity\" = '...': is not a single number"]),
+    (["trim", SCENE, "--fixed", "pitch", "--fixed", "roll=low", "--fixed", "=2"],
+     ["--fixed = 'pitch': is no value; give NAME=0.1", "'roll=low'", "'=2'"]),
+    (["margins", SCENE, "--loop", "heading", "--skew", "2"],
+     ["loop = 'heading': is no law of the controller; did you mean 'heading_pid'?",
+      "skew = 2.0: is above 1; give a number from -1 to 1"]),
+    (["margins", PAPER],
+     ["controller = None: is not in the scene, and margins are those of a loop; give [controller]"]),
+    *[(["rare", PAPER, "--limit", limit], [remedy]) for limit, remedy in [
+        ("peak depth over 12", 'write "peak depth above 12"'), ("max(depth) > 4 m", 'write "max(depth) above 4"'),
+        ("depth under", 'write "depth below 12.0"'), ("depth", 'write "depth above 12.0"'),
+        ("max(dpeth) above 3", "did you mean 'depth'?"), ("dpeth", "is neither a quantity nor an event"),
+    ]],
+])  # fmt: skip
+def test_odd_arguments_are_refused_all_at_once(given, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main([*given, "-q"]) == 2
+    out = capsys.readouterr()
+    assert all(text in out.err for text in words), out.err
+    assert out.out == ""
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_files_are_named_after_the_scene(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["tradeoff", PAPER, "-q"], study=Study(tradeoff_of(4.0)), draw=draw) == 0
+    assert capsys.readouterr() == ("", "")
+    files = sorted(path.name for path in (tmp_path / "runs" / "paper_tradeoff").iterdir())
+    assert files == [f"tradeoff.{end}" for end in ("csv", "json", "png")]
 
 
 def test_a_method_that_was_asked_for_and_has_no_measurement_ends_with_1(tmp_path, capsys):
@@ -39,27 +256,6 @@ def test_a_method_that_was_asked_for_and_has_no_measurement_ends_with_1(tmp_path
     assert json.loads((tmp_path / "b" / "tradeoff.json").read_text())["missing"] == found.missing
 
 
-def test_arguments_of_a_tradeoff(tmp_path, monkeypatch, capsys):
-    measure = Study(tradeoff_of(4.0))
-    monkeypatch.chdir(tmp_path)
-    assert main(["tradeoff", PAPER, "--members", "7", "-q"], study=measure, draw=draw) == 0
-    assert capsys.readouterr() == ("", "")
-    more = ["--of", "depth", "--methods", "rk4, psi_s", "--seconds", "3", "--out", "b"]
-    assert main(["tradeoff", PAPER, *more], study=measure, draw=draw) == 0
-    ((scene,), settings), (_, others) = measure.calls
-    assert scene.ensemble_settings.members == 7
-    assert settings == {"of": "position", "methods": None, "seconds": 45.0, "progress": None}
-    assert others.pop("progress") is not None
-    assert others == {"of": "depth", "methods": ["rk4", "psi_s"], "seconds": 3.0}
-    for folder in ("runs/paper_tradeoff", "b"):
-        assert sorted(path.name for path in (tmp_path / folder).iterdir()) == [
-            "tradeoff.csv", "tradeoff.json", "tradeoff.png"]  # fmt: skip
-    said = capsys.readouterr().out.split("\n")
-    files = [line.partition(" (")[0] for line in said[-4:-1]]
-    assert said[-5] == ""
-    assert files == [f"file        b/tradeoff.{end}" for end in ("json", "csv", "png")]
-
-
 def test_a_picture_that_fails_is_an_exit_code(tmp_path, capsys):
     for error, code, text in ((OSError("no room"), 1, "no room"), (NothingToDraw("no rows"), 0, "no rows")):
         parts = {"study": Study(tradeoff_of(4.0)), "draw": Study(error)}
@@ -68,70 +264,13 @@ def test_a_picture_that_fails_is_an_exit_code(tmp_path, capsys):
         assert capsys.readouterr().err == f"lgvi-warp: {picture} was not written: {text}\n"
 
 
-def test_arguments_of_a_sensitivity_study(tmp_path, capsys):
-    study = Study(sobol())
-    verb = ["sensitivity", PAPER, "--out", str(tmp_path)]
-
-    def reached(*options, code=0):
-        assert main([*verb, *options], study=study, draw=draw) == code
-        return study.calls[-1]
-
-    common = {"failed": "refuse", "threads": None, "progress": None}
-    plainly = common | {"samples": 256, "second_order": True, "replicates": 8, "groups": {}}
-    (_, of), settings = reached("-q")
-    assert (of, settings) == (["position[2]"], plainly)
-    assert reached("--first-order", "--samples", "0", "-q")[1] == plainly | {"samples": 0, "second_order": False}
-    grouped = ["--replicates", "4", "--group", "start=start.position,start.velocity"]
-    groups = {"start": ["start.position", "start.velocity"]}
-    assert reached(*grouped, "-q")[1] == plainly | {"replicates": 4, "groups": groups}
-    reached("--group", "start", "-q", code=2)
-    assert "--group = 'start': names no factors" in capsys.readouterr().err
-    assert reached("--analysis", "morris", "-q")[1] == common | {"samples": 64}
-    more = ["--of", "depth", "--of", "speed", "--samples", "5", "--failed", "drop", "--threads", "3", "--seed", "4"]
-    (scene, of), settings = reached("--analysis", "morris", *more)
-    assert scene.ensemble_settings.seed == 4
-    assert of == ["depth", "speed"]
-    assert settings.pop("progress") is not None
-    assert settings == {"failed": "drop", "threads": 3, "samples": 5}
-    said = capsys.readouterr().out
-    assert said.startswith(f"{sobol()}\n\nfile        {tmp_path}/sensitivity.")
-    assert said.count("file  ") == 4
-    assert said.endswith("MB)\n")
-
-
 @pytest.mark.parametrize(
     ("error", "code"), [(uq.FailedMembers("3 members failed"), 1), (MissingExtra("studies", "SALib", "uq"), 2)]
 )
 def test_a_sensitivity_study_that_fails_is_one_line(tmp_path, capsys, error, code):
-    assert main(["sensitivity", PAPER, "--out", str(tmp_path), "-q"], study=Study(error)) == code
+    assert main(["sensitivity", PAPER, "--of", "depth", "--out", str(tmp_path), "-q"], study=Study(error)) == code
     assert capsys.readouterr() == ("", f"lgvi-warp: {error}\n")
     assert not list(tmp_path.iterdir())
-
-
-def test_arguments_of_a_stability_map(tmp_path):
-    study = Study(region())
-    verb = ["stability", PAPER, "-q", "--out", str(tmp_path)]
-    more = "--x h=0.1:1 --y vehicle.mass --methods psi --points 5 --error 0.5 --of depth --duration 9 --seed 11"
-    assert main(verb, study=study, draw=draw) == 0
-    assert main([*verb, *more.split()], study=study, draw=draw) == 0
-    (plain, named) = study.calls
-    assert plain[0][1:] == ("h", "angular_velocity", None)
-    seed = lw.Scene.load(PAPER).ensemble_settings.seed
-    assert plain[1] == {"points": 24, "t1": None, "error": 0.01, "of": "attitude", "seed": seed, "progress": None}
-    assert named[0][1:] == ("h=0.1:1", "vehicle.mass", ["psi"])
-    assert named[1] == {"points": 5, "t1": 9.0, "error": 0.5, "of": "depth", "seed": 11, "progress": None}
-    assert (tmp_path / "stability.png").exists()
-
-
-def test_a_scene_without_an_ensemble_has_the_seed_0(tmp_path):
-    study = Study(region())
-    scene = tmp_path / "bare.toml"
-    scene.write_text('[vehicle]\nname = "sphere"\n')
-    verb = ["stability", str(scene), "-q", "--x", "speed", "--out", str(tmp_path / "out")]
-    assert main(verb, study=study, draw=draw) == 0
-    ((values, settings),) = study.calls
-    assert settings["seed"] == 0
-    assert values[1:3] == ("speed", "angular_velocity")
 
 
 def test_grids_of_a_stability_study(tmp_path, capsys):
@@ -140,17 +279,13 @@ def test_grids_of_a_stability_study(tmp_path, capsys):
     assert main([*verb, "--grid", "mass"], study=study, draw=draw) == 0
     assert (tmp_path / "stability_mass.png").exists()
     assert main([*verb, "--grid", "all"], study=study, draw=draw) == 0
-    assert [values[1:3] for values, _ in study.calls] == [GRIDS["mass"], *GRIDS.values()]
-    assert all(settings["progress"] is not None for _, settings in study.calls)
+    assert [(settings["x"], settings["y"]) for _, settings in study.calls] == [GRIDS["mass"], *GRIDS.values()]
+    assert all(callable(settings["progress"]) for _, settings in study.calls)
     assert {path.name for path in tmp_path.glob("*.json")} == {f"stability_{name}.json" for name in GRIDS}
     # One report for each, and a blank line between them.
     said = capsys.readouterr().out
     report = said.partition("\n\nfile")[0]
     assert said.partition(report)[2].count(f"{report}\n\n") == 3
-    for axis in ("--x", "--y"):
-        assert cli.main([*verb, "--grid", "mass", axis, "h"]) == 2
-        words = "--grid mass: names the same axes as --x and --y; leave out --grid, or both of them"
-        assert capsys.readouterr().err == f"lgvi-warp: {words}\n"
 
 
 def test_an_interrupted_stability_study_says_which_maps_are_finished(tmp_path, capsys):
@@ -223,8 +358,8 @@ def test_arguments_of_a_sweep(sweep, tmp_path, capsys):
     }  # fmt: skip
     assert capsys.readouterr() == ("", "")
     assert (tmp_path / "out" / "a.png").read_text() == "a picture"
-    _, (((), settings),), found = sweep("--members", "many")
-    assert (settings["members"], settings["seed"]) == ("many", 1)
+    _, (((), settings),), found = sweep()
+    assert (settings["members"], settings["seed"]) == (40, 1)
     assert settings["progress"] is not None
     assert found.runs == []  # nothing is recorded that was not asked for
     lines = capsys.readouterr().out.split("\n")
@@ -266,64 +401,6 @@ def test_the_plan_of_a_sweep_runs_nothing(sweep, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["plan"] == ["cells 4", "time 2"]
 
 
-class Rare:
-    """What a search for a rare event found."""
-
-    def save(self, out):
-        (out / "rare.json").write_text("{}")
-        return [out / "rare.json"]
-
-    def to_dict(self):
-        return {"probability": 1e-5}
-
-    def __str__(self):
-        return "the probability in words"
-
-
-def test_arguments_of_a_rare_event(tmp_path, capsys):
-    study = Study(Rare())
-    verb = ["rare", PAPER, "--when", "position[0] above 60", "--out", str(tmp_path)]
-    assert main([*verb, "-q"], study=study, draw=draw) == 0
-    more = ["--error", "0.2", "--cheaper", "h=0.1,dtype=float32", "--cheaper", "vehicle.mass = 5", "--failed", "refuse",
-            "--most", "50000", "--seed", "7", "--threads", "2", "--by", "splitting", "--looks", "20",
-            "--store", "kept"]  # fmt: skip
-    assert main([*verb, *more], study=study, draw=draw) == 0
-    ((_, when), plain), (_, others) = study.calls
-    seed = lw.Scene.load(PAPER).ensemble_settings.seed
-    assert when == "position[0] above 60"
-    assert plain == {"relative_error": 0.1, "by": "chains", "looks": 50, "cheaper": [], "failed": "event",
-                     "most": 1_000_000, "seed": seed, "threads": None, "progress": None, "store": None}  # fmt: skip
-    assert others.pop("progress") is not None
-    assert others == {"relative_error": 0.2, "by": "splitting", "looks": 20,
-                      "cheaper": [{"h": 0.1, "dtype": "float32"}, {"vehicle.mass": 5.0}],
-                      "failed": "refuse", "most": 50_000, "seed": 7, "threads": 2, "store": "kept"}  # fmt: skip
-    assert capsys.readouterr().out.startswith("the probability in words")
-    assert main([*verb, "--cheaper", "h", "-q"], study=study, draw=draw) == 2
-    assert "--cheaper = 'h': names no values" in capsys.readouterr().err
-
-
-def test_arguments_of_an_estimate(capsys):
-    study = Study(answer())
-    assert main(["estimate", PAPER, "--of", "mean depth", "--error", "0.1", "-q"], study=study) == 0
-    more = ["--of", "max(depth)", "--relative-error", "0.01", "--risk", "cvar:0.1", "--cheaper", "controller.delay=0",
-            "--step", "0.1", "--method", "rk4", "--seed", "7", "--threads", "1", "--dtype", "float32",
-            "--store", "kept"]  # fmt: skip
-    assert main(["estimate", PAPER, *more], study=study) == 0
-    assert capsys.readouterr().out == f"{answer()}\n"
-    ((scene, of, error), settings), ((other, *_), others) = study.calls
-    assert (of, error, scene.ensemble_settings.members) == ("mean depth", 0.1, 4096)
-    assert (settings["method"], settings["h"], settings["risk"], settings["cheaper"]) == (None, None, "mean", [])
-    assert other.ensemble_settings.seed == 7
-    assert (others["method"], others["h"], others["dtype"], others["threads"]) == ("rk4", 0.1, "float32", 1)
-    assert (others["relative_error"], others["risk"]) == (0.01, lw.metrics.CVaR(0.1))
-    assert others["cheaper"] == [{"controller.delay": 0.0}]
-    assert (settings["store"], others["store"]) == (None, "kept")
-    assert (
-        document(["estimate", PAPER, "--of", "depth", "--error", "1"], capsys, study=study)["members"]["psi_x 0.2"]
-        == 8192
-    )
-
-
 def test_an_estimate_is_written_and_run_again_by_its_file(tmp_path, capsys):
     """The folder has the answer with its recipe, which --recipe gives to the next."""
     recipe = {"setting": {"method": "psi_x", "h": 0.025}, "levels": [], "seed": 3}
@@ -333,51 +410,101 @@ def test_an_estimate_is_written_and_run_again_by_its_file(tmp_path, capsys):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["estimate.csv", "estimate.json", "estimate.txt"]
     assert main([*verb, "--recipe", str(tmp_path / "estimate.json"), "--heavy-tail", "-q"], study=study) == 0
     (_, first), (_, second) = study.calls
-    assert (first["recipe"], first["heavy_tail"]) == (None, False)
+    assert "recipe" not in first
     assert (second["recipe"], second["heavy_tail"]) == (recipe, True)
     (tmp_path / "odd.json").write_text("[1]")
     assert main([*verb, "--recipe", str(tmp_path / "odd.json")]) == 2
     assert "is no recipe of an answer" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("option", "words"),
-    [(["--risk", "large"], "--risk"), (["--risk", "cvar:2"], "is no part"), (["--cheaper", "a"], "--cheaper")],
-)
-def test_odd_arguments_of_an_estimate(option, words, capsys):
-    assert main(["estimate", PAPER, "--of", "depth", "--error", "1", *option], study=Study(answer())) == 2
-    assert words in capsys.readouterr().err
+def test_margins_are_read_back_from_their_files(tmp_path, capsys):
+    found = loops("", "at its limit: control_fins[1]", "")
+    assert main(["margins", SCENE, "--out", str(tmp_path), "-q"], study=Study(found)) == 0
+    again = lw.linear.Margins.load(tmp_path / "margins.json")
+    assert again.to_dict() == found.to_dict() == json.loads((tmp_path / "margins.json").read_text())
+    assert again.values["gain_upper"][-1] == math.inf
+    assert str(again) == str(found)
+    head, *rows = (tmp_path / "margins.csv").read_text().splitlines()
+    assert head == "member,why,gain_lower,gain_upper,delay_by_runs"
+    assert rows[1].startswith("1,at its limit: control_fins[1],")
+    assert (rows[0], rows[2]) == ("0,,0.5,2.0,0.2", "2,,0.0,inf,inf")
+    (held,) = document(["info", str(tmp_path)], capsys, name="info of a folder")["holds"]
+    assert held == {"kind": "margins", "path": f"{tmp_path}/margins.json", "content": found.to_dict()}
+    (tmp_path / "margins.png").unlink()
+    assert document(["plot", str(tmp_path)], capsys)["files"] == [f"{tmp_path}/margins.png"]
+    assert cli.main(["report", str(tmp_path), "-q"]) == 0
+    assert "at its limit: control_fins[1]" in (tmp_path / "report.html").read_text()
 
 
-def test_arguments_of_derivatives(tmp_path, capsys):
-    slopes = lw.studies.Derivatives(
-        ("depth",), ("m",), ("vehicle.mass",), np.ones(1), np.full((1, 1), np.nan), np.full((1, 1), np.nan),
-        np.full((1, 1), np.nan), {"depth by vehicle.mass": "there is none"},
-    )  # fmt: skip
-    study = Study(slopes)
+def test_members_that_fail_end_margins_with_1(tmp_path, capsys):
+    given = ["margins", SCENE, "--out", str(tmp_path)]
+    study = Study(loops("failed", "", "failed", ""))
+    document(given, capsys, code=1, study=study)
+    assert main([*given, "-q"], study=study) == 1
+    assert capsys.readouterr().err.endswith("2 of 4 members failed\n")
+    nobody = Study(loops("does not settle", "does not settle"))
+    content = document(given, capsys, study=nobody)
+    assert content["content"]["margins"]["why"] == ["does not settle"] * 2
+
+
+def test_the_worst_member_is_run_again_by_the_last_line(tmp_path, capsys):
+    given = ["worst-case", SCENE, "--of", "max(depth)", "--within", "vehicle.buoyancy=297:302", "--out", str(tmp_path),
+             "--method", "rk4", "--step", "0.05", "--duration", "20", "--set", "run.save_every=0.5"]  # fmt: skip
+    study = Study(worst())
+    assert main(given, study=study) == 0
+    (((scene,), settings),) = study.calls
+    assert (scene.run.step, scene.run.duration, settings["h"], settings["t1"]) == (0.05, 20.0, 0.05, 20.0)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == str(worst())
+    command = shlex.split(lines[1].removeprefix("again "))
+    assert command[:3] == ["lgvi-warp", "run", SCENE]
+    chosen = cli.parser().parse_args(command[1:])
+    member = lw.Ensemble.from_scene(lw.Scene.load(SCENE, cli.overrides(chosen)))
+    assert (member.members, member.seed, member.scene.run.step) == (1, 0, 0.05)
+    assert member.parameters(0, 1)["vehicle.buoyancy"].tolist() == [297.0]
+    assert member.parameters(0, 1)["drag_matrix.quadratic"][0, 1, 1] == 1000.0
+
+
+@pytest.mark.parametrize(("value", "which"), [(3.5, "largest"), (-2.0, "smallest"), (math.inf, "largest"),
+                                              (math.inf, "smallest")])  # fmt: skip
+def test_worst_cases_are_read_back_from_their_files(value, which, tmp_path, capsys):
+    restarts = np.array([value if math.isfinite(value) or which == "largest" else -math.inf, 3.0])
+    found = worst(value, worst=which, restarts=restarts)
+    given = ["worst-case", SCENE, "--of", "depth", "--within", "vehicle.mass=1:2", "--out", str(tmp_path)]
+    content = document(given, capsys, study=Study(found))["content"]["worst_case"]
+    assert content["value"] == (value if math.isfinite(value) else None)
+    again = lw.studies.WorstCase.load(tmp_path / "worst_case.json")
+    assert str(again) == str(found)
+    assert again.restarts.tolist() == found.restarts.tolist()
+    assert (tmp_path / "worst_case.csv").read_text() == 'vehicle.buoyancy,"drag_matrix.quadratic[1,1]"\n297.0,1000.0\n'
+    (held,) = document(["info", str(tmp_path)], capsys, name="info of a folder")["holds"]
+    assert (held["kind"], held["content"]) == ("worst_case", content)
+    assert cli.main(["plot", str(tmp_path)]) == 0
+    assert "has no picture" in capsys.readouterr().err
+    assert cli.main(["report", str(tmp_path), "-q"]) == 0
+
+
+def test_a_trim_gives_the_start_of_a_scene(tmp_path, capsys):
+    study = Study(steady())
+    assert main(["trim", SCENE, "--method", "psi_s", "--step", "0.02"], study=study) == 0
+    (((scene,), settings),) = study.calls
+    assert (scene.run.step, settings) == (0.02, {"method": "psi_s", "h": 0.02})
+    told = capsys.readouterr().out
+    start = {"euler_deg": [0.0, 0.0, 90.0], "velocity": [0.5, 0.0, 0.0]}
+    assert told == f"{steady()}\n\n[start]\n" + "".join(f"{name} = {value}\n" for name, value in start.items())
+    content = document(["trim", SCENE], capsys, study=study)
+    assert (content["start"], content["commands"]) == (start, {"thrusters": [0.25, -0.5]})
+    assert (content["method"], content["step"], len(content["residual"])) == ("psi_s", 0.02, 6)
+    content = document(["trim", SCENE, "--out", str(tmp_path)], capsys, name="trim with out", study=study)
+    assert content["content"]["trim"] == json.loads((tmp_path / "trim.json").read_text())
+
+
+def test_derivatives_of_a_fleet(tmp_path, capsys):
+    study = Study(slopes())
     verb = ["derivatives", PAPER, "--of", "depth", "--by", "vehicle.mass", "--out", str(tmp_path)]
-    assert main([*verb, "-q"], study=study) == 0
-    more = ["--of", "max(depth)", "--by", "start.position[2]", "--smooth", "--fleet", "--threads", "2", "--seed", "7"]
-    assert main([*verb, *more], study=study) == 0
-    ((scene, *asked), plain), ((fleet, *others), settings) = study.calls
-    assert (type(scene), asked) == (lw.Scene, [["depth"], ["vehicle.mass"]])
-    assert plain == {"smooth": False, "threads": None, "progress": None}
-    assert (type(fleet), others) == (lw.Ensemble, [["depth", "max(depth)"], ["vehicle.mass", "start.position[2]"]])
-    assert (fleet.seed, settings["smooth"], settings["threads"]) == (7, True, 2)
+    assert main([*verb, "--fleet", "--members", "9"], study=study) == 0
     assert "undefined   depth by vehicle.mass: there is none" in capsys.readouterr().out
-    assert lw.studies.Derivatives.load(tmp_path / "derivatives.json").undefined == slopes.undefined
     content = document([*verb], capsys, study=study)["content"]["derivatives"]
     assert content["jacobian"] == [[None]]
-
-
-@pytest.mark.parametrize("words, remedy", [
-    ("peak depth over 12", 'write "peak depth above 12"'),
-    ("max(depth) > 4 m", 'write "max(depth) above 4"'),
-    ("depth under", 'write "depth below 12.0"'),
-    ("depth", 'write "depth above 12.0"'),
-    ("max(dpeth) above 3", "did you mean 'depth'?"),
-    ("dpeth", "is neither a quantity nor an event"),
-])  # fmt: skip
-def test_words_of_a_rare_event_are_read_before_anything_runs(words, remedy, capsys):
-    assert main(["rare", str(PAPER), "--when", words]) == 2
-    assert remedy in capsys.readouterr().err
+    ((fleet,), _), ((scene,), _) = study.calls
+    assert (type(fleet), fleet.members, type(scene)) == (lw.Ensemble, 9, lw.Scene)

@@ -105,7 +105,7 @@ def test_verbose_says_where_an_error_came_from(capsys):
 
 def test_every_verb_is_of_those_that_write_or_of_those_that_do_not():
     writing = {"run", "resume", "merge", "export", "tradeoff", "sensitivity", "stability", "sweep", "rare",
-               "derivatives", "margins", "worst-case", "new", "plot", "report", "view"}  # fmt: skip
+               "derivatives", "margins", "worst-case", "tune-gains", "new", "plot", "report", "view"}  # fmt: skip
     assert writing | set(command.READING) == set(command.VERBS) == set(cli.parser().verbs)
     assert not writing & set(command.READING)
 
@@ -472,11 +472,12 @@ def test_studies_print_a_document_and_info_and_plot_know_their_folders(verb, tmp
     make = STUDIES[verb]
     study = Study(make())
     out = str(tmp_path)
-    content = document([verb, PAPER, "--out", out], capsys, study=study)
+    given = [verb, PAPER, *(["--of", "depth"] if verb == "sensitivity" else []), "--out", out]
+    content = document(given, capsys, study=study)
     assert content["content"] == {verb: make().to_dict()}
     assert content["faults"] == []
     assert f"{out}/{verb}.png" in content["files"]
-    assert main([verb, PAPER, "--out", out], study=study) == 0
+    assert main(given, study=study) == 0
     said = capsys.readouterr().out
     (held,) = document(["info", out], capsys, name="info of a folder")["holds"]
     assert (held["kind"], held["content"]) == (verb, make().to_dict())

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.criteria import files, members
+from lgvi_warp.criteria import files
 from lgvi_warp.measuring import cost, speed, term_cost
 from lgvi_warp.measuring.cost import Cost, Kind
 from lgvi_warp.methods.method import Method
-from lgvi_warp.runs.request import ensemble_of
+from lgvi_warp.runs.request import ensemble_of, scene_of
 
 
 class Clock:
@@ -200,15 +200,15 @@ def test_a_damaged_file_is_said_to_be_damaged(tmp_path):
 def test_whose_members_a_study_is_about(scene):
     fleet = lw.Ensemble(scene, 3)
     assert ensemble_of(fleet) is fleet
-    assert members.scene_of(fleet) is fleet.scene
-    assert members.scene_of(scene) is scene
+    assert scene_of(fleet) is fleet.scene
+    assert scene_of(scene) is scene
     assert ensemble_of(scene).members == scene.ensemble_settings.members
     with pytest.raises(lw.SceneError) as caught:
         ensemble_of(3)
     assert str(caught.value) == "fleet = 3: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"
     with pytest.raises(lw.SceneError) as caught:
-        members.scene_of(3)
-    assert str(caught.value) == "scene = 3: is neither a Scene nor an Ensemble; give lw.Scene(...)"
+        scene_of(3, "scene")
+    assert str(caught.value) == "scene = 3: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"
 
 
 def test_speeds_beside_the_peak_of_the_core():

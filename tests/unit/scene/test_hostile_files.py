@@ -296,7 +296,7 @@ OPTIONS = [
     ("tradeoff --seconds", "seconds", {"nan": "nan", "inf": "inf", "-1": "-1", "0": "0"}),
     ("stability --points", "points", {"0": "(0, 0)", "1000000": "(1000000, 1000000): make"}),
     ("stability --error", "error", {"nan": "nan"}),
-    ("sensitivity --samples", "samples", {"0": "0", "-4": "-4"}),
+    ("sensitivity --of depth --samples", "samples", {"0": "0", "-4": "-4"}),
 ]  # fmt: skip
 SET = {
     "vehicle.mass=120\n[start]": "vehicle.mass = '120\\n[start]': is not one value",

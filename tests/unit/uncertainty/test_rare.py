@@ -13,9 +13,10 @@ from scipy.stats import chi2
 from lgvi_warp.uncertainty.rare.cheaper import compared
 from lgvi_warp.uncertainty.rare.mixture import Mixture, WeightedMembers, doubts, fitted, log_weights, uncovered
 from lgvi_warp.uncertainty.rare.plain import sampled
-from lgvi_warp.uncertainty.rare.search import RareSearch, joined
+from lgvi_warp.uncertainty.rare.search import joined
 from lgvi_warp.uncertainty.rare.subset import NoProgress, climb, share_variance
 from tests.support.levels import first_levels
+from tests.support.rare import RareSearch
 
 CASES = ("one side", "two sides", "unequal sides", "a ball", "20 inputs")
 

@@ -13,10 +13,11 @@ from scipy.special import ndtr, ndtri
 from lgvi_warp.uncertainty.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
 from lgvi_warp.uncertainty.rare.mixture import fitted
 from lgvi_warp.uncertainty.rare.plain import sampled
-from lgvi_warp.uncertainty.rare.search import RareAnswer, RareSearch
+from lgvi_warp.uncertainty.rare.search import RareAnswer
 from lgvi_warp.uncertainty.rare.subset import NoProgress, climb
 from lgvi_warp.uncertainty.rare.witness import Surroundings, wide_of, witnessed
 from tests.support.levels import first_levels
+from tests.support.rare import RareSearch
 
 
 def two_modes(rate, share, p=1e-5, alone=False):

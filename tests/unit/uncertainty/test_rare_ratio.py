@@ -8,7 +8,7 @@ import pytest
 from scipy.special import ndtri
 
 from lgvi_warp.uncertainty.rare.ratio import Share, carried, members_of, ratio_of, shared
-from lgvi_warp.uncertainty.rare.search import RareSearch
+from tests.support.rare import RareSearch
 
 
 class Limit:

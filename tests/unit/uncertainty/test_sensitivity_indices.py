@@ -353,7 +353,7 @@ def test_a_design_takes_what_varies_and_the_seed_unless_given(scene):
     paper = analyses.designed(scene, None, None, Morris(4), 3)
     assert paper.seed == scene.ensemble_settings.seed
     assert set(paper.vary) == set(scene.ensemble_settings.vary)
-    with pytest.raises(lw.SceneError, match=r"scene = 3: is neither a Scene nor an Ensemble; give lw\.Scene"):
+    with pytest.raises(lw.SceneError, match=r"scene = 3: is neither an Ensemble nor a Scene; give lw\.Scene"):
         analyses.designed(3, None, None, Saltelli(True), 4)
 
 

@@ -251,7 +251,7 @@ WITHOUT = {
     "view": lambda folder: ["view", str(folder), "--out", str(folder / "a.rrd")],
     "run --live": lambda folder: ["run", str(ROOT / "examples" / "paper.toml"), "--live", "--out", str(folder / "run")],
     "sensitivity": lambda folder: ["sensitivity", str(ROOT / "examples" / "paper.toml"), "--out", str(folder / "s"),
-                                   "--analysis", "morris", "--samples", "4", "--duration", "0.1"],
+                                   "--of", "depth", "--analysis", "morris", "--samples", "4", "--duration", "0.1"],
 }  # fmt: skip
 
 

@@ -13,11 +13,11 @@ from lgvi_warp.sampling.final import joined
 from lgvi_warp.uncertainty.rare.event import SURE, condition_of
 from lgvi_warp.uncertainty.rare.flock import Flock
 from lgvi_warp.uncertainty.rare.moving import moved
-from lgvi_warp.uncertainty.rare.split_search import SplitSearch
 from lgvi_warp.uncertainty.rare.splitting import piloted, split_runs
 from lgvi_warp.uncertainty.rare.stages import Stage, walked
 from lgvi_warp.uncertainty.rare.subset import NoProgress
 from lgvi_warp.uncertainty.rare.walk import VehicleWalk, pieces
+from tests.support.rare import split
 from tests.support.refusals import says
 
 # A body of mass and added mass M in linear drag and white noise of force: speeds die out in TAU, and grow by S sqrt(t).
@@ -179,7 +179,7 @@ def test_the_grid_of_densities_knows_reflection():
 
 def scored(make, seeds, p, error=0.1):
     """(probability over p, told spread) of whole searches, (len(seeds), 2)."""
-    answers = [SplitSearch(make(seed), error, seed).answer() for seed in seeds]
+    answers = [split(make(seed), relative_error=error, seed=seed) for seed in seeds]
     return np.array([(each.probability / p, each.spread) for each in answers])
 
 

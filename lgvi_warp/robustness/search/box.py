@@ -213,7 +213,7 @@ def _starts(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
 def _stepped(
     ask: _CountedCost, places: np.ndarray, costs: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """One step of walks from places (k, d) along the axes, each to its best neighbour; where none is better steps are halved."""
+    """One step along the axes of walks from places (k, d), to the best neighbour; where none is better the step halves."""
     k, d = places.shape
     sides = np.concatenate([np.eye(d), -np.eye(d)])
     around = np.clip(places[:, None] + steps[:, None, None] * sides, 0.0, 1.0)

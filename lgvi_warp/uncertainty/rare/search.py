@@ -22,6 +22,7 @@ from lgvi_warp.uncertainty.rare.mixture import (
     fitted,
     log_weights,
     together,
+    uncovered,
     wanting,
 )  # fmt: skip
 from lgvi_warp.uncertainty.rare.plain import sampled
@@ -40,8 +41,6 @@ RARE, FEWEST_PLAIN = 1e-3, 256
 OWN_COUNT, BEYOND_CHANCE = 12, 0.01
 # The part of the error asked for that numbers are chosen for; one so much larger is left as it is. Most rounds of runs.
 AIM, LEFT, ROUNDS = 1.0, 1.2, 4
-# Times the spread that weights tell: the largest that there may be are seldom among those drawn.
-UNSEEN = 1.2
 # How often a normal number is more than three spreads above its mean.
 BEYOND_THREE = 0.00135
 # The least probability: the cube's levels end at 1e-16.
@@ -160,6 +159,15 @@ def beyond(seen: Witness, probability: float, spread: float) -> bool:
     )
 
 
+def unseen(share: float, count: float) -> float:
+    """Root mean square of the part of an event that weights do not see. docs/theory/rare_events.md, (B17).
+
+    share: of the second look's members where the mixture hardly draws. count: independent ones of them, 0 where it met none.
+    """
+    odd = share * count
+    return math.sqrt((odd + 1.0) * (odd + 2.0) / ((count + 2.0) * (count + 3.0))) if count else 0.0
+
+
 def _of_runs(groups: Groups) -> FailingGroup:
     """The failing members of all runs, with their weights."""
     columns, first = [], 0
@@ -202,9 +210,9 @@ class RareSearch:
 
     limit: Limit
     d: int
-    relative_error: float = 0.1
-    seed: int = 0
-    most: int = 1_000_000
+    relative_error: float
+    seed: int
+    most: int
     weighted: bool = True
     chained: Limit | None = None
     margin: float = 0.0
@@ -390,7 +398,8 @@ class RareSearch:
                 self._beside = found.probability * outside.sum(), math.sqrt((outside**2).sum()) / outside.sum()
             if not reasons:
                 self._note_beside(found.probability)
-                told = found.probability, UNSEEN * found.spread, found.effective
+                hidden = unseen(uncovered(found, mixture, [seen.u]), seen.independent)
+                told = found.probability, math.hypot(found.spread, hidden), found.effective
                 members = FailingGroup.alone(found.failing, found.rows, found.weights)
                 return self._found("importance", told, members, runs)
             if attempt + 1 < TRIES:

@@ -40,9 +40,9 @@ class SplitSearch:
     """
 
     walk: Any
-    relative_error: float = 0.1
-    seed: int = 0
-    most: int = 1_000_000
+    relative_error: float
+    seed: int
+    most: int
     report: Callable[[float], None] = lambda fraction: None
     notes: list[str] = field(default_factory=list)
     _price: float = 1.0

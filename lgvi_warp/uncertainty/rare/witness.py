@@ -40,6 +40,11 @@ class Witness:
     probability: float
     spread: float
 
+    @property
+    def independent(self) -> float:
+        """Number of members in effect: copies are one, and others are related."""
+        return len(np.unique(self.u, axis=0)) / RELATED**2
+
 
 class Surroundings:
     """Where independent runs went: places are apart that are farther from their members than these are from another run.

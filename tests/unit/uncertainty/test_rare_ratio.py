@@ -8,7 +8,7 @@ import pytest
 from scipy.special import ndtri
 
 from lgvi_warp.uncertainty.rare.ratio import Share, carried, members_of, ratio_of, shared
-from lgvi_warp.uncertainty.rare.search import RareSearch
+from tests.support.rare import searched
 
 
 class Limit:
@@ -33,7 +33,7 @@ def beyond(bound):
 
 
 def answer(limit, seed, **more):
-    found = RareSearch(limit, limit.d, seed=seed, **more).answer()
+    found = searched(limit, limit.d, seed=seed, **more)
     return SimpleNamespace(
         probability=found.probability,
         relative_error=found.spread,

@@ -75,6 +75,10 @@ class NoSuchMembers(SceneError, IndexError):  # noqa: N818
     """Members are named that a run or an ensemble does not have."""
 
 
+class UnknownArgument(SceneError, TypeError):  # noqa: N818
+    """A function or a class is given a keyword that it does not know."""
+
+
 class MembersFailed(RuntimeError):  # noqa: N818
     """Members failed in a run with on_failure="raise"; nothing of the run is lost.
 

@@ -151,15 +151,15 @@ def search(
     if ask.remaining and 2**d <= max(ask.remaining // 2, 1):
         ask(np.array(list(itertools.product((0.0, 1.0), repeat=d))))
     _walk_from_best(ask, FIRST_STEP)
-    points = size * len(least)
-    if spend:
-        points += _spread(ask, d, np.random.default_rng((seed, 2 * restarts)))
+    points, rng = size * len(least), np.random.default_rng((seed, 2 * restarts))
+    while spend and (more := _spread(ask, d, rng)):
+        points += more
     assert ask.best is not None
     return BestCandidate(ask.best, ask.least, np.array(least), ask.count, points)
 
 
 def _spread(ask: _CountedCost, d: int, rng: np.random.Generator) -> int:
-    """Spend what is left on Sobol points and on walks from those that are better than all their neighbours; how many points.
+    """Spend most of what is left on Sobol points and on walks from those better than all their neighbours; how many points.
 
     Multi-level single linkage (Rinnooy Kan & Timmer 1987), by Sobol points (Kucherenko & Sytsko 2005).
     """

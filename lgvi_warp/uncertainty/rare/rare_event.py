@@ -29,7 +29,7 @@ from lgvi_warp.uncertainty.rare.cheaper import cheaper_of, chosen_chain
 from lgvi_warp.uncertainty.rare.event import SURE, RareCondition, condition_of
 from lgvi_warp.uncertainty.rare.limit import VehicleLimit
 from lgvi_warp.uncertainty.rare.search import RareAnswer, RareSearch
-from lgvi_warp.uncertainty.rare.split_search import SplitSearch
+from lgvi_warp.uncertainty.rare.split_search import SplitAnswer, SplitSearch
 from lgvi_warp.uncertainty.rare.subset import MOST_LEVELS, NoProgress
 from lgvi_warp.uncertainty.rare.walk import VehicleWalk
 
@@ -38,6 +38,9 @@ OWN = "the scene's own"
 ALL_LOST = (
     "every failing member failed, or has a number that is not finite (NaN): the probability is of that; "
     'failed="refuse" shows the first of them'
+)
+WITH_STATUS = (
+    "by_condition is empty: a member that ends with the status counts as every condition; ask for each by itself"
 )
 WAYS = ("chains", "splitting")
 ASK = 'ask for what is rare, as "peak depth above 12"'
@@ -269,6 +272,10 @@ def _told(
     messages = [*found.notes, *[ALL_LOST] * (lost >= 1.0 - 1e-12)]
     of_any = Chance(found.probability, *found.interval())
     several = len(condition.names) == len(found.rows) > 1
+    if condition.statuses:
+        messages.append(WITH_STATUS)
+    # Runs of splitting are independent; members of one are related, wherever they began.
+    related = found.of_run if isinstance(found, SplitAnswer) else chains
     plain = (1.0 - found.probability) / (found.probability * max(found.spread, 1e-12) ** 2)
     return RareEvent(
         event=condition.label,
@@ -292,7 +299,7 @@ def _told(
         noise_moved={
             name: noise_score(found.failing[:, own_], found.weights, chains, parts) for name, own_ in columns.items()
         },
-        by_condition=chances_of(condition.names, found.rows, found.weights, chains, of_any, found.spread)
+        by_condition=chances_of(condition.names, found.rows, found.weights, related, of_any, found.spread)
         if several
         else {},
         chains=chains,

@@ -95,7 +95,7 @@ def peaks_found(d, most, part, seeds):
         runs = [box.search(cost, d, most, seed, 3, spend=spend) for spend in (False, True)]
         assert runs[1].cost <= runs[0].cost
         assert runs[0].runs <= runs[1].runs <= most
-        assert runs[1].runs > 0.8 * most
+        assert runs[1].runs > 0.95 * most
         assert box.least_peak(runs[1].points) < part
         found += [run.cost < 0.999 * least for run in runs]
     return found.tolist()
@@ -127,8 +127,9 @@ def test_spread_points_meet_what_they_are_said_to(d):
     assert found.runs <= 3000
     points = np.concatenate(asked)
     first = next(i for i, each in enumerate(asked) if len(each) == box.AT_ONCE)
-    spread = np.concatenate(asked[first : first + math.ceil(found.points / box.AT_ONCE)])
+    spread = np.concatenate(asked[first : first + 2])
     assert len(np.unique(spread, axis=0)) == len(spread)
+    assert found.points > 2500 - 50 * d
     assert len(points) == found.runs
     radius = radius_of(box.least_peak(len(spread)), d)
     centres = np.random.default_rng(d).uniform(radius, 1.0 - radius, (4000, d))

@@ -56,6 +56,8 @@ def normals_of(keys, seed, step):
 class LinearWalk:
     """A speed in drag and noise, and its place, by steps of Euler; the place begins at u where `start` is not 0."""
 
+    stretches = None
+
     def __init__(self, seed, bound, of=0, lasting=False, start=0.0, per=5, looks=20, dt=0.03):
         self.seed, self.bound, self.of = seed, bound, of
         self.looks, self.per, self.dt, self.start, self.d = looks, per, dt, start, int(start > 0.0)
@@ -107,7 +109,7 @@ class LinearWalk:
 class TwoSpeeds:
     """Two independent speeds in drag and noise; the event is that either was ever beyond its bound."""
 
-    d, lasting = 0, np.array([True, True])
+    d, lasting, stretches = 0, np.array([True, True]), None
 
     def __init__(self, seed, bounds, looks=64, dt=0.03):
         self.seed, self.bounds, self.looks, self.dt = seed, np.array(bounds)[:, None], looks, dt

@@ -91,8 +91,9 @@ def rare_event(
         failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
         most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
         seed: Seed of all that is drawn; 0 by default.
-        store: Folder for the results of runs, by="chains" alone: the same call, after it was interrupted, takes them from
-            there and goes on, with the answer of one that was not. One of other arguments is refused. None by default.
+        store: Folder for the results of runs: the same call, after it was interrupted, takes them from there and goes on,
+            with the answer of one that was not; with splitting level by level, after its pilot was run again. One of other
+            arguments is refused. None by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False for
             nobody.
@@ -121,8 +122,6 @@ def rare_event(
     faults.choice("by", by, WAYS)
     if by == "splitting" and cheaper:
         faults.add("cheaper", cheaper, "is of chains", 'leave it out, or give by="chains"')
-    if by == "splitting" and store is not None:
-        faults.add("store", store, "keeps the runs of chains", 'leave it out, or give by="chains"')
     check_asked(faults, relative_error, most)
     for name in ("of", "levels", "statistics", "draws", "common_noise"):
         if name in settings:
@@ -131,11 +130,13 @@ def rare_event(
     whole_number("seed", seed, 0), whole_number("looks", looks, 2, 1000)
     condition = condition_of(limit, members.scene)
     report = callback(progress) or (lambda fraction: None)
-    if by == "splitting":
-        return _by_splitting(members, condition, float(relative_error), looks, failed, most, seed, report, settings)
     faster = cheaper_of(cheaper, members, settings)
     asked = {"study": "rare_event", "limit": limit, "relative_error": relative_error, "most": most, "seed": seed,
              "cheaper": [each.name for each in faster], "failed": failed, **settings}  # fmt: skip
+    if by == "splitting":
+        remembered = Remembered(store, [members], {**asked, "by": by, "looks": looks})
+        walk = VehicleWalk(members, condition, settings, failed == "refuse", seed, looks, remembered)
+        return _by_splitting(walk, condition, float(relative_error), most, seed, report, settings)
     remembered = Remembered(store, [members], asked)
     own = VehicleLimit(members, condition, settings, failed, remembered, OWN)
     cost = expected_cost(own, relative_error)
@@ -161,10 +162,9 @@ def rare_event(
 
 
 def _by_splitting(
-    fleet: Ensemble, condition: RareCondition, relative_error: float, looks: int, failed: str, most: int, seed: int,
+    walk: VehicleWalk, condition: RareCondition, relative_error: float, most: int, seed: int,
     report: Callable[[float], None], settings: Mapping[str, Any]) -> RareEvent:  # fmt: skip
     """The answer by splitting in time."""
-    walk = VehicleWalk(fleet, condition, settings, failed == "refuse", seed, looks)
     search = SplitSearch(walk, relative_error, seed, most, report)
     try:
         found = search.answer()

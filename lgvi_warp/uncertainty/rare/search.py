@@ -27,7 +27,7 @@ from lgvi_warp.uncertainty.rare.mixture import (
 )  # fmt: skip
 from lgvi_warp.uncertainty.rare.plain import sampled
 from lgvi_warp.uncertainty.rare.subset import SHARE, Limit, NoProgress, SubsetRun, climb, levels_of
-from lgvi_warp.uncertainty.rare.witness import Surroundings, Witness, grown, wide_of, witnessed
+from lgvi_warp.uncertainty.rare.witness import PARTICLES, Surroundings, Witness, grown, wide_of, witnessed
 
 # Independent runs of chains; the members of a level in the first ones, and at least and at most in those that follow.
 RUNS, FIRST_SIZE, LEAST_SIZE, LARGEST_SIZE = 4, 500, 1000, 200_000
@@ -45,6 +45,8 @@ AIM, LEFT, ROUNDS = 1.0, 1.2, 4
 BEYOND_THREE = 0.00135
 # The least probability: the cube's levels end at 1e-16.
 LEAST = 1e-15
+# Members of the second look times the error asked: what they do not see is then below half of that error.
+LOOKED = 6.0
 # The least part of the second look's members that makes a failure mode which the chains passed by.
 LEAST_MISSED = 0.03
 BLIND = (
@@ -317,7 +319,8 @@ class RareSearch:
             return None
         rng = generator(self.seed, "rare witness")
         # Chains that did not arrive know no probability: an event of one in a million is looked for.
-        seen = witnessed(self._happens, self.d, wide_of(probability or 1e-6), rng)
+        particles = max(PARTICLES, math.ceil(LOOKED / self.relative_error))
+        seen = witnessed(self._happens, self.d, wide_of(probability or 1e-6), rng, particles)
         if not len(seen.u) and probability is not None:
             self.notes.append("the second look for other failure modes met no failing member, and tells nothing")
         return seen

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.special import ndtr, ndtri
+from scipy.stats import beta
 
 from lgvi_warp.uncertainty.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
 from lgvi_warp.uncertainty.rare.mixture import fitted
 from lgvi_warp.uncertainty.rare.plain import sampled
-from lgvi_warp.uncertainty.rare.search import RareAnswer
+from lgvi_warp.uncertainty.rare.search import RareAnswer, unseen
 from lgvi_warp.uncertainty.rare.subset import NoProgress, climb, first_levels
 from lgvi_warp.uncertainty.rare.witness import Surroundings, wide_of, witnessed
 from tests.support.rare import searched
@@ -61,6 +62,7 @@ def by_grid(limit, reach=8.0, count=1601):
 def held(limit, d, p, seeds, **more):
     """How many of the intervals hold a probability."""
     intervals = [searched(limit, d, seed=seed, **more).interval() for seed in seeds]
+    assert all(high > 1.005 * low > 0.0 for low, high in intervals)
     return sum(low <= p <= high for low, high in intervals)
 
 
@@ -82,6 +84,29 @@ def test_a_mode_that_no_level_leads_to_is_in_the_answer(alone):
 def test_two_modes_over_seeds(rate, share, alone):
     limit, p = two_modes(rate, share, alone=alone)
     assert held(limit, 2, p, range(20)) >= 18
+
+
+@pytest.mark.parametrize("count, odd", [(70.0, 0.0), (70.0, 2.0), (1000.0, 0.0)])
+def test_what_weights_do_not_see_is_by_the_rule_of_succession(count, odd):
+    assert unseen(odd / count, count) == pytest.approx(math.sqrt(beta(odd + 1.0, count - odd + 1.0).moment(2)))
+    assert unseen(0.0, 0.0) == 0.0
+
+
+def test_a_mode_that_is_not_drawn_is_within_the_error():
+    """One vehicle in fifty fails otherwise; chains and the second look pass by, and the draws' own error does not tell."""
+    limit, p = two_modes(1.0, 0.02)
+    found = [searched(limit, 2, seed=seed) for seed in range(6)]
+    assert {each.estimator for each in found} == {"importance"}
+    away = np.array([abs(each.probability / p - 1.0) / each.spread for each in found])
+    assert np.sqrt(np.mean(away**2)) < 1.4
+    assert all(each.spread > 0.01 for each in found)
+
+
+@pytest.mark.slow
+def test_a_small_error_that_is_asked_has_a_larger_second_look():
+    found = searched(lambda u: u.sum(axis=1) / math.sqrt(2.0) + ndtri(1e-5), 2, relative_error=0.01, seed=4)
+    assert found.spread < 0.012
+    assert abs(found.probability / 1e-5 - 1.0) < 4.0 * found.spread
 
 
 @pytest.mark.slow

@@ -31,7 +31,11 @@ class Stretches:
 
         def arrays(*_: np.ndarray) -> tuple[np.ndarray, ...]:
             crossed = go()
-            named = {"reach": stage.reach, "steps": walk.steps_run - steps, "seconds": walk.seconds - seconds}
+            named: dict[str, Any] = {
+                "reach": stage.reach,
+                "steps": walk.steps_run - steps,
+                "seconds": walk.seconds - seconds,
+            }
             for look, (rows, flock) in crossed.items():
                 named |= {f"{look} rows": rows} | {f"{look} {name}": each for name, each in arrays_of(flock).items()}
             return np.array(list(named)), *(np.asarray(each) for each in named.values())

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,10 @@ from scipy.integrate import quad
 from scipy.special import ndtr, ndtri
 from scipy.stats import beta
 
+import lgvi_warp as lw
+from lgvi_warp.criteria.success import success_of
 from lgvi_warp.uncertainty.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
+from lgvi_warp.uncertainty.rare.failing import failing_of
 from lgvi_warp.uncertainty.rare.mixture import fitted
 from lgvi_warp.uncertainty.rare.plain import sampled
 from lgvi_warp.uncertainty.rare.search import RareAnswer, unseen
@@ -298,3 +302,17 @@ def test_noise_that_decides_is_significant():
 def test_the_balls_are_rare():
     assert by_grid(balls) == pytest.approx(1.13e-5, rel=0.02)
     assert quad(lambda t: math.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi), 4.0, 40.0)[0] == pytest.approx(ndtr(-4.0))
+
+
+def test_a_member_that_an_event_ended_counts_for_that_event():
+    """And one that ended in another way, which has no distance, for every condition."""
+    scene = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), events=[lw.events.Floor(depth=4.0)])
+    way = lw.metrics.MaxError("north", name="way")
+    condition = failing_of(success_of({"way": {"below": 3.0}}, ["way"]), {"way": way}, scene)
+    assert condition.names == ("way 3 or more", "floor")
+    status = np.array([lw.Status.OK, lw.Status.OK, lw.Status.FLOOR, lw.Status.BOX], np.uint8)
+    values = dict(zip(condition.metrics, ([1.0, 3.5, 1.0, 1.0], [2.0, 2.0, 0.0, 2.0]), strict=True))
+    statistics = {f"each {name}": SimpleNamespace(value=np.array(each)[None, None]) for name, each in values.items()}
+    rows, lost = condition.distances(SimpleNamespace(status=status, statistics=statistics))
+    assert (rows > 0.0).tolist() == [[False, True, False, True], [False, False, True, True]]
+    assert not lost.any()

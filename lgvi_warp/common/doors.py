@@ -27,7 +27,7 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
 
     def find(name: str) -> Any:
         if name not in places:
-            from lgvi_warp.common.near import nearest
+            from lgvi_warp.common.nearest import nearest
 
             # What asks for private names asks whether a module has them.
             near = None if name.startswith("_") else nearest(name, tuple(sorted(places)))

@@ -146,7 +146,7 @@ MOST_KNOWN = 60
 
 def closest(word: Any, known: Iterable[str]) -> str:
     """Suggest the known name nearest to a word."""
-    from lgvi_warp.common.near import nearest  # loaded where something is wrong
+    from lgvi_warp.common.nearest import nearest  # loaded where something is wrong
 
     names = tuple(map(str, known))
     near = nearest(word[:LONGEST_VALUE] if isinstance(word, str) else brief(word), names)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The known name that is nearest to a word, whatever its case; without NumPy, for the doors."""
+"""Functions and classes that refuse an unknown keyword with the nearest known one; without NumPy, for the doors."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from lgvi_warp.common.nearest import nearest
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Of the flags of a function's code: it takes any keyword.
 CO_VARKEYWORDS = 8
-# Fewest letters of a word that names are searched for.
-SHORTEST = 3
 # Where the constructor of a class says for which one it checks keywords.
 MARK = "_checks_keywords_of"
 # Names of arguments in other packages, and what they are called here.
@@ -24,20 +24,6 @@ ELSEWHERE = {
     "of": ("quantity", "output", "outputs"),
     "save": ("saveat", "save_at", "every"),
 }
-
-
-# A file may have the same fault in thousands of tables, of which few are told.
-@functools.lru_cache(maxsize=64)
-def nearest(word: str, names: tuple[str, ...]) -> str | None:
-    """Find the name that a word ends, that differs in case alone, that is spelt alike, or that has the word in it."""
-    import difflib  # loads slowly
-
-    folded = {name.casefold(): name for name in reversed(names)}
-    text = word.casefold()
-    found = [name for name in folded if name.endswith(f".{text}")] or [name for name in folded if name == text]
-    found = found or difflib.get_close_matches(text, folded, n=1, cutoff=0.6)
-    found = found or [name for name in folded if len(text) >= SHORTEST and text in name]
-    return folded[found[0]] if found else None
 
 
 def near_names(*takers: Callable[..., Any]) -> Callable[[F], F]:

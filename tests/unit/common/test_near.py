@@ -8,7 +8,7 @@ import pickle
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.common.near import nearest
+from lgvi_warp.common.nearest import nearest
 from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
 from tests.support.public import PATHS
 from tests.support.refusals import says

@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.calls.noise import DRAWN, GIVEN, NoiseOfCalls, checked_indices
 from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, outputs, samples_for, statistics_for, values_of
-from lgvi_warp.common.arguments import explained, flag
+from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.near import near_names
@@ -38,7 +38,6 @@ class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of 
     """Raised when members failed and the answer cannot be computed from the remaining ones."""
 
 
-@explained
 class Prepared:
     """A run to be called many times, made by `prepare`; the noise of row i is that of member i, unless a call says another.
 

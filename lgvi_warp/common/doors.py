@@ -27,7 +27,7 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
 
     def find(name: str) -> Any:
         if name not in places:
-            from lgvi_warp.common.near import nearest
+            from lgvi_warp.common.nearest import nearest
 
             # What asks for private names asks whether a module has them.
             near = None if name.startswith("_") else nearest(name, tuple(sorted(places)))
@@ -36,6 +36,10 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
         home, name_there = places[name]
         # What a door holds of itself is a module.
         value = import_module(f"{door}.{name}") if home == door else getattr(import_module(home), name_there)
+        if isinstance(value, type):
+            from lgvi_warp.common.near import near_keywords
+
+            near_keywords(value)
         setattr(module, name, value)
         return value
 

@@ -75,6 +75,10 @@ class NoSuchMembers(SceneError, IndexError):  # noqa: N818
     """Members are named that a run or an ensemble does not have."""
 
 
+class UnknownArgument(SceneError, TypeError):  # noqa: N818
+    """A function or a class is given a keyword that it does not know."""
+
+
 class MembersFailed(RuntimeError):  # noqa: N818
     """Members failed in a run with on_failure="raise"; nothing of the run is lost.
 
@@ -142,7 +146,7 @@ MOST_KNOWN = 60
 
 def closest(word: Any, known: Iterable[str]) -> str:
     """Suggest the known name nearest to a word."""
-    from lgvi_warp.common.near import nearest  # loaded where something is wrong
+    from lgvi_warp.common.nearest import nearest  # loaded where something is wrong
 
     names = tuple(map(str, known))
     near = nearest(word[:LONGEST_VALUE] if isinstance(word, str) else brief(word), names)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The known name that is nearest to a word, whatever its case; without NumPy, for the doors."""
+"""Functions and classes that refuse an unknown keyword with the nearest known one; without NumPy, for the doors."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from lgvi_warp.common.nearest import nearest
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Of the flags of a function's code: it takes any keyword.
 CO_VARKEYWORDS = 8
-# Fewest letters of a word that names are searched for.
-SHORTEST = 3
+# Where the constructor of a class says for which one it checks keywords.
+MARK = "_checks_keywords_of"
 # Names of arguments in other packages, and what they are called here.
 ELSEWHERE = {
     "h": ("dt", "step", "stepsize", "step_size", "timestep", "time_step", "delta_t"),
@@ -22,20 +24,6 @@ ELSEWHERE = {
     "of": ("quantity", "output", "outputs"),
     "save": ("saveat", "save_at", "every"),
 }
-
-
-# A file may have the same fault in thousands of tables, of which few are told.
-@functools.lru_cache(maxsize=64)
-def nearest(word: str, names: tuple[str, ...]) -> str | None:
-    """Find the name that a word ends, that differs in case alone, that is spelt alike, or that has the word in it."""
-    import difflib  # loads slowly
-
-    folded = {name.casefold(): name for name in reversed(names)}
-    text = word.casefold()
-    found = [name for name in folded if name.endswith(f".{text}")] or [name for name in folded if name == text]
-    found = found or difflib.get_close_matches(text, folded, n=1, cutoff=0.6)
-    found = found or [name for name in folded if len(text) >= SHORTEST and text in name]
-    return folded[found[0]] if found else None
 
 
 def near_names(*takers: Callable[..., Any]) -> Callable[[F], F]:
@@ -61,6 +49,25 @@ def near_names(*takers: Callable[..., Any]) -> Callable[[F], F]:
     return decorate
 
 
+def near_keywords(kind: type) -> None:
+    """Let a public class refuse an unknown keyword with the nearest known one, as functions do; once, at first use."""
+    init = kind.__init__  # type: ignore[misc]
+    # One that Python's own classes have takes no keywords by name: of an enumeration, or where a tuple has names.
+    if not hasattr(init, "__code__") or getattr(init, MARK, None) is kind or (names := arguments_of(init)) is None:
+        return
+    known = frozenset(names)
+
+    @functools.wraps(init)
+    def wrapper(self: Any, *args: Any, **settings: Any) -> None:
+        # A subclass has keywords of its own, which it hands on.
+        if type(self) is kind and not known.issuperset(settings):
+            refuse_argument(kind.__qualname__, next(name for name in settings if name not in known), names)
+        init(self, *args, **settings)
+
+    setattr(wrapper, MARK, kind)
+    kind.__init__ = wrapper  # type: ignore[misc]
+
+
 def arguments_of(*functions: Any) -> tuple[str, ...] | None:
     """The keywords of functions, the first of which hands its own `**settings` on; None where the last takes any."""
     names = dict[str, None]()
@@ -74,7 +81,9 @@ def arguments_of(*functions: Any) -> tuple[str, ...] | None:
 
 
 def refuse_argument(function: str, word: str, names: tuple[str, ...]) -> None:
-    """Raise the TypeError of an unknown keyword."""
+    """Raise the SceneError of an unknown keyword, which is a TypeError, too."""
+    from lgvi_warp.common.errors import UnknownArgument
+
     meant = next((name for name in names if word.casefold() in ELSEWHERE.get(name, ())), None) or nearest(word, names)
     remedy = f"did you mean {meant!r}?" if meant else f"known: {', '.join(names)}"
-    raise TypeError(f"{function}() got an unexpected keyword argument {word!r}; {remedy}")
+    raise UnknownArgument([f"{function}() got an unexpected keyword argument {word!r}; {remedy}"])

@@ -58,6 +58,9 @@ class Sensor(MeasuringPart):
         place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
             reads the position or the depth of this place.
 
+    The reading of the first tick always arrives, at once and whatever the depth: it stands for what was read before the run,
+    on deck. A `DVL`, which needs the floor, has no such reading: its velocity is 0 before the first lock.
+
     An estimator that names the sensor (see lw.control.ErrorStateFilter) takes the readings itself: then what is measured stays
     as it was, no reading is kept, the first may be lost, and the estimator waits for the latency.
 

@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.criteria.members import scene_of
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.measuring.cost import Cost, costs
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.runs.request import scene_of
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene

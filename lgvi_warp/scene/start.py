@@ -28,7 +28,6 @@ PLACES = ("position", "geodetic")
 NAMES = (*PLACES, *ATTITUDES, *VELOCITIES, "angular_velocity")
 
 
-@explained
 @dataclass(frozen=True)
 class Environment:
     """Gravity and density of the water around the vehicle, and where and when on the Earth it is.

@@ -157,6 +157,21 @@ def test_what_is_measured_is_the_twins(case, dtype):
     assert np.abs(seen - wanted).max() < 10 * TICKS * 40 * EPS[dtype]
 
 
+def test_the_first_reading_stands_until_another_arrives():
+    """Lost from the start, late by more than the run, and always too deep: the reading of before the run is all there is."""
+    lost = [
+        lw.control.Sensor(name="gps", of="position", deepest=-1e3),
+        lw.control.Sensor(name="log", of="velocity", dropout=1.0),
+        lw.control.Sensor(name="gyro", of="angular_velocity", latency=1000),
+    ]
+    truth = motion()
+    seen = measured(one(scene(lost, period=PERIOD), np.zeros((MEMBERS, 3))), truth, H)
+    for columns in (slice(0, 3), slice(12, 15), slice(18, 21)):
+        assert np.array_equal(seen[:, :, columns], np.broadcast_to(truth[:1, :, columns], truth[:, :, columns].shape))
+        assert np.abs(truth[-1, :, columns] - truth[0, :, columns]).max() > 1e-3
+    assert np.array_equal(seen[:, :, 3:12], truth[:, :, 3:12])
+
+
 # Statistics: the chain "all" with other numbers, so with its kernel. A chance of 6e-7 for a right code; the seed is fixed.
 ERRORS = 5.0
 MANY = 2000

@@ -11,6 +11,7 @@ from lgvi_warp.common.npy_files import write_npz
 from lgvi_warp.criteria.memory import Remembered
 from lgvi_warp.uncertainty.estimating.levels import Runs
 from lgvi_warp.uncertainty.rare.limit import VehicleLimit
+from lgvi_warp.uncertainty.rare.walk import VehicleWalk
 from tests.support.refusals import refused, says
 
 SECONDS = ("seconds", "plain_seconds", "pilot_seconds")
@@ -97,6 +98,46 @@ def test_an_interrupted_call_goes_on_with_the_same_answer(name, tmp_path, ran):
     assert {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in (tmp_path / "kept").iterdir()} == files
 
 
+def split(**more):
+    """An event of noise and of a number that varies, along a few pieces."""
+    noise = lw.terms.WrenchNoise(force=(30.0, 0.0, 0.0))
+    scene = lw.Scene.named("sphere", terms=[lw.terms.Drag(linear=[20.0] * 3 + [1.0] * 3), noise])
+    members = lw.Ensemble(scene, vary={"start.position[0]": lw.distributions.Normal(std=0.5)})
+    more = {"by": "splitting", "looks": 5, "relative_error": 0.5, "most": 10_000, "seed": 2} | more
+    return lw.rare_event(members, "position[0] - 6.0", method="psi_x", h=0.1, t1=3.0, threads=1, **more)
+
+
+def test_splitting_goes_on_after_the_last_level(tmp_path, monkeypatch):
+    """Its pilot's plain members alone are run again."""
+    went, most, own = [], [np.inf], VehicleWalk.advance
+
+    def advance(self, flock, keys):
+        if len(went) >= most[0]:
+            raise KeyboardInterrupt
+        went.append(len(keys))
+        return own(self, flock, keys)
+
+    monkeypatch.setattr(VehicleWalk, "advance", advance)
+    whole = answer(split())
+    calls = len(went)
+    went.clear()
+    most[0] = 2 * calls // 3
+    with pytest.raises(KeyboardInterrupt):
+        split(store=tmp_path / "kept")
+    assert len(list((tmp_path / "kept").iterdir())) > 3
+    went.clear()
+    most[0] = np.inf
+    assert answer(split(store=tmp_path / "kept")) == whole
+    assert len(went) < 0.6 * calls
+    went.clear()
+    assert answer(split(store=tmp_path / "kept")) == whole
+    assert len(went) < 0.3 * calls
+    says(refused(split, store=tmp_path / "kept", looks=6), "store", "keeps the calls of other arguments")
+    torn = sorted((tmp_path / "kept").iterdir())[-1]
+    torn.write_bytes(torn.read_bytes()[:100])
+    assert answer(split(store=tmp_path / "kept")) == whole
+
+
 def test_a_progress_callback_may_interrupt(tmp_path, ran):
     def stop(fraction):
         if fraction > 0.3:
@@ -169,7 +210,6 @@ def test_functions_are_told_apart(tmp_path, ran):
 
 
 def test_what_cannot_be_kept_is_refused(tmp_path):
-    says(refused(rare, by="splitting", store=tmp_path), "store", "chains")
     says(refused(rare, store=3), "store", "is no path")
     (tmp_path / "file").write_text("a file")
     with pytest.raises(OSError, match="file"):

@@ -88,6 +88,11 @@ def test_rare_failures_are_those_of_the_normal_law(found):
         assert abs(rare.probability / p - 1.0) < 3.0 * rare.relative_error
         assert rare.estimator == "subset"
         assert rare.event == "way 3.6 or more or not ok"
+        way, floor, of_any, of_all = rare.by_condition.items()
+        assert [way[0], floor[0], of_any[0], of_all[0]] == ["way 3.6 or more", "floor", "any", "all"]
+        assert way[1].lower <= p - OF_FLOOR <= way[1].upper
+        assert floor[1].lower <= OF_FLOOR <= floor[1].upper
+        assert of_all[1].lower <= (p - OF_FLOOR) * OF_FLOOR <= of_all[1].upper
         # All of them fail, by one of the two ways.
         x, z = (rare.failing.own_values()[f"start.position[{i}]"] for i in (0, 2))
         middle = OFF * (case == "aside")

@@ -10,14 +10,15 @@ from scipy.special import ndtr, ndtri
 
 import lgvi_warp as lw
 from lgvi_warp.sampling.final import joined
+from lgvi_warp.uncertainty.rare.causes import Chance, chances_of
 from lgvi_warp.uncertainty.rare.event import SURE, condition_of
 from lgvi_warp.uncertainty.rare.flock import Flock
 from lgvi_warp.uncertainty.rare.moving import moved
-from lgvi_warp.uncertainty.rare.split_search import SplitSearch
 from lgvi_warp.uncertainty.rare.splitting import piloted, split_runs
 from lgvi_warp.uncertainty.rare.stages import Stage, walked
 from lgvi_warp.uncertainty.rare.subset import NoProgress
 from lgvi_warp.uncertainty.rare.walk import VehicleWalk, pieces
+from tests.support.rare import split
 from tests.support.refusals import says
 
 # A body of mass and added mass M in linear drag and white noise of force: speeds die out in TAU, and grow by S sqrt(t).
@@ -54,6 +55,8 @@ def normals_of(keys, seed, step):
 
 class LinearWalk:
     """A speed in drag and noise, and its place, by steps of Euler; the place begins at u where `start` is not 0."""
+
+    stretches = None
 
     def __init__(self, seed, bound, of=0, lasting=False, start=0.0, per=5, looks=20, dt=0.03):
         self.seed, self.bound, self.of = seed, bound, of
@@ -101,6 +104,32 @@ class LinearWalk:
         for _ in range(self.per * self.looks):
             C = A @ C @ A.T + np.outer(B, B)
         return float(np.sqrt(C[self.of, self.of]))
+
+
+class TwoSpeeds:
+    """Two independent speeds in drag and noise; the event is that either was ever beyond its bound."""
+
+    d, lasting, stretches = 0, np.array([True, True]), None
+
+    def __init__(self, seed, bounds, looks=64, dt=0.03):
+        self.seed, self.bounds, self.looks, self.dt = seed, np.array(bounds)[:, None], looks, dt
+        self.ran, self.fresh = 0, 0
+
+    members, keys, joined = LinearWalk.members, LinearWalk.keys, LinearWalk.joined
+
+    def begin(self, u):
+        n, no = len(u), np.zeros(len(u), bool)
+        return Flock(
+            0, Place(np.zeros((n, 2))), np.full((2, n), -np.inf), np.full((2, n), -SURE), np.zeros((n, 0)), no, no, no
+        )
+
+    def advance(self, flock, keys):
+        self.ran += len(keys)
+        noise = np.column_stack([normals_of(keys, self.seed, 2 * flock.look + i) for i in range(2)])
+        x = (1.0 - self.dt) * flock.place.x + np.sqrt(self.dt) * noise
+        most = np.fmax(flock.values, x.T)
+        beyond, no = most - self.bounds, np.zeros(len(x), bool)
+        return Flock(flock.look + 1, Place(x), most, beyond, x.copy(), (beyond > 0.0).any(axis=0), no, no)
 
 
 def passing(bound, steps, keep, noise, points=4001):
@@ -177,9 +206,35 @@ def test_the_grid_of_densities_knows_reflection():
     assert passing(bound, steps, 1.0, noise) == pytest.approx(2.0 * ndtr(-(bound + 0.5826 * noise)), rel=0.01)
 
 
+def chances_of_two(seed, bounds, error):
+    found = split(TwoSpeeds(seed, bounds), relative_error=error, seed=seed)
+    of_any = Chance(found.probability, *found.interval())
+    return chances_of(("a", "b"), found.rows, found.weights, found.of_run, of_any, found.spread)
+
+
+# Both are as probable as that one of them happens after the other: who goes no further than the first sees half of that.
+@pytest.mark.parametrize("bounds, seeds, least", [
+    pytest.param((1.3, 1.5), range(3), 3, id="likely"),
+    pytest.param((2.2, 2.4), range(20), 18, id="rare", marks=pytest.mark.slow),
+    pytest.param((1.3, 1.5), range(20), 18, id="likely over seeds", marks=pytest.mark.slow),
+])  # fmt: skip
+def test_each_condition_is_told_beside_the_others(bounds, seeds, least):
+    a, b = (passing(bound, 64, 0.97, np.sqrt(0.03)) for bound in bounds)
+    truth = {"a": a, "b": b, "any": a + b - a * b, "all": a * b}
+    held, told = dict.fromkeys(truth, 0), []
+    for seed in seeds:
+        found = chances_of_two(seed, bounds, 0.1)
+        told.append(found["all"].probability)
+        for name, p in truth.items():
+            held[name] += found[name].lower <= p <= found[name].upper
+    assert min(held.values()) >= least, held
+    if a * b > 1e-3:
+        assert np.mean(told) == pytest.approx(a * b, rel=0.25)
+
+
 def scored(make, seeds, p, error=0.1):
     """(probability over p, told spread) of whole searches, (len(seeds), 2)."""
-    answers = [SplitSearch(make(seed), error, seed, 1_000_000).answer() for seed in seeds]
+    answers = [split(make(seed), relative_error=error, seed=seed) for seed in seeds]
     return np.array([(each.probability / p, each.spread) for each in answers])
 
 

@@ -1,8 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A search for a rare event with what most tests ask of it."""
+"""Searches for rare events of standard normals and of walks, with what `lw.rare_event` takes by default."""
 
-from functools import partial
+import inspect
 
-from lgvi_warp.uncertainty.rare import search
+import lgvi_warp as lw
+from lgvi_warp.uncertainty.rare.search import RareSearch
+from lgvi_warp.uncertainty.rare.split_search import SplitSearch
 
-RareSearch = partial(search.RareSearch, relative_error=0.1, seed=0, most=1_000_000)
+_DEFAULTS = {
+    name: inspect.signature(lw.rare_event).parameters[name].default for name in ("relative_error", "seed", "most")
+}
+
+
+def searched(limit, d, **more):
+    """What a search for the event finds that a limit (n, d) -> (n,) or (k, n) is above 0."""
+    return RareSearch(limit, d, **_DEFAULTS | more).answer()
+
+
+def split(walk, **more):
+    """What splitting finds of the event of a walk."""
+    return SplitSearch(walk, **_DEFAULTS | more).answer()

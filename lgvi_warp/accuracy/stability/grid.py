@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.arguments import explained, items_of, whole_number
+from lgvi_warp.common.arguments import items_of, whole_number
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics import rates as member_rates
@@ -36,7 +36,6 @@ MOST_MEMBERS = 10_000_000
 FORM = '"NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":set" at the end for parameters'
 
 
-@explained
 @dataclass(frozen=True)
 class Axis:
     """What varies along an axis of a map, from a low to a high value.

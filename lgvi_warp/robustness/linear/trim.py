@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.near import near_names
 from lgvi_warp.control.over_floor import seen_floors
@@ -32,7 +31,6 @@ GUESSES = (0.0, 0.05, 0.5)
 ANGLES = ("roll", "pitch", "drift")
 
 
-@explained
 @dataclass(frozen=True)
 class Trim(Saved):
     """A steady motion, straight and level.

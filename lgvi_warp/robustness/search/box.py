@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A box of numbers with names, and the search of its least cost: evolution, restarts, corners, and a walk."""
+"""A box of numbers with names, and the search of its least cost: evolution, restarts, corners, a walk, and spread points."""
 
 from __future__ import annotations
 
@@ -21,6 +21,12 @@ POPULATION, LEAST = 8, 16
 EVOLUTION = 0.7
 # The walk begins with steps of this part of each width, and ends with the other.
 FIRST_STEP, LAST_STEP = 0.25, 1e-5
+# Parts of what evolution and walk leave: for spread points, and for walks from the best of them; points that are run at once.
+SPREAD, WALKS, AT_ONCE = 0.75, 0.2, 1000
+# Neighbours than which a start of a walk is better, times the logarithm of the points (Rinnooy Kan & Timmer 1987).
+NEIGHBOURS = 4.0
+# Steps of each walk, at least, before the worse half of the walks ends.
+STEPS = 2
 
 # Candidates (k, d) -> cost of each (k,); infinite where a run failed.
 Cost = Callable[[np.ndarray], np.ndarray]
@@ -72,12 +78,21 @@ class SearchBox:
 
 @dataclass(frozen=True)
 class BestCandidate:
-    """The best candidate of a search; at: (d,), in the unit cube; restarts: the least cost of each evolution."""
+    """The best candidate of a search; at: (d,), in the unit cube; restarts: the least cost of each evolution.
+
+    points: number of candidates that were spread evenly over the cube, whatever the cost was.
+    """
 
     at: np.ndarray
     cost: float
     restarts: np.ndarray
     runs: int
+    points: int = 0
+
+
+def least_peak(points: int, confidence: float = 0.95) -> float:
+    """The part of the cube that a region needs so that one of so many spread points lies in it, with this confidence."""
+    return 1.0 - (1.0 - confidence) ** (1.0 / points) if points else 1.0
 
 
 class _CountedCost:
@@ -104,12 +119,13 @@ class _CountedCost:
 
 def search(
     cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough: float = -math.inf,
-    report: Callable[[int], None] = lambda count: None) -> BestCandidate:  # fmt: skip
+    report: Callable[[int], None] = lambda count: None, spend: bool = False) -> BestCandidate:  # fmt: skip
     """Find the least cost in the unit cube of d dimensions, or one that is good enough.
 
     Evolution (Storn & Price 1997) several times, each from other places; then all corners where they are few; then a walk
     along the axes from the best place, with steps that shrink where none is better.
-    report: called with the number of candidates tried.
+    report: called with the number of candidates tried. spend: whether what is left goes to points spread over the cube, and
+    to walks from the best of them.
     """
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
@@ -134,10 +150,84 @@ def search(
         least.append(answer.fun)
     if ask.remaining and 2**d <= max(ask.remaining // 2, 1):
         ask(np.array(list(itertools.product((0.0, 1.0), repeat=d))))
-    step = FIRST_STEP
-    while ask.best is not None and step > LAST_STEP and ask.remaining >= 2 * d:
-        before = ask.least
-        ask(np.clip(ask.best + step * np.concatenate([np.eye(d), -np.eye(d)]), 0.0, 1.0))
-        step = step if ask.least < before else 0.5 * step
+    _walk_from_best(ask, FIRST_STEP)
+    points, rng = size * len(least), np.random.default_rng((seed, 2 * restarts))
+    while spend and (more := _spread(ask, d, rng)):
+        points += more
     assert ask.best is not None
-    return BestCandidate(ask.best, ask.least, np.array(least), ask.count)
+    return BestCandidate(ask.best, ask.least, np.array(least), ask.count, points)
+
+
+def _spread(ask: _CountedCost, d: int, rng: np.random.Generator) -> int:
+    """Spend most of what is left on Sobol points and on walks from those better than all their neighbours; how many points.
+
+    Multi-level single linkage (Rinnooy Kan & Timmer 1987), by Sobol points (Kucherenko & Sytsko 2005).
+    """
+    from scipy.stats import qmc
+
+    count = int(SPREAD * ask.remaining)
+    if count < LEAST:
+        return 0
+    points = qmc.Sobol(d, rng=rng).random_base2(math.ceil(math.log2(count)))[:count]
+    costs, asked = np.full(count, np.inf), 0
+    while asked < count and ask.remaining:
+        batch = points[asked : asked + AT_ONCE]
+        costs[asked : asked + len(batch)] = ask(batch)
+        asked += len(batch)
+    if not ask.remaining:
+        return asked
+    # Of these walks the worse half ends after each round; all rounds take as many candidates.
+    left = int(WALKS / (1.0 - SPREAD) * ask.remaining)
+    starts = _starts(points, costs)[: max(1, left // (2 * d * STEPS))]
+    while (rounds := len(starts).bit_length()) * 2 * d * STEPS * len(starts) > left and len(starts) > 1:
+        starts = starts[: len(starts) // 2]
+    before, walks = (
+        ask.least,
+        (points[starts], costs[starts], np.full(len(starts), min(FIRST_STEP, count ** (-1.0 / d)))),
+    )
+    for _ in range(rounds):
+        for _ in range(left // (rounds * 2 * d * len(walks[0]))):
+            if ask.remaining < 2 * d * len(walks[0]) or walks[2].max() < LAST_STEP:
+                break
+            walks = _stepped(ask, *walks)
+        kept = np.argsort(walks[1], kind="stable")[: (len(walks[1]) + 1) // 2]
+        walks = walks[0][kept], walks[1][kept], walks[2][kept]
+    if ask.least < before:
+        _walk_from_best(ask, float(walks[2][0]))
+    return asked
+
+
+def _starts(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
+    """Which of points (n, d) are better than all their neighbours, the best first; of equal ones the first is better."""
+    from scipy.spatial import cKDTree
+
+    n = len(points)
+    order = np.argsort(costs, kind="stable")
+    rank = np.empty(n, int)
+    rank[order] = np.arange(n)
+    tree, near = cKDTree(points), min(n, 1 + math.ceil(NEIGHBOURS * math.log(n)))
+    best = [rank[tree.query(points[i : i + AT_ONCE], near)[1]].min(axis=1) for i in range(0, n, AT_ONCE)]
+    return order[np.concatenate(best)[order] == np.arange(n)]
+
+
+def _stepped(
+    ask: _CountedCost, places: np.ndarray, costs: np.ndarray, steps: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One step along the axes of walks from places (k, d), to the best neighbour; where none is better the step halves."""
+    k, d = places.shape
+    sides = np.concatenate([np.eye(d), -np.eye(d)])
+    around = np.clip(places[:, None] + steps[:, None, None] * sides, 0.0, 1.0)
+    theirs = ask(around.reshape(-1, d)).reshape(k, 2 * d)
+    best = np.arange(k), theirs.argmin(axis=1)
+    better = theirs[best] < costs
+    return (np.where(better[:, None], around[best], places), np.where(better, theirs[best], costs),
+            np.where(better, steps, 0.5 * steps))  # fmt: skip
+
+
+def _walk_from_best(ask: _CountedCost, step: float) -> None:
+    """Walk from the best place of all, until steps are short or nothing is left."""
+    if ask.best is None:
+        return
+    walk = ask.best[None], np.array([ask.least]), np.array([step])
+    while walk[2][0] > LAST_STEP and ask.remaining >= 2 * len(ask.best):
+        walk = _stepped(ask, *walk)

@@ -11,7 +11,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from lgvi_warp.calls.prepared import Prepared, prepare, scene_value
-from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
@@ -28,7 +27,6 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
 
 
-@explained
 @dataclass(frozen=True)
 class Tuned(Saved):
     """The numbers with the least risk that a search found.

@@ -17,7 +17,7 @@ from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.results.quantities import OfInterest
-from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, search
+from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, least_peak, search
 from lgvi_warp.robustness.search.numbers import Numbers
 from lgvi_warp.runs.request import scene_of
 from lgvi_warp.sampling.designs.table import Table
@@ -43,6 +43,7 @@ class WorstCase(Saved):
         fleet: the member, to run it again; None where this was read from a file, beside which the numbers lie as the table
             worst_case.csv: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")) is the member.
         of_metric: whether the quantity is a metric, which is infinite where a loop never gets there; by default False.
+        points: number of members that were spread evenly over the box, whatever their quantity.
     """
 
     study: ClassVar[str] = "worst_case"
@@ -56,6 +57,12 @@ class WorstCase(Saved):
     runs: int
     fleet: Ensemble | None
     of_metric: bool = False
+    points: int = 0
+
+    @property
+    def unseen(self) -> float:
+        """Part of the box that a separate peak needs so that one of the spread points meets it with 95 %; 1 without points."""
+        return least_peak(self.points)
 
     def to_dict(self) -> dict[str, Any]:
         return finite_or_none({item.name: getattr(self, item.name) for item in fields(self) if item.name != "fleet"})
@@ -81,7 +88,8 @@ class WorstCase(Saved):
             return f"{event}: {where}; found in {self.runs} runs"
         bound = "a lower bound of the largest" if self.worst == "largest" else "an upper bound of the smallest"
         restarts = ", ".join(f"{value:.6g}" for value in self.restarts)
-        return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {restarts}"
+        seen = f"; a separate peak in {self.unseen:.2g} of the box or more was met with 95 %" if self.points else ""
+        return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {restarts}{seen}"
 
 
 @shows_progress
@@ -101,7 +109,9 @@ def worst_case(
     """Search numbers within bounds for the member whose quantity is worst.
 
     Differential evolution, in which a generation is an ensemble, several times from other places; then the corners, where they
-    are few; then a walk from the worst place. Noise is the same for all. What no member showed may be worse still.
+    are few; then a walk from the worst place. What is left of the budget goes to Sobol points over the whole box, and to walks
+    from the worst of them. Noise is the same for all. What no member showed may be worse still: `unseen` of the answer says
+    how small it must be.
 
     Args:
         fleet: A Scene or an Ensemble, whose scene is meant: numbers that are not searched are the scene's.
@@ -154,7 +164,7 @@ def worst_case(
 
     best = search(
         cost, len(box.names), budget, seed, restarts, good_enough=-np.finfo(float).max,
-        report=lambda count: report(min(1.0, count / budget)))  # fmt: skip
+        report=lambda count: report(min(1.0, count / budget)), spend=True)  # fmt: skip
     numbers = box.values(best.at[None])[0]
     sides = {
         name: "low" if value == low else "high" if value == high else ""
@@ -165,4 +175,6 @@ def worst_case(
     # A search by the sign; a failure is infinite whatever is worst.
     value = math.inf if math.isinf(best.cost) else sign * best.cost
     label, of_metric = numbers_of.label, numbers_of.of_metric
-    return WorstCase(parameters, value, label, worst, sides, sign * best.restarts, best.runs, member, of_metric)
+    return WorstCase(
+        parameters, value, label, worst, sides, sign * best.restarts, best.runs, member, of_metric, best.points
+    )

@@ -18,6 +18,7 @@ from lgvi_warp.common.npy_files import of_npz, write_npz
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.criteria.memory import key_of
 from lgvi_warp.criteria.success import Success
+from lgvi_warp.robustness.sweeps.cases import RARE
 from lgvi_warp.robustness.sweeps.setup import Setup, SweepCell
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.statistics.estimates import paired
@@ -29,7 +30,6 @@ from lgvi_warp.uncertainty.rare.rare_event import check_asked, rare_event
 from lgvi_warp.uncertainty.rare.ratio import FailingMembers, RareRatio, Share, members_of, ratio_of, shared
 
 # Defaults of the function for what a case may leave out.
-DEFAULTS = {name: inspect.signature(rare_event).parameters[name].default for name in ("relative_error", "most")}
 # Folder of the answers, within that of the sweep.
 FOLDER = "rare"
 
@@ -105,17 +105,19 @@ class RareFailures:
         for case in self.setup.cases:
             if asked := self.asked(case):
                 own = Faults(f"case {case.name!r}: rare.")
-                check_asked(own, **DEFAULTS | {name: asked[name] for name in DEFAULTS.keys() & asked.keys()})
+                check_asked(own, asked["relative_error"], asked["most"])
                 with faults.including():
                     own.raise_if_any()
         faults.raise_if_any()
 
     @staticmethod
     def asked(case: Any) -> dict[str, Any]:
-        """The arguments of `rare_event` that a case gives; empty where it does not ask."""
+        """The arguments of `rare_event` that a case may give, its own or the defaults; empty where it does not ask."""
         rare = getattr(case, "rare", None)
-        error = {"relative_error": DEFAULTS["relative_error"]}
-        return error | dict(rare) if isinstance(rare, Mapping) else error if rare else {}
+        if not rare:
+            return {}
+        defaults = inspect.signature(rare_event).parameters
+        return {name: defaults[name].default for name in RARE} | (dict(rare) if isinstance(rare, Mapping) else {})
 
     def of(self, cell: SweepCell) -> RareFailure | None:
         """What is known of a cell; None where nothing was asked."""

@@ -39,6 +39,8 @@ def rare_rows(sweep: SweepTable) -> list[dict[str, Any]]:
                 array = np.asarray(value)
                 row |= {f"likeliest {name}{list(index) if index else ''}": float(array[index])
                         for index in np.ndindex(array.shape)}  # fmt: skip
+            row |= {f"probability of {name}": chance.probability for name, chance in found.by_condition.items()
+                    if name != "any"}  # fmt: skip
             row |= {f"moved {name}": shift for name, shift in found.moved.items()}
             row |= {f"z of noise {name}": score for name, score in found.noise_moved.items()}
         rows.append(row)
@@ -53,6 +55,7 @@ def provenance_of_rare(sweep: SweepTable, cell: SweepCell) -> dict[str, Any]:
     if (found := answer.found) is not None:
         said |= {"event": found.event, "probability": found.probability, "interval": list(found.interval),
                  "error": found.relative_error, "by": found.estimator, "members": dict(found.members),
+                 "by_condition": {name: list(chance) for name, chance in found.by_condition.items()},
                  "messages": list(found.messages)}  # fmt: skip
     return {"rare": said}
 

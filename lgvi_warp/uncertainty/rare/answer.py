@@ -62,7 +62,7 @@ class RareEvent(Saved):
         moved_spread: by name, the standard deviation of the failing members in that of all members.
         moved_z: by name, the z-score farthest from 0 of these three against all members; from 4.5 on it is no chance.
         by_condition: where the event is any of several conditions, (probability, lower, upper) of each alone by its words, and
-            of "any" and "all" of them; empty otherwise, and with splitting.
+            of "any" and "all" of them, over the whole run; empty otherwise, and where a status is among them.
         chains: (m,), the chain of each of the failing members, where those of one are related; different numbers elsewhere.
     """
 

@@ -100,8 +100,10 @@ def chances_of(
     spread: of the relative error of the probability of any.
     """
     from scipy.special import ndtri
+    from scipy.stats import chi2
 
     happens = rows > 0.0
+    place = np.unique(chains, return_inverse=True)[1]
     events = {**dict(zip(names, happens, strict=True)), "any": None, "all": happens.all(axis=0)}
     found = {}
     for name, event in events.items():
@@ -110,7 +112,7 @@ def chances_of(
             continue
         share, error = (float(each[0]) for each in mean_and_error(event[:, None].astype(float), weights, chains))
         total = mean_and_error(np.ones((len(weights), 1)), weights, chains)[0][0]
-        clusters = np.bincount(np.unique(chains, return_inverse=True)[1], weights)
+        clusters = np.bincount(place, weights)
         count = float(total**2 / (clusters**2).sum()) / RELATED**2
         # None or all of so many may be chance: three of them bound what is hidden.
         hidden = min(1.0, 3.0 / count)
@@ -120,6 +122,10 @@ def chances_of(
             found[name] = Chance(of_any.probability, (1.0 - hidden) * of_any.lower, of_any.upper)
         else:
             away = float(ndtri(0.975)) * math.hypot(spread, RELATED * error / share)
-            p = of_any.probability * share
-            found[name] = Chance(p, p * math.exp(-away), min(of_any.upper, p * math.exp(away)))
+            p, own = of_any.probability * share, np.bincount(place, weights * event)
+            # Few chains have it: no interval is narrower than that of their number (Garwood 1936).
+            few = float(own.sum() ** 2 / (own**2).sum()) / RELATED**2
+            low = min(math.exp(-away), float(chi2.ppf(0.025, 2.0 * few)) / (2.0 * few))
+            high = max(math.exp(away), float(chi2.ppf(0.975, 2.0 * few + 2.0)) / (2.0 * few))
+            found[name] = Chance(p, p * low, min(of_any.upper, p * high))
     return found

@@ -26,19 +26,31 @@ class FailingCondition(RareCondition):
     """The event that a member does not pass; success: what it must fulfil.
 
     metrics: those that success limits, and the distances to events that would end success, by which chains go to them.
+    endings: (key, status) of these events by the names of their metrics.
     """
 
     success: Success = field(default_factory=Success)
+    endings: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        limits = self.success.limits
+        return tuple(_words(name, *limits[name]) if name in limits else self.endings[name][0] for name in self.metrics)
 
     def distances(self, answer: Any) -> tuple[np.ndarray, np.ndarray]:
         """How far members are beyond each way to fail (k, n), and which of them failed (n,)."""
         status = np.asarray(answer.status)
         numbers = {name: answer.statistics[f"each {name}"].value[0, 0] for name in self.metrics}
-        beyond = [_outside(numbers[name], *ends) for name, ends in self.success.limits.items()]
-        beyond += [LEAST - numbers[name] for name in self.metrics if name not in self.success.limits]
-        # Whoever ended otherwise than success asks has no need to be beyond a number.
+        limits = self.success.limits
+        beyond = {name: _outside(numbers[name], *limits[name]) if name in limits else LEAST - numbers[name]
+                  for name in self.metrics}  # fmt: skip
+        # Whoever ended otherwise than success asks has no need to be beyond a number: it counts as the event that ended it,
+        # and where that has no distance as every condition.
         badly = ~Success(self.success.status).passed(status, {})
-        return np.stack([np.where(badly, FAR, each) for each in beyond]), failed(status)
+        for name, (_, ending) in self.endings.items():
+            beyond[name] = np.where(status == ending, FAR, beyond[name])
+        otherwise = badly & ~np.isin(status, [ending for _, ending in self.endings.values()])
+        return np.stack([np.where(otherwise, FAR, each) for each in beyond.values()]), failed(status)
 
 
 def _outside(values: np.ndarray, above: float, below: float) -> np.ndarray:
@@ -50,19 +62,22 @@ def _outside(values: np.ndarray, above: float, below: float) -> np.ndarray:
 
 def failing_of(success: Success, metrics: Mapping[str, Statistic], scene: Any) -> FailingCondition:
     """The event that a member of a scene does not pass; metrics: of the sweep, by name. Raises SceneError."""
-    known = {name: metrics[name] for name in success.limits}
+    known, endings = {name: metrics[name] for name in success.limits}, dict[str, tuple[str, int]]()
     ended = [event for event in scene.events if not Success(success.status).passed(np.array([event.status]), {})[0]]
     for event in ended:
         if event.type in COUNTS:
             name, metric = metric_of("success", named(event))
             known.setdefault(name, metric)
+            endings[name] = event.key, int(event.status)
     if not known:
         problem = (
             "limits no metric, and no event of the scene whose distance is known ends it: nothing says how near one is"
         )
         raise refusal("success", success.to_dict(), problem, 'limit a metric, "peak depth" = { below = 12.0 }')
     words = [_words(name, *ends) for name, ends in success.limits.items()]
-    return FailingCondition(" or ".join([*words, f"not {'/'.join(success.status)}"]), None, {}, known, (), success)
+    return FailingCondition(
+        " or ".join([*words, f"not {'/'.join(success.status)}"]), None, {}, known, (), success, endings
+    )
 
 
 def _words(name: str, above: float, below: float) -> str:

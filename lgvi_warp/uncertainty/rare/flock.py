@@ -57,11 +57,13 @@ class Walk(Protocol):
 
     looks: number of the last look. d: number of normals that a member starts with. lasting: (c,), for each number that the
     event is of, whether the event has happened once it is beyond its bounds; else it must be so at the last look.
+    stretches: what keeps the way from level to level, as `Stretches`; None for nothing.
     """
 
     looks: int
     d: int
     lasting: np.ndarray
+    stretches: Any
 
     def begin(self, u: np.ndarray) -> Flock:
         """Members at the start, of standard normals (n, d)."""

@@ -29,7 +29,7 @@ from lgvi_warp.uncertainty.rare.cheaper import cheaper_of, chosen_chain
 from lgvi_warp.uncertainty.rare.event import SURE, RareCondition, condition_of
 from lgvi_warp.uncertainty.rare.limit import VehicleLimit
 from lgvi_warp.uncertainty.rare.search import RareAnswer, RareSearch
-from lgvi_warp.uncertainty.rare.split_search import SplitSearch
+from lgvi_warp.uncertainty.rare.split_search import SplitAnswer, SplitSearch
 from lgvi_warp.uncertainty.rare.subset import MOST_LEVELS, NoProgress
 from lgvi_warp.uncertainty.rare.walk import VehicleWalk
 
@@ -38,6 +38,9 @@ OWN = "the scene's own"
 ALL_LOST = (
     "every failing member failed, or has a number that is not finite (NaN): the probability is of that; "
     'failed="refuse" shows the first of them'
+)
+WITH_STATUS = (
+    "by_condition is empty: a member that ends with the status counts as every condition; ask for each by itself"
 )
 WAYS = ("chains", "splitting")
 ASK = 'ask for what is rare, as "peak depth above 12"'
@@ -88,8 +91,9 @@ def rare_event(
         failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
         most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
         seed: Seed of all that is drawn; 0 by default.
-        store: Folder for the results of runs, by="chains" alone: the same call, after it was interrupted, takes them from
-            there and goes on, with the answer of one that was not. One of other arguments is refused. None by default.
+        store: Folder for the results of runs: the same call, after it was interrupted, takes them from there and goes on,
+            with the answer of one that was not; with splitting level by level, after its pilot was run again. One of other
+            arguments is refused. None by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False for
             nobody.
@@ -118,8 +122,6 @@ def rare_event(
     faults.choice("by", by, WAYS)
     if by == "splitting" and cheaper:
         faults.add("cheaper", cheaper, "is of chains", 'leave it out, or give by="chains"')
-    if by == "splitting" and store is not None:
-        faults.add("store", store, "keeps the runs of chains", 'leave it out, or give by="chains"')
     check_asked(faults, relative_error, most)
     for name in ("of", "levels", "statistics", "draws", "common_noise"):
         if name in settings:
@@ -128,11 +130,13 @@ def rare_event(
     whole_number("seed", seed, 0), whole_number("intervals", intervals, 2, 1000)
     condition = condition_of(limit, members.scene)
     report = callback(progress) or (lambda fraction: None)
-    if by == "splitting":
-        return _by_splitting(members, condition, float(relative_error), intervals, failed, most, seed, report, settings)
     faster = cheaper_of(cheaper, members, settings)
     asked = {"study": "rare_event", "limit": limit, "relative_error": relative_error, "most": most, "seed": seed,
              "cheaper": [each.name for each in faster], "failed": failed, **settings}  # fmt: skip
+    if by == "splitting":
+        remembered = Remembered(store, [members], {**asked, "by": by, "intervals": intervals})
+        walk = VehicleWalk(members, condition, settings, failed == "refuse", seed, intervals, remembered)
+        return _by_splitting(walk, condition, float(relative_error), most, seed, report, settings)
     remembered = Remembered(store, [members], asked)
     own = VehicleLimit(members, condition, settings, failed, remembered, OWN)
     cost = expected_cost(own, relative_error)
@@ -158,10 +162,9 @@ def rare_event(
 
 
 def _by_splitting(
-    fleet: Ensemble, condition: RareCondition, relative_error: float, intervals: int, failed: str, most: int, seed: int,
+    walk: VehicleWalk, condition: RareCondition, relative_error: float, most: int, seed: int,
     report: Callable[[float], None], settings: Mapping[str, Any]) -> RareEvent:  # fmt: skip
     """The answer by splitting in time."""
-    walk = VehicleWalk(fleet, condition, settings, failed == "refuse", seed, intervals)
     search = SplitSearch(walk, relative_error, seed, most, report)
     try:
         found = search.answer()
@@ -269,6 +272,10 @@ def _told(
     messages = [*found.notes, *[ALL_LOST] * (lost >= 1.0 - 1e-12)]
     of_any = Chance(found.probability, *found.interval())
     several = len(condition.names) == len(found.rows) > 1
+    if condition.statuses:
+        messages.append(WITH_STATUS)
+    # Runs of splitting are independent; members of one are related, wherever they began.
+    related = found.of_run if isinstance(found, SplitAnswer) else chains
     plain = (1.0 - found.probability) / (found.probability * max(found.spread, 1e-12) ** 2)
     return RareEvent(
         event=condition.label,
@@ -292,7 +299,7 @@ def _told(
         noise_moved={
             name: noise_score(found.failing[:, own_], found.weights, chains, parts) for name, own_ in columns.items()
         },
-        by_condition=chances_of(condition.names, found.rows, found.weights, chains, of_any, found.spread)
+        by_condition=chances_of(condition.names, found.rows, found.weights, related, of_any, found.spread)
         if several
         else {},
         chains=chains,

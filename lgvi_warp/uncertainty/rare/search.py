@@ -22,11 +22,12 @@ from lgvi_warp.uncertainty.rare.mixture import (
     fitted,
     log_weights,
     together,
+    uncovered,
     wanting,
 )  # fmt: skip
 from lgvi_warp.uncertainty.rare.plain import sampled
 from lgvi_warp.uncertainty.rare.subset import SHARE, Limit, NoProgress, SubsetRun, climb, levels_of
-from lgvi_warp.uncertainty.rare.witness import Surroundings, Witness, grown, wide_of, witnessed
+from lgvi_warp.uncertainty.rare.witness import PARTICLES, Surroundings, Witness, grown, wide_of, witnessed
 
 # Independent runs of chains; the members of a level in the first ones, and at least and at most in those that follow.
 RUNS, FIRST_SIZE, LEAST_SIZE, LARGEST_SIZE = 4, 500, 1000, 200_000
@@ -40,12 +41,12 @@ RARE, FEWEST_PLAIN = 1e-3, 256
 OWN_COUNT, BEYOND_CHANCE = 12, 0.01
 # The part of the error asked for that numbers are chosen for; one so much larger is left as it is. Most rounds of runs.
 AIM, LEFT, ROUNDS = 1.0, 1.2, 4
-# Times the spread that weights tell: the largest that there may be are seldom among those drawn.
-UNSEEN = 1.2
 # How often a normal number is more than three spreads above its mean.
 BEYOND_THREE = 0.00135
 # The least probability: the cube's levels end at 1e-16.
 LEAST = 1e-15
+# Members of the second look times the error asked: what they do not see is then below half of that error.
+LOOKED = 6.0
 # The least part of the second look's members that makes a failure mode which the chains passed by.
 LEAST_MISSED = 0.03
 BLIND = (
@@ -158,6 +159,15 @@ def beyond(seen: Witness, probability: float, spread: float) -> bool:
     return seen.probability > 0.0 and math.log(seen.probability / max(probability, 1e-300)) > AGREEMENT * math.hypot(
         seen.spread, min(spread, 1.0)
     )
+
+
+def unseen(share: float, count: float) -> float:
+    """Root mean square of the part of an event that weights do not see. docs/theory/rare_events.md, (B17).
+
+    share: of the second look's members where the mixture hardly draws. count: independent ones of them, 0 where it met none.
+    """
+    odd = share * count
+    return math.sqrt((odd + 1.0) * (odd + 2.0) / ((count + 2.0) * (count + 3.0))) if count else 0.0
 
 
 def _of_runs(groups: Groups) -> FailingGroup:
@@ -309,7 +319,8 @@ class RareSearch:
             return None
         rng = generator(self.seed, "rare witness")
         # Chains that did not arrive know no probability: an event of one in a million is looked for.
-        seen = witnessed(self._happens, self.d, wide_of(probability or 1e-6), rng)
+        particles = max(PARTICLES, math.ceil(LOOKED / self.relative_error))
+        seen = witnessed(self._happens, self.d, wide_of(probability or 1e-6), rng, particles)
         if not len(seen.u) and probability is not None:
             self.notes.append("the second look for other failure modes met no failing member, and tells nothing")
         return seen
@@ -390,7 +401,8 @@ class RareSearch:
                 self._beside = found.probability * outside.sum(), math.sqrt((outside**2).sum()) / outside.sum()
             if not reasons:
                 self._note_beside(found.probability)
-                told = found.probability, UNSEEN * found.spread, found.effective
+                hidden = unseen(uncovered(found, mixture, [seen.u]), seen.independent)
+                told = found.probability, math.hypot(found.spread, hidden), found.effective
                 members = FailingGroup.alone(found.failing, found.rows, found.weights)
                 return self._found("importance", told, members, runs)
             if attempt + 1 < TRIES:

@@ -27,9 +27,10 @@ FEW_STARTS = 30
 
 @dataclass(frozen=True, eq=False)
 class SplitAnswer(RareAnswer):
-    """What splitting found; paths: of each failing member, as of `SplitRuns`."""
+    """What splitting found; paths: of each failing member, as of `SplitRuns`; of_run: (m,), the independent run of each."""
 
     paths: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    of_run: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
 
 @dataclass(eq=False)
@@ -122,7 +123,8 @@ class SplitSearch:
             )
             self.notes.append(f'{problem}; by="chains" moves these numbers, too')
         return SplitAnswer(probability, spread, len(runs) - 1.0, "splitting", self.walk.members, failing, limits, share, runs,
-                           tuple(self.notes), paths=paths)  # fmt: skip
+                           tuple(self.notes), np.concatenate([each.rows for each in rounds], axis=1), paths=paths,
+                           of_run=np.concatenate([RUNS * i + each.of_run for i, each in enumerate(rounds)]))  # fmt: skip
 
 
 def different(rows: np.ndarray, weights: np.ndarray) -> float:

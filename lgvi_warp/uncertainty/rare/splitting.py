@@ -9,12 +9,12 @@ coarse the looks are (Cerou, Del Moral, Furon & Guyader 2012).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lgvi_warp.uncertainty.rare.flock import Score, Walk
+from lgvi_warp.uncertainty.rare.flock import Flock, Score, Walk
 from lgvi_warp.uncertainty.rare.limit import limits_of, spreads_of
 from lgvi_warp.uncertainty.rare.moving import moved
 from lgvi_warp.uncertainty.rare.stages import AtLook, Log, Stage, first_reached, walked
@@ -117,6 +117,7 @@ class SplitRuns:
 
     runs: one each. failing: (m, d), normals at the start of members for which the event happens. limits: (m,), theirs.
     weights: (m,), probabilities. paths: for each of them (looks (k,), keys (k,)), from which look on it has which noise.
+    rows: (c, m), their limits by each condition at the last look. of_run: (m,), the run of each.
     """
 
     runs: tuple[SubsetRun, ...]
@@ -124,6 +125,8 @@ class SplitRuns:
     limits: np.ndarray
     weights: np.ndarray
     paths: tuple[tuple[np.ndarray, np.ndarray], ...]
+    rows: np.ndarray
+    of_run: np.ndarray
 
 
 def split_runs(
@@ -152,7 +155,26 @@ def split_runs(
                 stage = moved(walk, pilot.score, stages, stage, bound, pilot.steps[i], generators)[0]
     arrived = crossed if len(levels) == len(bounds) else {}
     runs = tuple(_run_of(run, levels, bounds, size) for run in range(count))
-    return _with_failing(runs, stages, arrived, pilot.score)
+    rows = {look: at_the_end(walk, flock) for look, (_, flock) in arrived.items()}
+    return _with_failing(runs, stages, arrived, rows, pilot.score)
+
+
+def at_the_end(walk: Walk, flock: Flock) -> np.ndarray:
+    """The limits by each condition (c, n) at the last look of members for which the event happened; infinite for lost ones.
+
+    Where there are several conditions, members go on to the end, with noise of their own: another one may hold later.
+    """
+    rows = np.where(flock.lost, np.inf, flock.distances)
+    if len(rows) == 1:
+        return rows
+    at, keys = np.flatnonzero(~flock.over), walk.keys(len(flock.over))
+    going = flock.part(at)
+    while len(at) and going.look < walk.looks:
+        going = walk.advance(going, keys[at])
+        rows[:, at] = np.where(going.lost, np.inf, going.distances)
+        left = np.flatnonzero(~going.over)
+        at, going = at[left], going.part(left)
+    return rows
 
 
 def _run_of(run: int, levels: Sequence[Stage], bounds: Sequence[float], size: int) -> SubsetRun:
@@ -167,29 +189,38 @@ def _run_of(run: int, levels: Sequence[Stage], bounds: Sequence[float], size: in
                      sum(map(len, limits)))  # fmt: skip
 
 
-def _with_failing(runs: tuple[SubsetRun, ...], stages: Sequence[Stage], arrived: AtLook, score: Score) -> SplitRuns:
+def _with_failing(
+    runs: tuple[SubsetRun, ...], stages: Sequence[Stage], arrived: AtLook, ends: Mapping[int, np.ndarray], score: Score
+) -> SplitRuns:
     """The runs with the members for which the event happened, each once, whose path may have been copied."""
     weights: dict[tuple[int, int], float] = {}
     limits: dict[tuple[int, int], float] = {}
     looks: dict[tuple[int, int], int] = {}
-    for rows, flock in arrived.values():
+    by_condition: dict[tuple[int, int], np.ndarray] = {}
+    for at, (rows, flock) in arrived.items():
         own = np.where(flock.lost, np.inf, limits_of(flock.distances, score.spreads))
         per_run = np.array([runs[run].probability for run in range(len(runs))])
         of_run = stages[-1].run
         happened = np.bincount(of_run[stages[-1].reach == math.inf], minlength=len(runs))
-        for row, limit in zip(rows.tolist(), own.tolist(), strict=True):
+        for row, limit, end in zip(rows.tolist(), own.tolist(), ends[at].T, strict=True):
             level, leaf = len(stages) - 1, row
             while level and stages[level].before[leaf] == math.inf and not stages[level].moved[leaf]:
                 level, leaf = level - 1, int(stages[level].parent[leaf])
             weight = per_run[of_run[row]] / happened[of_run[row]]
             weights[level, leaf] = weights.get((level, leaf), 0.0) + weight
             limits[level, leaf], looks[level, leaf] = limit, flock.look
+            by_condition.setdefault((level, leaf), end)
     paths, starts = [], []
     for level, leaf in weights:
         paths.append(_path(stages, level, leaf, looks[level, leaf]))
         starts.append(stages[level].u[leaf])
     normals = np.array(starts).reshape(len(starts), -1)
-    return SplitRuns(runs, normals, np.array(list(limits.values())), np.array(list(weights.values())), tuple(paths))
+    count = len(score.spreads)
+    return SplitRuns(
+        runs, normals, np.array(list(limits.values())), np.array(list(weights.values())), tuple(paths),
+        np.array(list(by_condition.values())).reshape(-1, count).T,
+        np.array([int(stages[level].run[leaf]) for level, leaf in weights], int),
+    )  # fmt: skip
 
 
 def _path(stages: Sequence[Stage], level: int, row: int, end: int) -> tuple[np.ndarray, np.ndarray]:

@@ -76,8 +76,17 @@ def walked(
     """Let the members of a stage go until they reach a bound of the score; (rows, flock) by look of those that do.
 
     score: None where nothing but the event itself is known. log: takes every look at every member. keys: of their noise (n,)
-    from a look to the next, by default those of the stage.
+    from a look to the next, by default those of the stage. A walk that keeps its stretches goes none twice.
     """
+    if log is None and walk.stretches is not None:
+        return walk.stretches(walk, stage, bound, lambda: _walked(walk, score, stage, bound, None, keys))
+    return _walked(walk, score, stage, bound, log, keys)
+
+
+def _walked(
+    walk: Walk, score: Score | None, stage: Stage, bound: float, log: Log | None,
+    keys: Callable[[int], np.ndarray] | None) -> AtLook:  # fmt: skip
+    """Go."""
     crossed: dict[int, list[tuple[np.ndarray, Flock]]] = {}
     moving: tuple[np.ndarray, Flock] | None = None
     for look in range(walk.looks + 1):

@@ -16,6 +16,7 @@ from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import failed
 from lgvi_warp.common.times import of_step
 from lgvi_warp.control.signals import ordered
+from lgvi_warp.criteria.memory import Remembered
 from lgvi_warp.criteria.success import Success
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.quantities import quantities
@@ -25,6 +26,7 @@ from lgvi_warp.uncertainty.rare.event import SURE, RareCondition, between
 from lgvi_warp.uncertainty.rare.flock import Flock
 from lgvi_warp.uncertainty.rare.following import followed, looks_of
 from lgvi_warp.uncertainty.rare.limit import Varying, refuse_lost
+from lgvi_warp.uncertainty.rare.stretches import Stretches
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,20 +44,23 @@ class VehicleWalk(Varying):
     """A scene as a Walk.
 
     fleet: the scene and what varies. condition: the event. settings: of `prepare`. refuse: whether a member that fails is an
-    error; else it is the event. seed: of the noise. looks: into how many pieces the time is cut, at most.
+    error; else it is the event. seed: of the noise. looks: into how many pieces the time is cut, at most. remembered: where
+    the way from level to level is kept.
 
     Attributes:
         lasting: as of a Walk.
         steps: (looks,), steps of each piece.
         h: step [s].
         seconds: how long pieces took [s].
+        steps_run: steps of all members that were run.
     """
 
     sources: tuple[Any, ...] = ()
 
     def __init__(
-        self, fleet: Any, condition: RareCondition, settings: Mapping[str, Any], refuse: bool, seed: int, looks: int
-    ):
+        self, fleet: Any, condition: RareCondition, settings: Mapping[str, Any], refuse: bool, seed: int, looks: int,
+        remembered: Remembered | None = None,
+    ):  # fmt: skip
         super().__init__(fleet)
         self.condition, self._refuse, self._seed = condition, refuse, seed
         self._followed = followed(condition)
@@ -75,7 +80,8 @@ class VehicleWalk(Varying):
         if not sum(each.numbers for each in run.draws):
             problem = "has no noise, so that copies of a member would go the same way"
             raise refusal("by", "splitting", problem, 'give by="chains", the default, or a scene with noise')
-        self._fresh, self._ran, self.seconds = 0, 0, 0.0
+        self.stretches = Stretches(remembered) if remembered is not None and remembered.keeps else None
+        self._fresh, self.steps_run, self.seconds = 0, 0, 0.0
 
     def _unit(self, save: Any) -> int:
         """The steps by which pieces begin: at samples, and at ticks of a controller."""
@@ -114,7 +120,7 @@ class VehicleWalk(Varying):
     @property
     def members(self) -> int:
         """Members that were run, in whole runs."""
-        return math.ceil(self._ran / self.steps.sum())
+        return math.ceil(self.steps_run / self.steps.sum())
 
     def begin(self, u: np.ndarray) -> Flock:
         """Members at the start, of standard normals (n, d)."""
@@ -139,7 +145,7 @@ class VehicleWalk(Varying):
             result = run(self.levels(flock.place.u), **noise)
         else:
             result = run.states(**self.states(len(keys)), **noise)
-        self._ran += steps * len(keys)
+        self.steps_run += steps * len(keys)
         there = self._flock(flock, result)
         self.seconds += time.perf_counter() - began
         return there

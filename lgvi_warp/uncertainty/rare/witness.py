@@ -40,6 +40,11 @@ class Witness:
     probability: float
     spread: float
 
+    @property
+    def independent(self) -> float:
+        """Number of members in effect: copies are one, and others are related."""
+        return len(np.unique(self.u, axis=0)) / RELATED**2
+
 
 class Surroundings:
     """Where independent runs went: places are apart that are farther from their members than these are from another run.
@@ -76,7 +81,7 @@ def wide_of(probability: float) -> float:
     return float(np.clip(-ndtri(max(probability, 1e-300)) / WIDE_OF, LEAST_WIDE, MOST_WIDE))
 
 
-def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator) -> Witness:
+def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator, particles: int = PARTICLES) -> Witness:
     """Failing members from draws that are `wide` times as wide in each direction. docs/theory/rare_events.md, (B13)."""
     u = wide * rng.standard_normal((FIRST, d))
     u = u[happens(u)]
@@ -94,7 +99,7 @@ def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator) -
         log_probability += float(logs.max()) + math.log(float(weights.mean()))
         variance += float(weights.var() / weights.mean() ** 2) / len(u)
         # Systematic: each particle as often as it weighs, but for one.
-        places = (np.arange(PARTICLES) + rng.random()) / PARTICLES
+        places = (np.arange(particles) + rng.random()) / particles
         u = u[np.minimum(np.searchsorted(np.cumsum(weights) / weights.sum(), places), len(u) - 1)]
         for _ in range(MOVES):
             u, scale = moved(happens, u, then, scale, rng)

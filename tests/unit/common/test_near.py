@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is unknown is refused with the nearest known name: methods, vehicles, keywords of functions, public names."""
 
+import enum
+import inspect
+import pickle
+
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.common.near import nearest
+from lgvi_warp.common.nearest import nearest
 from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
+from tests.support.public import PATHS
 from tests.support.refusals import says
 
 SCENE = lw.Scene.named("sphere")
@@ -50,6 +55,51 @@ def test_public_names_that_are_nearly_right(door, word, name):
     with pytest.raises(AttributeError, match=f"has no attribute '{word}'; did you mean '{name}'"):
         getattr(module, word)
     assert not hasattr(module, "__path_of_nothing__")
+
+
+def keywords(kind):
+    """Keywords of a constructor, the longest first; none where it takes any."""
+    parameters = inspect.signature(kind).parameters.values()
+    if any(each.kind is each.VAR_KEYWORD for each in parameters):
+        return []
+    named = [each.name for each in parameters if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)]
+    return sorted(named, key=len, reverse=True)
+
+
+CLASSES = {path: thing for path, thing in PATHS.items() if isinstance(thing, type) and not inspect.isabstract(thing)}
+# Of these, those whose constructor is Python's own, and those that take any keyword.
+OTHERS = {path for path, kind in CLASSES.items() if issubclass(kind, enum.Enum | tuple) or not keywords(kind)}
+
+
+@pytest.mark.parametrize("path", sorted(set(CLASSES) - OTHERS))
+def test_an_unknown_keyword_of_a_class_gets_the_nearest(path):
+    kind = CLASSES[path]
+    known = keywords(kind)
+    word = f"{known[0][:-1]}zz"
+    meant = nearest(word, tuple(inspect.signature(kind).parameters))
+    with pytest.raises(lw.SceneError) as caught:
+        kind(**{word: None})
+    remedy = f"did you mean {meant!r}?" if meant else f"known: {', '.join(inspect.signature(kind).parameters)}"
+    text = f"{kind.__qualname__}() got an unexpected keyword argument {word!r}; {remedy}"
+    assert str(caught.value) == text
+    assert isinstance(caught.value, TypeError)
+    assert type(pickle.loads(pickle.dumps(caught.value))) is type(caught.value)
+
+
+def test_classes_whose_keywords_are_not_checked_are_few():
+    assert len(CLASSES) > 120
+    assert len(OTHERS) <= 12, OTHERS
+
+
+def test_a_subclass_hands_its_own_keywords_on():
+    class Mine(lw.SaveAt):
+        def __init__(self, mine, **more):
+            super().__init__(**more)
+            object.__setattr__(self, "mine", mine)
+
+    assert (Mine(mine=3, every=0.5).mine, Mine(mine=3, every=0.5).every) == (3, 0.5)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'evry'"):
+        Mine(mine=3, evry=0.5)
 
 
 # Functions that take settings of a run, and keywords of other packages with what they are here.

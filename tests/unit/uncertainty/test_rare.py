@@ -16,7 +16,7 @@ from lgvi_warp.uncertainty.rare.plain import sampled
 from lgvi_warp.uncertainty.rare.search import joined
 from lgvi_warp.uncertainty.rare.subset import NoProgress, climb, share_variance
 from tests.support.levels import first_levels
-from tests.support.rare import RareSearch
+from tests.support.rare import searched
 
 CASES = ("one side", "two sides", "unequal sides", "a ball", "20 inputs")
 
@@ -37,7 +37,7 @@ def case(name, p):
 
 def answers(name, p, seeds, **more):
     limit, d = case(name, p)
-    return [RareSearch(limit, d, seed=seed, **more).answer() for seed in seeds]
+    return [searched(limit, d, seed=seed, **more) for seed in seeds]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -122,11 +122,11 @@ def test_progress_is_told_and_never_taken_back():
 
 
 def test_what_is_likely_is_sampled_plainly():
-    found = RareSearch(lambda u: u[:, 0] - 2.0, 3).answer()
+    found = searched(lambda u: u[:, 0] - 2.0, 3)
     assert found.estimator == "plain"
     assert abs(found.probability / ndtr(-2.0) - 1.0) < 4.0 * found.spread
     assert found.spread < 0.1
-    many = RareSearch(lambda u: u.sum(axis=1) / math.sqrt(300.0) - 2.0, 300).answer()
+    many = searched(lambda u: u.sum(axis=1) / math.sqrt(300.0) - 2.0, 300)
     assert many.estimator == "plain"
     assert abs(many.probability / ndtr(-2.0) - 1.0) < 4.0 * many.spread
 
@@ -134,14 +134,14 @@ def test_what_is_likely_is_sampled_plainly():
 def test_plain_members_that_meet_no_event_leave_it_to_chains():
     # Some 3,000 plain members expect 4 events: of a hundred seeds one meets none.
     p, d = 1.2e-3, 70
-    found = RareSearch(lambda u: u.sum(axis=1) / math.sqrt(d) + ndtri(p), d, relative_error=0.5, seed=35).answer()
+    found = searched(lambda u: u.sum(axis=1) / math.sqrt(d) + ndtri(p), d, relative_error=0.5, seed=35)
     assert found.estimator == "subset"
     assert abs(found.probability / p - 1.0) < 3.0 * found.spread
     assert found.weights.sum() == pytest.approx(1.0)
 
 
 def test_plain_members_are_told_where_they_are_too_few():
-    found = RareSearch(lambda u: u[:, 0] - 2.0, 3, relative_error=0.005, most=10_000).answer()
+    found = searched(lambda u: u[:, 0] - 2.0, 3, relative_error=0.005, most=10_000)
     assert found.estimator == "plain"
     assert found.members < 20_000
     assert any("more than the 10,000 members" in note for note in found.notes)
@@ -156,7 +156,7 @@ def test_plain_members_are_those_that_happen():
 
 
 def test_members_that_may_be_run_end_the_search():
-    found = RareSearch(case("a ball", 1e-7)[0], 6, seed=1, most=20_000).answer()
+    found = searched(case("a ball", 1e-7)[0], 6, seed=1, most=20_000)
     assert found.members < 30_000
     assert found.spread > 0.15
     assert any("more than the 20,000 members" in note for note in found.notes)
@@ -170,9 +170,7 @@ def test_chains_by_a_cheaper_limit_answer_for_the_right_one():
         ran.append(len(u))
         return limit(u)
 
-    found = RareSearch(
-        counted, d, seed=2, chained=lambda u: limit(u) + 0.1 * np.sin(5.0 * u[:, 0]), margin=0.4
-    ).answer()
+    found = searched(counted, d, seed=2, chained=lambda u: limit(u) + 0.1 * np.sin(5.0 * u[:, 0]), margin=0.4)
     assert found.estimator == "importance"
     assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.spread
     assert sum(ran) < 0.5 * found.members  # the draws of mixtures alone
@@ -187,7 +185,7 @@ def test_chains_go_on_by_the_right_limit_near_failure():
         return limit(u)
 
     chained = lambda u: limit(u) + 0.1 * np.sin(5.0 * u[:, 0])  # noqa: E731
-    found = RareSearch(counted, d, seed=2, weighted=False, chained=chained, margin=0.4).answer()
+    found = searched(counted, d, seed=2, weighted=False, chained=chained, margin=0.4)
     assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.spread
     assert sum(ran) < 0.6 * found.members
 
@@ -195,9 +193,7 @@ def test_chains_go_on_by_the_right_limit_near_failure():
 def test_a_cheaper_limit_that_shuts_failures_out_is_noticed():
     limit, d = case("two sides", 1e-5)
     # It does not see one of the sides.
-    found = RareSearch(
-        limit, d, seed=2, weighted=False, chained=lambda u: u[:, 0] + ndtri(5e-6) - 0.3, margin=0.3
-    ).answer()
+    found = searched(limit, d, seed=2, weighted=False, chained=lambda u: u[:, 0] + ndtri(5e-6) - 0.3, margin=0.3)
     assert any("hardly near failure" in note for note in found.notes)
 
 
@@ -210,14 +206,14 @@ def test_a_cheaper_limit_that_shuts_failures_out_is_noticed():
 ])  # fmt: skip
 def test_what_comes_no_nearer_ends(limit, kind):
     with pytest.raises(NoProgress) as stuck:
-        RareSearch(limit, 2).answer()
+        searched(limit, 2)
     assert stuck.value.kind == kind
     assert stuck.value.largest <= 0.0
 
 
 def test_members_that_fail_count_as_the_event():
     # A member that fails has an infinite limit: it is beyond every threshold. Here on the way to the event.
-    found = RareSearch(lambda u: np.where((u[:, 0] > 3.5) & (u[:, 1] > 1.0), np.inf, u[:, 0] - 4.0), 2, seed=1).answer()
+    found = searched(lambda u: np.where((u[:, 0] > 3.5) & (u[:, 1] > 1.0), np.inf, u[:, 0] - 4.0), 2, seed=1)
     p, lost = ndtr(-4.0) + (ndtr(-3.5) - ndtr(-4.0)) * ndtr(-1.0), ndtr(-3.5) * ndtr(-1.0)
     assert abs(found.probability / p - 1.0) < 3.0 * found.spread
     assert found.weights[np.isinf(found.limits)].sum() == pytest.approx(lost / p, abs=0.1)

@@ -4,20 +4,25 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.special import ndtr, ndtri
+from scipy.stats import beta
 
+import lgvi_warp as lw
+from lgvi_warp.criteria.success import success_of
 from lgvi_warp.uncertainty.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
+from lgvi_warp.uncertainty.rare.failing import failing_of
 from lgvi_warp.uncertainty.rare.mixture import fitted
 from lgvi_warp.uncertainty.rare.plain import sampled
-from lgvi_warp.uncertainty.rare.search import RareAnswer
+from lgvi_warp.uncertainty.rare.search import RareAnswer, unseen
 from lgvi_warp.uncertainty.rare.subset import NoProgress, climb
 from lgvi_warp.uncertainty.rare.witness import Surroundings, wide_of, witnessed
 from tests.support.levels import first_levels
-from tests.support.rare import RareSearch
+from tests.support.rare import searched
 
 
 def two_modes(rate, share, p=1e-5, alone=False):
@@ -61,14 +66,15 @@ def by_grid(limit, reach=8.0, count=1601):
 
 def held(limit, d, p, seeds, **more):
     """How many of the intervals hold a probability."""
-    intervals = [RareSearch(limit, d, seed=seed, **more).answer().interval() for seed in seeds]
+    intervals = [searched(limit, d, seed=seed, **more).interval() for seed in seeds]
+    assert all(high > 1.005 * low > 0.0 for low, high in intervals)
     return sum(low <= p <= high for low, high in intervals)
 
 
 @pytest.mark.parametrize("alone", [False, True], ids=["one function", "conditions"])
 def test_a_mode_that_no_level_leads_to_is_in_the_answer(alone):
     limit, p = two_modes(1000.0, 0.5, alone=alone)
-    found = RareSearch(limit, 2, seed=1).answer()
+    found = searched(limit, 2, seed=1)
     assert abs(found.probability / p - 1.0) < 4.0 * found.spread < 0.2
     # Half the weight of the failing members is of either mode.
     assert found.weights @ (found.failing[:, 0] > 4.0) == pytest.approx(0.5, abs=0.1)
@@ -83,6 +89,29 @@ def test_a_mode_that_no_level_leads_to_is_in_the_answer(alone):
 def test_two_modes_over_seeds(rate, share, alone):
     limit, p = two_modes(rate, share, alone=alone)
     assert held(limit, 2, p, range(20)) >= 18
+
+
+@pytest.mark.parametrize("count, odd", [(70.0, 0.0), (70.0, 2.0), (1000.0, 0.0)])
+def test_what_weights_do_not_see_is_by_the_rule_of_succession(count, odd):
+    assert unseen(odd / count, count) == pytest.approx(math.sqrt(beta(odd + 1.0, count - odd + 1.0).moment(2)))
+    assert unseen(0.0, 0.0) == 0.0
+
+
+def test_a_mode_that_is_not_drawn_is_within_the_error():
+    """One vehicle in fifty fails otherwise; chains and the second look pass by, and the draws' own error does not tell."""
+    limit, p = two_modes(1.0, 0.02)
+    found = [searched(limit, 2, seed=seed) for seed in range(6)]
+    assert {each.estimator for each in found} == {"importance"}
+    away = np.array([abs(each.probability / p - 1.0) / each.spread for each in found])
+    assert np.sqrt(np.mean(away**2)) < 1.4
+    assert all(each.spread > 0.01 for each in found)
+
+
+@pytest.mark.slow
+def test_a_small_error_that_is_asked_has_a_larger_second_look():
+    found = searched(lambda u: u.sum(axis=1) / math.sqrt(2.0) + ndtri(1e-5), 2, relative_error=0.01, seed=4)
+    assert found.spread < 0.012
+    assert abs(found.probability / 1e-5 - 1.0) < 4.0 * found.spread
 
 
 @pytest.mark.slow
@@ -100,23 +129,21 @@ def test_published_counterexamples_over_seeds(limit):
 
 
 def test_a_published_counterexample():
-    found = RareSearch(piecewise, 2, seed=3).answer()
+    found = searched(piecewise, 2, seed=3)
     p = ndtr(-4.0) + ndtr(-5.0)
     assert abs(found.probability / p - 1.0) < 4.0 * found.spread < 0.4
 
 
 def test_one_mode_takes_hardly_more_members():
     # Without the second look 13,750 on average over the first six seeds.
-    found = [
-        RareSearch(lambda u: u.sum(axis=1) / math.sqrt(2.0) + ndtri(1e-6), 2, seed=seed).answer() for seed in (1, 2)
-    ]
+    found = [searched(lambda u: u.sum(axis=1) / math.sqrt(2.0) + ndtri(1e-6), 2, seed=seed) for seed in (1, 2)]
     assert {each.estimator for each in found} == {"importance"}
     assert np.mean([each.members for each in found]) < 1.3 * 13_750
 
 
 def test_conditions_by_chains_alone_share_members_of_both():
     # Nested: whoever is above 4.3 is above 4.0 too, and counts half in each.
-    found = RareSearch(lambda u: np.stack([u[:, 0] - 4.0, u[:, 0] - 4.3]), 2, seed=2, weighted=False).answer()
+    found = searched(lambda u: np.stack([u[:, 0] - 4.0, u[:, 0] - 4.3]), 2, seed=2, weighted=False)
     assert found.estimator == "subset"
     assert abs(found.probability / ndtr(-4.0) - 1.0) < 3.0 * found.spread < 0.5
     each = chances_of(
@@ -128,7 +155,7 @@ def test_conditions_by_chains_alone_share_members_of_both():
 
 
 def test_a_condition_that_never_happens_has_a_bound_and_hides_no_other():
-    found = RareSearch(lambda u: np.stack([u[:, 0] - 4.0, 0.0 * u[:, 1] - 1.0]), 2, seed=2).answer()
+    found = searched(lambda u: np.stack([u[:, 0] - 4.0, 0.0 * u[:, 1] - 1.0]), 2, seed=2)
     assert abs(found.probability / ndtr(-4.0) - 1.0) < 4.0 * found.spread
     of_any = Chance(found.probability, *found.interval())
     each = chances_of(("a", "b"), found.rows, found.weights, found.chains, of_any, found.spread)
@@ -137,7 +164,7 @@ def test_a_condition_that_never_happens_has_a_bound_and_hides_no_other():
 
 
 def test_what_has_many_normals_says_that_it_may_miss_a_mode():
-    found = RareSearch(lambda u: u.sum(axis=1) / 10.0 - 3.8, 100, seed=1, relative_error=0.5).answer()
+    found = searched(lambda u: u.sum(axis=1) / 10.0 - 3.8, 100, seed=1, relative_error=0.5)
     assert any("3 / n" in note and "100 normals" in note for note in found.notes)
 
 
@@ -167,7 +194,7 @@ def test_surroundings_are_where_other_runs_go_too():
 def test_likely_events_are_held(d):
     thresholds = np.geomspace(1e-3, 0.4, 8)
     limits = [lambda u, p=p: u.sum(axis=1) / math.sqrt(d) + ndtri(p) for p in thresholds]
-    found = [RareSearch(limit, d, seed=i, relative_error=0.5).answer() for i, limit in enumerate(limits)]
+    found = [searched(limit, d, seed=i, relative_error=0.5) for i, limit in enumerate(limits)]
     intervals = [each.interval() for each in found]
     assert all(high > 1.005 * low > 0.0 for low, high in intervals)
     assert sum(low <= p <= high for p, (low, high) in zip(thresholds, intervals, strict=True)) >= 7
@@ -196,14 +223,12 @@ def test_sequences_that_agree_are_not_sure():
 def test_minus_infinity_is_farthest_from_the_event():
     with np.errstate(divide="ignore"):
         for at in (0.0, 1.6):  # half, and 5 % have a finite limit
-            found = RareSearch(
-                lambda u, at=at: np.log(np.maximum(u[:, 0] - at, 0.0)) - math.log(4.26 - at), 1, seed=1
-            ).answer()
+            found = searched(lambda u, at=at: np.log(np.maximum(u[:, 0] - at, 0.0)) - math.log(4.26 - at), 1, seed=1)
             assert abs(found.probability / ndtr(-4.26) - 1.0) < 4.0 * found.spread < 0.5
 
 
 def test_not_a_number_is_a_member_that_failed():
-    found = RareSearch(lambda u: np.where(u[:, 0] > 4.1, np.nan, u[:, 0] - 4.0), 2, seed=1).answer()
+    found = searched(lambda u: np.where(u[:, 0] > 4.1, np.nan, u[:, 0] - 4.0), 2, seed=1)
     assert abs(found.probability / ndtr(-4.0) - 1.0) < 4.0 * found.spread
     assert found.weights @ np.isinf(found.limits) == pytest.approx(ndtr(-4.1) / ndtr(-4.0), abs=0.1)
 
@@ -217,9 +242,9 @@ def test_no_interval_is_without_width():
 
 def test_levels_go_no_further_than_the_numbers():
     with pytest.raises(NoProgress) as stuck:
-        RareSearch(lambda u: u[:, 0] - 9.5, 2).answer()
+        searched(lambda u: u[:, 0] - 9.5, 2)
     assert stuck.value.kind == "never"
-    found = RareSearch(lambda u: u[:, 0] + ndtri(1e-15), 2, seed=1).answer()
+    found = searched(lambda u: u[:, 0] + ndtri(1e-15), 2, seed=1)
     assert abs(math.log(found.probability / 1e-15)) < 4.0 * found.spread
 
 
@@ -247,7 +272,7 @@ def test_the_number_of_parts_is_that_of_schwarz():
 def test_a_two_sided_event_moves_the_number_that_decides_and_no_noise():
     for seed in range(4):
         limit = lambda u: np.abs(u[:, 0]) - 4.0  # noqa: E731
-        found = RareSearch(limit, 41, seed=seed, relative_error=0.3).answer()
+        found = searched(limit, 41, seed=seed, relative_error=0.3)
         moves = moves_of(found.failing[:, :1], found.weights, found.chains)
         assert abs(moves.z[0]) > 10.0
         assert moves.size[0] == pytest.approx(4.22, abs=0.1)
@@ -259,7 +284,7 @@ def test_a_two_sided_event_moves_the_number_that_decides_and_no_noise():
 def test_irrelevant_noise_is_not_significant_over_seeds(d):
     scores, others = [], []
     for seed in range(20):
-        found = RareSearch(lambda u: np.abs(u[:, 0]) - 3.5, d + 2, seed=seed, relative_error=0.3).answer()
+        found = searched(lambda u: np.abs(u[:, 0]) - 3.5, d + 2, seed=seed, relative_error=0.3)
         scores.append(noise_score(found.failing[:, 2:], found.weights, found.chains, found.parts))
         others.append(moves_of(found.failing[:, :2], found.weights, found.chains).z)
     assert max(scores) < 4.5
@@ -270,7 +295,7 @@ def test_irrelevant_noise_is_not_significant_over_seeds(d):
 def test_noise_that_decides_is_significant():
     # The mean path is moved, or, by a two-sided event, the sum of squares alone.
     for limit in (lambda u: u.sum(axis=1) / 8.0 - 3.8, lambda u: np.abs(u.sum(axis=1)) / 8.0 - 3.8):
-        found = RareSearch(limit, 64, seed=1, relative_error=0.3).answer()
+        found = searched(limit, 64, seed=1, relative_error=0.3)
         assert noise_score(found.failing, found.weights, found.chains, found.parts) > 4.5
         assert set(found.parts) == set(range(PARTS))
 
@@ -278,3 +303,17 @@ def test_noise_that_decides_is_significant():
 def test_the_balls_are_rare():
     assert by_grid(balls) == pytest.approx(1.13e-5, rel=0.02)
     assert quad(lambda t: math.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi), 4.0, 40.0)[0] == pytest.approx(ndtr(-4.0))
+
+
+def test_a_member_that_an_event_ended_counts_for_that_event():
+    """And one that ended in another way, which has no distance, for every condition."""
+    scene = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), events=[lw.events.Floor(depth=4.0)])
+    way = lw.metrics.MaxError("north", name="way")
+    condition = failing_of(success_of({"way": {"below": 3.0}}, ["way"]), {"way": way}, scene)
+    assert condition.names == ("way 3 or more", "floor")
+    status = np.array([lw.Status.OK, lw.Status.OK, lw.Status.FLOOR, lw.Status.BOX], np.uint8)
+    values = dict(zip(condition.metrics, ([1.0, 3.5, 1.0, 1.0], [2.0, 2.0, 0.0, 2.0]), strict=True))
+    statistics = {f"each {name}": SimpleNamespace(value=np.array(each)[None, None]) for name, each in values.items()}
+    rows, lost = condition.distances(SimpleNamespace(status=status, statistics=statistics))
+    assert (rows > 0.0).tolist() == [[False, True, False, True], [False, False, True, True]]
+    assert not lost.any()

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The known name that is nearest to a word, whatever its case; without NumPy, for the doors."""
+
+from __future__ import annotations
+
+import functools
+
+# Fewest letters of a word that names are searched for.
+SHORTEST = 3
+
+
+# A file may have the same fault in thousands of tables, of which few are told.
+@functools.lru_cache(maxsize=64)
+def nearest(word: str, names: tuple[str, ...]) -> str | None:
+    """Find the name that a word ends, that differs in case alone, that is spelt alike, or that has the word in it."""
+    import difflib  # loads slowly
+
+    folded = {name.casefold(): name for name in reversed(names)}
+    text = word.casefold()
+    found = [name for name in folded if name.endswith(f".{text}")] or [name for name in folded if name == text]
+    found = found or difflib.get_close_matches(text, folded, n=1, cutoff=0.6)
+    found = found or [name for name in folded if len(text) >= SHORTEST and text in name]
+    return folded[found[0]] if found else None

@@ -132,7 +132,7 @@ def test_splitting_goes_on_after_the_last_level(tmp_path, monkeypatch):
     went.clear()
     assert answer(split(store=tmp_path / "kept")) == whole
     assert len(went) < 0.3 * calls
-    says(refused(split, store=tmp_path / "kept", looks=6), "store", "keeps the calls of other arguments")
+    says(refused(split, store=tmp_path / "kept", intervals=6), "store", "keeps the calls of other arguments")
     torn = sorted((tmp_path / "kept").iterdir())[-1]
     torn.write_bytes(torn.read_bytes()[:100])
     assert answer(split(store=tmp_path / "kept")) == whole

@@ -16,7 +16,6 @@ from lgvi_warp.control.heading_pid import HeadingPID as HeadingPID
 from lgvi_warp.control.heading_smc import HeadingSMC as HeadingSMC
 from lgvi_warp.control.heave_pid import HeavePID as HeavePID
 from lgvi_warp.control.imu import IMU as IMU
-from lgvi_warp.control.linear_mpc import LinearMPC as LinearMPC
 from lgvi_warp.control.loiter import Loiter as Loiter
 from lgvi_warp.control.low_pass import LowPass as LowPass
 from lgvi_warp.control.matrix import AllocationMatrix as AllocationMatrix
@@ -32,3 +31,4 @@ from lgvi_warp.control.state_feedback import StateFeedback as StateFeedback
 from lgvi_warp.control.trajectory import Trajectory as Trajectory
 from lgvi_warp.control.waypoints import Waypoints as Waypoints
 from lgvi_warp.engine.host_callback import CallbackInput as CallbackInput
+from lgvi_warp.extensions.others.predictive.linear_mpc import LinearMPC as LinearMPC

@@ -20,7 +20,7 @@ from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, word_of
 
 if TYPE_CHECKING:
-    from lgvi_warp.ocean.places import LocalPlane
+    from lgvi_warp.common.places import LocalPlane
 
 # What guidance may give, and laws may need.
 WISHES = ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgvi_warp.ocean.places import FAR_FROM_ORIGIN, too_long
+from lgvi_warp.common.places import FAR_FROM_ORIGIN, too_long
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins

@@ -17,9 +17,10 @@ from lgvi_warp.common.arguments import file_path, flag, path_of
 from lgvi_warp.common.errors import MissingExtra, SceneError, refusal
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.safe_files import inside
+from lgvi_warp.extensions.others.exporting import geojson, kml, ros
 from lgvi_warp.results.result import Result
 from lgvi_warp.scene.start import Environment
-from lgvi_warp.store.exporting import geojson, kml, ros, tables, trajectories, whole_store
+from lgvi_warp.store.exporting import tables, trajectories, whole_store
 from lgvi_warp.store.exporting.tracks import Report, recorded, tracks_of
 from lgvi_warp.store.folder import Folder
 from lgvi_warp.store.open import folder_of, open_run

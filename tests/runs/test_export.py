@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.others.exporting import geojson, kml, ros
+from lgvi_warp.extensions.others.exporting.lines import cut
 from lgvi_warp.scene.start import Environment
-from lgvi_warp.store.exporting import geojson, kml, ros, tables, trajectories
-from lgvi_warp.store.exporting.lines import cut
+from lgvi_warp.store.exporting import tables, trajectories
 from lgvi_warp.store.exporting.tracks import Tracks, tracks_of
 from tests.runs.test_hostile_folders import mutated
 from tests.support.verbs import main

@@ -16,7 +16,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 from lgvi_warp.physics.terms.events import Outside
 
 if TYPE_CHECKING:
-    from lgvi_warp.ocean.field_data import FieldData
+    from lgvi_warp.extensions.ocean.field_data import FieldData
 
 OUTSIDE = ("hold", "stop")
 # Numbers that are those of a data set.
@@ -143,7 +143,7 @@ class CurrentField(Term):
             >>> float(np.round(field.velocities[0, 0, 2, 0, 0, 1], 2))
             0.9
         """
-        from lgvi_warp.ocean.field_reader import read_field
+        from lgvi_warp.extensions.ocean.field_reader import read_field
 
         wanted = {"origin": origin, "start": start, "region": region, "speed": speed, "duration": duration,
                   "variables": variables, "spacing": spacing, "fill": fill, "checksum": checksum}  # fmt: skip
@@ -165,7 +165,7 @@ class CurrentField(Term):
     @classmethod
     def of_file(cls) -> Any:
         """The class whose fields a table with the key `file` may have, in a scene file."""
-        from lgvi_warp.ocean.field_data import FieldRequest
+        from lgvi_warp.extensions.ocean.field_data import FieldRequest
 
         return FieldRequest
 

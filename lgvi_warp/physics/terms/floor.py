@@ -105,7 +105,7 @@ class Floor(Event):
             >>> float(floor.depth_at(0.0, 0.0).round(2))
             25.0
         """
-        from lgvi_warp.ocean.floor_data import read_floor
+        from lgvi_warp.extensions.ocean.floor_data import read_floor
 
         wanted = cls.of_file()(origin, region, spacing, variable, positive, fill)
         numbers = read_floor(file, wanted)
@@ -124,9 +124,9 @@ class Floor(Event):
         """What a table with the key `file` may have, a class with fields.
 
         Returns:
-            lgvi_warp.ocean.floor_request.FloorRequest; a scene without a file does not load it.
+            lgvi_warp.extensions.ocean.floor_request.FloorRequest; a scene without a file does not load it.
         """
-        from lgvi_warp.ocean.floor_request import FloorRequest
+        from lgvi_warp.extensions.ocean.floor_request import FloorRequest
 
         return FloorRequest
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.errors import SceneError, ragged, refusal
+from lgvi_warp.common.places import LocalPlane
 from lgvi_warp.common.status import Status
 from lgvi_warp.control.signals import SAVED, SIGNALS
-from lgvi_warp.ocean.places import LocalPlane
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.fields import TABLE, Field

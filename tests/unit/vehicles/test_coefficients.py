@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.importers import poses as coefficients_poses
 from lgvi_warp.vehicles import fossen as co
 from lgvi_warp.vehicles import from_fossen, from_sdf, from_yaml
-from lgvi_warp.vehicles import poses as coefficients_poses
 from tests.support.refusals import says
 
 DIAGONAL = {"X_udot": -0.93, "Y_vdot": -35.5, "Z_wdot": -35.5, "K_pdot": -0.0704, "M_qdot": -4.88, "N_rdot": -4.88}

@@ -307,7 +307,6 @@ class ControlLaw(Part):
         "heading_pid",
         "heading_smc",
         "heave_pid",
-        "linear_mpc",
         "policy",
         "pose_pid",
         "pose_smc",

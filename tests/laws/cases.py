@@ -3,8 +3,8 @@
 
 import numpy as np
 
+from lgvi_warp.extensions.gliders.twin.moving_mass import MovingMass
 from lgvi_warp.physics import terms
-from lgvi_warp.reference.terms.moving_mass import MovingMass
 from lgvi_warp.reference.terms.thrusters import Thrusters
 from lgvi_warp.reference.terms.wrench import WrenchSchedule
 from tests.laws import cases_glider, cases_lift, cases_water

@@ -3,9 +3,9 @@
 
 import numpy as np
 
+from lgvi_warp.extensions.gliders.twin.ballast import Ballast
+from lgvi_warp.extensions.gliders.twin.buoyancy_engine import BuoyancyEngine
 from lgvi_warp.physics import terms
-from lgvi_warp.reference.terms.ballast import Ballast
-from lgvi_warp.reference.terms.buoyancy_engine import BuoyancyEngine
 from tests.laws.case import Case, case
 
 # The environment of tests/laws/test_parity.py.

@@ -3,12 +3,12 @@
 
 import numpy as np
 
+from lgvi_warp.extensions.gliders.twin.stratification import Stratification
+from lgvi_warp.extensions.gliders.twin.surface_buoyancy import SurfaceBuoyancy
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.terms.noisy import channel
 from lgvi_warp.reference.terms.current_field import CurrentField
 from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
-from lgvi_warp.reference.terms.stratification import Stratification
-from lgvi_warp.reference.terms.surface_buoyancy import SurfaceBuoyancy
 from lgvi_warp.reference.terms.waves import Waves
 from lgvi_warp.reference.terms.wrench_noise import WrenchNoise
 from tests.laws.case import Case, case

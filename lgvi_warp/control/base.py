@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Collection, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
@@ -231,9 +231,9 @@ class Part(Term):
 AnyPart = TypeVar("AnyPart", bound=Part)
 
 
-def _built_in(*words: str) -> registry.Kinds:
-    """The parts of these types, each in the file of its name."""
-    return registry.Kinds("lgvi_warp.control", {word: [word] for word in words})
+def _built_in(section: str, *words: str) -> registry.Kinds:
+    """The parts of these types in a list of a controller, each in the file of its name."""
+    return registry.Kinds("lgvi_warp.control", {word: [word] for word in words}, section)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -241,7 +241,8 @@ class MeasuringPart(Part):
     """A sensor or an estimator: changes what the controller takes for the motion."""
 
     section: ClassVar[str] = "sensors"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
+    kinds: ClassVar[registry.Kinds] = _built_in(
+        "sensors",
         "altimeter",
         "complementary_filter",
         "dvl",
@@ -283,8 +284,8 @@ class Guidance(Part):
     """A part that says which motion is wanted."""
 
     section: ClassVar[str] = "guidance"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
-        "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
+    kinds: ClassVar[registry.Kinds] = _built_in(
+        "guidance", "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
 
     @property
@@ -301,7 +302,8 @@ class ControlLaw(Part):
     """
 
     section: ClassVar[str] = "laws"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
+    kinds: ClassVar[registry.Kinds] = _built_in(
+        "laws",
         "callback",
         "depth_pid",
         "heading_pid",
@@ -431,7 +433,7 @@ class Allocation(Part):
     """
 
     section: ClassVar[str] = "allocation"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("pseudo_inverse", "bounded_least_squares", "matrix")
+    kinds: ClassVar[registry.Kinds] = _built_in("allocation", "pseudo_inverse", "bounded_least_squares", "matrix")
     # The term that takes the commands, the faults of its channels that are known, and which of X Y Z K M N laws ask for (6,);
     # set for a part of a scene.
     actuator: ClassVar[Any] = None
@@ -515,7 +517,7 @@ class Sending(Part):
     """A part that changes commands on their way to the actuators."""
 
     section: ClassVar[str] = "faults"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("fault")
+    kinds: ClassVar[registry.Kinds] = _built_in("faults", "fault")
 
 
 # The bases of parts by the list that they stand in, in the order in which their roles act.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Capabilities beside the core, one folder each; nothing of the core or its uses imports them."""
+"""What comes with the package beside its core, one folder each; the core finds them by lgvi_warp.common.extensions."""

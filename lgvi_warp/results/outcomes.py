@@ -94,7 +94,7 @@ def unconverged(warnings: np.ndarray, time: np.ndarray, value: np.ndarray) -> tu
     if not count:
         return ()
     # Time and value are those of the most serious warning.
-    of, times = np.flatnonzero((bits & bit) & (bits < 2 * bit)), ""
+    of, times = np.flatnonzero((bits & bit > 0) & (bits < 2 * bit)), ""
     if len(of):
         first = int(of[np.asarray(time)[of].argmin()])
         times = f" ({int(np.asarray(value)[of].max()):,} times at most, first in member {first} at {time[first]:g} s)"

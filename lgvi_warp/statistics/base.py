@@ -54,6 +54,7 @@ TYPES = registry.Kinds(
         "outcomes": ("outcome", "end_time"),
         "paths.path": ("path_maximum", "path_minimum", "path_range", "path_mean", "path_rms", "path_time"),
     },
+    "statistics",
 )
 
 

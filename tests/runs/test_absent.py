@@ -59,11 +59,11 @@ def test_compensation_is_there_only_if_asked_for(method, tmp_path):
 
 @pytest.mark.slow
 def test_memory_in_stages_is_there_only_where_it_is_followed(tmp_path):
-    # A method that goes back in time keeps a copy of the memory; a splitting follows nothing.
+    # A method that goes back in time keeps a copy of the memory; actuators without lag follow nothing.
     lagging = scene_of(CASES["thrusters"])
     held = terms.Thrusters(position=[(0.0, 0.0, 0.0)], direction=[(1.0, 0.0, 0.0)], coefficient=[5.0], command=[0.5])
     walk = "make_scheduled__locals__walk"
-    cases = (("rk4", lagging, {walk}), ("rk8", lagging, {walk, "copy_memory"}), ("psi_s", lagging, set()),
+    cases = (("rk4", lagging, {walk}), ("rk8", lagging, {walk, "copy_memory"}), ("psi_s", lagging, {walk}),
              ("rk8", lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms=[held]), set()))  # fmt: skip
     for i, (method, scene, marks) in enumerate(cases):
         (tmp_path / str(i)).mkdir()
@@ -254,6 +254,6 @@ def test_a_controller_that_is_absent_is_no_code(tmp_path):
     for name, scene in scenes.items():
         (tmp_path / name).mkdir()
         texts[name] = source(scene, tmp_path / name)
-    for word in ("feed", "held", "Measurement", "heading_error", "signals"):
+    for word in ("feed", "held_command", "Measurement", "heading_error", "signals"):
         assert word not in texts["plain"], word
         assert word in texts["steered"], word

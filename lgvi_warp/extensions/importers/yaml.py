@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -94,7 +94,7 @@ def from_yaml(
     ignore = names_of("ignore", ignore)
     content = table_of(parse_yaml(source), table)
     told: list[Any] = []
-    read = by_meaning(faults, content, ignore, told) | by_meaning(faults, given, (), told)
+    read = by_meaning(faults, content, set(ignore), told) | by_meaning(faults, given, set(), told)
     positions = fossen.HALF_TURN if position_axes == "flu" else np.ones(3)
     matrices = fossen.HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)
     if "mass_matrix" in read:
@@ -158,7 +158,7 @@ def add_rigid_body(faults: Faults, read: dict[str, Any], matrices: np.ndarray, p
     read |= {"mass": mass, "inertia": inertia.tolist(), "center_of_gravity": (positions * center).tolist()}
 
 
-def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: Collection[str], told: list[Any]) -> dict[str, Any]:
+def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str], told: list[Any]) -> dict[str, Any]:
     """Sort values by what their keys mean: aliases resolved, tables opened, Fossen's names gathered.
 
     told: Unknown keys so far.

@@ -7,7 +7,7 @@ import copy
 import dataclasses
 import functools
 import keyword
-from collections.abc import Collection, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
@@ -167,13 +167,13 @@ class Term:
 
     Fields declared by `number` are arrays after construction.
 
-    Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the module
-    of lgvi_kernels.laws by name (by default the type), or any object with the same functions; `timed` says whether the law
-    depends on time; `dissipative`, whether its damping never creates energy; `brakes`, whether it takes energy on the whole
-    even if some motions gain by it; `strengths` names the numbers without which it
-    does nothing; `carries` says whether it is a current that is the same everywhere and at all times, which exerts no force;
-    `anchored`, whether it holds the vehicle to a place, so that a current does work. docs/develop/add_a_force.md shows how to
-    write one.
+    Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the
+    module of lgvi_kernels.laws by name (by default the type), that of an extension by its path, or any object with the same
+    functions; `timed` says whether the law depends on time; `dissipative`, whether its damping never creates energy;
+    `brakes`, whether it takes energy on the whole even if some motions gain by it; `strengths` names the numbers without
+    which it does nothing; `carries` says whether it is a current that is the same everywhere and at all times, which exerts
+    no force; `anchored`, whether it holds the vehicle to a place, so that a current does work. docs/develop/add_a_force.md
+    shows how to write one.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
@@ -184,7 +184,7 @@ class Term:
 
     type: ClassVar[str] = ""
     # Classes by their type in a scene file; events have a table of their own.
-    kinds: ClassVar[MutableMapping[str, Any]] = {}
+    kinds: ClassVar[registry.Kinds] = registry.Kinds("lgvi_warp.physics.terms", {}, "terms")
     # Whether it acts on the motion: an event does not.
     acts: ClassVar[bool] = True
     device: ClassVar[Any] = ""
@@ -479,7 +479,7 @@ class Term:
             aligned: As of `PackingContext`: whether the kernel's axes and origin are the user's.
 
         Returns:
-            The name of a module of lgvi_kernels.laws, or an object with the same functions.
+            The name of a module of lgvi_kernels.laws, the path of another one, or an object with the same functions.
         """
         return self.device
 

@@ -47,7 +47,8 @@ def test_rows_of_the_memory():
 
 
 def test_order_and_shapes():
-    assert SAVED[: len(FIELDS)] == FIELDS
+    assert tuple(SAVED) == (*FIELDS, *SIGNALS)
+    assert len(SAVED) == len(FIELDS) + len(SIGNALS)
     assert ordered(["demand", "command", "position", "demand"]) == ("position", "command", "demand")
     shapes = {name: tuple(np.shape(np.zeros(SIGNALS[name].field.shape))) for name in SIGNALS if name not in CHANNELS}
     assert all(has_shape(name, shape) and not has_shape(name, (*shape, 1)) for name, shape in shapes.items())

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults, ragged, refusal
+from lgvi_warp.extensions.gliders import DEVICE
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.notation import EYE, cross, hat, repeated
 from lgvi_warp.physics.terms.actuators import UNLIMITED, first_row, motion, packed_following, refuse_unread
@@ -70,6 +71,7 @@ class MovingMass(Term):
     """
 
     type: ClassVar[str] = "moving_mass"
+    device: ClassVar[str] = f"{DEVICE}.moving_mass"
     strengths: ClassVar[tuple[str, ...]] = ("mass",)
     # The vehicle's mass, where it includes the inertia of this one [kg].
     most: ClassVar[float] = np.inf
@@ -166,7 +168,7 @@ class MovingMass(Term):
             motions = motion(self) | ({"rate": True} if self.carried else {})
             features |= {"driven": True} | channels | motions
         features["inertia"] = self.carried
-        return f"moving_mass:{','.join(name for name, present in features.items() if present)}"
+        return f"{self.device}:{','.join(name for name, present in features.items() if present)}"
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         # In addition, refuses more than the vehicle's mass, and directions without length; raises SceneError for members'
@@ -181,7 +183,7 @@ class MovingMass(Term):
         return bad
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # The rows of kernels/lgvi_kernels/laws/moving_mass.py; differences of places turn as vectors do.
+        # The rows of device/moving_mass.py; differences of places turn as vectors do.
         vector, reference = context.frame.vector, numbers["reference"]
         weight = numbers["mass"] * context.parameters["environment.gravity"]
         none = np.zeros((1, 3))

@@ -9,7 +9,7 @@ import lgvi_warp as lw
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.notation import hat
 from tests.conftest import ROOT
-from tests.laws.test_moving_mass import GRAVITY, held
+from tests.extensions.gliders.test_moving_mass import GRAVITY, held
 from tests.support.tools import difference, last, one
 
 MASS, BATTERY = 40.0, 9.0

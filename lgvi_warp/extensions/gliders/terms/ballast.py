@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.extensions.gliders import DEVICE
 from lgvi_warp.physics.terms.actuators import Commanded, motion, packed_following, refuse_idle, refuse_unread
 from lgvi_warp.physics.terms.base import (
     CONSERVED,
@@ -56,6 +57,7 @@ class Ballast(Commanded):
     """
 
     type: ClassVar[str] = "ballast"
+    device: ClassVar[str] = f"{DEVICE}.ballast"
 
     position: Any = number(("n", 3), "m", ((0.0, 0.0, 0.0),))
     limit: Any = number(("n",), "m3", None, least=0.0)
@@ -110,7 +112,7 @@ class Ballast(Commanded):
 
     def device_in(self, aligned: bool) -> str:
         if self.steady:
-            return "ballast"
+            return self.device
         driven = self.driver is not None
         # Members may bring in a lag where the scene has a limited rate.
         motions = motion(self) if driven else {"lag": self.slow, "rate": self.rate_limit is not None}
@@ -120,7 +122,7 @@ class Ballast(Commanded):
             *(name for name, acts in motions.items() if acts and moves),
             *(["power"] if self.powered else []),
         ]
-        return f"ballast_with:{','.join(features)}"
+        return f"{DEVICE}.ballast_with:{','.join(features)}"
 
     def check(self, faults: Faults) -> None:
         if vars(self)["commanded_twice"]:

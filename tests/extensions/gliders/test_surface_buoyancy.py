@@ -14,7 +14,8 @@ import lgvi_warp as lw
 from lgvi_warp.physics.energy import drift
 from lgvi_warp.reference.terms.waves import Waves
 from tests.conftest import ROOT
-from tests.laws.cases_water import SURFACE, arrays, surface
+from tests.extensions.gliders.cases import SURFACE, surface
+from tests.laws.cases_water import arrays
 from tests.laws.test_parity import BENT, both
 from tests.support.hamel import turn
 from tests.support.tools import difference, last, one, slope

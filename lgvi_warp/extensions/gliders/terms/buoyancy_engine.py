@@ -10,8 +10,9 @@ import numpy as np
 
 from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.extensions.gliders import DEVICE
+from lgvi_warp.extensions.gliders.terms.ballast import SEA_WATER, specific_weight
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.ballast import SEA_WATER, specific_weight
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 SIDES = ("down", "up")
@@ -59,6 +60,7 @@ class BuoyancyEngine(Term):
     """
 
     type: ClassVar[str] = "buoyancy_engine"
+    device: ClassVar[str] = f"{DEVICE}.buoyancy_engine"
 
     pump_rate: Any = number((), "m3/s", above=0.0)
     volume_down: Any = number((), "m3")
@@ -91,7 +93,7 @@ class BuoyancyEngine(Term):
         return self.accounted and self.efficiency is not None
 
     def device_in(self, aligned: bool) -> str:
-        return "buoyancy_engine:power" if self.powered else "buoyancy_engine"
+        return f"{self.device}:power" if self.powered else self.device
 
     def check(self, faults: Faults) -> None:
         for low, high in (("volume_down", "volume_up"), ("depth_top", "depth_bottom")):

@@ -8,15 +8,15 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.gliders.twin.buoyancy_engine import BuoyancyEngine
 from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.methods.tableaux import RK4
 from lgvi_warp.reference import advance, explicit
 from lgvi_warp.reference.submaps import start
-from lgvi_warp.reference.terms.buoyancy_engine import BuoyancyEngine
 from lgvi_warp.reference.terms.energy_use import EnergyUse
+from tests.extensions.gliders.cases import WATER
+from tests.extensions.gliders.test_ballast import ADDED, DENSITY, GRAVITY, MASS, PUMP, WEIGHT, falling
 from tests.laws.case import Case
-from tests.laws.cases_glider import WATER
-from tests.laws.test_ballast import ADDED, DENSITY, GRAVITY, MASS, PUMP, WEIGHT, falling
 from tests.laws.test_parity import STATE, body_of, scene_of
 from tests.support.refusals import refused, says
 from tests.support.tools import one, slope

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.extensions.gliders import DEVICE
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
@@ -40,6 +41,7 @@ class Polar(Term):
     """
 
     type: ClassVar[str] = "polar"
+    device: ClassVar[str] = f"{DEVICE}.polar"
     dissipative: ClassVar[bool] = False
     brakes: ClassVar[bool] = True
     braking_grows_with: ClassVar[tuple[str, ...]] = ("drag", "drag_by_attack")

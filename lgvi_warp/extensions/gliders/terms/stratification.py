@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.extensions.gliders import DEVICE
 from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, PackingContext, Term, number
 
 
@@ -31,6 +32,7 @@ class Stratification(Term):
     """
 
     type: ClassVar[str] = "stratification"
+    device: ClassVar[str] = f"{DEVICE}.stratification"
     strengths: ClassVar[tuple[str, ...]] = ("gradient",)
 
     gradient: Any = number((), "1/m")
@@ -38,7 +40,7 @@ class Stratification(Term):
     compressibility: Any = number((), "1/m", None, optional=True)
 
     def device_in(self, aligned: bool) -> str:
-        return "stratification" if self.compressibility is None else "stratification_compressed"
+        return self.device if self.compressibility is None else f"{self.device}_compressed"
 
     def present(self, numbers: Numbers) -> bool:
         return super().present(numbers) or bool(np.any(numbers.get("compressibility", 0.0)))

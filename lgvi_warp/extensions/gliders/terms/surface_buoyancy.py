@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.extensions.gliders import DEVICE
 from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, PackingContext, Term, number, rows_of
 from lgvi_warp.physics.terms.base import side_by_side as joined
 from lgvi_warp.physics.terms.cross_flow import GAUSS
@@ -54,6 +55,7 @@ class SurfaceBuoyancy(Term):
     """
 
     type: ClassVar[str] = "surface_buoyancy"
+    device: ClassVar[str] = f"{DEVICE}.surface_buoyancy"
     unique: ClassVar[bool] = True
 
     heights: Any = number(("k",), "m", least=0.0)
@@ -93,7 +95,7 @@ class SurfaceBuoyancy(Term):
         return frozenset() if self.timed else CONSERVED
 
     def device_in(self, aligned: bool) -> str:
-        return f"surface_buoyancy:{self.section}" + (",waves" if self.timed else "")
+        return f"{self.device}:{self.section}" + (",waves" if self.timed else "")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Rows of the parts, and of the waves above them.

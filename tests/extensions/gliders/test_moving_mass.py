@@ -9,12 +9,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.gliders.twin.moving_mass import MovingMass
 from lgvi_warp.reference.control.depth_pid import DepthPID
 from lgvi_warp.reference.control.loop import Fault, Loop
 from lgvi_warp.reference.control.matrix import AllocationMatrix
 from lgvi_warp.reference.control.set_point import SetPoint
 from lgvi_warp.reference.terms.drag import Drag
-from lgvi_warp.reference.terms.moving_mass import MovingMass
 from tests.support.loops import twin_body, twin_run
 from tests.support.tools import difference, last, one, slope
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Readers of vehicles: SDF, URDF and YAML files."""
+"""Readers of vehicles: SDF, URDF and YAML files of robotics packages. `lw.vehicles` names them."""

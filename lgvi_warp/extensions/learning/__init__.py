@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vehicles as environments of Gymnasium and Stable-Baselines3."""
+"""Vehicles as environments of Gymnasium and Stable-Baselines3: `lw.gym`."""

@@ -13,6 +13,9 @@ from lgvi_warp.common.files import new_text_file
 from lgvi_warp.extensions.others.exporting.lines import MapLine, lines
 from lgvi_warp.store.exporting.tracks import Report, Tracks
 
+# Programs read such a file whole.
+MOST_MEMBERS = 1000
+
 
 def write(tracks: Tracks, target: Path, report: Report) -> None:
     """Write a collection of features, one after the other."""

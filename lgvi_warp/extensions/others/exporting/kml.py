@@ -18,6 +18,9 @@ HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 """
 TAIL = "</Document>\n</kml>\n"
 
+# Programs read such a file whole.
+MOST_MEMBERS = 1000
+
 
 def write(tracks: Tracks, target: Path, report: Report) -> None:
     """Write a document with a placemark for each member, one after the other."""

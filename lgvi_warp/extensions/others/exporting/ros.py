@@ -47,6 +47,9 @@ _TRANSFORM_PARTS = _PARTS | {
     "geometry_msgs/Transform": "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n",
 }
 
+# Programs read such a file whole.
+MOST_MEMBERS = 1000
+
 
 def _definition(main: str, parts: Mapping[str, str]) -> str:
     """The definition of a message with those of its parts, as bags of ROS 2 have it."""

@@ -14,6 +14,7 @@ from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.times import whole_steps
 from lgvi_warp.control.base import Bus, ControlLaw, Numbers, Packed, PackingContext, list_of_names
+from lgvi_warp.extensions.others import DEVICE
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Term, number
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
@@ -98,6 +99,7 @@ class LinearMPC(ControlLaw):
     """
 
     type: ClassVar[str] = "linear_mpc"
+    device: ClassVar[str] = f"{DEVICE}.linear_mpc"
     iterates: ClassVar[bool] = True
 
     states: Sequence[str]

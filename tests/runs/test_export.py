@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.extensions.others.exporting import geojson, kml, ros
+from lgvi_warp.common import extensions
 from lgvi_warp.scene.start import Environment
-from lgvi_warp.store.exporting import tables, trajectories
+from lgvi_warp.store import export
 from lgvi_warp.store.exporting.tracks import tracks_of
 from tests.runs.test_hostile_folders import mutated
 from tests.support.exported import DATE, DEGREES, ORIGIN, OUTCOMES, SETTINGS, by_geodesic, fleet, scene
@@ -23,7 +23,7 @@ pytestmark = [
     pytest.mark.kernel,
     pytest.mark.filterwarnings("ignore:numpy.ndarray size changed"),
 ]
-FILES = ("csv", "parquet", "nc", "geojson", "kml", "mcap")
+FILES = ("csv", "parquet", "nc", *(ending[1:] for ending in extensions.words("exporters")))
 
 
 @pytest.fixture(scope="module")
@@ -228,8 +228,7 @@ def test_many_pieces_are_the_same_file(kind, result, tmp_path):
     if kind == "mcap":
         pytest.importorskip("mcap_ros2")
     whole = tracks_of(result, None, Environment(origin=ORIGIN, start=DATE))
-    write = {"csv": tables.csv, "parquet": tables.parquet, "nc": trajectories.netcdf, "geojson": geojson.write,
-             "kml": kml.write, "mcap": ros.write}[kind]  # fmt: skip
+    write = export.WRITERS.get(f".{kind}") or extensions.load("exporters", f".{kind}").write
     fractions = []
     write(whole, tmp_path / f"whole.{kind}", lambda fraction: None)
     write(dataclasses.replace(whole, piece_bytes=1), tmp_path / f"pieces.{kind}", fractions.append)

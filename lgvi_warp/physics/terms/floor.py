@@ -48,6 +48,7 @@ class Floor(Event):
     """
 
     type: ClassVar[str] = "floor"
+    depth_field: ClassVar[str] = "depth"
     status: ClassVar[Status] = Status.FLOOR
     # Keys of a table with the key `file`, in a scene file, beside those of `of_file`.
     of_file_besides: ClassVar[tuple[str, ...]] = ("file", "clearance", "name")

@@ -185,6 +185,11 @@ def names_of(key: str, value: Any) -> list[str]:
     return names
 
 
+def name_set(key: str, value: Any) -> set[str]:
+    """Read names whose order does not matter: a set, or the keys of a mapping, will do as well."""
+    return set(names_of(key, list(value) if isinstance(value, Set | Mapping) else value))
+
+
 Kind = TypeVar("Kind", bound=type)
 # Errors of Python and NumPy that an argument of another kind may lead to.
 RAW = (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, AssertionError, NotImplementedError)

@@ -245,13 +245,12 @@ class MeasuringPart(Part):
         "sensors",
         "altimeter",
         "complementary_filter",
-        "dvl",
-        "error_state_filter",
-        "imu",
         "sensor",
         "dead_reckoning",
         "low_pass",
     )
+    # Whether linear models of a loop may have it.
+    linear: ClassVar[bool] = True
     # Rows of the bus with what it believes, beside the measurement.
     belief_rows: ClassVar[int] = 0
 

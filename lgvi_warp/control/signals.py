@@ -60,29 +60,8 @@ _REFERENCE = _KINDS | {
 }
 
 
-# Rows of what an estimator believes, as lgvi_kernels/laws/control/error_state_filter.py writes them.
-_BLOCKS = "position [m], velocity [m/s], attitude [rad], biases of accelerometer [m/s^2] and gyroscope [rad/s]"
-_SLOTS = "four beams [m/s], fix and delayed fix, each three [m], depth [m], heading [rad]"
+# The group of signals that lie in the rows of what an estimator believes: an estimator adds its own.
 ESTIMATE = "estimate"
-_OF_ESTIMATOR = (
-    Signal(
-        Field("estimate_sigma", (15,), "1", f"standard deviations that the filter believes: {_BLOCKS}"), ESTIMATE, 0
-    ),
-    Signal(
-        Field("estimate_bias", (6,), "1", "estimated biases of accelerometer [m/s^2] and gyroscope [rad/s]"),
-        ESTIMATE,
-        15,
-    ),
-    Signal(Field("nees", (), "1", "e^T P^-1 e of the 15 errors of the estimate, by the truth"), ESTIMATE, 21),
-    Signal(Field("nis", (), "1", "sum of the squared innovations over their variances at the last tick"), ESTIMATE, 22),
-    Signal(Field("nis_count", (), "1", "how many innovations that are"), ESTIMATE, 23),
-    Signal(Field("innovation", (12,), "1", f"innovations of the last tick, 0 where none: {_SLOTS}"), ESTIMATE, 24),
-    Signal(
-        Field("innovation_sigma", (12,), "1", f"standard deviations that these should have: {_SLOTS}"),
-        ESTIMATE,
-        36,
-    ),
-)
 
 
 def _noted(group: str, word: str, kinds: Mapping[str, Field], rows: Mapping[str, int]) -> tuple[Signal, ...]:
@@ -123,19 +102,10 @@ add_signals(
     *_noted("reference", "wanted", _REFERENCE, _WANTED),
 )
 add_signals(
-    *_OF_ESTIMATOR,
-    absent=(
-        "is told by a filter, which this scene has not, or which does not report",
-        'give [[controller.sensors]] type = "error_state_filter" with report = true',
-    ),
-)
-add_signals(
     Signal(_OF_ITERATIONS, UNCONVERGED),
     absent=("is told by parts that iterate, which this controller has not", "leave it out"),
 )
 add_signals(Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""))
-# Names of those that a filter alone has.
-OF_A_FILTER = tuple(signal.field.name for signal in _OF_ESTIMATOR)
 
 
 class Names(Collection[str]):

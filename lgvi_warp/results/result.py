@@ -22,7 +22,7 @@ from lgvi_warp.common.reading import corrupt_file_as_scene_error
 from lgvi_warp.common.status import Status, StatusArray, WarningArray
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.control.controller import terms_of
-from lgvi_warp.control.signals import IN_FILES, field_of
+from lgvi_warp.control.signals import IN_FILES, SIGNALS, field_of
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, dims_of
@@ -212,8 +212,16 @@ class Result(Summarized):
     reference_position, reference_attitude, reference_velocity = _Signal(), _Signal(), _Signal()
     reference_angular_velocity, reference_depth = _Signal(), _Signal()
     reference_heading, reference_speed, reference_angular_acceleration = _Signal(), _Signal(), _Signal()
-    estimate_sigma, estimate_bias, nees, nis = _Signal(), _Signal(), _Signal(), _Signal()
-    nis_count, innovation, innovation_sigma = _Signal(), _Signal(), _Signal()
+    if TYPE_CHECKING:  # signals of extensions that come with the package, as the doors name these
+        estimate_sigma, estimate_bias, nees, nis = _Signal(), _Signal(), _Signal(), _Signal()
+        nis_count, innovation, innovation_sigma = _Signal(), _Signal(), _Signal()
+    else:
+
+        def __getattr__(self, name):
+            # A signal of an extension.
+            if not name.startswith("_") and name in SIGNALS:
+                return self._kept(name)
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @functools.cached_property
     def quaternion_wxyz(self) -> np.ndarray:

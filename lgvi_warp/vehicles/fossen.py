@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import extensions
-from lgvi_warp.common.arguments import names_of
+from lgvi_warp.common.arguments import name_set
 from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.common.reading import MOST_BYTES, MOST_OTHERS, file_text
 from lgvi_warp.common.toml_text import parsed
@@ -312,7 +312,7 @@ def add_derivatives(faults: Faults, body: Coefficients, values: Mapping[str, Any
     if not isinstance(values, Mapping):
         faults.add("coefficients", values, "is not a map of names", 'write {"X_udot": -30.0, "X_u": -4.0, ...}')
         values = {}
-    ignore = set(names_of("ignore", ignore))
+    ignore = name_set("ignore", ignore)
     matrices = {"dot": np.zeros((6, 6)), "linear": np.zeros((6, 6)), "quadratic": np.zeros((6, 6))}
     keys: dict[tuple[str, int, int], str] = {}
     for key, value in values.items():

@@ -22,10 +22,10 @@ def matrix(seed, size=1.0):
 
 
 def twin_of(module):
-    """The module of the twin of a term's module."""
+    """The module of the twin of a term, or a part of a controller, by its module."""
     if module.startswith("lgvi_warp.extensions."):
-        return module.replace(".terms.", ".twin.")
-    return module.replace("physics", "reference")
+        return module.replace(".terms.", ".twin.").replace(".control.", ".twin.")
+    return module.replace("physics", "reference").replace("lgvi_warp.control", "lgvi_warp.reference.control")
 
 
 def case(host, **numbers):

@@ -155,7 +155,8 @@ def _navigating() -> lw.Ensemble:
     fins = lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
     guidance, laws = [lw.control.SetPoint(heading=0.2)], [lw.control.HeadingPID(kp=1.0, kd=2.0)]
     return named(
-        "remus_100", controller=lw.Controller(0.1, sensors=sensors, guidance=guidance, laws=laws, allocation=[fins])
+        "remus_100",
+        controller=lw.Controller(period=0.1, sensors=sensors, guidance=guidance, laws=laws, allocation=[fins]),
     )
 
 

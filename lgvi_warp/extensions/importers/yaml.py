@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import yaml_text
-from lgvi_warp.common.arguments import names_of
+from lgvi_warp.common.arguments import name_set, names_of
 from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
 from lgvi_warp.extensions.importers.plugins import by_diagonal
 from lgvi_warp.vehicles import fossen
@@ -91,10 +91,10 @@ def from_yaml(
     faults.choice("quadratic", quadratic, ("diagonal", "full"))
     for key, value in (("position_axes", position_axes), ("matrix_axes", matrix_axes)):
         faults.choice(key, value, ("flu", "frd"))
-    ignore = names_of("ignore", ignore)
+    ignore = name_set("ignore", ignore)
     content = table_of(parse_yaml(source), table)
     told: list[Any] = []
-    read = by_meaning(faults, content, set(ignore), told) | by_meaning(faults, given, set(), told)
+    read = by_meaning(faults, content, ignore, told) | by_meaning(faults, given, set(), told)
     positions = fossen.HALF_TURN if position_axes == "flu" else np.ones(3)
     matrices = fossen.HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)
     if "mass_matrix" in read:

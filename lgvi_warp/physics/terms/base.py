@@ -216,6 +216,11 @@ class Term:
     following: ClassVar[tuple[str, ...]] = ()
     # Numbers with whose sizes the diagonal of `braking` grows, as it does with the speeds and the density where there are any.
     braking_grows_with: ClassVar[tuple[str, ...]] = ()
+    # For checks of what is plausible: the largest usual size of a number and why, or why it has none ("": of all numbers); the
+    # number that holds depths; whether the vehicle loses buoyancy above the surface by this term.
+    usual: ClassVar[Mapping[str, str | tuple[float, str]]] = {}
+    depth_field: ClassVar[str] = ""
+    floats: ClassVar[bool] = False
 
     name: str = ""
 
@@ -411,6 +416,18 @@ class Term:
         """
         fields = {word_of(item): item for item in self.number_fields()}
         return {name: _outside(fields[name], value) | _falling(fields[name], value) for name, value in numbers.items()}
+
+    def odd_at(self, numbers: Numbers, position: Array) -> Mapping[str, tuple[Array, str]]:
+        """What is odd about members where they start; by default nothing.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            position: Positions (n, 3) [m].
+
+        Returns:
+            By field: which members are odd (n,), and why, a text with {} for the depth.
+        """
+        return {}
 
     def present(self, numbers: Numbers) -> bool:
         """Whether any member feels the term; by default where one of its `strengths`, if it names any, is not zero.

@@ -48,6 +48,7 @@ class Floor(InFile, Event):
     """
 
     type: ClassVar[str] = "floor"
+    depth_field: ClassVar[str] = "depth"
     status: ClassVar[Status] = Status.FLOOR
     of_file_besides: ClassVar[tuple[str, ...]] = ("file", "clearance", "name")
     of_file_by: ClassVar[str] = "from_file"

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from lgvi_warp.common.arguments import mapping_of, names_of
+from lgvi_warp.common.arguments import mapping_of, name_set, names_of
 from lgvi_warp.common.declared import declared
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.physics.notation import cross
@@ -180,7 +180,7 @@ class QuadraticForm(Term):
             >>> form.products, form.values.tolist()
             (('Z_uw', 'M_uq'), [-80.0, -80.0])
         """
-        faults, skipped = Faults(), set(names_of("ignore", ignore))
+        faults, skipped = Faults(), name_set("ignore", ignore)
         density, L = faults.positive("rho", rho, "kg/m3"), faults.positive("length", length, "m")
         matrix = None if added_mass is None else faults.symmetric("added_mass", added_mass, "kg, kg m, kg m2", 6)
         sums: dict[Product, float] = {}

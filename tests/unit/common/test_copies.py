@@ -17,8 +17,8 @@ from lgvi_warp.common.errors import MissingExtra, NothingToDraw, NotReal
 from lgvi_warp.common.identity import UNKNOWN, identity
 from lgvi_warp.common.reading import UnreadableError
 from lgvi_warp.control.base import SECTIONS
+from lgvi_warp.extensions.navigation.consistency import TimeAverage
 from lgvi_warp.physics.given_draws import Stream
-from lgvi_warp.uncertainty.consistency import TimeAverage
 from tests.conftest import ROOT
 from tests.support.odd_calls import goods
 from tests.support.public import DOORS, NAMED

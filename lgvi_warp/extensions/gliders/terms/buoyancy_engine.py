@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -61,6 +62,9 @@ class BuoyancyEngine(Term):
 
     type: ClassVar[str] = "buoyancy_engine"
     device: ClassVar[str] = f"{DEVICE}.buoyancy_engine"
+    usual: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("depth_top", "depth_bottom", "reference_depth"), "a place in the sea may be anywhere"
+    )
 
     pump_rate: Any = number((), "m3/s", above=0.0)
     volume_down: Any = number((), "m3")

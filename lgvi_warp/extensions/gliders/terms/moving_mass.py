@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -73,6 +74,10 @@ class MovingMass(Term):
     type: ClassVar[str] = "moving_mass"
     device: ClassVar[str] = f"{DEVICE}.moving_mass"
     strengths: ClassVar[tuple[str, ...]] = ("mass",)
+    usual: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(("limit", "rate_limit"), "lengths and angles share it"),
+        **dict.fromkeys(("slide_direction", "turn_axis"), "a direction of any length but 0"),
+    }
     # The vehicle's mass, where it includes the inertia of this one [kg].
     most: ClassVar[float] = np.inf
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -42,6 +43,7 @@ class Polar(Term):
 
     type: ClassVar[str] = "polar"
     device: ClassVar[str] = f"{DEVICE}.polar"
+    usual: ClassVar[Mapping[str, str]] = {"": "coefficients are as large as the vehicle makes them"}
     dissipative: ClassVar[bool] = False
     brakes: ClassVar[bool] = True
     braking_grows_with: ClassVar[tuple[str, ...]] = ("drag", "drag_by_attack")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -34,6 +35,11 @@ class Stratification(Term):
     type: ClassVar[str] = "stratification"
     device: ClassVar[str] = f"{DEVICE}.stratification"
     strengths: ClassVar[tuple[str, ...]] = ("gradient",)
+    usual: ClassVar[Mapping[str, Any]] = {
+        "compressibility": (5e-3, "hulls lose millionths of their volume a metre"),
+        "reference_depth": "a check of depths looks at it",
+    }
+    depth_field: ClassVar[str] = "reference_depth"
 
     gradient: Any = number((), "1/m")
     reference_depth: Any = number((), "m", 0.0)
@@ -41,6 +47,10 @@ class Stratification(Term):
 
     def device_in(self, aligned: bool) -> str:
         return self.device if self.compressibility is None else f"{self.device}_compressed"
+
+    def odd_at(self, numbers: Numbers, position: Array) -> Mapping[str, tuple[Array, str]]:
+        lost = numbers.get("compressibility", np.zeros(1)) * (position[:, 2] - numbers["reference_depth"])
+        return {"compressibility": (lost >= 1.0, "the hull has no volume left at the start's depth of {:.4g} m")}
 
     def present(self, numbers: Numbers) -> bool:
         return super().present(numbers) or bool(np.any(numbers.get("compressibility", 0.0)))

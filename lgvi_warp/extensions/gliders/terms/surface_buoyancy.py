@@ -56,6 +56,7 @@ class SurfaceBuoyancy(Term):
 
     type: ClassVar[str] = "surface_buoyancy"
     device: ClassVar[str] = f"{DEVICE}.surface_buoyancy"
+    floats: ClassVar[bool] = True
     unique: ClassVar[bool] = True
 
     heights: Any = number(("k",), "m", least=0.0)

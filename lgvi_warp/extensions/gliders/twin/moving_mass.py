@@ -36,11 +36,6 @@ class MovingMass(Following):
         count = len(view.memory) - 3 * self.inertia
         return replace(view, memory=view.memory[:count]), view.memory[count:]
 
-    def evolve(self, view: View, second: bool) -> Array:
-        """That of channels, if a controller drives them."""
-        own, rest = self._halves(view)
-        return np.concatenate([super().evolve(own, second) if self.driven else own.memory, rest])
-
     def follow(self, view: View) -> Array:
         """That of channels, if a controller drives them."""
         own, rest = self._halves(view)

@@ -12,9 +12,10 @@ import numpy as np
 from lgvi_warp.common.declared import flag, text
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.control.base import Bus, MeasuringPart
-from lgvi_warp.control.dvl import DIAGONAL, DVL
-from lgvi_warp.control.imu import IMU
 from lgvi_warp.control.sensor import RANGE, Sensor
+from lgvi_warp.extensions.navigation import DEVICE
+from lgvi_warp.extensions.navigation.control.dvl import DIAGONAL, DVL
+from lgvi_warp.extensions.navigation.control.imu import IMU
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 from lgvi_warp.physics.terms.noisy import normals_at_start
 
@@ -84,6 +85,8 @@ class ErrorStateFilter(MeasuringPart):
     """
 
     type: ClassVar[str] = "error_state_filter"
+    device: ClassVar[str] = f"{DEVICE}.error_state_filter"
+    linear: ClassVar[bool] = False
     every_feature: ClassVar[tuple[str, ...]] = (*AIDS, REPORT)
     # The sensors that it uses, by what they are to it; set for a part of a scene.
     used: ClassVar[Mapping[str, Any]] = {}
@@ -163,7 +166,7 @@ class ErrorStateFilter(MeasuringPart):
         return (*(role for role in AIDS if getattr(self, role)), *((REPORT,) if self.report else ()))
 
     def device_in(self, aligned: bool) -> Any:
-        return f"error_state_filter:{','.join(self.chosen)}"
+        return f"{self.device}:{','.join(self.chosen)}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # What it believes of its sensors, where it finds their readings, and the first estimate.

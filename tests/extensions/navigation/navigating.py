@@ -4,11 +4,11 @@
 import numpy as np
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.navigation.twin import dvl as twin_dvl
+from lgvi_warp.extensions.navigation.twin import error_state_filter as twin_filter
+from lgvi_warp.extensions.navigation.twin import imu as twin_imu
 from lgvi_warp.physics.terms.noisy import channel, normals_at_start
 from lgvi_warp.reference.control import Measurement
-from lgvi_warp.reference.control import dvl as twin_dvl
-from lgvi_warp.reference.control import error_state_filter as twin_filter
-from lgvi_warp.reference.control import imu as twin_imu
 from lgvi_warp.reference.control.readings import attitude
 from lgvi_warp.reference.control.sensor import Sensor
 from lgvi_warp.reference.rotation import vee

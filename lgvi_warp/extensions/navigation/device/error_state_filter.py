@@ -14,15 +14,6 @@ from lgvi_kernels import device
 from lgvi_kernels.lanes.arithmetic import any_positive, element, set_element
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.complementary_filter import orthonormal
-from lgvi_kernels.laws.control.covariance import (
-    add_block,
-    add_noise,
-    copy_block,
-    squared_size,
-    turn_block,
-    updated,
-)
-from lgvi_kernels.laws.control.dvl import beam
 from lgvi_kernels.laws.control.readings import (
     heading,
     put_attitude,
@@ -32,6 +23,15 @@ from lgvi_kernels.laws.control.readings import (
     turn_to,
     turned,
 )
+from lgvi_warp.extensions.navigation.device.covariance import (
+    add_block,
+    add_noise,
+    copy_block,
+    squared_size,
+    turn_block,
+    updated,
+)
+from lgvi_warp.extensions.navigation.device.dvl import beam
 
 # Rows of its memory: position, velocity, attitude, both biases, rate, its last mean; position as the fix was sent, the fix,
 # ticks to wait; the error, rows to work with, the covariance; a Cholesky factor.

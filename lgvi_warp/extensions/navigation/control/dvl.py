@@ -14,6 +14,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.control.base import MeasuringPart
 from lgvi_warp.control.over_floor import packed_over, with_floor
 from lgvi_warp.control.sensor import BOTTOMLESS, HANDED, MOST_TICKS
+from lgvi_warp.extensions.navigation import DEVICE
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, own
 from lgvi_warp.physics.terms.noisy import key_of
 
@@ -61,6 +62,8 @@ class DVL(MeasuringPart):
     """
 
     type: ClassVar[str] = "dvl"
+    device: ClassVar[str] = f"{DEVICE}.dvl"
+    linear: ClassVar[bool] = False
     every_feature: ClassVar[tuple[str, ...]] = ("noise", "dropout", "floor", "grid", "silent", HANDED)
     # The floor; set for a part of a scene.
     ground: ClassVar[Any] = None
@@ -100,7 +103,7 @@ class DVL(MeasuringPart):
         return (*acting, HANDED) if self.is_handed else tuple(acting)
 
     def device_in(self, aligned: bool) -> Any:
-        return f"dvl:{','.join(self.chosen)}"
+        return f"{self.device}:{','.join(self.chosen)}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The numbers, the key of the random numbers, and the rows of the last velocity, and of the beams.

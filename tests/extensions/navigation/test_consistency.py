@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from lgvi_warp.uncertainty.consistency import STATES, time_average
+from lgvi_warp.extensions.navigation.consistency import STATES, time_average
 
 
 def errors(seed, members, times, phi):

@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.control.base import MeasuringPart
 from lgvi_warp.control.sensor import HANDED
+from lgvi_warp.extensions.navigation import DEVICE
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.noisy import key_of, normals_at_start
 
@@ -57,6 +58,8 @@ class IMU(MeasuringPart):
     """
 
     type: ClassVar[str] = "imu"
+    device: ClassVar[str] = f"{DEVICE}.imu"
+    linear: ClassVar[bool] = False
     every_feature: ClassVar[tuple[str, ...]] = (*NOISES, HANDED)
 
     place: Any = number((3,), "m", (0.0, 0.0, 0.0))
@@ -83,7 +86,7 @@ class IMU(MeasuringPart):
         return (*acting, HANDED) if self.is_handed else acting
 
     def device_in(self, aligned: bool) -> Any:
-        return f"imu:{','.join(self.chosen)}"
+        return f"{self.device}:{','.join(self.chosen)}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Place and noises, the keys of the random numbers, and the biases of the start in the rows of its memory.

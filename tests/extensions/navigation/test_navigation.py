@@ -10,13 +10,13 @@ import pytest
 from scipy.stats import chi2
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.navigation.twin import dvl as twin_dvl
 from lgvi_warp.physics.terms.noisy import channel
-from lgvi_warp.reference.control import dvl as twin_dvl
 from lgvi_warp.reference.control.altimeter import Ground
 from lgvi_warp.reference.control.readings import attitude
 from tests.conftest import ROOT
 from tests.control.bench import measured, scene
-from tests.support.navigating import (
+from tests.extensions.navigation.navigating import (
     BELIEFS,
     LOG,
     ON_BOARD,

@@ -12,7 +12,7 @@ from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.summaries import Rows, Summarized
 
-# States of the filter: what NEES is of (see lgvi_warp/control/error_state_filter.py).
+# States of the filter: what NEES is of (see control/error_state_filter.py).
 STATES = 15
 NEEDED = ("nees", "nis", "nis_count")
 

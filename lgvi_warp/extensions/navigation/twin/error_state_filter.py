@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.extensions.navigation.twin.dvl import beams
 from lgvi_warp.reference.control import Measurement, Part
-from lgvi_warp.reference.control.dvl import beams
 from lgvi_warp.reference.control.readings import heading, turn_to
 from lgvi_warp.reference.rotation import Array, exp, hat, norm
 

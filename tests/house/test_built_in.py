@@ -19,6 +19,7 @@ EVERYWHERE = {"weight", "restoring", "control_wrench"}
 # A law whose twin is the user's function.
 NO_TWIN = {"callback"}
 GUIDE = ROOT / "docs" / "guide" / "terms"
+LAWS = lw.laws.ControlLaw.kinds
 PARTS = {word: kind for base in SECTIONS.values() for word, kind in base.kinds.items()}
 
 
@@ -27,9 +28,11 @@ def built_in(kinds):
     return sorted(word for word, kind in kinds.items() if kind.__module__.startswith("lgvi_warp."))
 
 
-def twins(package):
-    """Names of classes in lgvi_warp.reference."""
-    folder = import_module(f"lgvi_warp.reference.{package}")
+def twins(package, kind):
+    """Names of classes in the folder of twins that a class belongs to: that of its extension, or of lgvi_warp.reference."""
+    home = kind.__module__.split(".")
+    own = ".".join([*home[:3], "twin"]) if home[1] == "extensions" else f"lgvi_warp.reference.{package}"
+    folder = import_module(own)
     modules = (import_module(f"{folder.__name__}.{module.name}") for module in iter_modules(folder.__path__))
     return {name for module in modules for name in vars(module)}
 
@@ -38,7 +41,7 @@ def twins(package):
 def test_a_force_has_its_twin_case_page_and_public_name(word):
     kind = terms.TYPES[word]
     assert kind.__name__ in lw.terms.__all__, "name it in lgvi_warp/terms.pyi"
-    assert kind.__name__ in twins("terms"), f"write its twin: class {kind.__name__} in lgvi_warp/reference/terms"
+    assert kind.__name__ in twins("terms", kind), f"write its twin: class {kind.__name__} in lgvi_warp/reference/terms"
     tested = {type(term).type for case in CASES.values() for term in case.terms} | EVERYWHERE
     assert word in tested, "add a case to tests/laws/cases.py"
     assert (GUIDE / f"{word}.md").exists(), f"write docs/guide/terms/{word}.md"
@@ -47,12 +50,16 @@ def test_a_force_has_its_twin_case_page_and_public_name(word):
 
 @pytest.mark.parametrize("word", built_in(PARTS))
 def test_a_part_of_a_controller_has_its_twin_and_public_name(word):
-    name = PARTS[word].__name__
+    kind, name = PARTS[word], PARTS[word].__name__
     assert name in lw.control.__all__, "name it in lgvi_warp/control/__init__.pyi"
-    assert name in twins("control") or word in NO_TWIN, f"write its twin: class {name} in lgvi_warp/reference/control"
+    twin = f"write its twin: class {name} in lgvi_warp/reference/control"
+    assert word in NO_TWIN or name in twins("control", kind), twin
 
 
-@pytest.mark.parametrize("word", built_in(lw.laws.ControlLaw.kinds))
+# Laws of an extension are tested in tests/extensions.
+@pytest.mark.parametrize(
+    "word", [word for word in built_in(LAWS) if LAWS[word].__module__.startswith("lgvi_warp.control.")]
+)
 def test_a_law_of_a_controller_is_tested(word):
     assert word in ACTING or word in NO_TWIN, "add numbers with which it acts to ACTING of tests/control/test_laws.py"
 

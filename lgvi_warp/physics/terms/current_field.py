@@ -13,7 +13,7 @@ from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults, ragged
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 from lgvi_warp.physics.terms.events import Outside
-from lgvi_warp.physics.terms.in_files import InFile
+from lgvi_warp.physics.terms.in_files import InFile, numbers_in
 
 OUTSIDE = ("hold", "stop")
 # Numbers that are those of a data set.
@@ -142,7 +142,7 @@ class CurrentField(InFile, Term):
         """
         wanted = {"origin": origin, "start": start, "region": region, "speed": speed, "duration": duration,
                   "variables": variables, "spacing": spacing, "fill": fill, "checksum": checksum}  # fmt: skip
-        numbers = cls._read_file(source, wanted, outside=outside, around=around)
+        numbers = numbers_in(source, cls, wanted, outside=outside, around=around)
         known = {key: getattr(numbers, key) for key in OF_DATA}
         return _with_data(cls(**known, outside=outside, scenario=scenario, name=name), numbers.data)
 

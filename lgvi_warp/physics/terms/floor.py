@@ -14,7 +14,7 @@ from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, own
 from lgvi_warp.physics.terms.events import Box, Event
-from lgvi_warp.physics.terms.in_files import InFile
+from lgvi_warp.physics.terms.in_files import InFile, numbers_in
 
 # Depths between which the box of a grid lies [m]: beyond any sea.
 ABOVE, BELOW = -1e5, 1e5
@@ -108,7 +108,7 @@ class Floor(InFile, Event):
         """
         wanted = {"origin": origin, "region": region, "spacing": spacing, "variable": variable, "positive": positive,
                   "fill": fill}  # fmt: skip
-        numbers = cls._read_file(file, wanted)
+        numbers = numbers_in(file, cls, wanted)
         at = {"depth": numbers.depth, "origin": numbers.origin, "spacing": numbers.spacing}
         return cls(**at, clearance=clearance, name=name)
 

@@ -7,8 +7,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from lgvi_warp.common import extensions
-from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.errors import Faults, SceneError
 
 
 class InFile:
@@ -22,7 +21,7 @@ class InFile:
     @classmethod
     def of_file(cls) -> Any:
         """Return the class whose fields a table with the key `file` may have; None without the extension that reads it."""
-        return extensions.load("requests", cls.type)
+        return _held("requests", cls.type)
 
     @classmethod
     def of_table(cls, where: str, table: Mapping[str, Any]) -> Self:
@@ -38,7 +37,7 @@ class InFile:
         Raises:
             SceneError: As that method.
         """
-        fields = dataclasses.fields(_known(cls.of_file(), cls.type))
+        fields = dataclasses.fields(_known(cls.of_file()))
         values = {key: value for key, value in table.items() if key != "type"}
         faults = Faults()
         faults.keys(where, values, [*(item.name for item in fields), *cls.of_file_besides])
@@ -53,15 +52,22 @@ class InFile:
         except SceneError as error:
             raise error.prefixed(f"{where}.") from error
 
-    @classmethod
-    def _read_file(cls, source: Any, wanted: Mapping[str, Any], **others: Any) -> Any:
-        """Numbers of a file or a data set, as the extension reads them."""
-        request = _known(cls.of_file(), cls.type)(**wanted)
-        return _known(extensions.load("readers", cls.type), cls.type)(source, request, **others)
+
+def numbers_in(source: Any, kind: type[InFile], wanted: Mapping[str, Any], **others: Any) -> Any:
+    """Read the numbers of a file or of a data set, as they are wanted, by the extension that has a reader."""
+    request = _known(kind.of_file())(**wanted)
+    return _held("readers", kind.type)(source, request, **others)
 
 
-def _known(found: Any, word: str) -> Any:
-    """What an extension has; refuse the file where none has it."""
-    if found is None:
-        raise refusal("file", word, "is of a kind that no installed extension reads", "install lgvi-warp anew")
-    return found
+def _held(table: str, word: str) -> Any:
+    """Return what an extension has under a word; None where none has it."""
+    from lgvi_warp.common import extensions  # a scene without a file does not load it
+
+    return extensions.load(table, word)
+
+
+def _known(request: Any) -> Any:
+    """Refuse a file that no installed extension reads."""
+    if request is None:
+        raise SceneError(["file: no installed extension reads such a file. Install lgvi-warp anew."])
+    return request

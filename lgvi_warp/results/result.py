@@ -218,10 +218,10 @@ class Result(Summarized):
     else:
 
         def __getattr__(self, name):
-            # A signal of an extension.
-            if not name.startswith("_") and name in SIGNALS:
-                return self._kept(name)
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            # A signal of an extension; else the error of a property that has no value, or the usual one.
+            if name.startswith("_") or hasattr(type(self), name) or name not in SIGNALS:
+                return object.__getattribute__(self, name)
+            return self._kept(name)
 
     @functools.cached_property
     def quaternion_wxyz(self) -> np.ndarray:

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from lgvi_kernels.advance.noting import ALL_NOTES, BITS_OF_ROWS, NOTED, bit
 from lgvi_warp.control.base import Bus
@@ -56,6 +57,7 @@ def test_order_and_shapes():
     assert not any(has_shape("actuator", shape) for shape in ((), (0,), (2, 2)))
 
 
+@pytest.mark.needs("navigation")
 def test_the_page_lists_all():
     rows = re.findall(r"^\| `(\w+)` \| (\(.*?\)) \| (.*?) \|", PAGE.read_text(), re.MULTILINE)
     assert [name for name, _, _ in rows] == list(SIGNALS)

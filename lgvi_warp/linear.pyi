@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The public names of this door, one a line.
 
-from lgvi_warp.extensions.others.predictive.mpc import mpc as mpc
+from lgvi_warp.extensions.others.control.mpc import mpc as mpc
 from lgvi_warp.robustness.linear.linearize import LinearModel as LinearModel
 from lgvi_warp.robustness.linear.linearize import linearize as linearize
 from lgvi_warp.robustness.linear.lqr import Regulator as Regulator

@@ -31,4 +31,4 @@ from lgvi_warp.engine.host_callback import CallbackInput as CallbackInput
 from lgvi_warp.extensions.navigation.control.dvl import DVL as DVL
 from lgvi_warp.extensions.navigation.control.error_state_filter import ErrorStateFilter as ErrorStateFilter
 from lgvi_warp.extensions.navigation.control.imu import IMU as IMU
-from lgvi_warp.extensions.others.predictive.linear_mpc import LinearMPC as LinearMPC
+from lgvi_warp.extensions.others.control.linear_mpc import LinearMPC as LinearMPC

@@ -29,7 +29,7 @@ OF_TESTS = {
     "control/test_bad_sensors.py": "docs/controllers/faults.md docs/controllers/sensors.md",
     "extensions/learning/test_gym.py": "docs/controllers/gym.md",
     "control/test_own_loop.py": "docs/controllers/bring_your_own_loop.md docs/controllers/learn_depth_keeping.md",
-    "control/test_navigation.py": "docs/controllers/navigation.md",
+    "extensions/navigation/test_navigation.py": "docs/controllers/navigation.md",
     "studies/test_derivatives.py": "docs/guide/derivatives.md",
     "studies/test_estimating.py": "docs/guide/least_cost.md",
     "studies/test_margins.py": "docs/controllers/margins.md docs/guide/worst_case.md",

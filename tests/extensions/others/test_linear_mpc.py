@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import lsq_linear, nnls
 
 import lgvi_warp as lw
-from lgvi_warp.extensions.others.predictive.linear_mpc import COORDINATES
+from lgvi_warp.extensions.others.control.linear_mpc import COORDINATES
 from lgvi_warp.extensions.others.twin import linear_mpc
 from lgvi_warp.robustness.linear.bench import COORDINATES as OF_MODELS
 from tests.support.loops import torpedo, twin_states

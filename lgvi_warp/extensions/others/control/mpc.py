@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.extensions.others.predictive.linear_mpc import COORDINATES, LinearMPC
+from lgvi_warp.extensions.others.control.linear_mpc import COORDINATES, LinearMPC
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 from lgvi_warp.robustness.linear.linearize import LinearModel
 from lgvi_warp.robustness.linear.lqr import lqr

@@ -38,11 +38,11 @@ def built_in(folder, name):
     """
     name, chooses, features = name.partition(":")
     path = name if "." in name else f"{__name__}.{folder}.{name}"
-    module = import_module(path) if all(map(str.isidentifier, path.split("."))) and found(path) else None
+    module = import_module(path) if all(map(str.isidentifier, path.split("."))) and is_module(path) else None
     return module.made(tuple(filter(None, features.split(",")))) if module and chooses else module
 
 
-def found(path):
+def is_module(path):
     """Whether there is a module at a path."""
     try:
         return find_spec(path) is not None

@@ -71,7 +71,7 @@ def _noted(group: str, word: str, kinds: Mapping[str, Field], rows: Mapping[str,
     return tuple(Signal(field(kind), group, row) for kind, row in rows.items())
 
 
-class Signals(registry.Kinds):
+class SignalTable(registry.Kinds):
     """Signals by name. A part of an extension adds its own, when its module is imported, by `add_signals`."""
 
     def _import(self, word: object) -> None:
@@ -80,7 +80,7 @@ class Signals(registry.Kinds):
             super()._import(word)
 
 
-SIGNALS = Signals("", {}, "signals")
+SIGNALS = SignalTable("", {}, "signals")
 # Groups of signals that only some controllers have: what a scene lacks that has not, and the remedy.
 _SOME: dict[str, tuple[str, str]] = {}
 

@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Processes that tests start load the bytecode that others left.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run quick test test-long coverage mutants lint docs gallery pictures bench bench-peers bench-loops clean
+.PHONY: run quick test test-core test-long coverage mutants lint docs gallery pictures bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -17,6 +17,10 @@ quick: $(VENV)/.dev
 
 test: lint
 	$(BIN)/python -m pytest -n auto --dist worksteal -m "not slow"
+
+# Tests of the core in a copy of the tree without lgvi_warp/extensions.
+test-core: $(VENV)/.dev
+	$(BIN)/python -m tests.support.core_alone
 
 test-long: $(VENV)/.dev
 	$(BIN)/python -m pytest -n auto --dist worksteal

@@ -7,7 +7,8 @@ import numpy as np
 
 import lgvi_warp as lw
 from benchmarks.coupled_problems import GENERAL
-from lgvi_warp.physics import notation, terms
+from lgvi_warp import terms
+from lgvi_warp.physics import notation
 
 GRAVITY = 9.8
 START = lw.Start([0.0, 0.0, 10.0], rotation_vector=[1.0, 2.0, 3.0], velocity_inertial=[0.3, 0.2, 0.1],

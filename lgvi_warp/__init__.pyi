@@ -33,6 +33,7 @@ from lgvi_warp.common.errors import SceneError as SceneError
 from lgvi_warp.common.status import Status as Status
 from lgvi_warp.common.status import Warnings as Warnings
 from lgvi_warp.control.controller import Controller as Controller
+from lgvi_warp.extensions.others.assimilation.assimilate import assimilate as assimilate
 from lgvi_warp.methods.method import Method as Method
 from lgvi_warp.methods.saveat import SaveAt as SaveAt
 from lgvi_warp.physics.vehicle import Vehicle as Vehicle
@@ -49,7 +50,6 @@ from lgvi_warp.statistics.until import Until as Until
 from lgvi_warp.store.export import export as export
 from lgvi_warp.store.open import open_run as open_run
 from lgvi_warp.store.settings import Store as Store
-from lgvi_warp.uncertainty.assimilation.assimilate import assimilate as assimilate
 from lgvi_warp.uncertainty.derivatives.derivatives import derivatives as derivatives
 from lgvi_warp.uncertainty.estimating.estimate import estimate as estimate
 from lgvi_warp.uncertainty.rare.rare_event import rare_event as rare_event

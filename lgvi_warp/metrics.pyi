@@ -2,6 +2,10 @@
 # The public names of this door, one a line.
 
 from lgvi_warp.criteria.risk import CVaR as CVaR
+from lgvi_warp.extensions.navigation.consistency import Consistency as Consistency
+from lgvi_warp.extensions.navigation.consistency import consistency as consistency
+from lgvi_warp.extensions.navigation.metrics import NEES as NEES
+from lgvi_warp.extensions.navigation.metrics import NIS as NIS
 from lgvi_warp.statistics.metrics.actuator_metrics import ActuatorEnergy as ActuatorEnergy
 from lgvi_warp.statistics.metrics.actuator_metrics import CustomMetric as CustomMetric
 from lgvi_warp.statistics.metrics.actuator_metrics import Effort as Effort
@@ -10,8 +14,6 @@ from lgvi_warp.statistics.metrics.actuator_metrics import SaturationShare as Sat
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure as TimeToFailure
 from lgvi_warp.statistics.metrics.actuator_metrics import Travel as Travel
 from lgvi_warp.statistics.metrics.dock_contact import DockContact as DockContact
-from lgvi_warp.statistics.metrics.filter_metrics import NEES as NEES
-from lgvi_warp.statistics.metrics.filter_metrics import NIS as NIS
 from lgvi_warp.statistics.metrics.nearest import Nearest as Nearest
 from lgvi_warp.statistics.metrics.tracking_metrics import IAE as IAE
 from lgvi_warp.statistics.metrics.tracking_metrics import ISE as ISE
@@ -26,5 +28,3 @@ from lgvi_warp.statistics.metrics.tracking_metrics import RMSError as RMSError
 from lgvi_warp.statistics.metrics.tracking_metrics import SettlingTime as SettlingTime
 from lgvi_warp.statistics.metrics.tracking_metrics import SteadyStateError as SteadyStateError
 from lgvi_warp.statistics.metrics.tracking_metrics import Undershoot as Undershoot
-from lgvi_warp.uncertainty.consistency import Consistency as Consistency
-from lgvi_warp.uncertainty.consistency import consistency as consistency

@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 # The public names of this door, one a line.
 
-from lgvi_warp.physics.terms.ballast import Ballast as Ballast
-from lgvi_warp.physics.terms.buoyancy_engine import BuoyancyEngine as BuoyancyEngine
+from lgvi_warp.extensions.gliders.terms.ballast import Ballast as Ballast
+from lgvi_warp.extensions.gliders.terms.buoyancy_engine import BuoyancyEngine as BuoyancyEngine
+from lgvi_warp.extensions.gliders.terms.moving_mass import MovingMass as MovingMass
+from lgvi_warp.extensions.gliders.terms.polar import Polar as Polar
+from lgvi_warp.extensions.gliders.terms.stratification import Stratification as Stratification
+from lgvi_warp.extensions.gliders.terms.surface_buoyancy import SurfaceBuoyancy as SurfaceBuoyancy
 from lgvi_warp.physics.terms.control_fins import ControlFins as ControlFins
 from lgvi_warp.physics.terms.control_wrench import ControlWrench as ControlWrench
 from lgvi_warp.physics.terms.cross_flow import CrossFlow as CrossFlow
@@ -19,11 +23,7 @@ from lgvi_warp.physics.terms.hull_loads import HullLoads as HullLoads
 from lgvi_warp.physics.terms.hydrostatics import Restoring as Restoring
 from lgvi_warp.physics.terms.hydrostatics import Weight as Weight
 from lgvi_warp.physics.terms.lift import BodyLift as BodyLift
-from lgvi_warp.physics.terms.moving_mass import MovingMass as MovingMass
-from lgvi_warp.physics.terms.polar import Polar as Polar
 from lgvi_warp.physics.terms.quadratic_form import QuadraticForm as QuadraticForm
-from lgvi_warp.physics.terms.stratification import Stratification as Stratification
-from lgvi_warp.physics.terms.surface_buoyancy import SurfaceBuoyancy as SurfaceBuoyancy
 from lgvi_warp.physics.terms.tether import Tether as Tether
 from lgvi_warp.physics.terms.thrusters import Thrusters as Thrusters
 from lgvi_warp.physics.terms.waves import Waves as Waves

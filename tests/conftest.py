@@ -53,6 +53,13 @@ def pytest_configure(config):
     config.stash[SKIPPED_GUARDS] = {}
 
 
+def pytest_runtest_setup(item):
+    """Skip what needs an extension in a copy of the tree that has none (tests/support/core_alone.py)."""
+    needed = [name for mark in item.iter_markers("needs") for name in mark.args]
+    if absent := [name for name in needed if not (ROOT / "lgvi_warp" / "extensions" / name).is_dir()]:
+        pytest.skip(f"without {', '.join(absent)}")
+
+
 def pytest_itemcollected(item):
     """Let reports say which tests are guards: `guard` is counted if skipped, `guard(in_ci=True)` fails there."""
     if mark := item.get_closest_marker("guard"):

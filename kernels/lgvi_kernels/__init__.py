@@ -32,13 +32,22 @@ from types import ModuleType
 def built_in(folder, name):
     """The device code of a name in a folder ("laws", "stops"), imported when it is asked for first; None for no such name.
 
+    A name with points is the path of a module elsewhere: that of an extension.
     Of "thrusters_with:driven,table" it is what that module's `made` returns for the features ("driven", "table"), of "imu:"
     for none.
     """
     name, chooses, features = name.partition(":")
-    path = f"{__name__}.{folder}.{name}"
-    module = import_module(path) if name.isidentifier() and find_spec(path) else None
+    path = name if "." in name else f"{__name__}.{folder}.{name}"
+    module = import_module(path) if all(map(str.isidentifier, path.split("."))) and is_module(path) else None
     return module.made(tuple(filter(None, features.split(",")))) if module and chooses else module
+
+
+def is_module(path):
+    """Whether there is a module at a path."""
+    try:
+        return find_spec(path) is not None
+    except ModuleNotFoundError:  # nor the package that it would be in
+        return False
 
 
 def device(path, features, **functions):

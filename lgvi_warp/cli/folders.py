@@ -52,7 +52,7 @@ class Content:
 
 # Study -> name of the public class of what it found.
 CLASSES = {"tradeoff": "Tradeoff", "stability": "StabilityMap", "rare": "RareEvent", "derivatives": "Derivatives",
-           "worst_case": "WorstCase", "estimate": "Estimated", "assimilate": "Assimilated", "tune_gains": "Tuned"}  # fmt: skip
+           "worst_case": "WorstCase", "estimate": "Estimated", "tune_gains": "Tuned"}  # fmt: skip
 
 
 def _study(kind: str) -> Any:
@@ -70,15 +70,16 @@ def _study(kind: str) -> Any:
 
         return Trim
     from lgvi_warp import studies
+    from lgvi_warp.common import extensions
 
-    return getattr(studies, CLASSES[kind])
+    return getattr(studies, CLASSES[kind]) if kind in CLASSES else extensions.load("studies", kind)
 
 
 def contents(folder: Path) -> list[Content]:
     """Look for numbers in a folder."""
-    from lgvi_warp.criteria.files import STUDY_FILES
+    from lgvi_warp.criteria.files import study_files
 
-    patterns = {"result": "result*.npz", **STUDY_FILES}
+    patterns = {"result": "result*.npz", **study_files()}
     studies: list[Content] = []
     if folder.suffix != ".zarr" and not folder.exists():
         raise SceneError([f"{folder}: is not there; give the folder of a run or of a study"])

@@ -12,7 +12,7 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
     """What a door assigns to `__all__`, `__getattr__` and `__dir__`.
 
     NumPy, SciPy and Warp take longer to import than a script may take that only asks for help or a version: so nothing is
-    imported before its name is used.
+    imported before its name is used. `dir` lists, in addition, classes of installed extensions (lgvi_warp.common.extensions).
 
     door: the module's name; the stub stands beside its file, with one line "from module import name as public_name" a name.
     """
@@ -25,12 +25,18 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
         for alias in line.names
     }
 
+    table = f"lw.{door.partition('.')[2]}"
+
     def find(name: str) -> Any:
         if name not in places:
+            from lgvi_warp.common.extensions import load
             from lgvi_warp.common.nearest import nearest
 
+            # A class: what else is asked for is a module of a room, mostly.
+            if name[:1].isupper() and (kind := load(table, name)) is not None:
+                return kind
             # What asks for private names asks whether a module has them.
-            near = None if name.startswith("_") else nearest(name, tuple(sorted(places)))
+            near = None if name.startswith("_") else nearest(name, tuple(listed()))
             remedy = f"; did you mean {near!r}?" if near else ""
             raise AttributeError(f"module {door!r} has no attribute {name!r}{remedy}")
         home, name_there = places[name]
@@ -43,4 +49,9 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
         setattr(module, name, value)
         return value
 
-    return sorted(places), find, lambda: sorted(places)
+    def listed() -> list[str]:
+        from lgvi_warp.common.extensions import words
+
+        return sorted({*places, *words(table)})
+
+    return sorted(places), find, listed

@@ -7,7 +7,7 @@ import contextlib
 import functools
 import math
 import reprlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -258,8 +258,10 @@ class Faults:
 
     def choice(self, key: str, value: Any, known: Iterable[Any]) -> bool:
         """Check that a value is one of those allowed; note a fault otherwise."""
-        known = list(known)
-        good = among(value, known)
+        # Of tables that extensions add to no list is made where the value is in them.
+        looked_up = isinstance(known, Container) and not isinstance(known, Sequence)
+        good = looked_up and isinstance(value, str) and value in known
+        good = good or among(value, known := list(known))
         if not good:
             self.add(key, value, "is not known", lambda: closest(value, known))
         return good

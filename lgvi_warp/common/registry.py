@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of classes by the word that a scene file gives them. Each class adds itself when it is made."""
+"""Tables of classes by the word that a scene file gives them. Each class adds itself when it is made.
+
+Words that the core does not know are looked up among those of extensions.
+"""
 
 from __future__ import annotations
 
@@ -14,45 +17,64 @@ class Kinds(MutableMapping[str, Any]):
     """Classes by their word. Those of a package are imported when their word is looked up: a scene names few of them.
 
     modules: modules of the package, and the words of the classes that each defines. They come first in lists. For a word
-        that is not among them all modules are imported.
+        that is not among them, nor among those of extensions, all modules are imported.
+    package: "" for a table that others fill.
+    table: the name of this table in an extension's `HOLDS`; empty, the default, for one that extensions add nothing to.
     """
 
-    def __init__(self, package: str, modules: Mapping[str, Sequence[str]]):
-        self.package = package
+    def __init__(self, package: str, modules: Mapping[str, Sequence[str]], table: str = ""):
+        self.package, self.table = package, table
         self.homes = {word: f"{package}.{module}" for module, words in modules.items() for word in words}
-        self._classes, self._all = dict[str, Any](), False
+        self.loaded, self._all = dict[str, Any](), not package
 
-    def _import(self, word: object = None) -> None:
-        """Import the module of a word; without one, or of another word, all modules."""
-        if isinstance(word, str) and word in self.homes:
+    def _import(self, word: object) -> None:
+        """Import the module of a word; of one that no table of modules has, all modules."""
+        if not isinstance(word, str) or word in self.loaded:
+            return
+        if word in self.homes:
             import_module(self.homes[word])
-        elif not self._all:
+        elif not (self.table and _extensions().load(self.table, word)):
+            self._import_all()
+
+    def _import_all(self) -> None:
+        """Import all modules of the package."""
+        if not self._all:
             self._all = True
             load_modules(import_module(self.package))
 
     def __getitem__(self, word: str) -> Any:
-        if word not in self._classes:
-            self._import(word)
-        return self._classes[word]
+        self._import(word)
+        return self.loaded[word]
 
     def __setitem__(self, word: str, kind: Any) -> None:
-        self._classes[word] = kind
+        self.loaded[word] = kind
 
     def __delitem__(self, word: str) -> None:
-        del self._classes[word]
+        del self.loaded[word]
 
     def __contains__(self, word: object) -> bool:
-        if word not in self.homes and word not in self._classes:
+        if word not in self.homes:
             self._import(word)
-        return word in self.homes or word in self._classes
+        return word in self.homes or word in self.loaded
 
     def __iter__(self) -> Iterator[str]:
-        self._import()
-        return iter(self.homes | self._classes)
+        self._import_all()
+        others = _extensions().words(self.table) if self.table else ()
+        return iter(self.homes | self.loaded | dict.fromkeys(others))
 
     def __len__(self) -> int:
-        self._import()
-        return len(self.homes | self._classes)
+        return sum(1 for _ in self)
+
+    def setdefault(self, word: str, kind: Any = None) -> Any:
+        # A class of the core is looked up nowhere else: while the core is imported no extension is.
+        if kind.__module__.startswith(f"{self.package}."):
+            return self.loaded.setdefault(word, kind)
+        return super().setdefault(word, kind)
+
+
+def _extensions() -> ModuleType:
+    """What looks words up in extensions: loaded for a word that the core does not know."""
+    return import_module("lgvi_warp.common.extensions")
 
 
 def add(known: MutableMapping[str, Any], kind: type, attribute: str = "type") -> bool:

@@ -9,14 +9,10 @@ from lgvi_warp.control.complementary_filter import ComplementaryFilter as Comple
 from lgvi_warp.control.dead_reckoning import DeadReckoning as DeadReckoning
 from lgvi_warp.control.depth_pid import DepthPID as DepthPID
 from lgvi_warp.control.docking import Docking as Docking
-from lgvi_warp.control.dvl import DVL as DVL
-from lgvi_warp.control.error_state_filter import ErrorStateFilter as ErrorStateFilter
 from lgvi_warp.control.fault import Fault as Fault
 from lgvi_warp.control.heading_pid import HeadingPID as HeadingPID
 from lgvi_warp.control.heading_smc import HeadingSMC as HeadingSMC
 from lgvi_warp.control.heave_pid import HeavePID as HeavePID
-from lgvi_warp.control.imu import IMU as IMU
-from lgvi_warp.control.linear_mpc import LinearMPC as LinearMPC
 from lgvi_warp.control.loiter import Loiter as Loiter
 from lgvi_warp.control.low_pass import LowPass as LowPass
 from lgvi_warp.control.matrix import AllocationMatrix as AllocationMatrix
@@ -32,3 +28,7 @@ from lgvi_warp.control.state_feedback import StateFeedback as StateFeedback
 from lgvi_warp.control.trajectory import Trajectory as Trajectory
 from lgvi_warp.control.waypoints import Waypoints as Waypoints
 from lgvi_warp.engine.host_callback import CallbackInput as CallbackInput
+from lgvi_warp.extensions.navigation.control.dvl import DVL as DVL
+from lgvi_warp.extensions.navigation.control.error_state_filter import ErrorStateFilter as ErrorStateFilter
+from lgvi_warp.extensions.navigation.control.imu import IMU as IMU
+from lgvi_warp.extensions.others.control.linear_mpc import LinearMPC as LinearMPC

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Collection, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
@@ -20,7 +20,7 @@ from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, word_of
 
 if TYPE_CHECKING:
-    from lgvi_warp.ocean.places import LocalPlane
+    from lgvi_warp.common.places import LocalPlane
 
 # What guidance may give, and laws may need.
 WISHES = ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
@@ -236,9 +236,9 @@ class Part(Term):
 AnyPart = TypeVar("AnyPart", bound=Part)
 
 
-def _built_in(*words: str) -> registry.Kinds:
-    """The parts of these types, each in the file of its name."""
-    return registry.Kinds("lgvi_warp.control", {word: [word] for word in words})
+def _built_in(section: str, *words: str) -> registry.Kinds:
+    """The parts of these types in a list of a controller, each in the file of its name."""
+    return registry.Kinds("lgvi_warp.control", {word: [word] for word in words}, section)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -246,16 +246,16 @@ class MeasuringPart(Part):
     """A sensor or an estimator: changes what the controller takes for the motion."""
 
     section: ClassVar[str] = "sensors"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
+    kinds: ClassVar[registry.Kinds] = _built_in(
+        "sensors",
         "altimeter",
         "complementary_filter",
-        "dvl",
-        "error_state_filter",
-        "imu",
         "sensor",
         "dead_reckoning",
         "low_pass",
     )
+    # Whether linear models of a loop may have it.
+    linear: ClassVar[bool] = True
     # Rows of the bus with what it believes, beside the measurement.
     belief_rows: ClassVar[int] = 0
 
@@ -288,8 +288,8 @@ class Guidance(Part):
     """A part that says which motion is wanted."""
 
     section: ClassVar[str] = "guidance"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
-        "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
+    kinds: ClassVar[registry.Kinds] = _built_in(
+        "guidance", "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
 
     @property
@@ -306,13 +306,13 @@ class ControlLaw(Part):
     """
 
     section: ClassVar[str] = "laws"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
+    kinds: ClassVar[registry.Kinds] = _built_in(
+        "laws",
         "callback",
         "depth_pid",
         "heading_pid",
         "heading_smc",
         "heave_pid",
-        "linear_mpc",
         "policy",
         "pose_pid",
         "pose_smc",
@@ -437,7 +437,7 @@ class Allocation(Part):
     """
 
     section: ClassVar[str] = "allocation"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("pseudo_inverse", "bounded_least_squares", "matrix")
+    kinds: ClassVar[registry.Kinds] = _built_in("allocation", "pseudo_inverse", "bounded_least_squares", "matrix")
     # The term that takes the commands, the faults of its channels that are known, and which of X Y Z K M N laws ask for (6,);
     # set for a part of a scene.
     actuator: ClassVar[Any] = None
@@ -521,7 +521,7 @@ class Sending(Part):
     """A part that changes commands on their way to the actuators."""
 
     section: ClassVar[str] = "faults"
-    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("fault")
+    kinds: ClassVar[registry.Kinds] = _built_in("faults", "fault")
 
 
 # The bases of parts by the list that they stand in, in the order in which their roles act.

@@ -28,7 +28,7 @@ from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 from lgvi_warp.physics.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from lgvi_warp.ocean.places import LocalPlane
+    from lgvi_warp.common.places import LocalPlane
 
 # A part of a component below this is round-off, when it is asked what actuators can make.
 SPANNED = 1e-8

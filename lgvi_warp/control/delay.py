@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common import registry
 from lgvi_warp.control.base import Part
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
@@ -24,7 +25,7 @@ class Delay(Part):
     """
 
     device: ClassVar[str] = "delay"
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[registry.Kinds] = registry.Kinds("", {})
 
     period: float = 1.0
     delay: Any = number((), "s", 0.0, least=0.0)

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from lgvi_warp.common import registry
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.fields import FIELDS, TABLE, Field
@@ -59,29 +60,8 @@ _REFERENCE = _KINDS | {
 }
 
 
-# Rows of what an estimator believes, as lgvi_kernels/laws/control/error_state_filter.py writes them.
-_BLOCKS = "position [m], velocity [m/s], attitude [rad], biases of accelerometer [m/s^2] and gyroscope [rad/s]"
-_SLOTS = "four beams [m/s], fix and delayed fix, each three [m], depth [m], heading [rad]"
+# The group of signals that lie in the rows of what an estimator believes: an estimator adds its own.
 ESTIMATE = "estimate"
-_OF_ESTIMATOR = (
-    Signal(
-        Field("estimate_sigma", (15,), "1", f"standard deviations that the filter believes: {_BLOCKS}"), ESTIMATE, 0
-    ),
-    Signal(
-        Field("estimate_bias", (6,), "1", "estimated biases of accelerometer [m/s^2] and gyroscope [rad/s]"),
-        ESTIMATE,
-        15,
-    ),
-    Signal(Field("nees", (), "1", "e^T P^-1 e of the 15 errors of the estimate, by the truth"), ESTIMATE, 21),
-    Signal(Field("nis", (), "1", "sum of the squared innovations over their variances at the last tick"), ESTIMATE, 22),
-    Signal(Field("nis_count", (), "1", "how many innovations that are"), ESTIMATE, 23),
-    Signal(Field("innovation", (12,), "1", f"innovations of the last tick, 0 where none: {_SLOTS}"), ESTIMATE, 24),
-    Signal(
-        Field("innovation_sigma", (12,), "1", f"standard deviations that these should have: {_SLOTS}"),
-        ESTIMATE,
-        36,
-    ),
-)
 
 
 def _noted(group: str, word: str, kinds: Mapping[str, Field], rows: Mapping[str, int]) -> tuple[Signal, ...]:
@@ -91,28 +71,67 @@ def _noted(group: str, word: str, kinds: Mapping[str, Field], rows: Mapping[str,
     return tuple(Signal(field(kind), group, row) for kind, row in rows.items())
 
 
-SIGNALS: dict[str, Signal] = {
-    signal.field.name: signal
-    for signal in (
-        *_OF_ACTUATORS,
-        *_noted("measured", "measured", _KINDS, _MEASURED),
-        *_noted("reference", "wanted", _REFERENCE, _WANTED),
-        *_OF_ESTIMATOR,
-        Signal(_OF_ITERATIONS, UNCONVERGED),
-        Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""),
-    )
-}
-# Names of those that a filter alone has.
-OF_A_FILTER = tuple(signal.field.name for signal in _OF_ESTIMATOR)
-# Names of all samples that a run may save, in their order, and of those that a file may hold.
-SAVED = (*FIELDS, *SIGNALS)
-IN_FILES = (*SAVED, "quaternion_wxyz", "energy")
+class SignalTable(registry.Kinds):
+    """Signals by name. A part of an extension adds its own, when its module is imported, by `add_signals`."""
+
+    def _import(self, word: object) -> None:
+        # No extension is asked for what is no signal.
+        if word not in TABLE:
+            super()._import(word)
+
+
+SIGNALS = SignalTable("", {}, "signals")
+# Groups of signals that only some controllers have: what a scene lacks that has not, and the remedy.
+_SOME: dict[str, tuple[str, str]] = {}
+
+
+def add_signals(*signals: Signal, absent: tuple[str, str] | None = None) -> None:
+    """Add signals to the table.
+
+    absent: Where only some controllers have the group of these signals, what is wrong without it, and the remedy.
+    """
+    for signal in signals:
+        SIGNALS[signal.field.name] = signal
+        if absent:
+            _SOME[signal.group] = absent
+
+
+add_signals(
+    *_OF_ACTUATORS,
+    *_noted("measured", "measured", _KINDS, _MEASURED),
+    *_noted("reference", "wanted", _REFERENCE, _WANTED),
+)
+add_signals(
+    Signal(_OF_ITERATIONS, UNCONVERGED),
+    absent=("is told by parts that iterate, which this controller has not", "leave it out"),
+)
+add_signals(Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""))
+
+
+class Names(Collection[str]):
+    """Names of samples: those of the motion, of all signals, and others. An extension is asked for a name that is none."""
+
+    def __init__(self, *others: str):
+        self._others = others
+
+    def __contains__(self, name: object) -> bool:
+        return name in FIELDS or name in self._others or name in SIGNALS
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*FIELDS, *SIGNALS, *self._others))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+
+# All samples that a run may save, and those that a file may hold.
+SAVED, IN_FILES = Names(), Names("quaternion_wxyz", "energy")
 
 
 def ordered(names: Iterable[str]) -> tuple[str, ...]:
     """Names of samples in the order in which they are saved."""
-    wanted = set(names)
-    return tuple(name for name in SAVED if name in wanted)
+    wanted = {name for name in names if name in SAVED}
+    return tuple(name for name in (*FIELDS, *SIGNALS.loaded) if name in wanted)
 
 
 def saved_fields(controller: Controller | None, accounted: bool = False) -> dict[str, Field]:
@@ -124,20 +143,12 @@ def saved_fields(controller: Controller | None, accounted: bool = False) -> dict
         return fields
     absent = _absent_groups(controller)
     signals = {
-        name: signal.field for name, signal in SIGNALS.items() if name != ENERGY_USED and signal.group not in absent
+        name: signal.field
+        for name, signal in SIGNALS.loaded.items()
+        if name != ENERGY_USED and signal.group not in absent
     }
     channels = sum(count for _, count in controller.bus.commands.values())
     return fields | signals | {name: replace(signals[name], shape=(channels,)) for name in CHANNELS}
-
-
-# Groups of signals that only some controllers have: what a scene lacks that has not, and the remedy.
-_SOME = {
-    ESTIMATE: (
-        "is told by a filter, which this scene has not, or which does not report",
-        'give [[controller.sensors]] type = "error_state_filter" with report = true',
-    ),
-    UNCONVERGED: ("is told by parts that iterate, which this controller has not", "leave it out"),
-}
 
 
 def _absent_groups(controller: Controller) -> set[str]:
@@ -146,11 +157,16 @@ def _absent_groups(controller: Controller) -> set[str]:
     return {group for group, row in rows.items() if row < 0}
 
 
+def field_of(name: str) -> Field:
+    """The field of a sample by its name."""
+    return TABLE[name] if name in TABLE else SIGNALS[name].field
+
+
 def has_shape(name: str, shape: tuple[int, ...]) -> bool:
     """Whether numbers of one vehicle at one time may have this shape, in some scene."""
     if name in CHANNELS:
         return len(shape) == 1 and shape[0] > 0
-    return shape == (TABLE[name] if name in TABLE else SIGNALS[name].field).shape
+    return shape == field_of(name).shape
 
 
 def row_of(name: str, bus: Bus, noted: Mapping[str, int]) -> int:

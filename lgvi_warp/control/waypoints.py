@@ -12,8 +12,8 @@ import numpy as np
 
 from lgvi_warp.common.declared import array, flag, word
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.places import LocalPlane, check_places
 from lgvi_warp.control.base import Guidance, Numbers, Packed, PackingContext
-from lgvi_warp.ocean.places import LocalPlane, check_places
 from lgvi_warp.physics.fields import PLACE_UNIT
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import number

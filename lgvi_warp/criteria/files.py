@@ -14,14 +14,15 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.common import extensions
 from lgvi_warp.common.arguments import explained, path_of
 from lgvi_warp.common.errors import among
 from lgvi_warp.common.files import write_text
 from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_json
 from lgvi_warp.common.tables import write_csv
 
-# Study -> pattern of the names of the files that hold what it found.
-STUDY_FILES = {
+# Study -> pattern of the names of the files that hold what it found; `study_files` has those of extensions too.
+_STUDY_FILES = {
     "tradeoff": "tradeoff.json",
     "sensitivity": "sensitivity.json",
     "stability": "stability*.json",
@@ -31,10 +32,14 @@ STUDY_FILES = {
     "margins": "margins.json",
     "worst_case": "worst_case.json",
     "estimate": "estimate.json",
-    "assimilate": "assimilate.json",
     "tune_gains": "tune_gains.json",
     "trim": "trim.json",
 }
+
+
+def study_files() -> dict[str, str]:
+    """Patterns of the names of the files of each study, those of extensions too."""
+    return _STUDY_FILES | {word: f"{word}.json" for word in extensions.words("studies")}
 
 
 def finite_or_none(value: Any) -> Any:

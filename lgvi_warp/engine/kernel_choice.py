@@ -304,7 +304,7 @@ def _folder_and_roles(term: Term) -> tuple[str, Sequence[str]]:
 
 def is_built_in(module: Any) -> bool:
     """Whether device code is one of the package's own."""
-    return str(getattr(module, "__name__", "")).startswith("lgvi_kernels.")
+    return str(getattr(module, "__name__", "")).startswith(("lgvi_kernels.", "lgvi_warp."))
 
 
 def declared(term: Term, module: Any, given: bool = False) -> tuple[tuple[str, Any], ...]:

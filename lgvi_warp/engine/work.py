@@ -215,7 +215,7 @@ def unpacked(
         # Products of contiguous matrices take half the time, and have the same bits.
         back = np.ascontiguousarray(np.swapaxes(frame.Q, -1, -2))
         turns = {"attitude": lambda R: np.ascontiguousarray(R) @ back}
-        for name in samples.keys() - {"position", *SIGNALS}:
+        for name in samples.keys() - {"position", *SIGNALS.loaded}:
             turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
             samples[name] = turn(samples[name])
     if frame.shifted:
@@ -267,7 +267,7 @@ def slopes_of_samples(
     values = divided(fields, raw, table)
     Q, (dQ, d_origin) = frame.Q, turn
     if frame.turned or dQ.any():
-        for name in slopes.keys() - {"position", *SIGNALS}:
+        for name in slopes.keys() - {"position", *SIGNALS.loaded}:
             if name == "attitude":
                 Qt, dQt = (np.swapaxes(q, -1, -2) for q in (Q, dQ))
                 slopes[name] = slopes[name] @ Qt + values[name] @ dQt

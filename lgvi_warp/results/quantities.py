@@ -16,7 +16,7 @@ from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.common.status import failed
 from lgvi_warp.common.times import rows_at
-from lgvi_warp.control.signals import SAVED
+from lgvi_warp.control.signals import ordered
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.physics.terms.events import from_list as events_of
@@ -289,7 +289,7 @@ class _Samples(dict[str, np.ndarray]):
 
 def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
     """The (samples, members) of a result in the form that a Quantity's function takes."""
-    fields = {name: result.samples[name][when] for name in SAVED if name in result.samples}
+    fields = {name: result.samples[name][when] for name in ordered(result.samples)}
     start = {name: result.samples[name][0] for name in fields}
     known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
     return _Samples(fields, result.time[when], result), known if members is None else members

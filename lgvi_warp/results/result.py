@@ -22,10 +22,10 @@ from lgvi_warp.common.reading import corrupt_file_as_scene_error
 from lgvi_warp.common.status import Status, StatusArray, WarningArray
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.control.controller import terms_of
-from lgvi_warp.control.signals import IN_FILES, SIGNALS
+from lgvi_warp.control.signals import IN_FILES, SIGNALS, field_of
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.fields import FIELDS, TABLE, dims_of
+from lgvi_warp.physics.fields import FIELDS, dims_of
 from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.events import from_list
 from lgvi_warp.physics.terms.floor import altitude_over
@@ -144,8 +144,8 @@ class Result(Summarized):
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """Outcomes, settings, fields with their units, statistics and messages."""
-        how, fields = self.provenance, TABLE | {name: signal.field for name, signal in SIGNALS.items()}
-        units = (f"{name} [{fields[name].unit}]" if fields[name].unit != "1" else name for name in self.samples)
+        how = self.provenance
+        units = (f"{name} [{unit}]" if (unit := field_of(name).unit) != "1" else name for name in self.samples)
         method = (
             f"{how['method']['name']}, {how['dtype']}, step {how['step']:g} s, {how['steps']:,} steps" if how else ""
         )
@@ -212,8 +212,16 @@ class Result(Summarized):
     reference_position, reference_attitude, reference_velocity = _Signal(), _Signal(), _Signal()
     reference_angular_velocity, reference_depth = _Signal(), _Signal()
     reference_heading, reference_speed, reference_angular_acceleration = _Signal(), _Signal(), _Signal()
-    estimate_sigma, estimate_bias, nees, nis = _Signal(), _Signal(), _Signal(), _Signal()
-    nis_count, innovation, innovation_sigma = _Signal(), _Signal(), _Signal()
+    if TYPE_CHECKING:  # signals of extensions that come with the package, as the doors name these
+        estimate_sigma, estimate_bias, nees, nis = _Signal(), _Signal(), _Signal(), _Signal()
+        nis_count, innovation, innovation_sigma = _Signal(), _Signal(), _Signal()
+    else:
+
+        def __getattr__(self, name):
+            # A signal of an extension; else the error of a property that has no value, or the usual one.
+            if name.startswith("_") or hasattr(type(self), name) or name not in SIGNALS:
+                return object.__getattribute__(self, name)
+            return self._kept(name)
 
     @functools.cached_property
     def quaternion_wxyz(self) -> np.ndarray:
@@ -341,11 +349,10 @@ class Result(Summarized):
             stored: Any = self.samples
             return stored.dataset(self.store)
         names = [*self.samples] + ["energy"] * (self.samples.keys() >= set(FIELDS))
-        fields = TABLE | {name: signal.field for name, signal in SIGNALS.items()}
         data = {}
         for name in names:
             values = getattr(self, name)
-            data[name] = (("time", "realization", *dims_of(name, values.shape[2:])), values, fields[name].attributes)
+            data[name] = (("time", "realization", *dims_of(name, values.shape[2:])), values, field_of(name).attributes)
         about = {item.name: item.attributes for item in member_fields.FIELDS} | {"weights": {"units": "1"}}
         for name, values in self._of_members().items():
             data[name] = (("realization",), np.asarray(values), about[name])

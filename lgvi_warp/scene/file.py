@@ -202,7 +202,7 @@ def _start(content: Mapping[str, Any], origin: Any) -> Any:
     place = _entry(content, "start", "geodetic")
     if place is None or np.shape(place) != (3,) or np.shape(origin) != (2,):
         return _entry(content, "start", "position")
-    from lgvi_warp.ocean.places import LocalPlane
+    from lgvi_warp.common.places import LocalPlane
 
     north, east = LocalPlane(*map(float, origin)).local(*place[:2])
     return [float(north), float(east), float(place[2])]

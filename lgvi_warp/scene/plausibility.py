@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgvi_warp.ocean.places import FAR_FROM_ORIGIN, too_long
+from lgvi_warp.common.places import FAR_FROM_ORIGIN, too_long
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins
@@ -50,8 +50,6 @@ LIMITS = {
     "depth": Limit(0.0, "m", ABOVE),
     "height": Limit(0.1, "m", "members that rise so far above the mean surface on the way are counted"),
 }
-# Fields of terms and events that hold depths [m].
-DEPTHS = {"floor": "depth", "current_profile": "depths", "stratification": "reference_depth"}
 # Most numbers of samples that are looked at after a run; where there are more, only the last time is.
 MOST_SAMPLES = 30_000_000
 
@@ -61,7 +59,6 @@ FAST = f"a current of {{:.4g}} m/s is beyond the {LIMITS['current'].value:g} m/s
 FAR = "an angle of {:.4g} rad is beyond 90 degrees: is it given in degrees?"
 SHALLOW = ("a depth of {:.4g} m is within one hull length, {:.3g} m, of a surface with waves: where the hull leaves the water "
            "is known to the event surface and the term surface_buoyancy alone")  # fmt: skip
-CRUSHED = "the hull has no volume left at the start's depth of {:.4g} m"
 BEYOND = "the start is {:.4g} m beyond this event: the member stops before its first step; start it before the event"
 HIGH = "a depth of {:.4g} m is above the surface: depth is positive down"
 FAR_AWAY = ("a place is {:.0f} km from environment.origin: lengths across the way to it are {:.2g} % too long there; take an "
@@ -134,8 +131,7 @@ def depths(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     A table of depths is odd if it begins above the surface and holds no depth below it.
     """
     for term in scene.parts:
-        field = DEPTHS.get(term.type)
-        if field is not None:
+        if field := term.depth_field:
             values, surface = p[f"{term.key}.{field}"], LIMITS["depth"].value
             values = values.reshape(len(values), -1)
             odd = (values.min(axis=1) < surface) & (values.max(axis=1) <= surface)
@@ -289,10 +285,9 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
         if any(term.type == "waves" and np.any(term.amplitudes) for term in scene.terms):
             length = hull_length(scene, members.parameters)
             yield "start.position", depth < length, _text(SHALLOW, *np.broadcast_arrays(depth, length))
-    for term in (term for term in scene.terms if term.type == "stratification"):
-        numbers = own(term, members.parameters)
-        lost = numbers.get("compressibility", np.zeros(1)) * (depth - numbers["reference_depth"])
-        yield f"{term.key}.compressibility", lost >= 1.0, _text(CRUSHED, depth)
+    for term in scene.terms:
+        for field, (odd, text) in term.odd_at(own(term, members.parameters), members.position).items():
+            yield f"{term.key}.{field}", odd, _text(text, depth)
     if scene.environment.origin is not None:
         yield _far_away("environment.origin", np.hypot(members.position[:, 0], members.position[:, 1]))
     for term in own_flows(scene):
@@ -335,7 +330,7 @@ def ends_at_the_surface(scene: SceneLike) -> bool:
 
 def floats(scene: SceneLike) -> bool:
     """Return whether the vehicle loses buoyancy above the surface."""
-    return any(term.type == "surface_buoyancy" for term in scene.terms)
+    return any(term.floats for term in scene.terms)
 
 
 def on_the_way(samples: Mapping[str, np.ndarray]) -> Oddities:

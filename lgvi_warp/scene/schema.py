@@ -83,9 +83,9 @@ def _list(kinds: Mapping[str, Any], default: str | None = None) -> Schema:
     ]
     # Terms whose numbers a file may hold.
     for word, kind in able.items():
-        if (request := getattr(kind, "of_file", None)) is not None:
+        if hasattr(kind, "of_file") and (request := kind.of_file()) is not None:
             known = {"type": {"const": word}} | {key: {} for key in kind.of_file_besides}
-            entries.append(_table(request(), known, ("type", "file")))
+            entries.append(_table(request, known, ("type", "file")))
     return {"type": "array", "items": {"anyOf": entries}}
 
 

@@ -19,7 +19,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import PLACE_UNIT, TABLE
 
 if TYPE_CHECKING:
-    from lgvi_warp.ocean.places import LocalPlane
+    from lgvi_warp.common.places import LocalPlane
 
 ATTITUDES = ("attitude", "rotation_vector", "quaternion_wxyz", "euler_deg")
 VELOCITIES = ("velocity", "velocity_inertial")
@@ -60,7 +60,7 @@ class Environment:
         faults = Faults("environment.")
         origin = read(self, faults)["origin"]
         if origin is not None:
-            from lgvi_warp.ocean.places import check_places
+            from lgvi_warp.common.places import check_places
 
             check_places(faults, "origin", origin)
             # Plain numbers: environments are compared.
@@ -83,7 +83,7 @@ class Environment:
         if self.origin is None:
             return None
         # Most scenes are nowhere: they load nothing of it.
-        from lgvi_warp.ocean.places import LocalPlane
+        from lgvi_warp.common.places import LocalPlane
 
         return LocalPlane(*self.origin)
 
@@ -138,7 +138,7 @@ NO_ORIGIN = "give the origin of the axes: [environment] origin = [latitude, long
 
 def positions_of(environment: Environment, key: str, places: np.ndarray) -> np.ndarray:
     """Positions (..., 3) [m] of places (..., 3) [deg, deg, m] that a key of the scene has; faults name the key."""
-    from lgvi_warp.ocean.places import check_places
+    from lgvi_warp.common.places import check_places
 
     faults = Faults()
     check_places(faults, key, places)

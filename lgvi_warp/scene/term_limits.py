@@ -13,7 +13,7 @@ import numpy as np
 
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.actuators import UNLIMITED
-from lgvi_warp.physics.terms.base import Term, word_of
+from lgvi_warp.physics.terms.base import word_of
 from lgvi_warp.physics.terms.strips import StripTerm
 from lgvi_warp.physics.terms.waves import components
 from lgvi_warp.scene.like import SceneLike
@@ -64,7 +64,6 @@ OF_THE_VEHICLE = "coefficients are as large as the vehicle and its reference len
 OF_THE_USER = "the unit of the command is the user's"
 ELSEWHERE = "another check looks at it"
 ANY_PLACE = "a place in the sea may be anywhere"
-MIXED = "lengths and angles share it"
 VOLUME = Rule(volume, "that is more than the vehicle displaces: are litres given for m3?")
 ARM = Rule(lambda scene, p: 10.0 * hull_length(scene, p), "that is ten lengths of the hull away: are mm given for m?")
 FORCE = Rule(_forces, "that is a hundred times the weight: a unit?")
@@ -88,8 +87,7 @@ BY_UNIT: dict[str, Rule | str] = {
     "N s^1/2": FORCE, "N m s^1/2": MOMENT,
 }  # fmt: skip
 BY_NAME: dict[str, Rule | str] = {
-    "stratification.compressibility": _same(5e-3, "hulls lose millionths of their volume a metre"),
-    "stratification.reference_depth": ELSEWHERE, "current_profile.depths": ELSEWHERE, "floor.depth": ELSEWHERE,
+    "current_profile.depths": ELSEWHERE, "floor.depth": ELSEWHERE,
     "hull_loads.stations": ELSEWHERE, "hull_loads.diameters": ELSEWHERE, "hull_loads.added_mass": ELSEWHERE,
     "cross_flow.stations": ELSEWHERE, "cross_flow.diameters": ELSEWHERE, "waves.amplitudes": ELSEWHERE,
     "current.velocity": ELSEWHERE, "current_profile.velocities": ELSEWHERE, "current_harmonics.amplitudes": ELSEWHERE,
@@ -98,13 +96,12 @@ BY_NAME: dict[str, Rule | str] = {
     "current_field.velocities": "its data set tells its own unit, which is converted", "current_field.origin": ANY_PLACE,
     "current_field.spacing": ANY_PLACE, "current_field.scenario": "the number of one", "control_fins.lift_angles": ANY_ANGLE,
     "waves.phases": ANY_ANGLE, "current_harmonics.phases": ANY_ANGLE, "tether.anchor": ANY_PLACE,
-    "tether.rest_length": ANY_PLACE, "buoyancy_engine.depth_top": ANY_PLACE,
-    "buoyancy_engine.depth_bottom": ANY_PLACE, "buoyancy_engine.reference_depth": ANY_PLACE,
+    "tether.rest_length": ANY_PLACE,
     "control_wrench.limit": OF_THE_VEHICLE, "control_wrench.rate_limit": OF_THE_VEHICLE, "drag.linear": OF_THE_VEHICLE,
     "drag.quadratic": OF_THE_VEHICLE, "drag_matrix.linear": OF_THE_VEHICLE, "drag_matrix.quadratic": OF_THE_VEHICLE,
-    "body_lift.matrix": OF_THE_VEHICLE, "moving_mass.limit": MIXED, "moving_mass.rate_limit": MIXED,
+    "body_lift.matrix": OF_THE_VEHICLE,
     "fins.chord": DIRECTION, "fins.normal": DIRECTION, "control_fins.chord": DIRECTION, "control_fins.normal": DIRECTION,
-    "moving_mass.slide_direction": DIRECTION, "moving_mass.turn_axis": DIRECTION, "thrusters.direction": DIRECTION,
+    "thrusters.direction": DIRECTION,
     "surface.depth": ANY_PLACE, "box.lower": ANY_PLACE, "box.upper": ANY_PLACE, "floor.origin": ANY_PLACE,
     "floor.spacing": ANY_PLACE, "floor.clearance": ANY_PLACE, "battery.capacity": "batteries have any size",
 }  # fmt: skip
@@ -112,8 +109,9 @@ BY_NAME: dict[str, Rule | str] = {
 
 def rule_of(kind: Any, item: Any) -> Rule | str | None:
     """The rule of a number of a term's class, or the reason why it has none; None where nobody has said either."""
-    if kind.type == "polar":
-        return OF_THE_VEHICLE
+    said = kind.usual.get(word_of(item), kind.usual.get(""))
+    if said is not None:
+        return said if isinstance(said, str) else _same(*said)
     return BY_NAME.get(f"{kind.type}.{word_of(item)}", BY_UNIT.get(item.metadata["unit"]))
 
 
@@ -124,7 +122,7 @@ COMMANDS = ("command", "command_schedule")
 def sizes(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for numbers of terms that are larger than their rule."""
     for term in scene.terms:
-        if type(term).__module__.startswith(Term.__module__.rpartition(".")[0]):
+        if type(term).__module__.startswith("lgvi_warp."):
             unread = COMMANDS if term.driver else COMMANDS[getattr(term, "holds", False) :][:1]
             for item in term.number_fields():
                 rule, name = rule_of(type(term), item), f"{term.key}.{word_of(item)}"

@@ -47,7 +47,6 @@ TYPES = registry.Kinds(
             *("max_error", "cross_track", "iae", "ise", "itae", "rms"),
         ),
         "metrics.nearest": ("nearest",),
-        "metrics.filter_metrics": ("nees", "nis"),
         "metrics.dock_contact": ("dock_contact",),
         "metrics.actuator_metrics": (
             *("effort", "travel", "saturation_share", "energy", "electrical_energy", "time_to_failure", "own_metric"),
@@ -56,6 +55,7 @@ TYPES = registry.Kinds(
         "outcomes": ("outcome", "end_time"),
         "paths.path": ("path_maximum", "path_minimum", "path_range", "path_mean", "path_rms", "path_time"),
     },
+    "statistics",
 )
 
 

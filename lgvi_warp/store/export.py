@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from lgvi_warp.common import extensions
 from lgvi_warp.common import files as durable
 from lgvi_warp.common.arguments import file_path, flag, path_of
 from lgvi_warp.common.errors import MissingExtra, SceneError, refusal
@@ -19,7 +20,7 @@ from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.results.result import Result
 from lgvi_warp.scene.start import Environment
-from lgvi_warp.store.exporting import geojson, kml, ros, tables, trajectories, whole_store
+from lgvi_warp.store.exporting import tables, trajectories, whole_store
 from lgvi_warp.store.exporting.tracks import Report, recorded, tracks_of
 from lgvi_warp.store.folder import Folder
 from lgvi_warp.store.open import folder_of, open_run
@@ -27,17 +28,12 @@ from lgvi_warp.store.state import state
 
 # All of a store, by a word, and the ending of its file.
 FORMATS = {"netcdf": ".nc", "parquet": ".parquet"}
-# Members, by the ending of the file.
+# Members, by the ending of the file; extensions have more.
 WRITERS: dict[str, Callable[..., None]] = {
     ".csv": tables.csv,
     ".parquet": tables.parquet,
     ".nc": trajectories.netcdf,
-    ".geojson": geojson.write,
-    ".kml": kml.write,
-    ".mcap": ros.write,
 }
-# Files that programs read whole, and the most members that they have unless the user names them.
-DRAWN, MOST_DRAWN = (".geojson", ".kml", ".mcap"), 1000
 
 
 @shows_progress
@@ -153,9 +149,9 @@ def _only_result(path: Path) -> Path | None:
 def _ending(to: Any) -> str:
     """The ending of the file that the user names, in lower case; refuse what no file can be made of."""
     ending = Path(to).suffix.lower() if isinstance(to, str | os.PathLike) else ""
-    if ending not in WRITERS:
-        known = f"{', '.join(WRITERS)}, or a word of {', '.join(FORMATS)}"
-        raise refusal("to", to, "is no file of a known kind", f"give a name that ends in {known}")
+    if ending not in (known := [*WRITERS, *extensions.words("exporters")]):
+        remedy = f"give a name that ends in {', '.join(known)}, or a word of {', '.join(FORMATS)}"
+        raise refusal("to", to, "is no file of a known kind", remedy)
     return ending
 
 
@@ -202,10 +198,15 @@ def _whole_store(source: Source) -> Write:
 def _some_members(result: Result, ending: str, members: Any, given: Environment | None) -> Write:
     """What writes members of a run into a file with this ending."""
     tracks = tracks_of(result, members, _environment_of(result, given))
-    if ending in DRAWN and members is None and tracks.count > MOST_DRAWN:
-        problem = f"are {tracks.count:,}, more than the {MOST_DRAWN:,} that a {ending} file of all members may have"
+    if ending in WRITERS:
+        return functools.partial(WRITERS[ending], tracks)
+    exporter = extensions.load("exporters", ending)
+    # Files that programs read whole.
+    most = getattr(exporter, "MOST_MEMBERS", tracks.count)
+    if members is None and tracks.count > most:
+        problem = f"are {tracks.count:,}, more than the {most:,} that a {ending} file of all members may have"
         raise refusal("members", None, problem, "choose some: members=range(100) (--members 0:100)")
-    return functools.partial(WRITERS[ending], tracks)
+    return functools.partial(exporter.write, tracks)
 
 
 def _nothing(fraction: float) -> None:

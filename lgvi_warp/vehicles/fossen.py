@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common import extensions
 from lgvi_warp.common.arguments import name_set
 from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.common.reading import MOST_BYTES, MOST_OTHERS, file_text
@@ -48,15 +49,21 @@ def vehicle_names() -> list[str]:
         >>> lw.vehicles.names()[:6]
         ['bluerov2_heavy', 'dsrv', 'eca_a9', 'girona_500', 'lauv', 'nordkvist_sanyal']
     """
-    folder = resources.files("lgvi_warp.vehicles")
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return sorted({*_own_vehicles(), *extensions.words("vehicles")})
+
+
+def _own_vehicles() -> dict[str, Path]:
+    """The files of the vehicles that no extension brings, by name."""
+    folder = Path(str(resources.files("lgvi_warp.vehicles")))
+    return {path.stem: path for path in folder.glob("*.toml")}
 
 
 def vehicle_file(name: str) -> Path:
     """Return the path of a vehicle's TOML file in the scene file's form, with a table [source]."""
-    if name not in (known := vehicle_names()):
-        raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
-    return Path(str(resources.files("lgvi_warp.vehicles") / f"{name}.toml"))
+    path = _own_vehicles().get(name) or extensions.file("vehicles", name)
+    if path is None:
+        raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, vehicle_names())}"])
+    return path
 
 
 def vehicle_tables(name: str) -> dict[str, Any]:

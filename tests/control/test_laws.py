@@ -33,7 +33,6 @@ ACTING = {
     "state_feedback": {"K": np.hstack([np.diag((20.0, 25.0, 30.0, 6.0, 7.0, 8.0)), np.diag((30.0, 40.0, 50.0, 3.0, 4.0, 5.0))])
                        + 0.05 * rng.normal(size=(6, 12))},
     "policy": {"scale": (10.0, 1.5, 2.0)},
-    "linear_mpc": {"Q": (40.0, 4.0)},
 }  # fmt: skip
 IDLE = {
     law: {name: value if name == "integral_limit" else 0.0 * np.array(value) for name, value in numbers.items()}
@@ -68,20 +67,6 @@ def scene(tmp_path_factory):
         lw.control.StateFeedback(**IDLE["state_feedback"]),
         lw.control.Policy(
             file=file, inputs=inputs, outputs=["Z", "K", "N"], **IDLE["policy"], output_activation="tanh"
-        ),
-        # Without weights of states and without a disturbance it wants nothing.
-        lw.control.LinearMPC(
-            states=("position[2]", "velocity[2]"),
-            inputs=("Z",),
-            A=[(1.0, 0.1), (0.0, 0.95)],
-            B=[(1e-4,), (2e-3,)],
-            R=(1e-2,),
-            limit=(10.0,),
-            rate_limit=(60.0,),
-            horizon=5,
-            iterations=10,
-            disturbance_time=np.inf,
-            **IDLE["linear_mpc"],
         ),
     ]
     guidance = [

@@ -2,6 +2,7 @@
 """The arrows between modules point one way (architecture, Layout), read from the source: lazy imports count as well."""
 
 import ast
+import re
 import sys
 
 import pytest
@@ -14,6 +15,9 @@ OPTIONAL = {
     "PIL", "gymnasium", "tqdm", "control", "tomlkit", "h5netcdf", "h5py", "dask", "pyproj", "rasterio", "mcap", "mcap_ros2",
     "stable_baselines3", "shtab",
 }  # fmt: skip
+DEVICE_OF_EXTENSIONS, TWIN_OF_EXTENSIONS = (
+    re.compile(rf"lgvi_warp\.extensions\.\w+\.{folder}\b") for folder in ("device", "twin")
+)
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 
 
@@ -46,6 +50,11 @@ def importers(package, lazy=True):
         if within(found.name, package) and not within(module, package)
         if found.kind == "top" or (lazy and found.kind == "lazy")
     }
+
+
+def imports_of(pattern):
+    """(module, what it imports) of the modules whose names match."""
+    return [(module, found) for module, all_of_it in modules().items() if pattern.match(module) for found in all_of_it]
 
 
 def test_the_reader_finds_both_packages():
@@ -90,7 +99,7 @@ def test_only_these_files_of_the_engine_know_the_kernels():
         "lgvi_warp.engine.state_lanes", "lgvi_warp.checks.bench",
         "lgvi_warp.checks.check", "lgvi_warp.checks.part_bench",
     }  # fmt: skip
-    assert importers("lgvi_kernels") == those
+    assert {module for module in importers("lgvi_kernels") if not DEVICE_OF_EXTENSIONS.match(module)} == those
 
 
 def test_the_engine_knows_no_law_by_name():
@@ -109,7 +118,24 @@ def test_the_engine_knows_no_law_by_name():
 
 
 def test_nothing_of_the_product_uses_the_reference():
-    assert importers("lgvi_warp.reference") == set()
+    assert {module for module in importers("lgvi_warp.reference") if not TWIN_OF_EXTENSIONS.match(module)} == set()
+
+
+@pytest.mark.parametrize(("folder", "allowed"), [
+    (DEVICE_OF_EXTENSIONS, {"lgvi_kernels", "warp"}), (TWIN_OF_EXTENSIONS, {"lgvi_warp.reference", "numpy"}),
+])  # fmt: skip
+def test_device_code_and_twins_of_an_extension_import_what_others_do(folder, allowed):
+    known = allowed | sys.stdlib_module_names
+    others = [(module, found.name) for module, found in imports_of(folder)
+              if not any(within(found.name, one) for one in (*known, ".".join(module.split(".")[:4])))]  # fmt: skip
+    assert others == []
+
+
+def test_no_extension_imports_another():
+    pairs = {(module, found.name) for module, found in imports_of(re.compile(r"lgvi_warp\.extensions\."))
+             if within(found.name, "lgvi_warp.extensions")}  # fmt: skip
+    assert [pair for pair in pairs if pair[0].split(".")[2] != pair[1].split(".")[2]] == []
+    assert {module.split(".")[1] for module in importers("lgvi_warp.extensions")} == set()
 
 
 def test_only_the_command_line_asks_for_sinks_and_late():
@@ -143,7 +169,7 @@ def test_the_rooms_are_all_folders_but_the_twin():
 
 def test_an_arrow_from_any_room_to_the_command_is_seen(monkeypatch):
     lowest = {room: min(module for module in part(f"lgvi_warp.{room}") if module.count(".") > 1)
-              for floor in ROOMS[:-1] for room in floor}  # fmt: skip
+              for floor in ROOMS for room in floor if room not in ("cli", "extensions")}  # fmt: skip
     for module in lowest.values():
         with monkeypatch.context() as patch:
             patch.setitem(modules(), module, [*modules()[module], Import("lgvi_warp.cli.command", "lazy")])

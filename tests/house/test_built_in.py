@@ -12,6 +12,7 @@ from lgvi_warp.physics import terms
 from lgvi_warp.statistics.base import TYPES as STATISTICS
 from tests.conftest import ROOT
 from tests.control.test_laws import ACTING
+from tests.laws.case import twin_of
 from tests.laws.cases import CASES
 
 # They take no numbers: every scene of the tests has them, or a controller's tests.
@@ -27,18 +28,18 @@ def built_in(kinds):
     return sorted(word for word, kind in kinds.items() if kind.__module__.startswith("lgvi_warp."))
 
 
-def twins(package):
-    """Names of classes in lgvi_warp.reference."""
-    folder = import_module(f"lgvi_warp.reference.{package}")
-    modules = (import_module(f"{folder.__name__}.{module.name}") for module in iter_modules(folder.__path__))
-    return {name for module in modules for name in vars(module)}
+def has_twin(kind):
+    """Whether a class has its twin: in lgvi_warp.reference or, of an extension, in its folder."""
+    package = twin_of(kind.__module__).rpartition(".")[0]
+    modules = (import_module(f"{package}.{module.name}") for module in iter_modules(import_module(package).__path__))
+    return any(hasattr(module, kind.__name__) for module in modules)
 
 
 @pytest.mark.parametrize("word", built_in(terms.TYPES))
 def test_a_force_has_its_twin_case_page_and_public_name(word):
     kind = terms.TYPES[word]
     assert kind.__name__ in lw.terms.__all__, "name it in lgvi_warp/terms.pyi"
-    assert kind.__name__ in twins("terms"), f"write its twin: class {kind.__name__} in lgvi_warp/reference/terms"
+    assert has_twin(kind), f"write its twin: class {kind.__name__} in lgvi_warp/reference/terms"
     tested = {type(term).type for case in CASES.values() for term in case.terms} | EVERYWHERE
     assert word in tested, "add a case to tests/laws/cases.py"
     assert (GUIDE / f"{word}.md").exists(), f"write docs/guide/terms/{word}.md"
@@ -49,10 +50,15 @@ def test_a_force_has_its_twin_case_page_and_public_name(word):
 def test_a_part_of_a_controller_has_its_twin_and_public_name(word):
     name = PARTS[word].__name__
     assert name in lw.control.__all__, "name it in lgvi_warp/control/__init__.pyi"
-    assert name in twins("control") or word in NO_TWIN, f"write its twin: class {name} in lgvi_warp/reference/control"
+    twin = word in NO_TWIN or has_twin(PARTS[word])
+    assert twin, f"write its twin: class {name} in lgvi_warp/reference/control"
 
 
-@pytest.mark.parametrize("word", built_in(lw.laws.ControlLaw.kinds))
+LAWS = {word: kind for word, kind in lw.laws.ControlLaw.kinds.items() if ".extensions." not in kind.__module__}
+
+
+# Laws of extensions are tested in tests/extensions.
+@pytest.mark.parametrize("word", built_in(LAWS))
 def test_a_law_of_a_controller_is_tested(word):
     assert word in ACTING or word in NO_TWIN, "add numbers with which it acts to ACTING of tests/control/test_laws.py"
 

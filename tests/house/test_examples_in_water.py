@@ -10,7 +10,7 @@ from lgvi_warp.cli import main
 from lgvi_warp.common.status import Warnings
 from tests.conftest import ROOT
 
-FILES = sorted((ROOT / "examples").rglob("*.toml"))
+FILES = [path for path in sorted((ROOT / "examples").rglob("*.toml")) if path.name != "pyproject.toml"]
 SCENES = {path.name: path for path in FILES if path.parent.name != "sweeps"}
 SWEEPS = {path.name: path for path in FILES if path.parent.name == "sweeps"}
 # Manoeuvres in deep water whose depth counts from the start: members that leave the water, of the members that run.

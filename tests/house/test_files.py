@@ -27,7 +27,7 @@ ALLOWED = {
     ("engine/executors/base.py", "pickle.loads"): "what a process sends to its own workers",
     ("calls/warm.py", "pickle.loads"): "the same",
     ("store/exporting/netcdf_files.py", "os.open"): "the null device",
-    ("vehicles/yaml.py", "read_text"): "a function of that name, which goes through reading",
+    ("extensions/importers/yaml.py", "read_text"): "a function of that name, which goes through reading",
     ("lanes/overloads.py", "read_bytes"): "the text of its own folder, for the hash of kernels",
 }
 

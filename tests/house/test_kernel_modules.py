@@ -15,7 +15,8 @@ KERNELS = Path(__file__).parents[2] / "kernels" / "lgvi_kernels"
 OPERATORS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.USub: "neg"}
 WARP = ("wp.", "overloads.")
 OFFERED = {name for name in vars(law) if not name.startswith("_")}
-FORMULAS = sorted({*KERNELS.rglob("*.py")} - {KERNELS / "lanes" / "arithmetic.py"})
+OF_EXTENSIONS = (KERNELS.parents[1] / "lgvi_warp" / "extensions").glob("*/device/*.py")
+FORMULAS = sorted({*KERNELS.rglob("*.py"), *OF_EXTENSIONS} - {KERNELS / "lanes" / "arithmetic.py"})
 
 
 def device_functions(tree):

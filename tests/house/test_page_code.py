@@ -27,14 +27,14 @@ OF_TESTS = {
         "docs/guide/events.md docs/guide/failed_members.md docs/guide/many_calls.md docs/guide/sampling.md "
         "docs/guide/sensitivity.md docs/guide/statistics.md docs/guide/vehicles.md",
     "control/test_bad_sensors.py": "docs/controllers/faults.md docs/controllers/sensors.md",
-    "control/test_gym.py": "docs/controllers/gym.md",
+    "extensions/learning/test_gym.py": "docs/controllers/gym.md",
     "control/test_own_loop.py": "docs/controllers/bring_your_own_loop.md docs/controllers/learn_depth_keeping.md",
-    "control/test_navigation.py": "docs/controllers/navigation.md",
+    "extensions/navigation/test_navigation.py": "docs/controllers/navigation.md",
     "studies/test_derivatives.py": "docs/guide/derivatives.md",
     "studies/test_estimating.py": "docs/guide/least_cost.md",
     "studies/test_margins.py": "docs/controllers/margins.md docs/guide/worst_case.md",
-    "laws/test_current_from_data.py": "docs/guide/ocean_data.md",
-    "unit/ocean/test_floor_data.py": "docs/guide/sea_floor.md",
+    "extensions/ocean/test_current_from_data.py": "docs/guide/ocean_data.md",
+    "extensions/ocean/test_floor_data.py": "docs/guide/sea_floor.md",
     "house/test_develop_pages.py":
         "docs/develop/add_a_method.md docs/develop/add_a_sampling.md docs/develop/add_a_statistic.md",
     "house/test_gallery.py": "docs/gallery.md",
@@ -58,7 +58,7 @@ NOT_ALONE = {
     "docs/gallery.md": "house/test_gallery.py",  # each snippet is a file
     "docs/start/tutorial.md": "house/test_wheel.py",  # dive.toml, which the page has the reader write
     "docs/guide/vehicles.md": "house/test_docs.py",  # model.sdf
-    "docs/guide/sea_floor.md": "unit/ocean/test_floor_data.py",  # gebco.nc
+    "docs/guide/sea_floor.md": "extensions/ocean/test_floor_data.py",  # gebco.nc
     "docs/guide/recordings.md": "house/test_page_code.py",  # a viewer
     "docs/controllers/learn_depth_keeping.md": "control/test_own_loop.py",  # stable_baselines3
 }

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each term of a scene beside its twin: what the parity, order and bits tests of tests/laws/test_parity.py run over."""
+"""Each term of a scene beside its twin: what the parity, order and bits tests of tests/laws/test_parity.py run over.
+
+Those of an extension are in tests/extensions/NAME/cases.py.
+"""
+
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 
 from lgvi_warp.physics import terms
-from lgvi_warp.reference.terms.moving_mass import MovingMass
 from lgvi_warp.reference.terms.thrusters import Thrusters
 from lgvi_warp.reference.terms.wrench import WrenchSchedule
-from tests.laws import cases_glider, cases_lift, cases_water
+from tests.laws import cases_lift, cases_water
 from tests.laws.case import Case, case, matrix
 
 LINEAR, QUADRATIC = (3.0, 4.0, 5.0, 0.3, 0.4, 0.5), (10.0, 30.0, 40.0, 1.0, 2.0, 3.0)
@@ -38,12 +43,6 @@ TABLE_OF_THRUST = (
     ((-9.0, -8.0, -5.0), (-2.0, -3.0, -1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (5.0, 3.0, 4.0), (20.0, 12.0, 9.0)),
 )
 
-# A battery that goes forward and aside, and back.
-SLIDING = dict(
-    mass=6.0, times=(0.1, 0.45, 1.2), places=((0.05, 0.0, 0.06), (0.25, -0.1, 0.06), (-0.1, 0.05, 0.1)),
-    reference=(0.0, 0.02, 0.05), inertia=False,
-)  # fmt: skip
-
 CASES = {
     "linear drag": case(terms.Drag, linear=LINEAR, quadratic=(0.0,) * 6),
     "quadratic drag": case(terms.Drag, linear=(0.0,) * 6, quadratic=QUADRATIC),
@@ -67,11 +66,6 @@ CASES = {
     "wrench in steps": Case(
         (terms.WrenchSchedule(**TABLE, interpolation="steps"),),
         (WrenchSchedule(**TWIN_TABLE, steps=True),),
-        False,
-    ),
-    "moving mass": Case(
-        (terms.MovingMass(**SLIDING),),
-        (MovingMass(**{key: np.asarray(value) for key, value in SLIDING.items()}, gravity=9.8),),
         False,
     ),
     "thrusters": Case(
@@ -129,7 +123,14 @@ CASES = {
     ),
 }  # fmt: skip
 
-CASES |= cases_water.CASES | cases_lift.CASES | cases_glider.CASES
+CASES |= cases_water.CASES | cases_lift.CASES
+# Of extensions: numbers by type with which nothing of a term jumps (test_parity.py); further cases (test_device_code.py).
+HELD, ALONE = {}, {}
+for path in sorted((Path(__file__).parents[1] / "extensions").glob("*/cases.py")):
+    cases = import_module(f"tests.extensions.{path.parent.name}.cases")
+    CASES |= cases.CASES
+    HELD |= cases.HELD
+    ALONE |= cases.ALONE
 
 
 def together(*names):
@@ -144,9 +145,10 @@ def together(*names):
 
 
 # One of each type.
-CASES["all together"] = together(
+ALL = (
     "drag matrix", "current", "current field", "current profile", "current harmonics", "waves", "Gauss-Markov current",
     "energy use", "tether", "wrench", "wrench schedule", "wrench noise", "moving mass", "thrusters", "fins",
     "control fins with rates", "cross-flow", "hull loads", "body lift", "stratification", "ballast with pumps",
     "buoyancy engine", "polar", "surface buoyancy", "quadratic form",
 )  # fmt: skip
+CASES["all together"] = together(*(name for name in ALL if name in CASES))

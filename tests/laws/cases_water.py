@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cases of waves, currents that change, noise and stratification. Import tests.laws.cases, which includes them, not this."""
+"""Cases of waves, currents that change, and noise. Import tests.laws.cases, which includes them, not this."""
 
 import numpy as np
 
@@ -7,14 +7,12 @@ from lgvi_warp.physics import terms
 from lgvi_warp.physics.terms.noisy import channel
 from lgvi_warp.reference.terms.current_field import CurrentField
 from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
-from lgvi_warp.reference.terms.stratification import Stratification
-from lgvi_warp.reference.terms.surface_buoyancy import SurfaceBuoyancy
 from lgvi_warp.reference.terms.waves import Waves
 from lgvi_warp.reference.terms.wrench_noise import WrenchNoise
 from tests.laws.case import Case, case
 
 # The vehicle and gravity of tests/laws/test_parity.py.
-GRAVITY, BUOYANCY, CENTER_OF_BUOYANCY = 9.8, 21.5 * 9.8, np.array((0.01, 0.005, -0.02))
+GRAVITY = 9.8
 
 HARMONICS = dict(
     amplitudes=((0.3, -0.2, 0.0), (0.1, 0.2, -0.1), (-0.05, 0.1, 0.02)),
@@ -28,10 +26,6 @@ GAUSS_MARKOV = dict(standard_deviation=(0.3, 0.2, 0.05), time_constant=4.0)
 WRENCH_NOISE = dict(force=(1.0, 2.0, 0.5), torque=(0.1, 0.2, 0.3))
 # A quarter of the step of tests/laws/test_parity.py.
 GRID = 0.005
-STRATIFICATION = dict(gradient=0.05, reference_depth=6.0)
-# So high that some of it is above the surface. Its pitch then grows too fast for an order to be seen, unlike that of one part.
-SURFACE = dict(heights=(20.0, 24.0, 26.0, 18.0), stations=(-2.0, -0.5, 1.5, 2.0))
-BALL = dict(heights=(24.0,), stations=(0.0,))
 
 
 def arrays(numbers):
@@ -43,13 +37,6 @@ def noisy(host, twin, numbers, name="", noise_step=None):
     """A Case whose twin draws the same random numbers."""
     term = host(**numbers, name=name, noise_step=noise_step)
     return Case((term,), (twin(**arrays(numbers), channel=channel(term.key), noise_step=noise_step),), False)
-
-
-def surface(numbers, section, *waves):
-    """A Case of buoyancy that fades at the surface, below waves if a term and its twin are given."""
-    hull = SurfaceBuoyancy(**arrays(numbers), section=section, buoyancy=BUOYANCY, center_of_buoyancy=CENTER_OF_BUOYANCY)
-    term = terms.SurfaceBuoyancy(**numbers, section=section)
-    return Case((term, *waves[:1]), (hull.beside(waves[1:]), *waves[1:]), numbers is BALL)
 
 
 RNG = np.random.default_rng(8)
@@ -82,21 +69,5 @@ CASES = {
             for side in (0, 1)
         ),
         False,
-    ),
-    "surface buoyancy": surface(SURFACE, "circle"),
-    "surface buoyancy of a box": surface(SURFACE, "box"),
-    "surface buoyancy of a ball": surface(BALL, "circle"),
-    "surface buoyancy in waves": surface(BALL, "box", terms.Waves(**WAVES), Waves(**arrays(WAVES), gravity=GRAVITY)),
-    "stratification": Case(
-        (terms.Stratification(**STRATIFICATION),),
-        (Stratification(**STRATIFICATION, buoyancy=BUOYANCY, center_of_buoyancy=CENTER_OF_BUOYANCY),),
-    ),
-    "stratification of a hull that yields": Case(
-        (terms.Stratification(**STRATIFICATION, compressibility=0.02),),
-        (
-            Stratification(
-                **STRATIFICATION, compressibility=0.02, buoyancy=BUOYANCY, center_of_buoyancy=CENTER_OF_BUOYANCY
-            ),
-        ),
     ),
 }

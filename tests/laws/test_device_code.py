@@ -16,9 +16,9 @@ from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.thrusters import Thrusters
 from lgvi_warp.reference.terms.weight import Weight
+from tests.laws import cases
 from tests.laws.case import Case
 from tests.laws.cases import CASES, PROPELLERS, TABLE_OF_THRUST, THRUSTERS
-from tests.laws.cases_glider import HELD_BALLAST
 from tests.laws.test_parity import GRAVITY, STATE, VEHICLE
 
 # Long enough for several turns of a command.
@@ -35,7 +35,7 @@ IMPLIED = {
 }
 ALONE = IMPLIED | {name: case for name, case in CASES.items() if len(case.terms) == 1}
 (LAGGING,), (LAGGING_TWIN,), _ = CASES["thrusters"]
-ALONE["held ballast"] = HELD_BALLAST
+ALONE |= cases.ALONE
 ALONE["prompt thrusters"] = Case(
     (replace(LAGGING, time_constant=0.0),), (type(LAGGING_TWIN)(**vars(LAGGING_TWIN) | {"time_constant": np.zeros(3)}),)
 )

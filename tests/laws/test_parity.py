@@ -16,9 +16,9 @@ from lgvi_warp.reference.submaps import Body, look, start, water
 from lgvi_warp.reference.terms.current import Current
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
+from tests.laws import cases
 from tests.laws.case import Case, case, matrix
 from tests.laws.cases import CASES, together
-from tests.laws.cases_water import BALL
 from tests.support.tools import TURN, difference, from_state, last, one, slope
 
 GRAVITY = 9.8
@@ -170,7 +170,7 @@ HELD = {
     "control_fins": {"command": None, "command_schedule": ((0.1, 0.15, -0.2),) * 4},
     "wrench_noise": {"force": (1e-30,) * 3, "torque": (1e-30,) * 3},
     "gauss_markov_current": {"standard_deviation": (1e-30,) * 3},
-    "surface_buoyancy": BALL,
+    **cases.HELD,
 }
 SMOOTH = {name: case.terms for name, case in CASES.items() if case.smooth} | {
     "all together": tuple(replace(term, **HELD.get(term.type, {})) for term in CASES["all together"].terms)

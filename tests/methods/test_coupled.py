@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.gliders.twin.stratification import Stratification
+from lgvi_warp.extensions.gliders.twin.surface_buoyancy import SurfaceBuoyancy
 from lgvi_warp.physics.notation import hat
 from lgvi_warp.reference import coupled
 from lgvi_warp.reference.submaps import Body, K, State, look, start, water
 from lgvi_warp.reference.terms.restoring import Restoring
-from lgvi_warp.reference.terms.stratification import Stratification
-from lgvi_warp.reference.terms.surface_buoyancy import SurfaceBuoyancy
 from lgvi_warp.reference.terms.weight import Weight
 from tests.laws.cases import CASES
 from tests.support.tools import difference, last, one

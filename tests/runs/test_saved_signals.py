@@ -11,8 +11,8 @@ from lgvi_warp.control import signals
 from lgvi_warp.physics.fields import FIELDS
 from tests.control import test_altitude as floors
 from tests.control import test_loop as loops
+from tests.extensions.navigation import navigating
 from tests.runs.test_going_on import SENSORS, autopilot, fleet_of, law
-from tests.support import navigating
 
 MODEL = {"type": "reference_model", "natural_frequency": [0.2, 0.3], "damping_ratio": [1.0, 1.0]}
 SIGHT = {"type": "waypoints", "points": [[0, 0, 5], [0.5, 0, 5], [0.5, 5, 6]], "speed": 1.5, "look_ahead": 3.0,

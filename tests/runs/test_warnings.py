@@ -303,7 +303,7 @@ def test_inertia_that_no_rigid_body_has():
 def unstable():
     free = scene_of((30.0, 30.0, 31.0), **LAWS)
     # Of water that is nearly the same everywhere, so that the kernel is that of the test of the result's energy.
-    laws = [terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=1.0), terms.Stratification(gradient=1e-12)]
+    laws = [terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=1.0), lw.terms.Stratification(gradient=1e-12)]
     scene = lw.Scene(free.vehicle, free.environment, terms=laws)
     b, R = np.array([[1.0, 0.0, 0.0]] * 2), np.broadcast_to(np.eye(3), (2, 3, 3))
     stiffness = 30.0 * np.array([0.5, 2.1]) ** 2
@@ -364,7 +364,7 @@ def test_energy_is_that_of_the_result(method, monkeypatch):
     monkeypatch.setattr(step_warnings, "ENERGY", 1e-12)
     base = scene_of((1.0, 2.0, 3.0), (1.0, 2.0, 2.5), net=0.5, moment=(0.1, 0.0, -0.3))
     laws = [terms.Tether(anchor=[0.0, 0.0, 0.5], stiffness=0.4, rest_length=0.7, attachment=[0.1, 0.0, 0.05]),
-            terms.Stratification(gradient=0.2, reference_depth=0.3)]  # fmt: skip
+            lw.terms.Stratification(gradient=0.2, reference_depth=0.3)]  # fmt: skip
     scene = lw.Scene(base.vehicle, base.environment, terms=laws)
     h = 0.1
     fleet = one(scene, *random_states(11, 6, 0.4, 0.4))
@@ -418,7 +418,7 @@ def test_energy_where_the_forces_have_another_origin(monkeypatch):
     ([], True), ([terms.Drag(linear=[0.1] * 6)], True), ([terms.Wrench(force=[1.0, 0.0, 0.0])], False),
     ([terms.Current(velocity=[1.0, 0.0, 0.0])], True), ([terms.Current(velocity=[1.0, 0.0, 0.1])], False),
     ([terms.Current(velocity=[1.0, 0.0, 0.0]), terms.Tether(anchor=[0.0] * 3, stiffness=1.0)], False),
-    ([terms.BodyLift(matrix=np.eye(6))], False), ([terms.Stratification(gradient=0.01)], True),
+    ([terms.BodyLift(matrix=np.eye(6))], False), ([lw.terms.Stratification(gradient=0.01)], True),
 ])  # fmt: skip
 def test_energy_is_watched_where_no_force_creates_any(laws, conservative):
     base = scene_of((2.0, 2.0, 2.0))

@@ -98,7 +98,8 @@ def _terms() -> dict[str, Callable[[], str]]:
 
     names = ("drag", "quadratic drag", "drag matrix", "current", "current profile", "tether", "wrench schedule", "thrusters",
              "waves", "Gauss-Markov current", "fins", "control fins with rates", "cross-flow", "body lift", "stratification",
-             "wrench noise", "all together")  # fmt: skip
+             "wrench noise", "all together", "moving mass", "ballast with pumps", "buoyancy engine", "polar",
+             "surface buoyancy in waves", "stratification of a hull that yields")  # fmt: skip
 
     # Explicit and linearly implicit methods evaluate terms by other code than a kick does.
     by_stages = (("current profile", "rk4"), ("drag matrix", "rkw3"))
@@ -142,11 +143,32 @@ def _samplings() -> dict[str, Callable[[], str]]:
     }
 
 
+def _navigating() -> lw.Ensemble:
+    """A REMUS 100 whose controller knows its motion by an IMU, a log, a depth cell and fixes that come late."""
+    sensors = [
+        lw.control.IMU(place=(0.1, 0.0, 0.0), accelerometer_noise=1e-3, gyroscope_noise=1e-4, accelerometer_walk=1e-4),
+        lw.control.DVL(place=(-0.1, 0.0, 0.05), noise=0.01, every=2, dropout=0.1),
+        lw.control.Sensor(name="cell", of="depth", noise=0.02),
+        lw.control.Sensor(name="usbl", of="position", noise=0.5, every=5, latency=2),
+        lw.control.ErrorStateFilter(dvl="dvl", depth="cell", delayed_fix="usbl"),
+    ]
+    fins = lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
+    guidance, laws = [lw.control.SetPoint(heading=0.2)], [lw.control.HeadingPID(kp=1.0, kd=2.0)]
+    return named(
+        "remus_100",
+        controller=lw.Controller(period=0.1, sensors=sensors, guidance=guidance, laws=laws, allocation=[fins]),
+    )
+
+
 def _others() -> dict[str, Callable[[], str]]:
     floor = [lw.events.Floor(depth=10.1), lw.events.StopTime(at=0.73)]
+    beliefs = lw.SaveAt(
+        every=0.1, fields=("position", "measured_position", "estimate_sigma", "nees", "nis", "innovation")
+    )
     return {
+        "navigation": lambda: hashed(solved(_navigating(), "psi_x", save=beliefs)),
         **{f"vehicle {name}": functools.partial(lambda name: hashed(solved(named(name), "psi_x")), name)
-           for name in ("remus_100", "bluerov2_heavy", "sphere")},
+           for name in ("remus_100", "bluerov2_heavy", "sphere", "seawing", "slocum")},
         "events": lambda: hashed(solved(named("remus_100", events=floor), "psi_x", statistics=STATISTICS)),
         "store": lambda: stored(paper()),
         "store with statistics": lambda: stored(paper(), statistics=STATISTICS, keep=[3, 17]),

@@ -20,6 +20,7 @@ from lgvi_warp.reference.terms.driven import ControlWrench
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
 from lgvi_warp.reference.terms.wrench import Wrench
+from tests.laws import case
 
 
 def torpedo(buoyancy, center_of_buoyancy, inertia=(1.5, 4.0, 4.5)):
@@ -52,7 +53,7 @@ def twin_of(part, numbers, scene):
 
     numbers: {name: value} of the member, by which the part's own are replaced.
     """
-    kind = getattr(importlib.import_module(f"lgvi_warp.reference.control.{part.type}"), type(part).__name__)
+    kind = getattr(importlib.import_module(case.twin_of(type(part).__module__)), type(part).__name__)
     values = {item.name: getattr(part, item.name) for item in dataclasses.fields(part) if item.name != "name"}
     for name in values:
         values[name] = numbers.get(f"{part.key}.{name.removesuffix('_')}", values[name])

@@ -61,7 +61,7 @@ def candidates(folder):
 
 def is_device(path):
     """Whether a file is device code."""
-    return "lgvi_kernels" in path.parts
+    return "lgvi_kernels" in path.parts or "device" in path.parts
 
 
 def sampled(found, sources, count, seed):

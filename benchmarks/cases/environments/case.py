@@ -10,7 +10,7 @@ import lgvi_warp as lw
 from benchmarks.cases.environments import others
 from benchmarks.cases.environments.others import EVERY, STEP
 from benchmarks.timing import least
-from lgvi_warp.engine.episodes import Episodes
+from lgvi_warp.extensions.learning.episodes import Episodes
 from lgvi_warp.runs.settle import make_plan
 
 EPISODE = 20.0

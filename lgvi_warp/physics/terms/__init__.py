@@ -14,10 +14,10 @@ from lgvi_warp.common.names import folded
 from lgvi_warp.physics.terms.base import AnyTerm, Term, build, check_list
 from lgvi_warp.physics.terms.hydrostatics import Restoring, Weight
 
-# Classes of terms by their type in a scene file, each also an attribute of this package.
+# Classes of terms by their type in a scene file; those of this package are attributes of it.
 registry.load_modules(sys.modules[__name__])
 TYPES = Term.kinds
-globals().update({kind.__name__: kind for kind in TYPES.values()})
+globals().update({kind.__name__: kind for kind in TYPES.loaded.values()})
 
 # Names that no term may have: its parameters would be mixed with those of the scene.
 RESERVED = ("vehicle", "environment", "start")

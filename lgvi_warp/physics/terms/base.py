@@ -7,7 +7,7 @@ import copy
 import dataclasses
 import functools
 import keyword
-from collections.abc import Collection, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
@@ -167,13 +167,13 @@ class Term:
 
     Fields declared by `number` are arrays after construction.
 
-    Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the module
-    of lgvi_kernels.laws by name (by default the type), or any object with the same functions; `timed` says whether the law
-    depends on time; `dissipative`, whether its damping never creates energy; `brakes`, whether it takes energy on the whole
-    even if some motions gain by it; `strengths` names the numbers without which it
-    does nothing; `carries` says whether it is a current that is the same everywhere and at all times, which exerts no force;
-    `anchored`, whether it holds the vehicle to a place, so that a current does work. docs/develop/add_a_force.md shows how to
-    write one.
+    Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the
+    module of lgvi_kernels.laws by name (by default the type), that of an extension by its path, or any object with the same
+    functions; `timed` says whether the law depends on time; `dissipative`, whether its damping never creates energy;
+    `brakes`, whether it takes energy on the whole even if some motions gain by it; `strengths` names the numbers without
+    which it does nothing; `carries` says whether it is a current that is the same everywhere and at all times, which exerts
+    no force; `anchored`, whether it holds the vehicle to a place, so that a current does work. docs/develop/add_a_force.md
+    shows how to write one.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
@@ -184,7 +184,7 @@ class Term:
 
     type: ClassVar[str] = ""
     # Classes by their type in a scene file; events have a table of their own.
-    kinds: ClassVar[MutableMapping[str, Any]] = {}
+    kinds: ClassVar[registry.Kinds] = registry.Kinds("lgvi_warp.physics.terms", {}, "terms")
     # Whether it acts on the motion: an event does not.
     acts: ClassVar[bool] = True
     device: ClassVar[Any] = ""
@@ -218,6 +218,11 @@ class Term:
     braking_grows_with: ClassVar[tuple[str, ...]] = ()
     # Rows of memory, at first 0, that the device code of a term has which does not define `packed`.
     memory_rows: ClassVar[int] = 0
+    # For checks of what is plausible: the largest usual size of a number and why, or why it has none ("": of all numbers); the
+    # number that holds depths; whether the vehicle loses buoyancy above the surface by this term.
+    usual: ClassVar[Mapping[str, str | tuple[float, str]]] = {}
+    depth_field: ClassVar[str] = ""
+    floats: ClassVar[bool] = False
 
     name: str = ""
 
@@ -414,6 +419,18 @@ class Term:
         fields = {word_of(item): item for item in self.number_fields()}
         return {name: _outside(fields[name], value) | _falling(fields[name], value) for name, value in numbers.items()}
 
+    def odd_at(self, numbers: Numbers, position: Array) -> Mapping[str, tuple[Array, str]]:
+        """What is odd about members where they start; by default nothing.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            position: Positions (n, 3) [m].
+
+        Returns:
+            By field: which members are odd (n,), and why, a text with {} for the depth.
+        """
+        return {}
+
     def present(self, numbers: Numbers) -> bool:
         """Whether any member feels the term; by default where one of its `strengths`, if it names any, is not zero.
 
@@ -481,7 +498,7 @@ class Term:
             aligned: As of `PackingContext`: whether the kernel's axes and origin are the user's.
 
         Returns:
-            The name of a module of lgvi_kernels.laws, or an object with the same functions.
+            The name of a module of lgvi_kernels.laws, the path of another one, or an object with the same functions.
         """
         return self.device
 

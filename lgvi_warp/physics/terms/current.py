@@ -49,6 +49,7 @@ class CurrentProfile(Term):
     """
 
     type: ClassVar[str] = "current_profile"
+    depth_field: ClassVar[str] = "depths"
 
     depths: Any = number(("k",), "m", rising=True)
     velocities: Any = number(("k", 3), "m/s")

@@ -3,20 +3,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from lgvi_warp.common.declared import word
-from lgvi_warp.common.errors import Faults, SceneError, ragged
+from lgvi_warp.common.errors import Faults, ragged
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 from lgvi_warp.physics.terms.events import Outside
-
-if TYPE_CHECKING:
-    from lgvi_warp.ocean.field_data import FieldData
+from lgvi_warp.physics.terms.in_files import InFile, numbers_in
 
 OUTSIDE = ("hold", "stop")
 # Numbers that are those of a data set.
@@ -26,7 +23,7 @@ ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CurrentField(Term):
+class CurrentField(InFile, Term):
     """A current on a regular grid in north, east and depth, and in time if that is given: linear in each, held outside.
 
     Several fields of one grid, of an ensemble forecast say, are scenarios: `scenario` says which, and may vary by member.
@@ -67,10 +64,10 @@ class CurrentField(Term):
     scenario: Any = number((), "1", 0.0, least=0.0)
     outside: str = word("hold", known=OUTSIDE)
     # Where the numbers come from, of `from_dataset`.
-    data: FieldData | None = field(default=None, init=False, repr=False)
+    data: Any = field(default=None, init=False, repr=False)
 
-    # Keys of a table with the key `file`, in a scene file, beside those of `of_file`.
     of_file_besides: ClassVar[tuple[str, ...]] = ("file", "around", "outside", "scenario", "name")
+    of_file_by: ClassVar[str] = "from_dataset"
 
     @classmethod
     def from_dataset(
@@ -143,11 +140,9 @@ class CurrentField(Term):
             >>> float(np.round(field.velocities[0, 0, 2, 0, 0, 1], 2))
             0.9
         """
-        from lgvi_warp.ocean.field_reader import read_field
-
         wanted = {"origin": origin, "start": start, "region": region, "speed": speed, "duration": duration,
                   "variables": variables, "spacing": spacing, "fill": fill, "checksum": checksum}  # fmt: skip
-        numbers = read_field(source, cls.of_file()(**wanted), outside=outside, around=around)
+        numbers = numbers_in(source, cls, wanted, outside=outside, around=around)
         known = {key: getattr(numbers, key) for key in OF_DATA}
         return _with_data(cls(**known, outside=outside, scenario=scenario, name=name), numbers.data)
 
@@ -161,37 +156,6 @@ class CurrentField(Term):
             if velocities.ndim == 6:
                 object.__setattr__(self, "velocities", velocities)
         super().__post_init__()
-
-    @classmethod
-    def of_file(cls) -> Any:
-        """The class whose fields a table with the key `file` may have, in a scene file."""
-        from lgvi_warp.ocean.field_data import FieldRequest
-
-        return FieldRequest
-
-    @classmethod
-    def of_table(cls, where: str, table: Mapping[str, Any]) -> Self:
-        """The field of a file that a table of a scene file names.
-
-        Args:
-            where: The table's place in the scene.
-            table: The key `file`, and those of `from_dataset` besides.
-
-        Returns:
-            The field.
-
-        Raises:
-            SceneError: As `from_dataset`.
-        """
-        known = [*(item.name for item in dataclasses.fields(cls.of_file())), *cls.of_file_besides]
-        values = {key: value for key, value in table.items() if key != "type"}
-        faults = Faults()
-        faults.keys(where, values, known)
-        faults.raise_if_any()
-        try:
-            return cls.from_dataset(values.pop("file"), values.pop("origin", None), **values)
-        except SceneError as error:
-            raise error.prefixed(f"{where}.") from error
 
     def with_fields(self, fields: Mapping[str, Any]) -> Any:
         # Other velocities are not those of the data.
@@ -293,7 +257,7 @@ class CurrentField(Term):
         return result
 
 
-def _with_data(field: Any, data: FieldData | None) -> Any:
+def _with_data(field: Any, data: Any) -> Any:
     """The field, which knows where its numbers come from."""
     object.__setattr__(field, "data", data)
     return field

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common import registry
 from lgvi_warp.common.declared import text
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.status import Status
@@ -27,7 +28,7 @@ class Event(Term):
     """
 
     status: ClassVar[Status] = Status.CONDITION
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[registry.Kinds] = registry.Kinds("lgvi_warp.physics.terms", {}, "events")
     acts: ClassVar[bool] = False
 
 

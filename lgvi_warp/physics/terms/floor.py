@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, dataclass
@@ -11,17 +10,18 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, own
 from lgvi_warp.physics.terms.events import Box, Event
+from lgvi_warp.physics.terms.in_files import InFile, numbers_in
 
 # Depths between which the box of a grid lies [m]: beyond any sea.
 ABOVE, BELOW = -1e5, 1e5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Floor(Event):
+class Floor(InFile, Event):
     """Stop where the body's origin sinks to the sea floor: flat, or on a regular grid, where its depth is bilinear.
 
     Between the nodes of a grid the depth is linear in north and in east; outside, the nearest edge holds. `edges` gives the
@@ -48,9 +48,10 @@ class Floor(Event):
     """
 
     type: ClassVar[str] = "floor"
+    depth_field: ClassVar[str] = "depth"
     status: ClassVar[Status] = Status.FLOOR
-    # Keys of a table with the key `file`, in a scene file, beside those of `of_file`.
     of_file_besides: ClassVar[tuple[str, ...]] = ("file", "clearance", "name")
+    of_file_by: ClassVar[str] = "from_file"
 
     depth: Any = number(("x", "y"), "m")
     origin: Any = number((2,), "m", None, optional=True)
@@ -105,10 +106,9 @@ class Floor(Event):
             >>> float(floor.depth_at(0.0, 0.0).round(2))
             25.0
         """
-        from lgvi_warp.ocean.floor_data import read_floor
-
-        wanted = cls.of_file()(origin, region, spacing, variable, positive, fill)
-        numbers = read_floor(file, wanted)
+        wanted = {"origin": origin, "region": region, "spacing": spacing, "variable": variable, "positive": positive,
+                  "fill": fill}  # fmt: skip
+        numbers = numbers_in(file, cls, wanted)
         at = {"depth": numbers.depth, "origin": numbers.origin, "spacing": numbers.spacing}
         return cls(**at, clearance=clearance, name=name)
 
@@ -118,43 +118,6 @@ class Floor(Event):
         dry = float(np.mean(depth < 0.0))
         told = depth.ndim == 2 and dry > 0.5
         return (f"{100.0 * dry:.0f} % of the floor lies above the sea: its sign may be wrong",) if told else ()
-
-    @classmethod
-    def of_file(cls) -> Any:
-        """What a table with the key `file` may have, a class with fields.
-
-        Returns:
-            lgvi_warp.ocean.floor_request.FloorRequest; a scene without a file does not load it.
-        """
-        from lgvi_warp.ocean.floor_request import FloorRequest
-
-        return FloorRequest
-
-    @classmethod
-    def of_table(cls, where: str, table: Mapping[str, Any]) -> Self:
-        """The floor of a file that a table of a scene file names.
-
-        Args:
-            where: The table's place in the scene.
-            table: The key `file`, and those of `from_file` besides.
-
-        Returns:
-            The floor.
-
-        Raises:
-            SceneError: As `from_file`.
-        """
-        values = {key: value for key, value in table.items() if key != "type"}
-        faults = Faults()
-        faults.keys(where, values, [*(item.name for item in dataclasses.fields(cls.of_file())), *cls.of_file_besides])
-        if "origin" not in values:
-            remedy = "give [latitude, longitude] of the origin of the axes [deg]"
-            faults.add(f"{where}.origin", "", "is missing", remedy)
-        faults.raise_if_any()
-        try:
-            return cls.from_file(values.pop("file"), values.pop("origin"), **values)
-        except SceneError as error:
-            raise error.prefixed(f"{where}.") from error
 
     def __post_init__(self) -> None:
         if self.on_grid and self.origin is None:

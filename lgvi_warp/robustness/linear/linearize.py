@@ -12,9 +12,6 @@ import numpy as np
 from lgvi_warp.common.arguments import explained, flag
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
 from lgvi_warp.common.near import near_names
-from lgvi_warp.control.dvl import DVL
-from lgvi_warp.control.error_state_filter import ErrorStateFilter
-from lgvi_warp.control.imu import IMU
 from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.control.sensor import HANDED, Sensor
 from lgvi_warp.criteria.running import step_of
@@ -295,7 +292,7 @@ def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, t
     """
     controller, sensors, zeros = scene.controller, [], list[str]()
     # A filter believes noises that are not 0; linear models refuse it elsewhere.
-    if controller is None or any(isinstance(part, ErrorStateFilter) for part in controller.sensors):
+    if controller is None or any(part.uses for part in controller.sensors):
         return scene, (), ()
     for part in controller.sensors:
         acting = [word for word in words if isinstance(part, Sensor) and np.any(getattr(part, word))]
@@ -318,7 +315,7 @@ def check_parts(controller: Any, purpose: str, refused: Collection[str] | None =
         problem = f"lets no motion be steady, as {purpose} need it"
     faults = Faults()
     for part in controller.sensors:
-        if isinstance(part, IMU | DVL | ErrorStateFilter):
+        if not part.linear:
             faults.add("sensors", part.key, problem, "leave it out of this scene")
         if isinstance(part, Sensor):
             numbers = {name: np.asarray(value)[None] for name, value in part.parameters().items()}

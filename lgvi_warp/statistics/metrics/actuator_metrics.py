@@ -13,8 +13,7 @@ from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
-from lgvi_warp.control.signals import CHANNELS, ENERGY_USED, SAVED, SIGNALS, ordered
-from lgvi_warp.physics.fields import TABLE
+from lgvi_warp.control.signals import CHANNELS, ENERGY_USED, SAVED, SIGNALS, field_of, ordered
 from lgvi_warp.statistics.metrics.metric import Metric, OfOne, State, Ticks, Total
 from lgvi_warp.statistics.values.quantity import Quantity, named
 
@@ -37,9 +36,7 @@ class _AllOf(Quantity):
 
 def all_of(*names: str) -> Quantity:
     """Return all numbers of some samples as a quantity."""
-    return _AllOf(
-        ", ".join(names), _nothing, SIGNALS[names[0]].field.unit if names[0] in SIGNALS else "", ordered(names)
-    )
+    return _AllOf(", ".join(names), _nothing, field_of(names[0]).unit if names[0] in SIGNALS else "", ordered(names))
 
 
 def _nothing(samples: Fields, members: Members) -> np.ndarray:
@@ -306,7 +303,7 @@ class CustomMetric(Metric):
     def _divided(self, x: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         """The samples by name, (n, ...)."""
         names = self.quantity.fields
-        shapes = {name: (TABLE[name] if name in TABLE else SIGNALS[name].field).shape for name in names}
+        shapes = {name: field_of(name).shape for name in names}
         channels = [name for name in names if name in CHANNELS]
         rest = len(x) - sum(int(np.prod(shapes[name])) for name in names if name not in CHANNELS)
         shapes |= {name: (rest // len(channels),) for name in channels}

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -151,10 +152,13 @@ KNOWN: dict[str, Quantity] = {
         _known("energy", FIELDS, _energy),
     )
 }
-# Signals of a controller whose shape is the same in all scenes.
-SIGNAL_QUANTITIES = {
-    name: _of(signal.field, (name,), _field(name)) for name, signal in SIGNALS.items() if name not in CHANNELS
-}
+
+
+@functools.cache
+def _of_signal(name: str) -> Quantity | None:
+    """A signal of a controller whose shape is the same in all scenes; None for what is no such signal."""
+    known = name not in CHANNELS and name in SIGNALS
+    return _of(SIGNALS[name].field, (name,), _field(name)) if known else None
 
 
 def named(key: str, of: str, text: str) -> Quantity:
@@ -162,7 +166,7 @@ def named(key: str, of: str, text: str) -> Quantity:
     match = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
     if match and match[1] in CHANNELS:
         return _channel(key, of, match[1], match[2] or "")
-    if match is None or (base := KNOWN.get(match[1]) or SIGNAL_QUANTITIES.get(match[1])) is None:
+    if match is None or (base := KNOWN.get(match[1]) or _of_signal(match[1])) is None:
         raise refusal(key, of, "is not known", closest(text, (*KNOWN, *SIGNALS)))
     if match[2] is None:
         return base

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.store.exporting.tracks import FIELDS, Report, Tracks, derived_of, units_of
+from lgvi_warp.control.signals import field_of
+from lgvi_warp.store.exporting.tracks import Report, Tracks, derived_of, units_of
 from lgvi_warp.store.layout import MEMBER, WEIGHT
 
 # By name of a column, its unit ("" for none) and its numbers, one for each row.
@@ -79,7 +80,7 @@ def _columns(tracks: Tracks, rows: slice) -> Columns:
         if tracks.environment.start is not None:
             columns["utc"] = ("", _in_utc(np.tile(tracks.moments(tracks.time), count)))
     for name, values in samples.items():
-        unit = FIELDS[name].attributes["units"]
+        unit = field_of(name).attributes["units"]
         columns |= _components(name, unit, np.swapaxes(values, 0, 1).reshape(-1, *values.shape[2:]))
     for item in derived_of(tracks, BESIDE):
         columns[item.field.name] = (item.field.unit, item.function(tracks, samples).T.reshape(-1))

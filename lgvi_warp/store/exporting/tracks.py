@@ -12,12 +12,12 @@ import numpy as np
 
 from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.errors import SceneError, ragged, refusal
+from lgvi_warp.common.places import LocalPlane
 from lgvi_warp.common.status import Status
-from lgvi_warp.control.signals import SAVED, SIGNALS
-from lgvi_warp.ocean.places import LocalPlane
+from lgvi_warp.control.signals import ordered
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
-from lgvi_warp.physics.fields import TABLE, Field
+from lgvi_warp.physics.fields import Field
 from lgvi_warp.physics.terms.base import word_of
 from lgvi_warp.results.result import Result
 from lgvi_warp.scene.start import Environment
@@ -25,8 +25,7 @@ from lgvi_warp.statistics.values.quantity import KNOWN
 
 # What is told the fraction that is done.
 Report = Callable[[float], None]
-# Fields of the samples, and numbers of the start, by name.
-FIELDS = TABLE | {name: signal.field for name, signal in SIGNALS.items()}
+# Numbers of the start, by name.
 START_UNITS = {"start.position": "m", "start.rotation_vector": "rad", "start.euler_deg": "deg", "start.velocity": "m/s",
                "start.velocity_inertial": "m/s", "start.angular_velocity": "rad/s"}  # fmt: skip
 
@@ -76,7 +75,7 @@ class Tracks:
     @property
     def fields(self) -> tuple[str, ...]:
         """Names of the fields with samples."""
-        return tuple(name for name in SAVED if name in self.result.samples)
+        return ordered(self.result.samples)
 
     def needing(self, names: Sequence[str], purpose: str) -> None:
         """Refuse a run that has not kept what a kind of file is made of."""

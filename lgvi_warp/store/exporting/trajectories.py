@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.control.signals import field_of
 from lgvi_warp.results import member_fields
 from lgvi_warp.results.result import END_TIME
 from lgvi_warp.store.exporting.netcdf_files import new_netcdf
-from lgvi_warp.store.exporting.tracks import FIELDS, Report, Tracks, derived_of, units_of
+from lgvi_warp.store.exporting.tracks import Report, Tracks, derived_of, units_of
 
 DIMENSIONS = ("trajectory", "obs")
 # Quantities that follow from samples, and what the file calls them.
@@ -111,9 +112,9 @@ def _layout(tracks: Tracks, file: Any) -> list[str]:
         names.append(_create(file, name, "f8", DIMENSIONS, attributes).name)
     for field in (field for field in tracks.fields if field not in ("position", "attitude")):
         values = tracks.sample(field, slice(0, 1), slice(0, 1))
-        entries, meaning = _entries(field, values.shape[2:]), FIELDS[field].meaning
+        entries, meaning = _entries(field, values.shape[2:]), field_of(field).meaning
         for i, name in enumerate(entries):
-            attributes = _described(meaning, FIELDS[field].unit, i, len(entries)) | _about(tracks, name)
+            attributes = _described(meaning, field_of(field).unit, i, len(entries)) | _about(tracks, name)
             names.append(_create(file, name, values.dtype, DIMENSIONS, attributes).name)
     return names
 

@@ -22,7 +22,7 @@ from lgvi_warp.common.files import place_of, write_text
 from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_bytes, file_json, file_text
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.status import Warnings
-from lgvi_warp.criteria.files import STUDY_FILES, of_study
+from lgvi_warp.criteria.files import of_study, study_files
 from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.results.varied import varied
 from lgvi_warp.statistics.estimates.table import table
@@ -101,7 +101,7 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
         run, studies = run_in(folder), studies_in(folder)
         if run is None and not studies:
             fault = "holds no run and no study"
-            remedy = f"give a folder that lgvi-warp run wrote, or a study: {', '.join(STUDY_FILES)}".replace("_", "-")
+            remedy = f"give a folder that lgvi-warp run wrote, or a study: {', '.join(study_files())}".replace("_", "-")
             raise SceneError([f"{folder}: {fault}; {remedy}"])
         place, parts = folder.resolve().name, list[str]()
         if run is not None:
@@ -130,7 +130,7 @@ def run_in(folder: Path) -> tuple[Result, Path] | None:
 
 def studies_in(folder: Path) -> list[Path]:
     """Find the studies that a folder holds."""
-    return [inside(folder, path.name) for pattern in STUDY_FILES.values() for path in sorted(folder.glob(pattern))]
+    return [inside(folder, path.name) for pattern in study_files().values() for path in sorted(folder.glob(pattern))]
 
 
 def name_of(provenance: Mapping[str, Any]) -> str:

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from lgvi_kernels.advance.noting import ALL_NOTES, BITS_OF_ROWS, NOTED, bit
 from lgvi_warp.control.base import Bus
@@ -47,7 +48,8 @@ def test_rows_of_the_memory():
 
 
 def test_order_and_shapes():
-    assert SAVED[: len(FIELDS)] == FIELDS
+    assert tuple(SAVED) == (*FIELDS, *SIGNALS)
+    assert len(SAVED) == len(FIELDS) + len(SIGNALS)
     assert ordered(["demand", "command", "position", "demand"]) == ("position", "command", "demand")
     shapes = {name: tuple(np.shape(np.zeros(SIGNALS[name].field.shape))) for name in SIGNALS if name not in CHANNELS}
     assert all(has_shape(name, shape) and not has_shape(name, (*shape, 1)) for name, shape in shapes.items())
@@ -55,6 +57,7 @@ def test_order_and_shapes():
     assert not any(has_shape("actuator", shape) for shape in ((), (0,), (2, 2)))
 
 
+@pytest.mark.needs("navigation")
 def test_the_page_lists_all():
     rows = re.findall(r"^\| `(\w+)` \| (\(.*?\)) \| (.*?) \|", PAGE.read_text(), re.MULTILINE)
     assert [name for name, _, _ in rows] == list(SIGNALS)

@@ -267,45 +267,6 @@ FOSSEN = [
 ENERGY = [({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, "drag_matrix.linear", "creates energy", "minus Fossen's")]
 
 
-LINK = ("<sdf><model name='m'><link name='b'><inertial><mass>10</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz>"
-        "</inertia></inertial></link><plugin name='hydrodynamics'><xU>-1</xU></plugin></model></sdf>")  # fmt: skip
-SDF = [
-    ("<sdf/>", {}, "SDF link", "has none", "with a <link>"),
-    ("<sdf><link name='b'/></sdf>", {}, "'b'", "no <inertial>", "add mass, pose and inertia"),
-    ("<sdf><", {}, "not XML", "mend that line"),
-    ("missing.sdf", {}, "missing.sdf", "No such file", "give the path of a file, or its text"),
-    (None, {}, "SDF file None", "give the path of a file, or its text"),
-    (LINK.replace("<mass>10</mass>", ""), {}, "<mass>", "is missing", "[kg]"),
-    (LINK.replace(">10<", ">ten<"), {}, "<mass> = 'ten'", "does not hold 1 finite numbers"),
-    (LINK.replace("<xU>-1</xU>", "<xU>-1</xU><yV>1</yV>"), {}, "plugin's linear drag", "both signs", "Fossen's signs"),
-    (LINK.replace("xU", "xUabsV"), {}, "<xUabsV> = -1.0", "product of velocities", "leave it out"),
-    ("<sdf><link></sdf>", {}, "not XML", "mend that line"),
-    (LINK, {"link": "c"}, "SDF link = 'c'", "not in the file", "known: b"),
-    (LINK, {"volume": -1.0}, "volume = -1.0", "not positive", "[m3]"),
-    (LINK, {"volume": 0.01, "gravity": "g"}, "gravity = 'g'", "not numeric", "[m/s2]"),
-]
-
-
-@pytest.mark.parametrize(("text", "more", "words"), [(row[0], row[1], row[2:]) for row in SDF])
-def test_sdf(text, more, words):
-    fault = next(one for one in faults(lw.vehicles.from_sdf, text, **more) if words[0] in one)
-    assert all(word in fault for word in words), fault
-
-
-YAML = [
-    ("inertia: [1, 2, 2.5]\n", "mass = ''", "is missing", "add mass to the file, or pass mass="),
-    ("mass: 10\ninertia:\n", "inertia = ''", "is missing", "pass inertia="),
-    ("mass: ten\ninertia: [1, 2, 2.5]\n", "mass = 'ten'", "not numeric", "[kg]"),
-    ("mass: 10\ninertia: [1, 2, 2.5]\nvolume: 0.1\n", "density = 'not given'", "[kg/m3 (with volume)]"),
-    ("mass: 10\ninertia: [1, 2, 2.5]\ncolour: red\n", "colour = 'red'", "unknown key", "ignore="),
-    ("mass: 10\ninertia: [1, 2, 2.5]\nadded_mass: [1, 2]\n", "added_mass = [1, 2]", "shape (2,)", "6x6 matrix"),
-    ("mass: 10\ninertia: [1, 2, 2.5]\ncoefficients: [1]\n", "coefficients = [1]", "not a map", "X_udot"),
-    ("- 1\n- 2\n", "is not a map", "write mass: ..."),
-    ("nowhere.yaml", "nowhere.yaml", "give the path"),
-    ("mass: [1\n", "YAML", "mend that line"),
-]
-
-
 PATHS = [(path, str(path), "give the path of a TOML file") for path in ("missing.toml", None)]
 FAR, NEAR = lw.distributions.Normal(std=100.0), lw.distributions.Uniform(0.1, 0.2)
 VARIED = [(PROFILE, "current_profile.depths"), (SCHEDULE, "wrench_schedule.times"),
@@ -373,7 +334,6 @@ ONE_FAULT = [
     (lambda values: lw.Start(**values), STARTS),
     (lambda given: lw.vehicles.from_fossen(given, **BODY), FOSSEN),
     (lambda given: from_dict(lw.vehicles.from_fossen(given, **BODY)), ENERGY),
-    (lambda text: pytest.importorskip("yaml") and lw.vehicles.from_yaml(text), YAML),
     (lw.Scene.load, PATHS),
     (varied, [((*row, FAR, 50), row[1], "unphysical", "of 50 members", "smaller spread") for row in VARIED]),
     (

@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Underwater gliders: what moves and weighs in them, their polars, and water and hulls by whose density they dive."""
+
+# Where the device code of the terms is.
+DEVICE = f"{__name__}.device"
+HOLDS = {
+    "terms": {
+        "ballast": ".terms.ballast",
+        "buoyancy_engine": ".terms.buoyancy_engine",
+        "moving_mass": ".terms.moving_mass",
+        "polar": ".terms.polar",
+        "stratification": ".terms.stratification",
+        "surface_buoyancy": ".terms.surface_buoyancy",
+    },
+    "vehicles": {"seawing": "vehicles/seawing.toml", "slocum": "vehicles/slocum.toml"},
+}

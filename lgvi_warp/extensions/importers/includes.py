@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an SDF file includes: put in its place from files that the user names; no path or address of the file is opened."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Mapping
+from typing import Any
+from xml.etree.ElementTree import Element
+
+from lgvi_warp.common.errors import SceneError, closest, refusal
+from lgvi_warp.extensions.importers.robot_xml import MOST_ELEMENTS, is_true, parse_xml, text_of
+
+# Models within models that are put in place.
+MOST_NESTED = 8
+
+
+def put_in_place(root: Element, given: Any) -> None:
+    """Put models in the place of <include> elements whose <name>, <uri>, or its last part, is in a map of paths or texts."""
+    if not (isinstance(given, Mapping) and all(isinstance(each, str | os.PathLike) for each in given.values())):
+        raise refusal(
+            "include", given, "is no map of files", "give include={'tethys': 'model.sdf'}: a path or text by name"
+        )
+    files = {name: parse_xml(source, f"include {name!r}") for name, source in given.items()}
+    used: set[str] = set()
+    known: set[str] = set()
+    size = _put(root, files, used, known, 0)
+    if unused := [name for name in files if name not in used]:
+        raise refusal("include", unused[0], "is none that the file includes", closest(unused[0], sorted(known)))
+    if size > MOST_ELEMENTS:
+        raise SceneError([f"SDF include: makes more than {MOST_ELEMENTS:,} elements; give the vehicle alone"])
+
+
+def _put(root: Element, files: Mapping[str, Element], used: set[str], known: set[str], depth: int) -> int:
+    """Put models in place below an element; the number of elements there is then."""
+    if depth > MOST_NESTED:
+        raise SceneError([f"SDF include: is nested more than {MOST_NESTED} deep, or in a circle; mend the files"])
+    size = sum(1 for _ in root.iter())
+    for parent in [element for element in root.iter() if element.find("include") is not None]:
+        for place, child in reversed(list(enumerate(parent))):
+            if child.tag != "include":
+                continue
+            names = names_of(child)
+            known.update(names)
+            name = next((each for each in names if each in files), None)
+            if name is None:
+                continue
+            used.add(name)
+            model = _model(files[name], name, child)
+            size += _put(model, files, used, known, depth + 1)
+            if size > MOST_ELEMENTS:
+                return size
+            parent[place : place + 1] = _merged(model, name) if is_true(child.get("merge")) else [model]
+    return size
+
+
+def names_of(include: Element) -> list[str]:
+    """By what an <include> may be named: its <name>, its <uri>, and the last part of that."""
+    uri = text_of(include.find("uri"))
+    return [each for each in (text_of(include.find("name")), uri, uri.rstrip("/").rpartition("/")[2]) if each]
+
+
+def _model(root: Element, name: str, include: Element) -> Element:
+    """A copy of the model of a file with what its <include> says of it: name, pose, static, and plugins besides."""
+    found = root if root.tag == "model" else root.find("model")
+    if found is None:
+        raise SceneError([f"SDF include {name!r}: the file has no <model>; give the file of a model"])
+    model = copy.deepcopy(found)
+    model.set("name", text_of(include.find("name")) or model.get("name", ""))
+    for tag in ("pose", "static", "placement_frame"):
+        if (own := include.find(tag)) is not None:
+            for old in model.findall(tag):
+                model.remove(old)
+            model.append(own)
+            if tag == "placement_frame":
+                model.set("placement_frame", text_of(own))
+    model.extend(include.findall("plugin"))
+    return model
+
+
+def _merged(model: Element, name: str) -> list[Element]:
+    """The parts of a model that becomes one with the model that includes it."""
+    pose = text_of(model.find("pose"))
+    if any(float(word) != 0.0 for word in pose.split() if word.replace(".", "").replace("-", "").isdigit()):
+        raise SceneError([f"SDF include {name!r}: is merged at a pose of its own; include it without merge"])
+    return [child for child in model if child.tag not in ("pose", "static")]

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`lw.gym.sb3`: a vector environment as the `VecEnv` of Stable-Baselines3, whose learners take that alone."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.arguments import members_of
+from lgvi_warp.common.errors import MissingExtra, refusal
+from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.extensions.learning.gym import Vehicles, step_by
+
+# What the base class of Stable-Baselines3 calls indices: one, several, or None for all.
+Indices = int | Iterable[int] | None
+
+
+def sb3(env: Vehicles) -> Any:
+    """Return a vector environment as the `VecEnv` that learners of Stable-Baselines3 take.
+
+    Where an episode ends, the step returns the first observation of the next one, whatever the autoreset of `env`; the last
+    one is in infos[i]["terminal_observation"], "TimeLimit.truncated" says whether time alone ended it, and "status" why the
+    vehicle ended by itself. The environment is shared, not copied: use one of the two.
+
+    Args:
+        env: The environment, an `lw.gym.VectorEnv` with bounds of its actions.
+
+    Returns:
+        stable_baselines3.common.vec_env.VecEnv of env.num_envs environments, with their spaces. `seed(s)` makes the next
+        `reset()` draw by the seed s, one for all. Rewards are float32 (num_envs,).
+
+    Raises:
+        SceneError: Where `env` is something else, or its actions have no bounds.
+        MissingExtra: Where Stable-Baselines3 is not installed.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> parts = dict(guidance=[lw.control.SetPoint(depth=9.0)], laws=[lw.control.HeavePID(kp=40.0, kd=60.0)])
+        >>> scene = lw.Scene.named("bluerov2_heavy", controller=lw.Controller(period=0.1, **parts))
+        >>> env = lw.gym.VectorEnv(scene, observe=["depth_error", "down"], act="thrusters", num_envs=4, h=0.02, duration=8.0)
+        >>> for_learners = lw.gym.sb3(env)  # then stable_baselines3.PPO("MlpPolicy", for_learners).learn(100_000)
+        >>> for_learners.reset().shape
+        (4, 4)
+    """
+    made = _vec_env(needed())
+    if not isinstance(env, Vehicles):
+        problem = "is no lw.gym.VectorEnv"
+        raise refusal("env", type(env).__name__, problem, "give it without wrappers; Stable-Baselines3 has its own")
+    space: Any = env.single_action_space
+    if not np.isfinite([space.low, space.high]).all():
+        remedy = "give scale= to lw.gym.VectorEnv, what an action of 1 is"
+        raise refusal("env", "", "has actions without bounds, which no learner of Stable-Baselines3 takes", remedy)
+    return made(env)
+
+
+class Baselines:
+    """A `VecEnv` over a vector environment, all of whose vehicles share their attributes."""
+
+    num_envs: int
+    _seeds: list[int | None]
+    _options: list[dict[str, Any]]
+
+    def __init__(self, env: Any):
+        self.env = env
+        self._asked: np.ndarray | None = None
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)  # type: ignore[call-arg]
+
+    def reset(self) -> np.ndarray:
+        """Begin new episodes of all environments.
+
+        Returns:
+            Their first observations (num_envs, k).
+
+        Raises:
+            ValueError: Where options were set, of which there are none.
+        """
+        if any(self._options):
+            raise ValueError(f"options = {self._options[0]}: there are none to set; vary the ensemble")
+        self._asked = None
+        observed, _ = self.env.reset(seed=self._seeds[0])
+        self._seeds = [None] * self.num_envs
+        return observed
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions of a step.
+
+        Args:
+            actions: (num_envs, n).
+        """
+        self._asked = np.array(actions)
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Make the step of `step_async`.
+
+        Returns:
+            (observations, rewards, where episodes ended, infos); infos are empty but for those that ended.
+
+        Raises:
+            RuntimeError: Without `step_async` before.
+        """
+        if self._asked is None:
+            raise RuntimeError("step_wait: no step was begun; call step_async(actions) first")
+        actions, self._asked = self._asked, None
+        observed, rewards, terminated, truncated, infos = step_by("SameStep", self.env, actions)
+        done = terminated | truncated
+        each: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        status = infos["final_info"].get("status") if done.any() else None
+        for i in np.flatnonzero(done):
+            each[i]["terminal_observation"] = infos["final_obs"][i]
+            each[i]["TimeLimit.truncated"] = bool(truncated[i] and not terminated[i])
+            if status is not None and status[i]:
+                each[i]["status"] = int(status[i])
+        return observed, rewards.astype(np.float32), done, each
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Draw by a seed from the next `reset` on.
+
+        Args:
+            seed: One for all environments; None, the default, for one that NumPy's global generator draws.
+
+        Returns:
+            The seed, once for each environment.
+        """
+        drawn = int(np.random.randint(2**31)) if seed is None else int(seed)
+        self._seeds = [drawn] * self.num_envs
+        return self._seeds
+
+    def close(self) -> None:
+        """Close the environment; again does nothing."""
+        self.env.close()
+
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+        """Look an attribute of the environment up.
+
+        Args:
+            attr_name: Its name.
+            indices: Of which environments; None, the default, for all.
+
+        Returns:
+            Its value, once for each; of an array with a row for each environment, that row.
+        """
+        return self._of_each(getattr(self.env, attr_name), indices)
+
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+        """Set an attribute of the environment, for all vehicles.
+
+        Args:
+            attr_name: Its name.
+            value: Its value.
+            indices: All environments; None, the default, says so.
+
+        Raises:
+            ValueError: Where only some environments are named.
+        """
+        if set(self._chosen(indices)) != set(range(self.num_envs)):
+            raise ValueError(f"indices = {indices}: all environments share their attributes; leave it out")
+        setattr(self.env, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of the environment once, for all vehicles.
+
+        Args:
+            method_name: Its name.
+            method_args: What it is called with.
+            indices: Whose answers are wanted; None, the default, for all.
+            method_kwargs: What it is called with, by name.
+
+        Returns:
+            Its answer, once for each; of an array with a row for each environment, that row.
+        """
+        return self._of_each(getattr(self.env, method_name)(*method_args, **method_kwargs), indices)
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Indices = None) -> list[bool]:
+        """Say whether environments are wrapped: none is.
+
+        Args:
+            wrapper_class: Class of a wrapper.
+            indices: Of which environments; None, the default, for all.
+
+        Returns:
+            False for each.
+        """
+        return [False for _ in self._chosen(indices)]
+
+    def get_images(self) -> list[None]:
+        """Say that there are no images: `lw.record` shows the vehicles of a run.
+
+        Returns:
+            None for each environment.
+        """
+        return [None] * self.num_envs
+
+    def _chosen(self, indices: Indices) -> list[int]:
+        if indices is None:
+            return list(range(self.num_envs))
+        return members_of("indices", [indices] if is_whole(indices, 0) else indices, self.num_envs).tolist()
+
+    def _of_each(self, value: Any, indices: Indices) -> list[Any]:
+        by_row = isinstance(value, np.ndarray) and value.shape[:1] == (self.num_envs,)
+        return [value[i] if by_row else value for i in self._chosen(indices)]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the environment: the copy has not begun."""
+        return sb3, (self.env,)
+
+
+def needed() -> type:
+    """The base class of Stable-Baselines3's vector environments."""
+    try:
+        from stable_baselines3.common.vec_env import VecEnv
+    except ImportError as error:
+        raise MissingExtra("learners of Stable-Baselines3", "stable_baselines3", "learn") from error
+    return VecEnv
+
+
+@functools.cache
+def _vec_env(base: type) -> type:
+    """`Baselines` as a class of Stable-Baselines3's, made when it is used first: that may be absent."""
+    return type("SB3VecEnv", (Baselines, base), {"__doc__": Baselines.__doc__, "__module__": __name__})

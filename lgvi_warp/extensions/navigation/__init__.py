@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Inertial navigation: an IMU, a log, an error-state filter, and what says whether the filter believes what is so."""
+
+# Where the device code of the parts is.
+DEVICE = f"{__name__}.device"
+HOLDS = {
+    "sensors": {"dvl": ".control.dvl", "error_state_filter": ".control.error_state_filter", "imu": ".control.imu"},
+    "signals": dict.fromkeys(
+        ("estimate_sigma", "estimate_bias", "nees", "nis", "nis_count", "innovation", "innovation_sigma"), ".signals"
+    ),
+    "statistics": {"nees": ".metrics", "nis": ".metrics"},
+}

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Doppler velocity log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.declared import text
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.base import MeasuringPart
+from lgvi_warp.control.over_floor import packed_over, with_floor
+from lgvi_warp.control.sensor import BOTTOMLESS, HANDED, MOST_TICKS
+from lgvi_warp.extensions.navigation import DEVICE
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, own
+from lgvi_warp.physics.terms.noisy import key_of
+
+BEAMS = 4
+# Beams stand at 45 degrees from the bow.
+DIAGONAL = float(np.sqrt(0.5))
+MOST_ANGLE = 1.5
+# How far a beam looks for a floor on a grid where its range has no end [m].
+FARTHEST = 2e4
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DVL(MeasuringPart):
+    """A Doppler velocity log with four beams in a cross: the velocity over ground of its place along each of them.
+
+        reading_i = u_i . (nu + Omega x place) + noise xi_i
+        u_i = (+-sin(angle) / sqrt(2), +-sin(angle) / sqrt(2), cos(angle))
+
+    A beam has no echo where it is lost by chance, where it looks upward, and where the way along it to the floor, flat or on a
+    grid, is not within its range. An `error_state_filter` takes each beam by itself, so one is of use too; without a filter
+    the measured velocity becomes that of the log's place by least squares of three beams or four, else it stays the last one,
+    and is 0 before the first: a log without bottom lock tells no velocity.
+
+    Args:
+        place: Place of the log (3,) [m], body axes; 0 by default.
+        angle: Angle of the beams from the body's third axis [rad]; 30 degrees by default.
+        noise: Standard deviation along a beam [m/s]; 0 by default.
+        dropout: Probability with which a beam is lost at a tick; 0 by default.
+        every: Ticks from one new reading to the next, a whole number; 1 by default.
+        floor: Key of the scene's `lw.events.Floor` that is the ground; "" by default: always an echo.
+        least_range: Shortest way along a beam to the floor [m]; 0 by default.
+        greatest_range: Longest way along a beam to the floor [m]; inf by default.
+        silent_from: From when on it is silent [s]; inf by default, never.
+        silent_to: Until when [s]; inf by default, to the end.
+
+    Raises:
+        SceneError: Where `every` is no whole number, or a range or a silence ends before it begins; and as `Term`. A scene
+            refuses a log whose floor is none of its events.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> log = lw.control.DVL(noise=0.01, every=2, floor="floor", greatest_range=60.0)
+        >>> float(log.greatest_range)
+        60.0
+    """
+
+    type: ClassVar[str] = "dvl"
+    device: ClassVar[str] = f"{DEVICE}.dvl"
+    linear: ClassVar[bool] = False
+    every_feature: ClassVar[tuple[str, ...]] = ("noise", "dropout", "floor", "grid", "silent", HANDED)
+    # The floor; set for a part of a scene.
+    ground: ClassVar[Any] = None
+
+    place: Any = number((3,), "m", (0.0, 0.0, 0.0))
+    angle: Any = number((), "rad", np.pi / 6.0, above=0.0, most=MOST_ANGLE)
+    noise: Any = number((), "m/s", 0.0, least=0.0)
+    dropout: Any = number((), "1", 0.0, least=0.0, most=1.0)
+    every: Any = number((), "ticks", 1.0, least=1.0, most=MOST_TICKS)
+    floor: str = text("is not a text", "give the name of a floor among the scene's events", "")
+    least_range: Any = number((), "m", 0.0, least=0.0)
+    greatest_range: Any = number((), "m", np.inf, least=0.0, infinite=True)
+    silent_from: Any = number((), "s", np.inf, infinite=True)
+    silent_to: Any = number((), "s", np.inf, infinite=True)
+
+    def check(self, faults: Faults) -> None:
+        if float(self.every) != round(float(self.every)):
+            near = f"{np.floor(self.every):g} or {np.ceil(self.every):g}"
+            faults.add("every", float(self.every), "is no whole number of ticks", f"give {near}")
+        for first, last in (("least_range", "greatest_range"), ("silent_from", "silent_to")):
+            begin, end = float(getattr(self, first)), float(getattr(self, last))
+            if np.isfinite(end) and end <= begin:
+                faults.add(last, end, f"is not above {first} = {begin:g}", "give a larger one, or leave it out")
+
+    def in_scene(self, faults: Faults, events: Sequence[Term], sensors: Sequence[Any]) -> Any:
+        return with_floor(self, faults, events) if self.floor else self
+
+    @property
+    def handed_rows(self) -> int:
+        return 2 * BEAMS
+
+    def features(self, numbers: Numbers) -> tuple[str, ...]:
+        # What some member has.
+        acting = [name for name in ("noise", "dropout") if np.any(numbers[name])]
+        acting += [] if self.ground is None else ["grid" if self.ground.on_grid else "floor"]
+        acting += ["silent"] if np.any(np.isfinite(numbers["silent_from"])) else []
+        return (*acting, HANDED) if self.is_handed else tuple(acting)
+
+    def device_in(self, aligned: bool) -> Any:
+        return f"{self.device}:{','.join(self.chosen)}"
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        # The numbers, the key of the random numbers, and the rows of the last velocity, and of the beams.
+        from scipy.special import ndtri
+
+        values: dict[str, Any] = {name: numbers[name] for name in ("place", "noise", "least_range")}
+        for name in ("greatest_range", "silent_from", "silent_to"):
+            values[name] = np.minimum(numbers[name], BOTTOMLESS)
+        values |= {"ahead": DIAGONAL * np.sin(numbers["angle"]), "down": np.cos(numbers["angle"])}
+        values |= {"every": np.rint(numbers["every"]), "key": key_of(self.key, context)}
+        # A beam is lost where a standard normal is below this.
+        values["dropout"] = np.clip(ndtri(numbers["dropout"]), -BOTTOMLESS, BOTTOMLESS)
+        # Without a filter its own memory has the rows of the beams, behind the last velocity.
+        values["handed"] = self.bus.handed[self.key] if self.is_handed else 0
+        memory = np.zeros((1, 0 if self.is_handed else 3 + 2 * BEAMS))
+        if "grid" in self.chosen:
+            reach = {"most": np.minimum(numbers["greatest_range"], FARTHEST)}
+            return packed_over(self.ground, context, values | reach)._replace(memory=memory)
+        flat = self.ground is not None
+        values["floor"] = own(self.ground, context.parameters)["depth"] if flat else np.array([BOTTOMLESS])
+        return Packed(values, memory=memory)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An inertial measurement unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.control.base import MeasuringPart
+from lgvi_warp.control.sensor import HANDED
+from lgvi_warp.extensions.navigation import DEVICE
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.noisy import key_of, normals_at_start
+
+# Numbers that are noise: where no member has one, it is no code.
+NOISES = ("accelerometer_noise", "gyroscope_noise", "accelerometer_walk", "gyroscope_walk")
+# What it hands on: velocity and turn gained, and both biases as they are, by which a filter is judged.
+HANDED_ROWS = 12
+# Rows of its memory, and of these those of the biases.
+ROWS, BIAS_ROWS = 18, slice(12, 18)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IMU(MeasuringPart):
+    """Accelerometers and gyroscopes: the velocity and the turn that they gain from one tick to the next, with errors.
+
+    As units do that correct for coning and sculling, it adds up over the whole period what happens between two ticks:
+
+        turn     = log(R_k-1^T R_k) + T b_w + sqrt(T) gyroscope_noise xi
+        velocity = R_k-1^T (v_k - v_k-1 - g T) + T b_a + sqrt(T) accelerometer_noise xi,   in the axes of the last tick
+        b <- b + sqrt(T) walk xi;   at first bias + turn_on xi, once a member
+
+    T is the period of the controller, v the velocity over ground of the unit's place, xi standard normals that follow from the
+    seed, the member, the tick and the unit's name. The Allan deviation is noise / sqrt(t) and walk sqrt(t / 3), in quadrature.
+    An `error_state_filter` takes what it hands on. Without one it replaces the measured angular velocity by the mean of the
+    last period; a log then stands before it, as it would take that rate for the truth. IEEE Std 952-1997 has the model.
+
+    Args:
+        place: Place of the unit (3,) [m], body axes; 0 by default.
+        accelerometer_noise: Noise density (3,) [m/s^1.5]: m/s^2 per root of Hz; 0 by default; one number for all axes.
+        gyroscope_noise: Noise density (3,) [rad/s^1/2]; 0 by default.
+        accelerometer_walk: Random walk of the bias (3,) [m/s^2.5]; 0 by default.
+        gyroscope_walk: Random walk of the bias (3,) [rad/s^1.5]; 0 by default.
+        accelerometer_bias: Steady bias (3,) [m/s^2]; 0 by default.
+        gyroscope_bias: Steady bias (3,) [rad/s]; 0 by default.
+        accelerometer_turn_on: Standard deviation of the bias of each member at the start (3,) [m/s^2]; 0 by default.
+        gyroscope_turn_on: The same of the gyroscopes (3,) [rad/s]; 0 by default.
+
+    Raises:
+        SceneError: As `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.control.IMU(gyroscope_noise=1e-4).gyroscope_noise
+        array([0.0001, 0.0001, 0.0001])
+    """
+
+    type: ClassVar[str] = "imu"
+    device: ClassVar[str] = f"{DEVICE}.imu"
+    linear: ClassVar[bool] = False
+    every_feature: ClassVar[tuple[str, ...]] = (*NOISES, HANDED)
+
+    place: Any = number((3,), "m", (0.0, 0.0, 0.0))
+    accelerometer_noise: Any = number((3,), "m/s^1.5", 0.0, least=0.0)
+    gyroscope_noise: Any = number((3,), "rad/s^1/2", 0.0, least=0.0)
+    accelerometer_walk: Any = number((3,), "m/s^2.5", 0.0, least=0.0)
+    gyroscope_walk: Any = number((3,), "rad/s^1.5", 0.0, least=0.0)
+    accelerometer_bias: Any = number((3,), "m/s^2", 0.0)
+    gyroscope_bias: Any = number((3,), "rad/s", 0.0)
+    accelerometer_turn_on: Any = number((3,), "m/s^2", 0.0, least=0.0)
+    gyroscope_turn_on: Any = number((3,), "rad/s", 0.0, least=0.0)
+
+    def __post_init__(self) -> None:
+        self.repeat(3, *(item.name for item in self.number_fields()))
+        super().__post_init__()
+
+    @property
+    def handed_rows(self) -> int:
+        return HANDED_ROWS
+
+    def features(self, numbers: Numbers) -> tuple[str, ...]:
+        # The noises that some member has.
+        acting = tuple(name for name in NOISES if np.any(numbers[name]))
+        return (*acting, HANDED) if self.is_handed else acting
+
+    def device_in(self, aligned: bool) -> Any:
+        return f"{self.device}:{','.join(self.chosen)}"
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        # Place and noises, the keys of the random numbers, and the biases of the start in the rows of its memory.
+        biases = []
+        values: dict[str, Any] = {name: numbers[name] for name in ("place", *NOISES)}
+        for kind in ("accelerometer", "gyroscope"):
+            name, spread = f"{self.key}.{kind}", numbers[f"{kind}_turn_on"]
+            bias = numbers[f"{kind}_bias"]
+            if np.any(spread):
+                bias = bias + spread * normals_at_start(context.seed, name, context.members)
+            biases.append(bias)
+            values[f"{kind}_key"] = key_of(name, context)
+        members = max(len(bias) for bias in biases)
+        memory = np.zeros((members, ROWS))
+        memory[:, BIAS_ROWS] = np.hstack([np.broadcast_to(bias, (members, 3)) for bias in biases])
+        values["gravity"] = context.parameters["environment.gravity"]
+        return Packed(values | {"handed": self.bus.handed.get(self.key, 0)}, memory=memory)

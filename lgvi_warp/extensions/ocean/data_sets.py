@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Data sets: files in NetCDF, opened so that only what is asked for is read, and nothing but the file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+
+from lgvi_warp.common import reading
+from lgvi_warp.common.arguments import path_of
+from lgvi_warp.common.errors import MissingExtra, SceneError, brief, refusal
+from lgvi_warp.extensions.ocean.closed_files import leads_elsewhere
+
+# What reads a file, by how it begins: a stranger's file decides nothing else. HDF5 is read from the file that was looked at.
+HDF5, CLASSIC = b"\x89HDF\r\n\x1a\n", (b"CDF\1", b"CDF\2", b"CDF\5")
+REMEDY = "give the path of a NetCDF file, or an xarray Dataset"
+
+
+def xarray() -> Any:
+    """The library, imported when it is needed."""
+    try:
+        import xarray
+    except ImportError as error:
+        raise MissingExtra("data sets of the ocean", "xarray", "ocean") from error
+    return xarray
+
+
+@contextlib.contextmanager
+def data_set(source: Any) -> Iterator[Any]:
+    """An xarray Dataset as `opened` gives it, closed at the end where it is that of a file."""
+    ds = opened(source)
+    try:
+        yield ds
+    except OSError as error:  # of what is read when it is needed
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise SceneError([f"file = {brief(os.fspath(source))}: is damaged: {reason}; {REMEDY}"]) from error
+    finally:
+        if ds is not source:
+            ds.close()
+
+
+def opened(source: Any) -> Any:
+    """An xarray Dataset: the one that is given, or that of a NetCDF file, of which nothing but coordinates is read yet."""
+    library = xarray()
+    if isinstance(source, library.Dataset):
+        return source
+    if isinstance(source, library.DataArray):
+        raise refusal("file", type(source).__name__, "is one variable", "give the Dataset that has it")
+    with contextlib.ExitStack() as stack:
+        path, file = stack.enter_context(regular_file(source, "file"))
+        begin = file.read(8)
+        file.seek(0)
+        try:
+            if begin == HDF5:
+                _check_closed(file, path)
+                whole = library.open_dataset(file, engine="h5netcdf", cache=False, phony_dims="access")
+            elif begin.startswith(CLASSIC):
+                _check_whole(path, os.fstat(file.fileno()).st_size)
+                whole = library.open_dataset(path, engine="netcdf4", cache=False)
+            else:
+                raise ValueError("it begins as none")
+            stack.callback(whole.close)
+            ds = whole.copy()
+            ds.set_close(stack.pop_all().close)
+            return ds
+        except (SceneError, MissingExtra):
+            raise
+        except Exception as error:  # whatever the library makes of a damaged file
+            reason = " ".join(str(error).split())[:200] or type(error).__name__
+            raise SceneError([f"file = {path}: is damaged, or no NetCDF file: {reason}; {REMEDY}"]) from error
+
+
+def _check_closed(file: BinaryIO, path: str) -> None:
+    """Refuse an HDF5 file that is not all there is."""
+    try:
+        import h5py
+    except ImportError as error:
+        raise MissingExtra("NetCDF files", "h5py", "ocean") from error
+    with h5py.File(file, "r") as content:
+        problem = leads_elsewhere(content)
+    if problem:
+        raise refusal("file", path, problem, "give a file that holds all its numbers, packed by filters of HDF5 itself")
+
+
+def _check_whole(path: str, size: int) -> None:
+    """Refuse a file in a classic form that promises more numbers than it has bytes: no such form packs them."""
+    try:
+        import netCDF4
+    except ImportError as error:
+        raise MissingExtra("NetCDF files", "netCDF4", "ocean") from error
+    with netCDF4.Dataset(path) as content:
+        if any(float(one.size) * one.dtype.itemsize > size for one in content.variables.values()):
+            raise ValueError("it is shorter than it says")
+
+
+@contextlib.contextmanager
+def regular_file(source: Any, key: str) -> Iterator[tuple[str, BinaryIO]]:
+    """The path of a regular file, absolute, and the file itself, open to read: libraries are given what was looked at."""
+    path = os.path.abspath(path_of(key, source))
+    with contextlib.ExitStack() as stack:
+        try:
+            file = stack.enter_context(reading.opened(path, "data set"))
+        except reading.UnreadableError as error:
+            raise refusal(key, os.fspath(source), f"{error.what}: it is no regular file", REMEDY) from None
+        except (OSError, ValueError) as error:
+            raise refusal(key, os.fspath(source), str(getattr(error, "strerror", None) or error), REMEDY) from None
+        yield path, file

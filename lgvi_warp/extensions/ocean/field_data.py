@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is wanted of a data set with a current, and what became of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.declared import array, declared, read, word
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.extensions.ocean.holes import FILLS
+
+# Part of the velocities' rms from which on a change by the regular grid is told.
+MUCH = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class FieldRequest:
+    """What is wanted of a data set; numbers that are None follow from it.
+
+    Args:
+        origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,); needed.
+        start: Moment that is t = 0: a datetime, or a text as ISO 8601 writes it, in UTC where it names no zone; by default
+            the first of the data.
+        region: Least and largest north, east and depth that are read, (3, 2) [m]; by default all the data.
+        speed: Bound of the speed over ground [m/s] that says the region in place of `region`: what a vehicle that starts at
+            `around` can reach in `duration`.
+        duration: Time from the start on that is read [s]; by default to the end of the data.
+        variables: Names of the variables: eastward and northward, and upward if there is one; by default those with the
+            standard_name, or the name, that models give them.
+        spacing: Distances of the nodes that are made [m], (3,); by default at least as fine as the data's own.
+        fill: What stands where values are missing: "nearest", the default, "zero", or "refuse".
+        checksum: That of the numbers of the file that are read, so that another file is not taken for it.
+    """
+
+    origin: Any = array(None, shape=(2,), unit="deg")
+    start: Any = None
+    region: Any = array(None, shape=(3, 2), unit="m")
+    speed: float | None = declared(Faults.positive, None, unit="m/s")
+    duration: float | None = declared(Faults.positive, None, unit="s")
+    variables: Any = None
+    spacing: Any = array(None, shape=(3,), unit="m")
+    fill: str = word("nearest", known=FILLS)
+    checksum: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FieldData:
+    """Where a field comes from, and what became of the data on the way.
+
+    Attributes:
+        file: Path of the file; None for a Dataset.
+        request: What was asked for, with all that followed from the data.
+        nodes: Numbers of nodes (s, t, x, y, z).
+        missing: How many values were missing on land and below the sea floor, of those that were read.
+        values: How many were read.
+        error: Largest change of a velocity at the data's own nodes and times, by the regular grid [m/s].
+        last: The last time that was read [s].
+        more: Whether the data has later ones.
+        speed: Root mean square of the velocities [m/s].
+        gap: Begin and end [s] of the longest time without a field, where it is more than twice the usual one; else None.
+    """
+
+    file: str | None
+    request: FieldRequest
+    nodes: tuple[int, ...]
+    missing: int
+    values: int
+    error: float
+    last: float
+    more: bool
+    speed: float
+    gap: tuple[float, float] | None
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on values that were missing, and on what the regular grid changes."""
+        sentences = []
+        if self.missing:
+            part = 100.0 * self.missing / self.values
+            how = {"zero": "taken for 0", "nearest": "filled with the nearest value"}[self.request.fill]
+            amount = f"{self.missing:,} of {self.values:,} values ({part:.2g} %)"
+            sentences.append(f"{amount}, on land or below the sea floor, are missing: {how}")
+        if self.gap is not None:
+            begin, end = (f"{t / 3600.0:.4g}" for t in self.gap)
+            sentences.append(
+                f"the data have no field from {begin} to {end} h: the current goes straight from one to the other"
+            )
+        if self.error > MUCH * self.speed:
+            of_rms = f"{100.0 * self.error / self.speed:.2g} % of the rms" if self.speed else "of no current"
+            sentences.append(
+                f"the regular grid changes a velocity by up to {self.error:.3g} m/s, {of_rms}: give a finer spacing"
+            )
+        return tuple(sentences)
+
+    def table(self) -> dict[str, Any]:
+        """What reads the same numbers again, as keys of a scene file."""
+        request = {item.name: getattr(self.request, item.name) for item in dataclasses.fields(self.request)}
+        plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in request.items()}
+        return {"file": self.file} | {name: value for name, value in plain.items() if value is not None}
+
+
+@dataclass(frozen=True, eq=False)
+class FieldNumbers:
+    """Velocities (s, t, x, y, z, 3) [m/s] in inertial axes on a regular grid, and what its axes are."""
+
+    velocities: np.ndarray
+    origin: np.ndarray
+    spacing: np.ndarray
+    times: np.ndarray | None
+    data: FieldData
+
+
+def checked(faults: Faults, request: FieldRequest) -> dict[str, Any]:
+    """Values of a request that are read; the faults of others."""
+    values = read(request, faults)
+    del values["fill"]
+    if request.origin is None:
+        faults.add("origin", "", "is missing", "give [latitude, longitude] of the origin of the axes [deg]")
+    elif (origin := values["origin"]) is not None and abs(origin[0]) > 89.0:
+        faults.add("origin", origin, "has a latitude beyond 89 degrees", "give [latitude, longitude] in degrees")
+    if (region := values["region"]) is not None and np.any(region[:, 1] < region[:, 0]):
+        faults.add(
+            "region", region, "ends before it begins", "give [[from, to], [from, to], [from, to]]: north, east, depth"
+        )
+    if (spacing := values["spacing"]) is not None and np.any(spacing <= 0.0):
+        faults.add("spacing", spacing, "is not positive", "give numbers above 0 [m]")
+    if request.speed is not None and request.region is not None:
+        faults.add("speed", request.speed, "says the region, and so does region", "leave one of them out")
+    if request.speed is not None and request.duration is None:
+        faults.add("speed", request.speed, "says no region without a duration", "give duration [s], or [run] duration")
+    names = request.variables
+    if names is not None and not (
+        isinstance(names, list | tuple) and len(names) in (2, 3) and all(isinstance(n, str) for n in names)
+    ):
+        faults.add("variables", names, "are no two or three names", "give ['uo', 'vo'], or a third one for upward")
+    return values

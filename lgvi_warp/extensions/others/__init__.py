@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Assimilation, exports to maps and ROS, and the predictive control law."""
+
+# Where the device code of the law is.
+DEVICE = f"{__name__}.device"
+HOLDS = {
+    "laws": {"linear_mpc": ".control.linear_mpc"},
+    # By the ending of a file. Each module has `write`, and `MOST_MEMBERS` where its files hold no more of a whole run.
+    "exporters": {".geojson": ".exporting.geojson", ".kml": ".exporting.kml", ".mcap": ".exporting.ros"},
+    "studies": {"assimilate": ".assimilation.answer:Assimilated"},
+}

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The answer of an assimilation: where the members are, how sure they are, and what they learned."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from lgvi_warp.common import summaries
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.summaries import Summarized
+from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
+from lgvi_warp.extensions.others.assimilation.innovations import InnovationTest, tested
+from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.sampling.final import NUMBERS, Final
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Assimilated(Summarized, Saved):
+    """Members that followed what was measured, after each measurement.
+
+    Attributes:
+        time: Times of the measurements (k,) [s].
+        mean: Means after them, weighted with particles: position (k, 3) [m], velocity and angular_velocity (k, 3) [m/s, rad/s,
+            body axes], attitude (k, 3, 3), and the learned numbers by name, (k, ...).
+        std: Standard deviations of the same; of the attitude (k, 3) [rad], about the body's axes.
+        innovations: By name of the series, values less predictions (k, m); NaN where it has none.
+        innovation_std: What they should be, (k, m): root of the spread of the predictions and the instrument's variance.
+        whitened: Innovations over the root of their covariance, (k, m), by name of the series.
+        left_out: By name of the series, the times at which the gate left it out, (k,), True or False.
+        log_likelihood: Logarithm of the probability density of all measured values, each given those before it; without those
+            that the gate left out. Scenes that follow the same series may be compared by it.
+        inflation: Factor on the covariance of the members before each measurement, (k,).
+        effective: Effective number of members before resampling, (k,), where copies of one member count once; with Kalman
+            filters their number.
+        ancestors: Number of members of the beginning from which those after each measurement come, (k,).
+        final: Where the members are at the end, from which a run can go on.
+        parameters: The learned numbers of the members at the end, by name, (n, ...), as
+            `run.states(final, parameters=parameters)` takes them.
+        weights: Weights of the members at the end, (n,), with the sum 1.
+        method: Name of the filter.
+        messages: What the user should know.
+        provenance: Scene, ensemble, settings, versions and machine.
+    """
+
+    study: ClassVar[str] = "assimilate"
+
+    time: np.ndarray
+    mean: Mapping[str, np.ndarray]
+    std: Mapping[str, np.ndarray]
+    innovations: Mapping[str, np.ndarray]
+    innovation_std: Mapping[str, np.ndarray]
+    whitened: Mapping[str, np.ndarray]
+    left_out: Mapping[str, np.ndarray]
+    log_likelihood: float
+    inflation: np.ndarray
+    effective: np.ndarray
+    ancestors: np.ndarray
+    final: Final
+    parameters: Mapping[str, np.ndarray]
+    weights: np.ndarray
+    method: str
+    messages: tuple[str, ...]
+    provenance: dict[str, Any]
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """What was learned, and whether innovations are what they should be."""
+        rows = [("method", self.method)]
+        for name in self.parameters:
+            rows.append((name, f"{_text(self.mean[name][-1])} +- {_text(self.std[name][-1])}"))
+        rows.append(("position", f"{_text(self.mean['position'][-1])} +- {_text(self.std['position'][-1])} m"))
+        for name, test in self.consistency().items():
+            text = f"{test.ratio:.2f} of what their spread should be, {test.verdict}"
+            rows.append((f"innovations of {name}", text))
+        rows.append(("log-likelihood", f"{self.log_likelihood:.2f}"))
+        if (self.inflation != 1.0).any():
+            rows.append(("inflation", f"{self.inflation[-1]:.3g} at the end, of the covariance"))
+        rows.append(("effective", f"{self.effective[-1]:,.0f} of {self.final.members:,} members at the end"))
+        rows += [("message", text) for text in self.messages]
+        return f"Assimilation of {len(self.time):,} times to {self.time[-1]:g} s", rows
+
+    def to_dict(self) -> dict[str, Any]:
+        content = {item.name: getattr(self, item.name) for item in fields(self)}
+        ends = {name: getattr(self.final, name) for name in NUMBERS}
+        arrays = [self.final.to_arrays(), self.final.parameters]
+        ends["arrays"], ends["parameters"] = ({name: _packed(rows) for name, rows in each.items()} for each in arrays)
+        return dict(finite_or_none({**content, "final": ends}))
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        ends, read = content["final"], dict[str, Any](content)
+        arrays, parameters = (
+            {name: _unpacked(rows) for name, rows in ends[key].items()} for key in ("arrays", "parameters")
+        )
+        for item in fields(cls):
+            if item.type == "np.ndarray":
+                read[item.name] = _array(content[item.name])
+            elif item.type == "Mapping[str, np.ndarray]":
+                read[item.name] = {name: _array(rows) for name, rows in content[item.name].items()}
+        read["ancestors"] = read["ancestors"].astype(np.int64)
+        read["left_out"] = {name: rows != 0.0 for name, rows in read["left_out"].items()}
+        read["final"] = Final.from_arrays(arrays, ends, parameters)
+        return cls(**read | {"messages": tuple(content["messages"])})
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        kinds = {"mean": self.mean, "std": self.std, "innovation": self.innovations}
+        columns = {f"{kind} {name}": np.asarray(rows).reshape(len(self.time), -1)
+                   for kind, each in kinds.items() for name, rows in each.items()}  # fmt: skip
+        for k, time in enumerate(self.time):
+            entries = {f"{name}[{i}]" if rows.shape[1] > 1 else name: float(value)
+                       for name, rows in columns.items() for i, value in enumerate(rows[k])}  # fmt: skip
+            yield {"time": float(time), "effective": float(self.effective[k])} | entries
+
+    def consistency(self, level: float = 0.95) -> dict[str, InnovationTest]:
+        """Compare innovations with what those of a right filter are: normal, of their own spread, independent in time.
+
+        Args:
+            level: Probability that all of a right filter's numbers are inside their bands, in (0, 1); 0.95 by default.
+
+        Returns:
+            By name of the series, root mean square, mean and correlation of the innovations with bands, and a verdict.
+
+        Raises:
+            SceneError: If the level is not in (0, 1).
+        """
+        faults = Faults()
+        chance = faults.number("level", level)
+        if chance is not None and not 0.0 < chance < 1.0:
+            faults.add("level", level, "is no probability between 0 and 1", "give 0.95, say")
+        faults.raise_if_any()
+        tests = {}
+        for name, apart in self.innovations.items():
+            used = np.isfinite(self.whitened[name]) & ~self.left_out[name][:, None]
+            normalised, whitened = (
+                np.where(used, each, np.nan) for each in (apart / self.innovation_std[name], self.whitened[name])
+            )
+            left_out = int((np.isfinite(apart) & self.left_out[name][:, None]).sum())
+            tests[name] = tested(normalised, whitened, left_out, float(level))
+        return tests
+
+    def table(self) -> Table:
+        """The learned numbers of the members as a design, whose runs begin with them.
+
+        Returns:
+            A table with a column for each number.
+        """
+        return Table(values=dict(self.parameters))
+
+
+def _text(values: Any) -> str:
+    """A few numbers, to four digits."""
+    return ", ".join(f"{value:.4g}" for value in np.atleast_1d(values).ravel())
+
+
+def _array(values: Any) -> np.ndarray:
+    """Numbers of a file, NaN where they were not finite."""
+    return np.array(with_missing_as(values, np.nan), np.float64)
+
+
+def _packed(rows: np.ndarray) -> dict[str, Any]:
+    """An array to the bit, as texts: a run that goes on needs it so."""
+    rows = np.ascontiguousarray(rows)
+    return {"dtype": rows.dtype.str, "shape": list(rows.shape), "base64": base64.b64encode(rows.tobytes()).decode()}
+
+
+def _unpacked(content: Mapping[str, Any]) -> np.ndarray:
+    dtype = np.dtype(content["dtype"])
+    if dtype.kind not in "fiub":
+        raise ValueError(f"{dtype} are no numbers")
+    return np.frombuffer(base64.b64decode(content["base64"]), dtype).reshape(content["shape"]).copy()

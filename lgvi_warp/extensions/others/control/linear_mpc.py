@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Linear model predictive control as a law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from lgvi_warp.common.declared import real, whole
+from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.times import whole_steps
+from lgvi_warp.control.base import Bus, ControlLaw, Numbers, Packed, PackingContext, list_of_names
+from lgvi_warp.extensions.others import DEVICE
+from lgvi_warp.physics.notation import repeated
+from lgvi_warp.physics.terms.base import Term, number
+from lgvi_warp.physics.terms.control_wrench import COMPONENTS
+
+# Numbers of the motion that may be states, in the device code's order, and what must be wanted for each.
+COORDINATES = {
+    f"{name}[{i}]": wish
+    for name, wishes in (
+        ("position", ("position", "position", "depth")),
+        ("rotation", ("attitude",) * 3),
+        ("velocity", (None,) * 3),
+        ("angular_velocity", (None,) * 3),
+    )
+    for i, wish in enumerate(wishes)
+}
+LONGEST = 20
+
+
+class Condensed(NamedTuple):
+    """A problem of a horizon in its inputs alone, v (k,), each a part of its limit.
+
+    cost: H (k, k) of v H v / 2 + f v. slope: f = slope (x, d), (k, 2 n). best: v = best (x, d) without limits.
+    """
+
+    cost: np.ndarray
+    slope: np.ndarray
+    best: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LinearMPC(ControlLaw):
+    """Inputs that are best over a horizon by a linear model and within their limits (Rawlings, Mayne & Diehl 2017, chapter 1).
+
+    With x' = A x + B u + d from tick to tick, the inputs of the next `horizon` periods make the sum of (x - x_s)^T Q (x - x_s)
+    + (u - u_s)^T R (u - u_s), and (x - x_s)^T P (x - x_s) at the end, least, with |u| up to `limit` and its rate up to
+    `rate_limit`. The first of them is the demand; at the next tick it begins anew. Where the best inputs without limits keep
+    these, they are taken, to round-off; else those within them are found by an interior-point method (Nocedal & Wright 2006,
+    algorithm 16.4), whose demand is right to 1e-6 of the limit, in float32 to 1e-2; a run says in its messages where a tick
+    had not converged.
+
+    d is what the model lacks: x less what it predicted, filtered over `disturbance_time`. x_s and u_s are the steady state
+    under d in which the `tracked` errors are 0: so steady disturbances leave no error of these. What the actuators did not
+    deliver did not act. `lw.linear.mpc` makes the law from a linear model.
+
+    Args:
+        states: Names of the states (n,), errors of what is measured less what is wanted: "position[0]" to "position[2]" [m,
+            inertial axes], "rotation[0]" to "rotation[2]" (the e_R of `PosePID`), "velocity[0]" to "velocity[2]" over ground
+            [m/s], "angular_velocity[0]" to "angular_velocity[2]" [rad/s], body axes.
+        inputs: Which of "X", "Y", "Z", "K", "M", "N" are the inputs (m,).
+        A: What a period makes of the state, (n, n).
+        B: What it makes of inputs that are held, (n, m).
+        Q: Weights of the states (n,), at least 0.
+        R: Weights of the inputs (m,), above 0.
+        limit: Largest inputs (m,) [N, N m].
+        P: Weight of the state at the end of the horizon (n, n), symmetric; by default Q.
+        rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default none.
+        disturbance_time: Time over which the disturbance is filtered [s]; infinite: none is estimated. 5 by default.
+        tracked: Names of the states whose errors are to vanish, at most as many as inputs; by default the first of `states`,
+            as many as inputs.
+        horizon: Number of periods, 1 to 20; 10 by default.
+        iterations: Largest number of iterations at a tick, of which most take about ten; 50 by default.
+        period: Period of the model [s]; a controller of another period is refused. By default whatever it has.
+
+    Raises:
+        SceneError: Where names, shapes or weights are at fault, or inputs hold no steady state without an error of what is
+            tracked; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> T = 0.1
+        >>> law = lw.control.LinearMPC(
+        ...     states=["position[2]", "velocity[2]"],
+        ...     inputs=["Z"],
+        ...     A=[[1.0, T], [0.0, 1.0]],
+        ...     B=[[T * T / 2.0 / 20.0], [T / 20.0]],
+        ...     Q=[1.0, 0.0],
+        ...     R=[1e-4],
+        ...     limit=[30.0],
+        ... )
+        >>> law.needs, law.demands
+        (('depth',), ('Z',))
+    """
+
+    type: ClassVar[str] = "linear_mpc"
+    device: ClassVar[str] = f"{DEVICE}.linear_mpc"
+    iterates: ClassVar[bool] = True
+
+    states: Sequence[str]
+    inputs: Sequence[str]
+    A: Any = number(("n", "n"), "1")
+    B: Any = number(("n", "m"), "1/N, 1/(N m)")
+    Q: Any = number(("n",), "1", least=0.0)
+    R: Any = number(("m",), "1", above=0.0)
+    limit: Any = number(("m",), "N, N m", above=0.0)
+    P: Any = number(("n", "n"), "1", None, optional=True)
+    rate_limit: Any = number(("m",), "N/s, N m/s", None, optional=True, above=0.0)
+    disturbance_time: Any = number((), "s", 5.0, above=0.0, infinite=True)
+    tracked: Sequence[str] | None = None
+    horizon: int = whole(1, "is no number of periods", f"give 1 to {LONGEST}", default=10)
+    iterations: int = whole(1, "is no number of iterations", "give 1 or more", default=50)
+    period: float | None = real(None, unit="s", least=1e-9)
+
+    def check(self, faults: Faults) -> None:
+        states = list_of_names(faults, "states", self.states, tuple(COORDINATES))
+        inputs = list_of_names(faults, "inputs", self.inputs, COMPONENTS)
+        tracked = (
+            states[: len(inputs)] if self.tracked is None else list_of_names(faults, "tracked", self.tracked, states)
+        )
+        for key, names, size in (("states", states, len(self.A)), ("inputs", inputs, self.B.shape[1])):
+            if names and len(names) != size:
+                faults.add(key, getattr(self, key), f"are {len(names)}", f"name the {size} of A and B")
+        if len(tracked) > len(inputs):
+            faults.add("tracked", tracked, f"are {len(tracked)}", f"name at most {len(inputs)}, one for each input")
+        if is_whole(self.horizon, LONGEST + 1):
+            faults.add("horizon", self.horizon, "is too long", f"give 1 to {LONGEST}")
+        if self.P is not None and not faults and not _at_least_zero(self.P):
+            faults.add("P", self.P, "is not symmetric and at least 0", "give such weights")
+        if faults:
+            return
+        places = [states.index(name) for name in tracked]
+        if _steady_state(self.A, self.B, places) is None:
+            problem = "has no steady inputs that hold it against any disturbance"
+            faults.add("tracked", ", ".join(tracked), problem, "track another state, or give other inputs")
+        wishes = dict.fromkeys(COORDINATES[name] for name in states)
+        known = {
+            "states": tuple(states), "inputs": tuple(inputs), "needs": tuple(wish for wish in wishes if wish),
+            "demands": tuple(inputs), "tracked": None if self.tracked is None else tuple(tracked), "tracked_places": places,
+        }  # fmt: skip
+        for name, value in known.items():
+            object.__setattr__(self, name, value)
+
+    def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
+        # A model of another period would be wrong without a sign of it.
+        if self.period is not None and whole_steps(self.period, bus.period) != 1:
+            problem = f"is that of the model, and the controller's is {bus.period:g} s"
+            raise refusal(f"{self.key}.period", self.period, problem, "make the model anew with this period")
+        return super().wired(bus, others)
+
+    def to_dict(self) -> dict[str, Any]:
+        lists = {"states": list(self.states), "inputs": list(self.inputs)}
+        return super().to_dict() | lists | ({} if self.tracked is None else {"tracked": list(self.tracked)})
+
+    def condensed(self, numbers: Numbers, i: int, period: float) -> Condensed:
+        """The problem of a member in its inputs alone.
+
+        Args:
+            numbers: Numbers of the fields by name, each (n, ...).
+            i: Place of the member in them.
+            period: Time between two ticks [s].
+
+        Returns:
+            Its matrices.
+        """
+        own = {name: value[min(i, len(value) - 1)] for name, value in numbers.items()}
+        A, B, limit, N = own["A"], own["B"] * own["limit"], own["limit"], self.horizon
+        n, m = B.shape
+        weights = [np.diag(own["Q"])] * (N - 1) + [own.get("P", np.diag(own["Q"]))]
+        powers = [np.eye(n)]
+        for _ in range(N):
+            powers.append(A @ powers[-1])
+        Phi = np.concatenate(powers[1:])
+        Gamma = np.zeros((N * n, N * m))
+        for row in range(N):
+            for column in range(row + 1):
+                Gamma[row * n : (row + 1) * n, column * m : (column + 1) * m] = powers[row - column] @ B
+        weighted = np.concatenate([W @ Gamma[j * n : (j + 1) * n] for j, W in enumerate(weights)])
+        cost = weighted.T @ Gamma + np.diag(np.tile(own["R"] * limit**2, N))
+        # About its steady state under d, x_s = S_x d and u_s = S_u d, the model has no disturbance.
+        steady = _steady_state(A, own["B"], vars(self)["tracked_places"])
+        S_x, S_u = (np.zeros((n, n)), np.zeros((m, n))) if steady is None else np.split(steady, [n])
+        at_once = weighted.T @ Phi
+        slope = np.hstack([at_once, -at_once @ S_x - cost @ np.tile(S_u / limit[:, None], (N, 1))])
+        return Condensed(cost, slope, -np.linalg.solve(cost, slope))
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        # Places, A, B, limits, and the matrices of the problem; memory of state, inputs and disturbance.
+        period, (n, m) = self.bus.period, self.B.shape
+        k = m * self.horizon
+        places = [*(list(COORDINATES).index(name) for name in self.states), *map(COMPONENTS.index, self.inputs)]
+        gain = -np.expm1(-period / numbers["disturbance_time"])
+        matrices = {name: value for name, value in numbers.items() if name != "disturbance_time"}
+        names, arrays = list(matrices), repeated(*matrices.values())
+        rows = []
+        for i in range(len(arrays[0])):
+            own = dict(zip(names, arrays, strict=True))
+            found = self.condensed(own, i, period)
+            limit = own["limit"][i]
+            change = period * own["rate_limit"][i] / limit if "rate_limit" in own else np.zeros(m)
+            half = found.cost[np.tril_indices(k)]
+            parts = (places, own["A"][i], own["B"][i], limit, change, found.best, found.slope, half)
+            rows.append(np.concatenate([np.ravel(part) for part in parts]))
+        words = {"states": n, "inputs": m, "horizon": self.horizon, "iterations": self.iterations}
+        rated = int(self.rate_limit is not None)
+        words |= {"rated": rated, "unmet": self.bus.unmet, "unconverged": self.bus.unconverged}
+        work = len(COORDINATES) + len(COMPONENTS) + 2 * n + 2 * m + 5 * k + 8 * (1 + rated) * k + k * (k + 1) // 2
+        return Packed(words | {"gain": gain}, np.array(rows), np.zeros((1, 1 + 2 * n + m)), work=work)
+
+
+def _at_least_zero(matrix: np.ndarray) -> bool:
+    """Whether a matrix is symmetric and has no negative eigenvalue, but for round-off."""
+    size = np.abs(matrix).max()
+    return bool(np.allclose(matrix, matrix.T) and np.linalg.eigvalsh(matrix).min() >= -1e-9 * size)
+
+
+def _steady_state(A: np.ndarray, B: np.ndarray, tracked: Sequence[int]) -> np.ndarray | None:
+    """(x_s, u_s) = S d, (n + m, n): the smallest with x_s = A x_s + B u_s + d and no error of what is tracked; None: none."""
+    n, m = B.shape
+    goal = np.eye(n)[list(tracked)]
+    both = np.block([[A - np.eye(n), B], [goal, np.zeros((len(goal), m))]])
+    # Rows of one size, so that the rank does not depend on units.
+    sizes = np.linalg.norm(both, axis=0)
+    scaled = both / np.where(sizes > 0.0, sizes, 1.0)
+    wanted = np.concatenate([-np.eye(n), np.zeros((len(goal), n))])
+    found, *_ = np.linalg.lstsq(scaled, wanted, rcond=1e-12)
+    left = scaled @ found - wanted
+    return None if np.abs(left).max() > 1e-6 else found / np.where(sizes > 0.0, sizes, 1.0)[:, None]

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tracks of members as a GeoJSON file (RFC 7946): a feature for each, with its outcome and the times of its points."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.files import new_text_file
+from lgvi_warp.extensions.others.exporting.lines import MapLine, lines
+from lgvi_warp.store.exporting.tracks import Report, Tracks
+
+# Programs read such a file whole.
+MOST_MEMBERS = 1000
+
+
+def write(tracks: Tracks, target: Path, report: Report) -> None:
+    """Write a collection of features, one after the other."""
+    with new_text_file(target) as file:
+        start = {} if tracks.environment.start is None else {"start": f"{tracks.moments(np.zeros(()))}Z"}
+        file.write(json.dumps({"type": "FeatureCollection", "source": tracks.source} | start)[:-1])
+        file.write(', "features": [')
+        for done, line in enumerate(lines(tracks, "a map")):
+            file.write(",\n" if done else "\n")
+            file.write(json.dumps(_feature(line), allow_nan=False))
+            report((done + 1) / tracks.count)
+        file.write("\n]}\n")
+
+
+def _feature(line: MapLine) -> dict[str, Any]:
+    """A member: its line, and when it was where."""
+    geometry, times = _geometry(line)
+    properties = {"member": line.member, "status": line.status, "end_time": line.end_time, "times": times}
+    return {"type": "Feature", "id": line.member, "geometry": geometry, "properties": properties}
+
+
+def _geometry(line: MapLine) -> tuple[dict[str, Any] | None, Any]:
+    """The geometry of a line, and its times [s] in the same lists: None for no place, a point for one."""
+    if len(line.points) == 0:
+        return None, []
+    if len(line.points) == 1:
+        return {"type": "Point", "coordinates": line.points[0, :3].tolist()}, line.points[0, 3].tolist()
+    places, times = zip(*((part[:, :3].tolist(), part[:, 3].tolist()) for part in line.parts), strict=True)
+    if len(places) == 1:
+        return {"type": "LineString", "coordinates": places[0]}, times[0]
+    return {"type": "MultiLineString", "coordinates": list(places)}, list(times)

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tracks of members as a KML file: tracks in time where the run has a date, else lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from lgvi_warp.common.files import new_text_file
+from lgvi_warp.extensions.others.exporting.lines import MapLine, lines
+from lgvi_warp.store.exporting.tracks import Report, Tracks
+
+HEAD = """<?xml version="1.0" encoding="UTF-8"?>
+<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">
+<Document><name>Ensemble of underwater vehicles</name>
+"""
+TAIL = "</Document>\n</kml>\n"
+
+# Programs read such a file whole.
+MOST_MEMBERS = 1000
+
+
+def write(tracks: Tracks, target: Path, report: Report) -> None:
+    """Write a document with a placemark for each member, one after the other."""
+    with new_text_file(target) as file:
+        file.write(HEAD)
+        for done, line in enumerate(lines(tracks, "a map")):
+            file.write(ET.tostring(_placemark(tracks, line), encoding="unicode") + "\n")
+            report((done + 1) / tracks.count)
+        file.write(TAIL)
+
+
+def _placemark(tracks: Tracks, line: MapLine) -> ET.Element:
+    """A member: its name, its outcome, and its track or line."""
+    placemark = ET.Element("Placemark")
+    _text(placemark, "name", f"member {line.member}")
+    data = ET.SubElement(placemark, "ExtendedData")
+    for name, value in (("status", line.status), ("end_time", repr(line.end_time))):
+        _text(ET.SubElement(data, "Data", name=name), "value", value)
+    if len(line.points) == 0:
+        return placemark
+    if len(line.points) == 1:
+        _coordinates(ET.SubElement(placemark, "Point"), line.points)
+    elif tracks.environment.start is not None:
+        _track(tracks, ET.SubElement(placemark, "gx:Track"), line)
+    else:
+        several = placemark if len(line.parts) == 1 else ET.SubElement(placemark, "MultiGeometry")
+        for part in line.parts:
+            _coordinates(ET.SubElement(several, "LineString"), part)
+    return placemark
+
+
+def _track(tracks: Tracks, track: ET.Element, line: MapLine) -> None:
+    """Add times, then places: a viewer goes the short way between two, across the antimeridian too."""
+    _text(track, "altitudeMode", "absolute")
+    for moment in np.datetime_as_string(tracks.moments(line.points[:, 3])):
+        _text(track, "when", f"{moment}Z")
+    for point in line.points:
+        _text(track, "gx:coord", " ".join(map(repr, point[:3].tolist())))
+
+
+def _coordinates(geometry: ET.Element, points: np.ndarray) -> None:
+    """Add longitude, latitude and height of points."""
+    _text(geometry, "altitudeMode", "absolute")
+    _text(geometry, "coordinates", " ".join(",".join(map(repr, point)) for point in points[:, :3].tolist()))
+
+
+def _text(parent: ET.Element, name: str, text: str) -> None:
+    """Add an element with a text."""
+    ET.SubElement(parent, name).text = text

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Terms and events whose numbers a file may hold, which an extension reads."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar, Self
+
+from lgvi_warp.common.errors import Faults, SceneError
+
+
+class InFile:
+    """A term or an event that is also made of a file. The extension's words are its type."""
+
+    type: ClassVar[str]
+    # Keys of a table with the key `file`, in a scene file, beside those of `of_file`; the method that reads the file.
+    of_file_besides: ClassVar[tuple[str, ...]]
+    of_file_by: ClassVar[str]
+
+    @classmethod
+    def of_file(cls) -> Any:
+        """Return the class whose fields a table with the key `file` may have; None without the extension that reads it."""
+        return _held("requests", cls.type)
+
+    @classmethod
+    def of_table(cls, where: str, table: Mapping[str, Any]) -> Self:
+        """Read the file that a table of a scene file names.
+
+        Args:
+            where: The table's place in the scene.
+            table: The key `file`, and those of the method besides that reads it.
+
+        Returns:
+            The term or event.
+
+        Raises:
+            SceneError: As that method.
+        """
+        fields = dataclasses.fields(_known(cls.of_file()))
+        values = {key: value for key, value in table.items() if key != "type"}
+        faults = Faults()
+        faults.keys(where, values, [*(item.name for item in fields), *cls.of_file_besides])
+        if any(
+            item.name == "origin" and item.default is dataclasses.MISSING for item in fields if item.name not in values
+        ):
+            remedy = "give [latitude, longitude] of the origin of the axes [deg]"
+            faults.add(f"{where}.origin", "", "is missing", remedy)
+        faults.raise_if_any()
+        try:
+            return getattr(cls, cls.of_file_by)(values.pop("file"), values.pop("origin", None), **values)
+        except SceneError as error:
+            raise error.prefixed(f"{where}.") from error
+
+
+def numbers_in(source: Any, kind: type[InFile], wanted: Mapping[str, Any], **others: Any) -> Any:
+    """Read the numbers of a file or of a data set, as they are wanted, by the extension that has a reader."""
+    request = _known(kind.of_file())(**wanted)
+    return _held("readers", kind.type)(source, request, **others)
+
+
+def _held(table: str, word: str) -> Any:
+    """Return what an extension has under a word; None where none has it."""
+    from lgvi_warp.common import extensions  # a scene without a file does not load it
+
+    return extensions.load(table, word)
+
+
+def _known(request: Any) -> Any:
+    """Refuse a file that no installed extension reads."""
+    if request is None:
+        raise SceneError(["file: no installed extension reads such a file. Install lgvi-warp anew."])
+    return request

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The extensions that come with the package are found by their words."""
 
+from importlib import import_module
+
 import pytest
 
 import lgvi_warp as lw
+from lgvi_kernels.maps.bounded import written_here
 from lgvi_warp.common import extensions
 from lgvi_warp.physics.terms import TYPES
 from tests.conftest import ROOT
@@ -45,3 +48,12 @@ class Mine(lw.laws.Term):
 print(json.dumps([lw.laws.Term.kinds["polar"].__module__, Mine.__module__]))
 """
     assert told_by(code, ROOT)[0] == ["lgvi_warp.extensions.gliders.terms.polar", "__main__"]
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "lgvi_warp" / "extensions").glob("*/device/*.py")), ids=lambda path: path.stem
+)
+def test_device_code_of_the_package_is_trusted_with_the_whole_memory(path):
+    # A pump writes to the account of the energy used, beyond its own rows.
+    module = import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    assert written_here(module)

@@ -32,7 +32,7 @@ ROLES = (
 
 def written_here(law):
     """Whether a law's device code is one of this package's: its reads follow from what its term has packed."""
-    return isinstance(law, ModuleType) and law.__name__.startswith("lgvi_kernels.")
+    return isinstance(law, ModuleType) and law.__name__.startswith(("lgvi_kernels.", "lgvi_warp."))
 
 
 class BoundedLaw:

@@ -94,7 +94,7 @@ def _refuse_boundless(text: str, scene: Any) -> None:
 
 
 def _differing(text: str) -> dict[str, Any]:
-    """What differs in a cheaper setting, as the command has it: "h=0.1,dtype=float32". Raises SceneError."""
+    """Changes of a cheaper setting, in the command's form: "h=0.1,dtype=float32". Raises SceneError."""
     differing: dict[str, Any] = {}
     for part in text.split(","):
         name, equals, value = (word.strip() for word in part.partition("="))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many vehicles a packet holds: by a table for each kind of processor, or as it was measured on this machine.
+"""Number of vehicles in a packet: by a table for each kind of processor, or as it was measured on this machine.
 
 What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> kind of kernel
 -> width, and under HASHES the hash of one kernel -> its width.
@@ -164,7 +164,7 @@ def this_machine() -> str:
 
 
 def _content(file: Path) -> dict[str, object]:
-    """What a file of tuned widths holds; nothing, if it is none."""
+    """Content of a file of tuned widths; empty for any other file."""
     with contextlib.suppress(OSError, ValueError, SceneError):
         content = safe_files.parsed(safe_files.read(file.parent, file.name, MOST_BYTES))
         return content if isinstance(content, dict) else {}

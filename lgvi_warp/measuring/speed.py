@@ -56,7 +56,7 @@ def operations(method: str, iterations: int | None = None) -> int | None:
 
 
 def stages_of(composition: str) -> int:
-    """How many steps of its base a composition makes."""
+    """Number of steps of its base in a composition."""
     return len(COMPOSITIONS[composition][1] if composition in COMPOSITIONS else HALVES[composition][1])
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a derivative by dual lanes costs beside the run without: plain simulations a tangent, kernels alone.
+"""Cost of a derivative by dual lanes beside the run without: plain simulations a tangent, kernels alone.
 
 The paper's vehicle and REMUS 100, one thread, by its time, in turn; with one tangent and with two. Central differences cost
 2. heyoka's variational equations in its batch integrator, on the paper's vehicle, where that package is there.

@@ -121,7 +121,7 @@ class Floor(Event):
 
     @classmethod
     def of_file(cls) -> Any:
-        """What a table with the key `file` may have, a class with fields.
+        """Class whose fields a table with the key `file` may have.
 
         Returns:
             lgvi_warp.ocean.floor_request.FloorRequest; a scene without a file does not load it.

@@ -43,7 +43,7 @@ def all_of(*names: str) -> Quantity:
 
 
 def _nothing(samples: Fields, members: Members) -> np.ndarray:
-    """What numbers are made of that need no samples."""
+    """Empty inputs for numbers that need no samples."""
     return np.zeros((len(samples.time), members.count))
 
 
@@ -95,7 +95,7 @@ class Effort(OfChannels):
 
 @dataclass(frozen=True, eq=False)
 class Travel(OfChannels):
-    """How far the actuators move, |change| from tick to tick summed over channels [unit of the commands]; then statistics.
+    """Travel of the actuators, |change| from tick to tick summed over channels [unit of the commands]; then statistics.
 
     Args:
         of: "actuator" (the default: where they are, after delay, fault, limit and lag), "command", or one channel.
@@ -224,7 +224,7 @@ class ElectricalEnergy(OfChannels):
 
 @dataclass(frozen=True, eq=False)
 class TimeToFailure(Metric):
-    """When each member failed or an event stopped it [s], infinite for those that went on to the end; then statistics of it.
+    """Time at which each member failed or an event stopped it [s], infinite for those that ran to the end.
 
     Only lw.statistics.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed.
     lw.statistics.Outcome is the probability to have ended by each time.
@@ -256,7 +256,7 @@ _END = Quantity("end", _nothing, "s", ())
 
 
 class TickSamples(dict[str, np.ndarray]):
-    """What a user's metric is told of one tick: samples (n, ...) by name, the time t [s], and dt [s] since the tick before."""
+    """Input of a user's metric at one tick: samples (n, ...) by name, the time t [s], and dt [s] since the tick before."""
 
     def __init__(self, samples: Mapping[str, np.ndarray], t: float, dt: float):
         super().__init__(samples)
@@ -324,7 +324,7 @@ class CustomMetric(Metric):
         return values
 
     def _asked(self, state: np.ndarray | None, x: np.ndarray, t: float, dt: float) -> np.ndarray:
-        """What the function returns at a tick; x: (d, n)."""
+        """Value of the function at a tick; x: (d, n)."""
         values = self._real(self.of(state, TickSamples(dict(self._divided(x)), t, dt)))
         if values.shape[-1:] != x.shape[1:] or (state is not None and values.shape != state.shape):
             wanted = f"(..., {x.shape[1]})" if state is None else f"{state.shape}"

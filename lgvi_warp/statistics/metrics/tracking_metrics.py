@@ -90,7 +90,7 @@ class OfStep(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class Overshoot(OfStep):
-    """How far each member goes beyond its goal at most [unit, or % of the step], 0 if it never does; then statistics of it.
+    """Largest distance of each member beyond its goal [unit, or % of the step], 0 if it never does; then statistics of it.
 
     Args:
         of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
@@ -129,7 +129,7 @@ class Overshoot(OfStep):
 
 @dataclass(frozen=True, eq=False)
 class Undershoot(OfStep):
-    """How far each member goes the wrong way from its start at most [unit, or % of the step]; then statistics of it.
+    """Largest distance of each member in the wrong direction from its start [unit, or % of the step]; then statistics of it.
 
     Args:
         of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
@@ -155,7 +155,7 @@ class Undershoot(OfStep):
 
 @dataclass(frozen=True, eq=False)
 class PeakTime(OfCourse):
-    """When each member is farthest in the direction of its step [s], the first such tick; then statistics of it.
+    """Time at which each member is farthest in the direction of its step [s], the first such tick; then statistics of it.
 
     Args:
         of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
@@ -203,7 +203,7 @@ class Peak(Overshoot):
 
 @dataclass(frozen=True, eq=False)
 class RiseTime(OfCourse):
-    """How long each member takes from 10 % to 90 % of its step [s]; then statistics of it.
+    """Time of each member from 10 % to 90 % of its step [s]; then statistics of it.
 
     From the first tick with at least 10 % of the step done to the first one with at least 90 %. Infinite where a member never
     gets there.
@@ -247,7 +247,7 @@ class RiseTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class SettlingTime(OfCourse):
-    """When each member comes within a band about its goal for good [s]; then statistics of it.
+    """Time after which each member stays within a band about its goal [s]; then statistics of it.
 
     The time of the first tick from which on |d| <= within at every tick of its time under way; infinite where it is outside
     at the last one.

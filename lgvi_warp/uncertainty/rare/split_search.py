@@ -27,7 +27,7 @@ FEW_STARTS = 30
 
 @dataclass(frozen=True, eq=False)
 class SplitAnswer(RareAnswer):
-    """What splitting found; paths: of each failing member, as of `SplitRuns`."""
+    """Answer of splitting; paths: of each failing member, as of `SplitRuns`."""
 
     paths: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 

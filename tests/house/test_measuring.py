@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What benchmarks read of the machine: energy counters, nodes of memory, and the operations of instructions."""
+"""Readings of the machine by benchmarks: energy counters, nodes of memory, and the operations of instructions."""
 
 import json
 import os
@@ -109,7 +109,7 @@ def test_operations_of_an_instruction(mnemonic, operands, tally):
 
 
 def test_the_product_knows_the_operations_that_were_counted():
-    """Of compositions it takes the sum of their steps, and what goes with the length of each stage."""
+    """Compositions take the sum of their steps, and the operations of each stage's length."""
     rows = [one for one in json.loads(roofline.ROWS.read_text()) if one["scene"] == "paper"]
     counted = {one["method"]: one["operations"] for one in rows}
     assert set(counted) == set(operations.METHODS)

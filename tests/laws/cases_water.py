@@ -35,7 +35,7 @@ BALL = dict(heights=(24.0,), stations=(0.0,))
 
 
 def arrays(numbers):
-    """As the twins take them."""
+    """Numbers as the twins take them."""
     return {key: np.asarray(value) for key, value in numbers.items()}
 
 

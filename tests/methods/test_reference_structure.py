@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the twin's maps keep: momenta, orthogonality, reversibility, the symplectic form; exactly the true claims."""
+"""Invariants of the twin's maps: momenta, orthogonality, reversibility, the symplectic form; exactly the true claims."""
 
 import functools
 from dataclasses import replace

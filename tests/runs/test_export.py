@@ -182,7 +182,7 @@ def test_single_precision_stays(single, tmp_path):
 
 
 def faults_of(path):
-    """What the CF checker says of a file, of high and of medium weight."""
+    """Findings of the CF checker on a file, of high and of medium weight."""
     from compliance_checker.runner import CheckSuite
 
     suite = CheckSuite()
@@ -340,7 +340,7 @@ def test_members_leave_the_transforms_as_they_end(result, tmp_path):
 @pytest.mark.parametrize(("off", "extra"), [(0.0, 0), (1e-8, 0), (-1e-8, 0), (0.01, 1), (-0.01, 0)])
 @pytest.mark.parametrize("at", [1, 3])
 def test_a_member_that_ends_at_a_sample_is_written_once(at, off, extra, result, tmp_path, monkeypatch):
-    """Of any end there is one message, and none of the same member has the stamp of another."""
+    """Each end has one message, and no two of one member share a stamp."""
     pytest.importorskip("mcap_ros2")
     ends = result.end_time.copy()
     ends[1] = result.time[at] + off
@@ -415,7 +415,7 @@ def stored(result, tmp_path_factory):
 
 
 def content_of(path):
-    """What a file says, whatever wrote it: without the provenance, which tells where the run was kept."""
+    """Content of a file, whatever wrote it: without the provenance, which tells where the run was kept."""
     if path.suffix == ".nc":
         with xarray.open_dataset(path) as run:
             return run.load().drop_attrs()
@@ -435,7 +435,7 @@ def test_every_kind_of_run_gives_the_same_file(kind, stored, tmp_path):
 
 @pytest.mark.parametrize("kind", FILES)
 def test_many_pieces_are_the_same_file(kind, result, tmp_path):
-    """What does not fit into one piece is written member by member, or time by time."""
+    """Data that do not fit into one piece are written member by member, or time by time."""
     if kind == "mcap":
         pytest.importorskip("mcap_ros2")
     whole = tracks_of(result, None, Environment(origin=ORIGIN, start=DATE))

@@ -163,7 +163,7 @@ def test_an_interrupted_stability_study_says_which_maps_are_finished(tmp_path, c
 
 
 class Swept:
-    """What a sweep of three cells found, of which some were refused."""
+    """Answer of a sweep of three cells, some of them refused."""
 
     rares = None
 
@@ -267,7 +267,7 @@ def test_the_plan_of_a_sweep_runs_nothing(sweep, tmp_path, capsys):
 
 
 class Rare:
-    """What a search for a rare event found."""
+    """Answer of a search for a rare event."""
 
     def save(self, out):
         (out / "rare.json").write_text("{}")

@@ -58,7 +58,7 @@ def by_grid(limit, reach=8.0, count=1601):
 
 
 def held(limit, d, p, seeds, **more):
-    """How many of the intervals hold a probability."""
+    """Count of intervals that hold a probability."""
     intervals = [RareSearch(limit, d, seed=seed, **more).answer().interval() for seed in seeds]
     return sum(low <= p <= high for low, high in intervals)
 

@@ -71,7 +71,7 @@ def declare_counted(Key):
 
 
 def declare_gridded(Key):
-    """Sum of a step's draws, for a key that gives their number and has `normals_of`."""
+    """What the draws of a step add up to, for a key that says how many there are, and that has `normals_of`."""
 
     @overloads.func
     def normals_over(view: Any, key: Key, stream: int):

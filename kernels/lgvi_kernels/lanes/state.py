@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""State of a packet through the steps: motion, the vehicle's constants, and the View that laws see.
+"""What a packet carries through the steps: the state, the vehicle's constants, and the View that laws see.
 
 Momenta and inertia are kept divided by max J (`scale`): so the quartic of equation (24) stays within float32, and only
 forces, which are not scaled, are multiplied by 1 / max J.
@@ -84,13 +84,13 @@ def flow_struct(width, real):
 
 @functools.cache
 def table_number(width, real, shared):
-    """Number of the laws' table: lanes, or, where all members share its rows, one number for them all."""
+    """What the laws' table holds: lanes, or, where all members share its rows, one number for them all."""
     return real if shared else lane(width, real)
 
 
 @functools.cache
 def view_struct(width, real, shared=False, bounded=False):
-    """Inputs of a law: the only argument that grows when laws need more, so their signatures stay.
+    """What a law may read: the only argument that grows when laws need more, so their signatures stay.
 
     north, east, down: R^T e1, R^T e2, R^T e3, the inertial axes in body axes; b [m], inertial.
     nu [m/s], Om [rad/s]: velocities relative to the water, body axes; only damping laws see them.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Addition of a change to a state: by a plain sum, or by a compensated one, where each number is a sum v + v_low of two.
+"""How a change is added to a state: by a plain sum, or by a compensated one, where each number is a sum v + v_low of two.
 
 Compensated (W. Kahan 1965): the change is added to v_low, v takes the digits of the result that it can hold, and v_low keeps
 the rest, exactly. The round-off of a step is then that of its changes, which are small, not that of the state. Only b is

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measured and wanted values of a controller at a tick: the structs that its parts hand on.
+"""What a controller measures and wants at a tick: the structs that its parts hand on.
 
 Both are in the user's body axes and about the user's origin, whatever the kernel's own are.
 """
@@ -14,7 +14,7 @@ from lgvi_kernels.lanes.state import struct, table_number
 
 @functools.cache
 def measurement_struct(width, real, shared=False):
-    """Readings of sensors: the truth at first.
+    """What sensors say: the truth at first.
 
     north, east, down: the inertial axes in body axes, as in a View; position [m], inertial; velocity over ground and
     water_velocity through the water [m/s], angular_velocity [rad/s], body axes.
@@ -45,7 +45,7 @@ def reference_struct(width, real):
 
 @functools.cache
 def held_key():
-    """Key of an actuator's commands: `row`, the first of them in the memory."""
+    """Where an actuator finds its commands: `row`, the first of them in the memory."""
     return struct("HeldKey", row=wp.int32)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of laws on a View: turn vectors, read their table and memory, find velocities at a point, sum damping."""
+"""What laws do with a View: turn vectors, read their table and memory, find velocities at a point, sum damping."""
 
 from typing import Any
 

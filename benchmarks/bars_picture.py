@@ -26,7 +26,7 @@ OURS, OTHERS = "#0072b2", "#9aa5b1"
 
 
 def rows_of() -> Path:
-    """Where the rows are kept."""
+    """Path of the rows."""
     return ROOT / "benchmarks" / "rows" / "bars.json"
 
 

@@ -70,7 +70,7 @@ REVOLUTIONS, PROPELLER_LAG = 1525.0 / 60.0, 1.0
 
 @dataclass(frozen=True)
 class Choices:
-    """How the loop is run; by default as the simulator does.
+    """Options of the loop; defaults are the simulator's.
 
     parts: steps in a period of the autopilots. method: "euler", its forward Euler, which turns and moves with the new
     velocities; or "rk4", with fins and propeller exactly after their commands. model: reference model of the heading, by

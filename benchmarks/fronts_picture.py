@@ -36,12 +36,12 @@ METHODS = {
 
 
 def rows_of(name: str) -> Path:
-    """Where the rows of a scene are kept."""
+    """Path of a scene's rows."""
     return ROOT / "benchmarks" / "rows" / f"fronts_{name}.json"
 
 
 def picture_of(name: str) -> Path:
-    """Where the picture of a scene is."""
+    """Path of a scene's picture."""
     return ROOT / "docs" / "guide" / f"accuracy_{name}.png"
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the vehicles of the package right themselves, run ahead and turn: commands, and one run of each.
+"""Righting, running and turning of the package's vehicles: commands, and one run of each.
 
 `python benchmarks/named_vehicles.py NAME picture.png` draws a vehicle's turn from above and how it rights itself.
 """
@@ -24,7 +24,7 @@ SIZE, FINE = (8.38, 3.6), 200
 
 
 class Trial(NamedTuple):
-    """What is asked of a vehicle.
+    """Trial of a vehicle.
 
     Attributes:
         t1: How long it runs [s].
@@ -88,7 +88,7 @@ MEMBERS = ("rolled", "pitched", "free", "ahead", "turn", "neutral")
 
 
 class Run(NamedTuple):
-    """What a vehicle did: `member` of MEMBERS, then time.
+    """Motion of a vehicle: `member` of MEMBERS, then time.
 
     Attributes:
         time: (n,) [s].
@@ -151,7 +151,7 @@ def run(name: str, step: float | None = None, t1: float | None = None) -> Run:
 
 
 def righting(time: np.ndarray, angle: np.ndarray) -> str:
-    """How an angle (n,) [rad] at times (n,) [s] comes back, in words."""
+    """Sentence on the return of an angle (n,) [rad] at times (n,) [s]."""
     turned = np.flatnonzero(np.diff(np.sign(angle)) != 0)
     peaks = [np.abs(angle[a:b]).max() for a, b in zip(turned, turned[1:], strict=False) if b > a]
     swings = [peak for peak in peaks if peak > 0.01 * ANGLE]
@@ -196,7 +196,7 @@ def draw(name: str, file: str) -> None:
 
 
 def seen(ran: Run, trial: Trial) -> float:
-    """How much of the paths is shown [s]: about a turn and a third."""
+    """Shown time of the paths [s]: about a turn and a third."""
     return float(min(trial.t1, 2.7 * np.pi / abs(ran.end("turn")[5])))
 
 
@@ -208,7 +208,7 @@ def near(ran: Run, member: str) -> np.ndarray:
 
 
 def shortest(ran: Run) -> float:
-    """How much of the angles is shown [s]: until both have come back, 12 s at most."""
+    """Shown time of the angles [s]: until both have come back, 12 s at most."""
     late = [ran.time[np.flatnonzero(np.abs(ran.angle(member)) > 0.05 * ANGLE)[-1]] for member in ("rolled", "pitched")]
     return float(min(1.2 * max(late), 12.0))
 

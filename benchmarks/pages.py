@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the benchmarks print and write: JSON lines, Markdown tables, and the part of a docs' page between its marks."""
+"""Output of the benchmarks: JSON lines, Markdown tables, and the part of a docs' page between its marks."""
 
 import json
 from collections.abc import Iterable, Sequence

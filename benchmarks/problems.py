@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What benchmarks and tests solve: the paper's vehicle in nearly neutral trim with each term alone, and with all; states."""
+"""Problems of benchmarks and tests: the paper's vehicle in nearly neutral trim with each term alone, and with all; states."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ START = lw.Start([0.0, 0.0, 10.0], rotation_vector=[1.0, 2.0, 3.0], velocity_ine
 
 
 def vehicle():
-    """That of Nordkvist & Sanyal (2010), ballasted to a weight of 0.24 N in water: in a minute it hardly sinks."""
+    """Vehicle of Nordkvist & Sanyal (2010), ballasted to a weight of 0.24 N in water: in a minute it hardly sinks."""
     return lw.Vehicle(
         123.8,
         inertia=[5.46, 5.29, 5.72],

@@ -35,7 +35,7 @@ def fleet():
 
 
 def read(path):
-    """What is known so far."""
+    """Answers so far."""
     if path.exists():
         return json.loads(path.read_text())
     return {"seed": 0, "members": 0, "above": [0] * len(BOUNDS), "answers": []}

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a comparison with a published experiment or code keeps: its rows, the curves of its picture, and where both stand."""
+"""Stored content of a comparison with a published experiment or code.
+
+Its rows, the curves of its picture, and where both stand.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +54,7 @@ class Row(NamedTuple):
 
 
 class Content(NamedTuple):
-    """What is kept of a comparison.
+    """Stored content of a comparison.
 
     Attributes:
         rows: The compared numbers.
@@ -75,7 +78,7 @@ def case(name: str) -> ModuleType:
 
 
 def rows_of(name: str) -> Path:
-    """Where the rows of a comparison are kept."""
+    """Path of a comparison's rows."""
     return ROOT / "benchmarks" / "rows" / f"validation_{name}.json"
 
 
@@ -95,7 +98,7 @@ def keep(name: str, content: Content) -> None:
 
 
 def kept(name: str) -> Content:
-    """What is kept of a comparison."""
+    """Stored content of a comparison."""
     content = json.loads(rows_of(name).read_text())
     return Content(
         [Row(*row) for row in content["rows"]], {key: tuple(pair) for key, pair in content["curves"].items()}
@@ -146,13 +149,13 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def section(name: str, content: Content) -> str:
-    """What stands between the marks of a comparison's page: its picture and its table."""
+    """Section between the marks of a comparison's page: its picture and its table."""
     module = case(name)
     return "\n\n".join([f"![{module.PICTURE}]({name}.png)", table(content.rows)])
 
 
 def within(rows: Sequence[Row]) -> str:
-    """How many rows agree as well as the published number is known, of those of which that is said."""
+    """Number of rows that agree to the accuracy of the published number, of those with a stated accuracy."""
     told = [row for row in rows if row.within is not None]
     return f"{sum(abs(row.error) <= row.within for row in told)} of {len(told)}" if told else ""  # type: ignore[operator]
 

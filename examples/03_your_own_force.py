@@ -26,7 +26,7 @@ def dock_law(w: Any, view: Any, p: Any):
 
 
 class DockOnDevice:
-    """What the kernel takes from this file."""
+    """Device code that the kernel takes from this file."""
 
     POTENTIAL, law = True, dock_law
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an author of device code imports: bases of terms and of parts of a controller, and the checks of both."""
+"""Imports of an author of device code: bases of terms and of parts of a controller, and the checks of both."""
 
 from lgvi_warp.common.doors import names_in_stub
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which of the varied parameters make a quantity of interest vary: Sobol indices, Morris' screening, and adaptors.
+"""Sensitivity of a quantity of interest to the varied parameters: Sobol indices, Morris' screening, and adaptors.
 
     indices = lw.uq.sobol(scene, "position[2]", samples=1024, h=0.01, t1=60.0)
     print(indices)

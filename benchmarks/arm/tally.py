@@ -17,7 +17,7 @@ BYTES = {"s": 4, "d": 8}
 
 
 class Tally(NamedTuple):
-    """What instructions do, by lane: operations, those of them that take an instruction of their own, slow ones.
+    """Count of instructions' work by lane: operations, those with an instruction of their own, slow ones.
 
     operations: additions and multiplications, 2 for a fused pair. instructions: the same, 1 for a fused pair.
     slow: divisions and square roots. vector, scalar: instructions of either kind, slow ones too, not by lane.
@@ -39,7 +39,10 @@ class Tally(NamedTuple):
 
 
 def lanes(operands):
-    """How many numbers an instruction makes, by its first operand: v0.2d, z0.d, d0; and whether these are side by side."""
+    """Count of numbers that an instruction produces, by its first operand: v0.2d, z0.d, d0.
+
+    And whether these are side by side.
+    """
     vector = re.match(r"v\d+\.(\d+)[sd]", operands)
     if vector:
         return int(vector[1]), True

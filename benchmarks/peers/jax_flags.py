@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What JAX must find in the environment before it starts: the widest registers, and fused multiply-adds allowed."""
+"""Environment that JAX needs before it starts: the widest registers, and fused multiply-adds allowed."""
 
 import os
 

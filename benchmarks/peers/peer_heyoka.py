@@ -59,7 +59,7 @@ def integrator(problem: Problem, tolerance: float) -> Any:
 
 
 def signs(state: np.ndarray) -> np.ndarray:
-    """Of the velocities of states (18, lanes)."""
+    """Signs of the velocities of states (18, lanes)."""
     return np.where(state[FIRST:] < 0.0, -1.0, 1.0)
 
 
@@ -124,7 +124,7 @@ class Batch:
             self.ends[i] = one[0].state
 
     def end(self) -> End:
-        """Of the last call."""
+        """End of the last call."""
         return matrix_end_of(self.ends.transpose(0, 2, 1).reshape(-1, SIZE)[: self.count])
 
 

@@ -53,7 +53,7 @@ DRIVEN_METHODS: tuple[Setting, ...] = (
 
 
 def methods_of(problem: Problem) -> Iterator[Setting]:
-    """What is measured for a problem."""
+    """Settings measured for a problem."""
     yield from DRIVEN_METHODS if problem.driven else METHODS
     for dtype, enough in zip(("float64", "float32"), ENOUGH, strict=True):
         for method, order in EXPLICIT.items():
@@ -95,7 +95,7 @@ class Fleet:
         self.samples[i] = self.parts[i].launch(0, self.plan.grid.steps)
 
     def end(self) -> End:
-        """Of the last call, a member that failed as not a number."""
+        """End of the last call; NaN for a failed member."""
         ends = []
         for part, raw in zip(self.parts, self.samples, strict=True):
             raw = raw[:, -1].transpose(0, 2, 1).reshape(1, -1, raw.shape[2])

@@ -65,7 +65,7 @@ class Problem:
 
     @property
     def members(self) -> int:
-        """How many."""
+        """Number of members."""
         return len(self.b)
 
     @property

@@ -74,7 +74,7 @@ def picture(folder: Path) -> None:
 
 
 def keep_to_cores(threads: int) -> None:
-    """As many cores as threads for this process, before any peer counts them: JAX has no other setting."""
+    """Keep this process to as many cores as threads, before any peer counts them: JAX has no other setting."""
     if hasattr(os, "sched_setaffinity"):
         cores = sorted(os.sched_getaffinity(0))
         if threads > len(cores):

@@ -34,7 +34,7 @@ LOOP, SAMPLE = "simulator", 0.02  # the simulator, and its own step [s]
 
 
 class Size(NamedTuple):
-    """How much is run: members, seconds of a motion, and seconds of the simulator's one vehicle."""
+    """Size of a run: members, seconds of a motion, and seconds of the simulator's one vehicle."""
 
     members: int
     t1: float

@@ -258,7 +258,7 @@ def tether_energy(method, k, h):
 
 
 def munk():
-    """How far h w may go before a Munk oscillation tumbles, kernel; it depends on the start."""
+    """Limit of h w before a Munk oscillation tumbles, kernel; it depends on the start."""
     angles, roll = np.array([0.01, 0.1, 0.3, 0.6, 0.3]), np.array([0.0, 0.0, 0.0, 0.0, np.pi / 4])
     side = np.stack([0 * roll, np.cos(roll), np.sin(roll)], axis=1)
     p = np.sin(angles)[:, None] * np.eye(3)[0] + np.cos(angles)[:, None] * side
@@ -431,7 +431,7 @@ def stable(method, I6, start):
 
 
 def solvability():
-    """How often W has no solution below the bound h (|Om| + |Js^-1 S p| + |Js^-1 Sd p|)."""
+    """Share of cases in which W has no solution below the bound h (|Om| + |Js^-1 S p| + |Js^-1 Sd p|)."""
     count, rows = 2000, []
     for bound in (0.7, 0.8, 0.9, 0.99):
         rng = np.random.default_rng(6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often the intervals of statistics hold the true value, of so many repetitions with known truth: a Markdown table.
+"""Coverage of the intervals of statistics over repetitions with known truth: a Markdown table.
 
 The second table stops each repetition by itself as lw.Until does: looks at blocks of 256 members from `members` on, then
 whenever 5 % came to them, until the interval of a mean is narrow enough. The third is of designs with replicates: functions

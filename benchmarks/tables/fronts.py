@@ -86,7 +86,7 @@ def measured(name):
 
 
 def kept_rows(name):
-    """What is kept of a scene."""
+    """Stored content of a scene."""
     return json.loads(rows_of(name).read_text())
 
 

@@ -36,7 +36,7 @@ def row(records, method):
 
 
 def notes(records):
-    """Where a width is worse than it should be, where single precision gains less than 1.9, and what takes long to load."""
+    """Notes on widths that are worse than they should be, on single precision that gains less than 1.9, and on long loads."""
     timed, lines = [one for one in records if "width" in one], []
     for dtype in case.DTYPES:
         for width in sorted({one["width"] for one in timed}):

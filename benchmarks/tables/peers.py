@@ -104,7 +104,7 @@ def cell(time: float, method: str) -> str:
 
 
 def behind(records: list[dict[str, Any]], problem: str, others: list[str]) -> str:
-    """Where another system is faster, and where the lead is less than was wanted."""
+    """Notes on problems where another system is faster, or the lead is less than the goal."""
     lines = []
     for name in others:
         most, until = WANTED.get(name, (1.0, 0.0))

@@ -51,7 +51,7 @@ def numbers(pair, columns):
 
 
 def tables(found):
-    """Those of terms, of driven vehicles, and of methods for coupled inertia."""
+    """Tables of terms, of driven vehicles, and of methods for coupled inertia."""
     columns = (("ns_per_vehicle_step", 1), ("more_than_none", 1))
     terms, driven, methods = {}, [], []
     for (kind, name, method), pair in found.items():

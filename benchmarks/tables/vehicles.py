@@ -19,7 +19,7 @@ def main() -> str:
 
 
 def column(name: str) -> dict[str, str]:
-    """What a vehicle did, in words by title."""
+    """Motion of a vehicle, in words by title."""
     run, trial = named.run(name), named.TRIALS[name]
     ahead, down = run.over_ground("ahead")
     level, _ = run.over_ground("turn")

@@ -104,7 +104,7 @@ def measured() -> Content:
 
 
 def _numbers(ends: Any, place: Any, nu: Any, pitch: Any, yaw: Any) -> dict[tuple[str, str], float]:
-    """What is compared, at the ends of the three steps."""
+    """Compared numbers at the ends of the three steps."""
     ahead, down, about = ends
     return {
         ("surge at 10.9 s", "m/s"): nu[0, ahead],

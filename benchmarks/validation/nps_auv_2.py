@@ -45,7 +45,7 @@ FORCES, VELOCITIES = "XYZKMN", "uvwpqr"
 
 
 def size(name: str) -> float:
-    """What a dimensionless coefficient of two velocities is multiplied with."""
+    """Factor of a dimensionless coefficient of two velocities."""
     return 0.5 * DENSITY * LENGTH ** (2 + (name[0] in "KMN") + sum(letter in "pqr" for letter in name[1:]))
 
 
@@ -59,7 +59,7 @@ def added_mass() -> Any:
 
 
 def tables() -> dict[str, Any]:
-    """What the scene file holds, from the printed numbers."""
+    """Content of the scene file, from the printed numbers."""
     added, lever = added_mass(), lw.notation.hat(np.array([0.0, 0.0, BELOW]))
     rigid = np.block([[MASS * np.eye(3), -MASS * lever], [MASS * lever, INERTIA]])
     # What the added mass makes is taken off; the rudder is held, and so makes products of velocities, as the propeller does.

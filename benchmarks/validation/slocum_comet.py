@@ -22,7 +22,7 @@ BEFORE = 30.0  # s: computed before what is compared, for the glide to become st
 
 
 def legs() -> Any:
-    """What was measured, a record a leg."""
+    """Measurements, a record a leg."""
     return np.genfromtxt(ROOT / SCENES[1], delimiter=",", names=True, skip_header=5)
 
 

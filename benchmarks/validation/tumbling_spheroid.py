@@ -60,7 +60,7 @@ class Exact:
 
     @property
     def period(self) -> float:
-        """Of rocking, or of half a turn [s]."""
+        """Period of rocking, or of half a turn [s]."""
         if self.k < 1.0:
             return float(4.0 * ellipk(self.k**2) / self.omega)
         return float(2.0 * ellipk(self.k**-2) / (self.k * self.omega))

@@ -75,7 +75,7 @@ class Vehicle:
             self.note(numbers[0], self.velocity)
 
     def answer(self, packet):
-        """What is sent back for a packet of bytes; None for one that is none of ArduPilot's."""
+        """Answer to a packet of bytes; None for one that is none of ArduPilot's."""
         magic = struct.unpack_from("<H", packet)[0] if len(packet) >= 8 else 0
         if magic not in CHANNELS or len(packet) != 8 + 2 * CHANNELS[magic]:
             self.strange += 1

@@ -62,7 +62,7 @@ def scene():
 
 
 def compared(members):
-    """How far members leave the true line, and the one that they believe in, in each case."""
+    """Distance of members from the true line, and from the estimated one, in each case."""
     off = [lw.metrics.CrossTrack(), lw.metrics.CrossTrack(measured=True, name="cross_track believed")]
     return lw.sweep(
         scene(), CASES, members=members, seed=1, metrics=off, success={"cross_track": {"below": LIMIT}},

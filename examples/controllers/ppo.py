@@ -28,7 +28,7 @@ def network(sizes, last):
 
 
 def advantages(rewards, values, ended, following):
-    """How much better each action was than expected (k, n); following: the value of what each step led to, 0 if terminated."""
+    """Advantage of each action over the expectation (k, n); following: the value of what each step led to, 0 if terminated."""
     found, running = np.zeros_like(rewards), np.zeros(rewards.shape[1])
     for k in reversed(range(len(rewards))):
         surprise = rewards[k] + DISCOUNT * following[k] - values[k]

@@ -34,7 +34,7 @@ def fixes(result):
 
 
 def recording():
-    """What the instruments say of the vehicle that was recorded."""
+    """Readings of the recorded vehicle's instruments."""
     track = lw.solve(scene().with_numbers(TRUTH), "rk8", h=0.05, t1=T1, save=lw.SaveAt(every=EVERY))
     exact = fixes(track)[0]
     return exact + STD * np.random.default_rng(1).normal(size=exact.shape)

@@ -28,7 +28,7 @@ def run():
 
 
 def amplitude(angle, values):
-    """Of the part of some values that swings with an angle."""
+    """Amplitude of the part of some values that swings with an angle."""
     parts = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
     return np.hypot(*np.linalg.lstsq(parts, values, rcond=None)[0][:2])
 

@@ -51,7 +51,7 @@ def dock_law(w: Any, view: Any, p: Any):
 
 
 class DockOnDevice:
-    """What a module of lgvi_kernels.laws would hold."""
+    """Device code as a module of lgvi_kernels.laws would hold it."""
 
     POTENTIAL = True
     params = staticmethod(dock_params)
@@ -71,7 +71,7 @@ class Dock(lw.laws.Term):
     reach: Any = lw.laws.number((), "m", least=1e-3)
 
     def packed(self, numbers, context):
-        """As dock_params() has them: the nose from the origin of the forces, in the kernel's axes."""
+        """Numbers in the order of dock_params(): the nose from the origin of the forces, in the kernel's axes."""
         values = {
             "position": numbers["position"],
             "energy": numbers["energy"],

@@ -50,7 +50,7 @@ def fresh_costs(gains, members):
 
 
 def plot(costs, path):
-    """How many of the vehicles cost more than so much, and the means of the worst 5 %."""
+    """Exceedance curve of the vehicles' costs, and the means of the worst 5 %."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")

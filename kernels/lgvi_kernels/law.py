@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the author of a law, an event or a controller imports: lanes, their functions, structs, and functions of a View.
+"""Imports for the author of a law, an event or a controller: lanes, their functions, structs, and functions of a View.
 
 A law that writes + - * / between lanes imports `add`, `sub`, `mul`, `div` too: Warp looks the operators up by name. The minus
 before a lane or a 3-vector needs none.

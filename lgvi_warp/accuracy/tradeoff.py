@@ -350,7 +350,7 @@ def growth_of(
 
 
 def noise_text(sample: Sample) -> str:
-    """How the runs of a comparison share their noise, in words."""
+    """Sentence on how the runs of a comparison share their noise."""
     every = f"{sample.h(sample.draws):.4g} s"
     return f"noise acts: all runs see one path of it, drawn every {every}; errors by paths are of order 1"
 
@@ -444,7 +444,7 @@ def report_text(tradeoff: Tradeoff) -> str:
 
 
 def growth_text(growth: Growth) -> str:
-    """How errors grow, in words."""
+    """Sentence on the growth of errors."""
     if not np.isfinite(growth.rate):
         return "unknown: a difference of 1e-8 rad grows beyond measure at once"
     if growth.power is not None:

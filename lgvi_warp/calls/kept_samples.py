@@ -49,7 +49,7 @@ def not_kept(key: str, field: str, kept: tuple[str, ...]) -> SceneError:
 
 
 class KnownMembers:
-    """What is known of a block's members where their ensemble is not: parameters, and the start as the first sample has it."""
+    """Stored facts about a block's members, without their ensemble: parameters, and the start as the first sample has it."""
 
     def __init__(self, parameters: Mapping[str, np.ndarray], count: int, start: KeptFields | None):
         self.parameters, self.count, self._start = parameters, count, start
@@ -87,7 +87,7 @@ class KeptSamples:
                 yield Block(block.first, min(block.stop, self.result.members))
 
     def weights_of(self, block: Block) -> np.ndarray | None:
-        """What the members of a block count for; None where all count alike."""
+        """Weights of a block's members; None where all count alike."""
         return None if self.weights is None else np.asarray(self.weights[block.first : block.stop])
 
     @functools.cached_property
@@ -120,7 +120,7 @@ class KeptSamples:
         return rows
 
     def ends(self, block: Block) -> Ends:
-        """How and when the members of a block ended."""
+        """Outcomes and end times of a block's members."""
         at, result = slice(block.first, block.stop), self.result
         status = np.asarray(result.status[at])
         event = np.zeros(len(status), np.uint8) if result.event is None else np.asarray(result.event[at])
@@ -130,7 +130,7 @@ class KeptSamples:
         return Ends(status, event, result.end_time[at], tuple(each.key for each in self.events))
 
     def members(self, block: Block, names: tuple[str, ...]) -> Any:
-        """What functions of (samples, members) see of a block's members."""
+        """View of a block's members for functions of (samples, members)."""
         known = self.result.parameters
         if isinstance(known, DrawnParameters):
             return known.select(block.first, block.stop)

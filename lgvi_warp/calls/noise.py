@@ -23,7 +23,7 @@ DRAWN, GIVEN = "drawn", "given"
 
 @dataclass(frozen=True, eq=False)
 class NoiseOfCalls:
-    """What a run draws, and from where.
+    """Draws of a run and their source.
 
     layout: what is drawn. given: whether calls give it. seed, members: of the ensemble. plan: of the members that the run was
     prepared for, whose kernel says how normals are rounded. varied: names of what varies. grid: steps.

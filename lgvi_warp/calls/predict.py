@@ -274,7 +274,7 @@ class Sized:
         return size(self.plan, self.store) + each * len(blocks(self.plan.ensemble.members))
 
     def _sums(self) -> dict[str, list[int]]:
-        """What the marker of a block lists: files with sizes and checksums, here the longest possible ones."""
+        """Content of a block's marker: files with sizes and checksums, here the longest possible ones."""
         assert self.store is not None
         block, k = blocks(self.plan.ensemble.members)[0], len(self.plan.grid.times)
         keys = {key: column.bytes for column in columns(self.plan, self.store) for key in column.keys(block, k)}

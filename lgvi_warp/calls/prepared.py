@@ -78,7 +78,7 @@ class Prepared:
 
     @property
     def draws(self) -> tuple[NoiseDraws, ...]:
-        """What noise and sensors draw in a call: standard normals, the columns of xi in this order; none without noise."""
+        """Draws of noise and sensors in a call: standard normals, the columns of xi in this order; none without noise."""
         return self.noise.layout.draws
 
     @shows_progress

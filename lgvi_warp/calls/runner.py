@@ -198,7 +198,7 @@ def outputs(
 
 
 def _not_numbers(of: Sequence[OfResult], numbers: Sequence[np.ndarray]) -> np.ndarray:
-    """Which members (n,) have a quantity that is no number, or infinite where it may not be."""
+    """Mask of members (n,) with a quantity that is no number, or infinite where it may not be."""
     odd = [np.isnan(x) if each.may_be_infinite else ~np.isfinite(x) for each, x in zip(of, numbers, strict=True)]
     return np.asarray(np.concatenate(odd, axis=1).any(axis=1))
 

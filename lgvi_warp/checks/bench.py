@@ -143,7 +143,7 @@ class Device:
             wp.launch(self.kernel.kernel, self.packets * repeats, inputs, device="cpu")
 
     def written(self) -> np.ndarray:
-        """What the last launch wrote: (count, fields), a copy."""
+        """Output of the last launch (count, fields), a copy."""
         out = self.out.numpy().reshape(self.packets, self.fields, -1).transpose(0, 2, 1)
         return np.array(out.reshape(-1, self.fields))
 
@@ -185,7 +185,7 @@ class Bank(Device):
 
     @property
     def memory(self) -> Any:
-        """What the law remembers, a Warp array (packets, rows) of lanes; the second half is a backup."""
+        """Memory of the law, a Warp array (packets, rows) of lanes; the second half is a backup."""
         return self.laws.memory.array
 
     def evaluate(self, views: Views, h: float = KICK, step: int = STEP) -> dict[str, np.ndarray]:

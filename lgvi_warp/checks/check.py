@@ -145,7 +145,7 @@ def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check
 
 
 def _of_every_law(bench: Bench, step: float) -> Iterator[Check]:
-    """What holds for every law: blind to what it must not look at, lanes apart, varied as shared."""
+    """Checks that hold for every law: blind to what it must not look at, lanes apart, varied as shared."""
     views, kind, here = bench.views, type(bench.term).__name__, bench.at(bench.views)
     faster = bench.at(replace(views, velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
     later = bench.at(replace(views, time=views.time + 3.7))
@@ -424,7 +424,7 @@ def _follow(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _carried(bench: Bench, step: float) -> Iterator[Check]:
-    """What is added to an inertia is symmetric."""
+    """Check that an added inertia is symmetric."""
     if "carried_inertia" not in bench.roles:
         return
     D = bench.at(bench.views)["carried_inertia"].reshape(-1, 6, 6)

@@ -59,7 +59,7 @@ PERIOD = 0.1
 
 @dataclass(frozen=True)
 class TwinMeasurement:
-    """What a twin takes for the motion at a tick, as lgvi_warp.reference.control has it.
+    """Motion that a twin reads at a tick, as lgvi_warp.reference.control has it.
 
     position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
     angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick, numbers of the step that begins and of the tick.
@@ -322,7 +322,7 @@ def _twin(bench: PartBench, packed: Any, here: Answers, twin: Any) -> Iterator[C
 
 
 def _of_twin(bench: PartBench, twin: Any, i: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the twin makes of the ticks of a member (TICKS * OUT_FIELDS,), and its last commands."""
+    """Output of the twin for the ticks of a member (TICKS * OUT_FIELDS,), and its last commands."""
     ticks, unmet, to = bench.ticks, bench.ticks.bus[i, bench.bus.unmet :][:6], getattr(bench.part, "to", "")
     actuator, out = SimpleNamespace(command=np.zeros(0)), ticks.rows[:, i, :OUT_FIELDS].copy()
     if isinstance(bench.part, Allocation):

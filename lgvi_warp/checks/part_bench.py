@@ -50,7 +50,7 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class RandomTicks:
-    """What is measured, wanted and demanded before a part acts, at ticks that follow one another.
+    """Measured, wanted and demanded values before a part acts, at consecutive ticks.
 
     rows: (TICKS, k, TICK_FIELDS), the columns of `lgvi_kernels.advance.examine_part` for k members.
     bus: (k, rows), what others left in the first rows of the memory.
@@ -94,7 +94,7 @@ class RandomTicks:
 
 
 class Answers(NamedTuple):
-    """What a part made of ticks.
+    """Output of a part over ticks.
 
     ticks: (k, TICKS * OUT_FIELDS), what is measured, wanted and demanded after it.
     memory: (k, rows), the bus, the part's rows and the guard behind them, after the last tick.
@@ -121,7 +121,7 @@ class PartBench(TermBench):
         super().__init__(part, module, scene, count, seed, ROLES, (width, 1), make_examine_part, REMEDY)
 
     def packed(self, parameters: Mapping[str, np.ndarray] | None = None, elsewhere: bool = False) -> Any:
-        """What the part packs; parameters: of the scene by name, each (1, ...) or (n, ...), by default its own."""
+        """Packed numbers of the part; parameters: of the scene by name, each (1, ...) or (n, ...), by default its own."""
         numbers = self.parameters if parameters is None else parameters
         context = packing_context(numbers, self.count, self.seed, self.period / EVERY, elsewhere)
         return self.part.packed(Ensemble.own(self.part, numbers), context)

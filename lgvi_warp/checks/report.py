@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a check of device code finds: single checks, and the report that lists them."""
+"""Findings of a check of device code: single checks, and the report that lists them."""
 
 from __future__ import annotations
 

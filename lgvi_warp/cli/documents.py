@@ -11,7 +11,7 @@ from lgvi_warp.cli.writing import Written
 
 
 def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
-    """How a run was computed: method, precision, step, number of steps and end of the run [s], seed, versions and machine."""
+    """Settings of a run: method, precision, step, number of steps and end of the run [s], seed, versions and machine."""
     names = ("dtype", "step", "steps", "versions", "machine")
     method, duration = provenance["method"], provenance["step"] * provenance["steps"]
     content = {"method": method["name"], "chosen": method.get("chosen"), "duration": duration}
@@ -19,7 +19,7 @@ def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
 
 
 def of_result(result: Any) -> dict[str, Any]:
-    """What became of the members of a run, statistics at its end, and how it was computed."""
+    """Outcomes of a run's members, statistics at its end, and its settings."""
     divided = result.substeps > 0
     return {
         "members": result.members,
@@ -88,7 +88,7 @@ def of_prediction(prediction: Any) -> dict[str, Any]:
 
 
 def of_store(contents: dict[str, Any]) -> dict[str, Any]:
-    """What a store holds, and how its run was computed."""
+    """Content of a store and the settings of its run."""
     return {name: value for name, value in contents.items() if name != "provenance"} | {
         "settings": of_settings(contents["provenance"])
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What lies in a folder that a verb wrote: for info, and for pictures that are drawn again."""
+"""Content of a folder that a verb wrote: for info, and for pictures that are drawn again."""
 
 from __future__ import annotations
 

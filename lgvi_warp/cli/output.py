@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What verbs print: text in colors, or one JSON document."""
+"""Output of verbs: text in colors, or one JSON document."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the arguments change of a scene, and which folder and store they name."""
+"""Changes of a scene by arguments, and the folder and store that they name."""
 
 from __future__ import annotations
 

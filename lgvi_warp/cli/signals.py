@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ends the command from outside: Ctrl-C, SIGTERM, SIGHUP, and a terminal that is gone."""
+"""Signals that end the command from outside: Ctrl-C, SIGTERM, SIGHUP, and a terminal that is gone."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Signals:
 
     @property
     def text(self) -> str:
-        """What happened, as "interrupted by SIGTERM"."""
+        """Cause of the end, as "interrupted by SIGTERM"."""
         if self.number in (None, signal.SIGINT):
             return "interrupted"
         return f"interrupted by {signal.Signals(self.number).name}"

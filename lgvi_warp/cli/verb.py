@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a verb of the command is: a function, its name, its help and its arguments, in one place."""
+"""Verb of the command: a function, its name, its help and its arguments, in one place."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a door, a module that users import, finds its names: a stub beside it lists them, each imported when it is used."""
+"""Lookup of names behind a door, a module that users import: a stub beside it lists them, each imported when it is used."""
 
 import ast
 import sys
@@ -9,7 +9,7 @@ from typing import Any
 
 
 def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
-    """What a door assigns to `__all__`, `__getattr__` and `__dir__`.
+    """Values that a door assigns to `__all__`, `__getattr__` and `__dir__`.
 
     NumPy, SciPy and Warp take longer to import than a script may take that only asks for help or a version: so nothing is
     imported before its name is used. `dir` lists, in addition, classes of installed extensions (lgvi_warp.common.extensions).

@@ -192,7 +192,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def fault(root: Path, key: str, size: int, crc: int) -> str | None:
-    """What a file is by its size [bytes] and checksum: "is missing", "is torn" or "has changed"; None for one in order."""
+    """State of a file by its size [bytes] and checksum: "is missing", "is torn" or "has changed"; None for one in order."""
     try:
         with safe_files.opened(root, key) as file:
             if os.fstat(file.fileno()).st_size != size:
@@ -267,7 +267,7 @@ def write_text(path: str | os.PathLike[str], text: str, root: str | os.PathLike[
 
 
 class PlacedFiles:
-    """How many files this process has put in their places, and the last of them, for a process that is ended."""
+    """Count of files that this process has put in place, and the last of them, for a process that is ended."""
 
     def __init__(self) -> None:
         self.count = 0

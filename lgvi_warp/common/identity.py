@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which Python function something is: a hash of what it would do, the same in every process and session."""
+"""Identity of a Python function: a hash of its behaviour, the same in every process and session."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ class _Reader:
             self._imported(name, names)
 
     def _named(self, name: str, value: Any, names: set[str]) -> None:
-        """What a function calls by a name; of a module that is the user's, what the function names of it."""
+        """Object behind a global name of a function; of a user's module, only the attributes that the function reads."""
         self._word(name)
         if isinstance(value, types.ModuleType):
             self._module(value, names)
@@ -260,7 +260,7 @@ def _names(code: types.CodeType) -> tuple[set[str], set[str], set[str]]:
 
 
 def _place(value: Any) -> tuple[str, str, str] | None:
-    """Where a library has something: (module, name, edition); None for what is the user's, or cannot be found so."""
+    """Place of an object in a library: (module, name, edition); None for what is the user's, or cannot be found so."""
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if isinstance(value, np.ufunc):
         name = value.__name__

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What this machine can do: SIMD width, threads and memory; and the software's versions for provenance."""
+"""Capabilities of this machine: SIMD width, threads and memory; and the software's versions for provenance."""
 
 from __future__ import annotations
 

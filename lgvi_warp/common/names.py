@@ -15,7 +15,7 @@ RULE = "give letters, digits, _, - and points"
 
 
 def wrong_with(name: str) -> tuple[str, str] | None:
-    """(what is wrong, the remedy) with a name of a term or an event; None for a good one."""
+    """(problem, remedy) for a name of a term or an event; None for a good one."""
     if not name:
         return "is empty", RULE
     bad = next((character for character in name if not (character.isalnum() or character in BESIDE)), None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How long the parts of a kernel's first use take."""
+"""Durations of the phases of a kernel's first use."""
 
 from typing import NamedTuple
 

@@ -133,7 +133,7 @@ def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
 
 
 def whole_remedy(value: Any, remedy: str) -> str:
-    """What to give in place of a value that is no whole number: of 1e4, which Python and TOML read as a float, 10000."""
+    """Replacement for a value that is no whole number: of 1e4, which Python and TOML read as a float, 10000."""
     if isinstance(value, float | np.floating) and math.isfinite(value) and value == round(value):
         return f"write {round(value)}, since a number with a point or an exponent is no whole number here"
     return remedy
@@ -187,7 +187,7 @@ def _check(part: Any) -> None:
 
 
 def _masked(part: np.ma.MaskedArray) -> tuple[str, str]:
-    """(what is wrong, the remedy) with an array of which numbers are masked."""
+    """(problem, remedy) for an array of which numbers are masked."""
     mask = np.ma.getmaskarray(part)
     if mask.dtype.names:
         return "has masked numbers", "leave out what is masked, or give numbers for it"

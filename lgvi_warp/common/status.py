@@ -58,7 +58,7 @@ class Status(IntEnum):
 
     @property
     def text(self) -> str:
-        """What happened and the remedy, in one sentence."""
+        """Problem and remedy, in one sentence."""
         return _TEXT[self]
 
 
@@ -155,7 +155,7 @@ class Warnings(IntFlag):
 
     @property
     def text(self) -> str:
-        """What was seen and the remedy, in one sentence for each warning set."""
+        """Observation and remedy, in one sentence for each warning set."""
         return "; ".join(_WARNING_TEXT[warning] for warning in Warnings if warning in self)
 
     @property
@@ -263,7 +263,7 @@ def under_way(result: Any) -> np.ndarray:
 
 
 def stop_time(result: Any) -> np.ndarray:
-    """When each member stopped (n,) [s]: at its event, or its last good state where it failed; inf if it ran to the end."""
+    """Stop time of each member (n,) [s]: at its event, or its last good state where it failed; inf if it ran to the end."""
     return np.where(np.asarray(result.status) != Status.OK, np.asarray(result.failure_time), np.inf)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a controller is made of, one file each: sensors, guidance, laws, allocation and faults."""
+"""Parts of a controller, one file each: sensors, guidance, laws, allocation and faults."""
 
 from lgvi_warp.common.doors import names_in_stub
 

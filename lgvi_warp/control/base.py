@@ -111,7 +111,7 @@ class Bus(NamedTuple):
         return cls(commands, row, row + 6, 2 * row + 6, end + belief + 2 * iterates, period=period, **places)
 
     def values_of(self, key: str) -> dict[str, Any]:
-        """What the device code of an actuator reads."""
+        """Numbers that the device code of an actuator reads."""
         first = self.commands[key][0]
         if not self.delayed:
             return {"commands": {"row": first}, "report": self.report + first}
@@ -144,7 +144,7 @@ class Part(Term):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """What it wants of the motion, among `WISHES`; by default nothing."""
+        """Quantities that it wants of the motion, among `WISHES`; by default nothing."""
         return ()
 
     @property
@@ -498,7 +498,7 @@ class Allocation(Part):
         """
 
     def reach(self) -> np.ndarray:
-        """What the channels make: a wrench for each, of the scene's own numbers.
+        """Wrench of each channel, of the scene's own numbers.
 
         Returns:
             (6, channels) [N, N m], of any size. By default, for a part that does not know it, every component by itself.

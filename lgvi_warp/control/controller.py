@@ -244,7 +244,7 @@ class Controller:
         return sum(part.belief_rows for part in self.sensors)
 
     def _effect(self) -> np.ndarray:
-        """What all channels make of the components that are asked for, each column of unit size, (6, channels)."""
+        """Effect of all channels on the demanded components, each column of unit size, (6, channels)."""
         effect = self.asked[:, None] * np.concatenate([part.reach() for part in self.allocation], axis=1)
         sizes = np.linalg.norm(effect, axis=0)
         return np.asarray(effect / np.where(sizes > 0.0, sizes, 1.0))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What allocations by efforts have in common: the effect of a channel's effort, and the command that makes it."""
+"""Common parts of allocations by efforts: the effect of a channel's effort, and the command that makes it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class EffortAllocation(Allocation):
 
     @property
     def shape(self) -> str:
-        """How effort follows from the command: "square", "polynomial" or "table" of thrusters, else "linear"."""
+        """Relation of effort to command: "square", "polynomial" or "table" of thrusters, else "linear"."""
         return str(getattr(self.actuator, "shape", "linear"))
 
     @property
@@ -113,7 +113,7 @@ RANK = 1e-10
 
 
 def polynomials(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Those of thrusters, ahead and astern."""
+    """Polynomials of thrusters, ahead and astern."""
     return numbers["polynomial"], numbers["polynomial_astern"]
 
 
@@ -125,7 +125,7 @@ def pseudo_inverse(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> n
 
 
 def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """As `knots` of values (n, k), where several knots may be at one place, with one value: those change nothing."""
+    """Knots of values (n, k); several may share one place and value, which changes nothing."""
     width = np.diff(at, axis=1)
     inverse = np.divide(1.0, width, out=np.zeros_like(width), where=width > 0.0)
     steps = np.stack([at[:, :-1], inverse, np.diff(values, axis=1)], axis=-1)
@@ -164,7 +164,7 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
 
 
 def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """Where polynomials (1 or n, powers) from the first power up cease to rise first, (1 or n,), or their reach."""
+    """First maximum of polynomials (1 or n, powers) without constant part, (1 or n,), or their reach."""
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
     values = polynomial_values(polynomial, points)
@@ -179,7 +179,7 @@ def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
 
 
 def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Where a condition of an array, which holds at low and not at high, ceases to hold, by bisection."""
+    """Last place at which a condition of an array holds, between low (holds) and high (fails), by bisection."""
     for _ in range(60):
         middle = 0.5 * (low + high)
         inside = holds(middle)

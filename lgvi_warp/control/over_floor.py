@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What parts of a controller know of the sea floor of their scene."""
+"""Sea floor of the scene as parts of a controller know it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def with_floor(part: Any, faults: Faults, events: Sequence[Term]) -> Any:
 
 
 def packed_over(ground: Floor, context: PackingContext, values: dict[str, Any]) -> Packed:
-    """What the device code reads that looks the floor's depth up, each member's own, with other values."""
+    """Numbers for device code that looks up the floor's depth, per member, with other values."""
     return ground.packed_grid(own(ground, context.parameters), values)
 
 

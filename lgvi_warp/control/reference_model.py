@@ -22,7 +22,7 @@ TERMS = 13
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReferenceModel(Guidance):
-    """What the guidance before it wants, led smoothly from the measured state (Fossen 2021, 12.1.1).
+    """Smooth path from the measured state to the values that the guidance before it wants (Fossen 2021, 12.1.1).
 
     Each number x follows its target s by x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0. It
     starts at the measured position, heading and rates. Between ticks the target is held and the equation solved exactly;
@@ -60,7 +60,7 @@ class ReferenceModel(Guidance):
 
 
 def _maps(omega: np.ndarray, zeta: np.ndarray, period: float) -> np.ndarray:
-    """What a period does to (x - s, x', x''), (n, count, 3, 3): the exponential of the model's matrix."""
+    """Transition over a period of (x - s, x', x''), (n, count, 3, 3): the exponential of the model's matrix."""
     # In units of 1 / omega, so that all entries are of one size: halved until small, a series, and squared as often.
     A = np.zeros((*omega.shape, 3, 3))
     A[..., 0, 1] = A[..., 1, 2] = 1.0

@@ -100,7 +100,7 @@ class Sensor(MeasuringPart):
 
     @property
     def count(self) -> int:
-        """How many numbers it reads."""
+        """Count of numbers that it reads."""
         return READINGS[self.of]
 
     def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
@@ -137,7 +137,7 @@ class Sensor(MeasuringPart):
         return self.count + 1
 
     def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
-        """What it draws.
+        """Streams of its draws.
 
         Args:
             acting: Names of its numbers that vary, or are not zero.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run may save beside the motion, signals of a controller and the energy used: shape, unit and meaning, by name."""
+"""Quantities that a run may save beside the motion, signals of a controller and the energy used.
+
+Shape, unit and meaning, by name.
+"""
 
 from __future__ import annotations
 

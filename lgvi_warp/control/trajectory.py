@@ -21,7 +21,7 @@ FASTEST = 1e15
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trajectory(Guidance):
-    """Where the vehicle shall be at which time, with its velocity and the rate of its heading as feedforward.
+    """Wanted position over time, with velocity and heading rate as feedforward.
 
     Before the first time and after the last one, the vehicle shall be at rest at the first place and at the last one.
 

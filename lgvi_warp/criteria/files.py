@@ -70,7 +70,7 @@ def of_study(path: str | os.PathLike[str]) -> AbstractContextManager[None]:
 
 
 class Saved(ABC):
-    """What a study found, as content of a JSON file and as records of a CSV file.
+    """Answer of a study, as content of a JSON file and as records of a CSV file.
 
     Attributes:
         study: name of the study, and of its files.

@@ -52,7 +52,7 @@ class Remembered:
         return self._folder is not None
 
     def __call__(self, name: str, run: Callable[..., Arrays], *arrays: np.ndarray) -> Arrays:
-        """What a function returns of arrays; name: of the function, among those that are called.
+        """Call a function of arrays, or read its stored return values; name: of the function.
 
         Raises: SceneError, where the folder has another call in this place.
         """
@@ -91,7 +91,7 @@ class Remembered:
         return refusal("store", str(self._folder), problem, remedy)
 
     def _key(self, fleets: Sequence[Ensemble], asked: Mapping[str, Any]) -> str:
-        """What the arguments are, as text. Raises SceneError where a function of the user's cannot be told from others."""
+        """Text that identifies the arguments. Raises SceneError where a function of the user's cannot be told from others."""
         told = {f"[{i}] {place}": each for i, fleet in enumerate(fleets)
                 for place, each in identities(functions_of(fleet)).items()}  # fmt: skip
         told |= {name: identity(value) for name, value in asked.items() if name not in NO_MATTER}

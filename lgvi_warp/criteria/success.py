@@ -38,7 +38,7 @@ def probability(hits: int, count: int, confidence: float, interval: str) -> Prob
 
 
 def none_text(hits: int, count: int, confidence: float) -> str:
-    """What is known where all of `count` members passed, or none: a one-sided limit; "" where some did."""
+    """Knowledge where all of `count` members passed, or none: a one-sided limit; "" where some did."""
     if not count or 0 < hits < count:
         return ""
     verb = "fails" if hits else "passes"
@@ -57,7 +57,7 @@ class Success:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def passed(self, status: np.ndarray, numbers: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Which members pass (n,), of their status (n,) and their metrics (n,) by name."""
+        """Mask of members that pass (n,), from their status (n,) and their metrics (n,) by name."""
         ended = np.zeros(len(status), bool)
         known = {OK: status == 0, NOT_FAILED: ~failed(status)}
         for word in self.status:

@@ -43,7 +43,7 @@ def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
 
 
 class Writing(NamedTuple):
-    """How numbers of members are written into lanes: as `put`, and as `put_rows`."""
+    """Way of writing members' numbers into lanes: by `put`, and as `put_rows`."""
 
     put: Callable[[np.ndarray, Any], None]
     put_rows: Callable[[np.ndarray, np.ndarray], None]
@@ -147,7 +147,7 @@ FIELDS = ("own", "bounds")
 
 
 class Group(NamedTuple):
-    """What each of several terms packed, and whether all members share it, and earlier calls brought the same."""
+    """Packed numbers of several terms; whether all members share them, and whether earlier calls brought the same."""
 
     packed: Sequence[Packed]
     shared: Sequence[bool]
@@ -260,7 +260,7 @@ class LawArrays:
 
 
 def _bounded(dtype: np.dtype) -> list[tuple[str, ...]]:
-    """Of each law of a struct, the names of the bounds that stand beside its numbers, in their order; none for none."""
+    """Names of the bounds beside the numbers of each law of a struct, in order."""
     names: list[tuple[str, ...]] = []
     while "own" in (dtype.names or ()):
         first_law = dtype["own"]

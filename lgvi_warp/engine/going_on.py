@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a run goes on from where another ended: what its packets leave, and what those of the next take."""
+"""Continuation of a run: state that its packets leave and that the next run's packets take."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BESIDE: dict[str, Any] = dict(
 
 
 def settings_of(plan: Plan) -> dict[str, Any]:
-    """What the states of a plan's packets, and what they remember, depend on beside the members' numbers."""
+    """Settings on which states and memory of a plan's packets depend, beside the members' numbers."""
     spec: Spec = plan.spec
     control = spec.control
     parts = list(spec._replace(**BESIDE))
@@ -46,7 +46,7 @@ def settings_of(plan: Plan) -> dict[str, Any]:
 
 
 def known_settings(plan: Plan) -> dict[str, Any]:
-    """What states and memory of a plan's runs depend on; computed once."""
+    """Settings on which states and memory of a plan's runs depend; computed once."""
     settings: dict[str, Any] = plan.shared("settings of states", {}, lambda numbers: settings_of(plan))
     return settings
 
@@ -59,7 +59,7 @@ def _named(value: Any) -> Any:
 
 
 def beginning(plan: Plan) -> int:
-    """How the first launch of a plan begins (see lgvi_kernels.advance.beginning).
+    """Kind of beginning of a plan's first launch (see lgvi_kernels.advance.beginning).
 
     Members go on exactly where neither their numbers nor what decides their states is another; else from their states.
     """
@@ -154,7 +154,7 @@ def left_by(packets: Packets) -> dict[str, np.ndarray]:
 
 
 def places_of(packets: Packets) -> dict[str, slice]:
-    """Where in the memory of some packets each law, part and event has what it remembers; "signals" are of the controller."""
+    """Rows of each law, part and event in the memory of some packets; "signals" are of the controller."""
     choice, laws = packets.plan.kernel_choice, packets.laws
     kinds = ("law", choice.laws), ("part", choice.parts_of_control), ("event", choice.events)
     names = [name_of(kind, term) for kind, each in kinds for term, _ in each]

@@ -14,7 +14,7 @@ from lgvi_warp.engine.packets import Packets
 
 @dataclass(frozen=True)
 class CallbackInput:
-    """What a controller measures, or wants, of m members at a tick.
+    """Measured or wanted values of m members at a tick.
 
     Args:
         position: Positions (m, 3) [m], inertial axes.
@@ -44,7 +44,7 @@ class CallbackInput:
 
 
 def last_tick(packets: Packets, members: np.ndarray | None = None) -> tuple[CallbackInput, CallbackInput]:
-    """What was measured and what was wanted at the last tick: (measured, wanted), copies.
+    """Measured and wanted values at the last tick: (measured, wanted), copies.
 
     members: which of their members (m,); None (default) for all.
     """

@@ -29,7 +29,7 @@ class Kernel:
 
     @functools.cached_property
     def advance(self) -> Advance:
-        """What launches use of it."""
+        """Kernel function that launches call."""
         with build_lock, self._laws_compile():
             return make_advance(self._spec)
 

@@ -202,7 +202,7 @@ def kept_header(cache: Path, scratch: Path) -> Iterator[None]:
 
 @functools.cache
 def header_key() -> str:
-    """What a precompiled header belongs to: the processor, and Warp's own headers as they were."""
+    """Key of a precompiled header: the processor, and Warp's own headers as they were."""
     native = Path(wp.__file__).parent / "native"
     files = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in sorted(native.glob("*.h"))]
     content = json.dumps([wp.get_cpu_kernel_cache_key(), str(native), files])

@@ -28,7 +28,7 @@ from lgvi_warp.scene.slices import over_members
 
 @dataclass(frozen=True)
 class KernelChoice:
-    """What the kernel of a run must contain."""
+    """Contents of the kernel of a run."""
 
     aligned: bool  # the kernel's axes are the user's but for order and sense (see `PackingContext`)
     moved: bool  # the state's origin differs from the user's
@@ -296,7 +296,7 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
 
 
 def _folder_and_roles(term: Term) -> tuple[str, Sequence[str]]:
-    """Where the built-in device code of a term, an event or a part of a controller is, and what it may define."""
+    """Folder of the built-in device code of a term, an event or a controller part, and the roles that it may define."""
     if isinstance(term, Part):
         return "laws.control", tuple(ARGUMENTS)
     return ("laws", ROLES) if term.acts else ("stops", ("distance",))
@@ -328,7 +328,7 @@ def seeing_roles(module: Any) -> tuple[str, ...]:
 
 @functools.cache
 def _functions_of(seeing: Callable[[Any], Any]) -> Any:
-    """What a law makes that looks at the water; kept, since each plan asks."""
+    """Functions of a law that looks at the water; cached, since each plan needs them."""
     return seeing(_no_water)
 
 
@@ -394,7 +394,7 @@ def _acting(
 
 
 def _flow(acting: list[tuple[Term, Any]]) -> str:
-    """How the water moves: the most general FLOW of the laws."""
+    """Motion of the water: the most general FLOW of the laws."""
     return max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
 
 

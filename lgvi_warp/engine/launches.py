@@ -24,7 +24,7 @@ GATHERED_BYTES = 8_000_000
 
 @dataclass(frozen=True, eq=False)
 class Launches:
-    """How the steps of a run are divided into launches."""
+    """Division of a run's steps into launches."""
 
     grid: TimeGrid
     lengths: tuple[tuple[float, ...], tuple[float, ...]]  # of stages and leads, in units of the step h [1]
@@ -50,7 +50,7 @@ class Launches:
         return self.begins == GOES_ON
 
     def beginning(self, k0: int) -> int:
-        """How the launch of the steps from k0 on begins."""
+        """Kind of beginning of the launch of the steps from k0 on."""
         return self.begins if k0 == self.grid.first else 0
 
     def looks_at(self, k: int) -> bool:
@@ -83,7 +83,7 @@ class Launches:
         )
 
     def samples_due(self, k0: int, k1: int) -> tuple[int, int]:
-        """Which samples fall due in the launch of steps k0 to k1: s0 to s1 - 1, after step k0 and no later than step k1."""
+        """Range of samples due in the launch of steps k0 to k1: s0 to s1 - 1, after step k0 and no later than step k1."""
         steps = self.grid.sample_steps
         return int(steps.searchsorted(k0, side="right")), int(steps.searchsorted(k1, side="right"))
 
@@ -101,19 +101,19 @@ class Launches:
         return self.grid.first // self.every + 1
 
     def slot_of(self, tick: int, slots: int) -> int:
-        """Where the kernel gathers a tick of `gathered`, counted from its first one."""
+        """Slot in which the kernel gathers a tick of `gathered`, counted from its first one."""
         assert self.gathered is not None
         assert self.every is not None
         return int(self.gathered.sample_steps[tick] // self.every - self.first_tick) % slots
 
     def ticks_held(self, count: int) -> int:
-        """How many ticks of a block of so many members are gathered at once; 0 where none are."""
+        """Number of ticks of a block of so many members that are gathered at once; 0 where none are."""
         if self.gathered is None:
             return 0
         return max(2, min(GATHERED_BYTES // max(1, self.tick_bytes(count)), len(self.gathered.times)))
 
     def ticks_of(self, k0: int, k1: int) -> slice:
-        """Which ticks are gathered once the launch of steps k0 to k1 has ended.
+        """Ticks that are gathered once the launch of steps k0 to k1 has ended.
 
         Those after step k0, with that of the start, and no later than k1. Where a function of the host answers, a tick ends in
         the next launch: those from step k0 on and before step k1, with that of the end.

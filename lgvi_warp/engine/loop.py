@@ -34,7 +34,7 @@ class RunProgress:
 
 @dataclass
 class Merged:
-    """How many members the keepers have received: up to where merging has begun, and where it is complete."""
+    """Count of members that the keepers have received: up to where merging has begun, and where it is complete."""
 
     begun: int = 0
     done: int = 0

@@ -52,6 +52,6 @@ class MemberStatus:
         return np.where(self.status != 0, (self.failed_step + fraction) * plan.grid.h, plan.grid.times[-1])
 
     def ends(self, plan: Plan) -> Ends:
-        """How and when the members ended, as statistics need it."""
+        """Outcomes and end times of the members, as statistics need them."""
         events = tuple(event.key for event in plan.ensemble.scene.events)
         return Ends(self.status, self.event, self.end_time(plan), events)

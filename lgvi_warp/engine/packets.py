@@ -192,7 +192,7 @@ class Packets:
 
     @property
     def memory(self) -> Any:
-        """What laws and method remember, a Warp array (packets, rows) of lanes; the second half is a backup."""
+        """Memory of laws and method, a Warp array (packets, rows) of lanes; the second half is a backup."""
         return self.laws.memory.array
 
     def _arrays(self) -> list[Any]:
@@ -357,7 +357,7 @@ class Packets:
             return wp.launch(plan.kernel.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
 
     def gathered(self, when: slice) -> np.ndarray:
-        """What the last launch gathered at ticks, in the user's axes.
+        """Values that the last launch gathered at ticks, in the user's axes.
 
         Returns: (ticks, members, numbers of a sample), in memory that the next launch overwrites.
         """
@@ -486,13 +486,13 @@ def by_members(lanes: np.ndarray) -> np.ndarray:
 
 
 def columns_of(sizes: Mapping[str, int]) -> Any:
-    """Where the kernel writes the motion."""
+    """Columns into which the kernel writes the motion."""
     firsts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
     return wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS))
 
 
 def columns_at_ticks(plan: Plan) -> np.ndarray:
-    """Where in a tick's rows the kernel writes the motion."""
+    """Columns of a tick's rows into which the kernel writes the motion."""
     columns, row, firsts = [], 0, {}
     for name, size in plan.layout.tick_fields.items():
         firsts[name], row = row, row + size

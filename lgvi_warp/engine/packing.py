@@ -35,7 +35,7 @@ Plan = Any
 
 
 class Packing:
-    """What the kernel needs of some members, in its frame and its units.
+    """Numbers of some members in the kernel's frame and units.
 
     U: (1 or m, 3, 3), matrix of the turns of psi_x; zero for other methods.
     scale: (1 or m,) [kg m^2], what momenta are divided by in the kernel; 1 for methods that need none.
@@ -137,7 +137,7 @@ class Packing:
         return packed
 
     def _with_normals(self, term: Term, numbers: Any, packed: Packed) -> Packed:
-        """What a term packed, with its rows of the normals that the call gives."""
+        """Packed numbers of a term, with its rows of the normals that the call gives."""
         if self.members.given is None or self.members.given.rows(term.key) is None:
             return packed  # and stays shared, if it was
         given = self._context(numbers).given
@@ -167,7 +167,7 @@ class Packing:
         return 2 * len(spec.gauss[1]) * SLOPE_FIELDS if spec.gauss else 0
 
     def starts(self) -> Starts:
-        """What the members' states are made of."""
+        """Numbers from which the members' states are built."""
         m, frame, axes = self.members, self.frame, self.numbers[AXES][0]
         attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
         mass = self._shared("diagonal mass", lambda numbers: _diagonal_mass(numbers[FRAME][0]))
@@ -225,7 +225,7 @@ def name_of(kind: str, term: Term) -> str:
 
 
 def remembered_by(kind: str, term: Term, final: Final | None) -> np.ndarray | None:
-    """What a law, part or event remembers of the run that members go on from, (m, rows); None for nothing."""
+    """Memory of a law, part or event from the continued run, (m, rows); None for none."""
     return None if final is None else final.lanes.get(name_of(kind, term))
 
 
@@ -246,7 +246,7 @@ def _inertia_of_state(numbers: Any) -> np.ndarray:
 
 
 def _water(numbers: Any, frame: Frame) -> Fields:
-    """What accelerating water acts on: displaced mass minus dry mass, and its lever."""
+    """Masses on which accelerating water acts: displaced mass minus dry mass, and its lever."""
     displaced, dry = vehicle.displaced_mass(numbers), vehicle.dry_mass(numbers)
     center = numbers["vehicle.center_of_buoyancy"]
     lever = displaced[:, None] * center - (dry[:, None] * vehicle.center_of_mass(numbers))
@@ -255,7 +255,7 @@ def _water(numbers: Any, frame: Frame) -> Fields:
 
 
 def _shear(numbers: Any, frame: Frame, full: bool, lever: bool) -> Fields:
-    """What water that varies in space acts on: the body's own mass and the added mass, about the user's origin."""
+    """Masses on which water that varies in space acts: the body's own mass and the added mass, about the user's origin."""
     dry, added = vehicle.dry_mass(numbers), vehicle.added_blocks(numbers)
     M = symmetric(inertia.in_axes(frame.Q, added.M))
     fields: Fields = {"dry": dry, "added": M if full else M[0]}

@@ -68,7 +68,7 @@ class Plan:
 
     @property
     def phases(self) -> Phases:
-        """How long `compile` took, by phase; zeros where this process had loaded the kernel."""
+        """Duration of `compile`, by phase; zeros where this process had loaded the kernel."""
         return self.kernel.phases
 
     def compile(self) -> float:

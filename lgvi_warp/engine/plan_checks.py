@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run refuses before it begins: settings that do not go together, and steps that do not suit what acts."""
+"""Refusals before a run begins: settings that do not go together, and steps that do not suit what acts."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the kernel writes of a sample, and gathers at a tick: fields of the motion, then signals of the controller."""
+"""Layout of samples and of gathered ticks in the kernel: fields of the motion, then signals of the controller."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ACCOUNT_ROW = -1
 
 @dataclass(frozen=True, eq=False)
 class SampleLayout:
-    """Where each number of a sample is.
+    """Place of each number of a sample.
 
     fields: in the order in which they are saved. compensated: a position is two sums.
     read_at_ticks: field of the motion -> which of its numbers statistics read at ticks, () for all; None: all of all fields.
@@ -45,7 +45,7 @@ class SampleLayout:
 
     @functools.cached_property
     def sizes(self) -> dict[str, int]:
-        """What the kernel writes of a sample: the fields kept, and those needed to move them back to the user's origin.
+        """Fields that the kernel writes of a sample: those kept, and those needed to move them back to the user's origin.
 
         Returns: Field -> numbers per sample, as written; a compensated position is b, then b_low. Signals come last.
         """
@@ -60,7 +60,10 @@ class SampleLayout:
 
     @functools.cached_property
     def tick_fields(self) -> dict[str, int]:
-        """How many numbers of each field the kernel gathers at a tick, in the user's axes; of signals all, as in samples."""
+        """Count of numbers of each field that the kernel gathers at a tick, in the user's axes.
+
+        Of signals all, as in samples.
+        """
         sizes = {name: size for name, size in self.sizes.items() if name in self.fields}
         entries = self.tick_entries
         return {name: len(entries.get(name, ())) or size for name, size in sizes.items() if self._reads(name)}
@@ -79,7 +82,7 @@ class SampleLayout:
 
     @property
     def noted_bits(self) -> int:
-        """What ticks note, as bits (see noting.py): that of which something is saved, and all where the host is asked."""
+        """Bits of the signals that ticks note (see noting.py): those saved, and all where the host controls."""
         noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
         return sum({bit(signal.group, signal.row) for signal in noted}) | ASKED_NOTES * self.choice.has_callback
 

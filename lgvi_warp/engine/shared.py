@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all members share: results that follow from numbers of which none varies, computed once for a run."""
+"""Shared results: those that follow from numbers of which none varies, computed once for a run."""
 
 from __future__ import annotations
 

@@ -98,7 +98,10 @@ def kernel_of(width: int, real: Any) -> Any:
 
 
 def _place(values: np.ndarray | None) -> tuple[tuple[int, int, int], Any]:
-    """Where numbers lie: address, and the bytes from member to member and from number to number; and what lies there."""
+    """Memory layout of numbers: address, and the bytes from member to member and from number to number.
+
+    And what lies there.
+    """
     if values is None:
         return (0, 0, 0), None
     if values.dtype != np.float64:

@@ -17,7 +17,7 @@ NUMBERS = 18
 
 
 class Starts(NamedTuple):
-    """What the states of m members are made of, each (1 or m, ...).
+    """Numbers from which the states of m members are built, each (1 or m, ...).
 
     Attitude (3, 3), position (3,) [m], velocity (3,) [m/s] and angular velocity (3,) [rad/s] as the user gives them.
     water: (3,) [m/s], its velocity in the user's body axes; None where it rests.

@@ -119,7 +119,7 @@ def leaves_rotations(method: Method) -> bool:
 
 
 def departure(rows: np.ndarray) -> np.ndarray:
-    """How far matrices, rows (packets, 9, width), are from rotations: the largest entry of |R R^T - I|, (packets * width,)."""
+    """Distance of matrices, rows (packets, 9, width), from rotations: the largest entry of |R R^T - I|, (packets * width,)."""
     R = rows.reshape(len(rows), 3, 3, -1)
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
     entries = [np.abs((R[:, i] * R[:, j]).sum(axis=1, dtype=np.float64) - (i == j)) for i, j in pairs]

@@ -79,7 +79,7 @@ def _explicit_frame(body: inertia.Blocks) -> Frame:
 
 @dataclass(frozen=True)
 class Survey:
-    """What holds for at least one member, and the largest values."""
+    """Features of at least one member, and the largest values."""
 
     turned: bool  # axes other than the user's, or forces about another origin (see `PackingContext.aligned`)
     bent: bool  # drag acts and has no exact flow along the kernel's axes
@@ -291,7 +291,7 @@ def _entries_beside(frame: Frame) -> frozenset[tuple[int, int]]:
 
 
 def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
-    """What a survey says of the axes and origins of some members."""
+    """Survey of the axes and origins of some members."""
     return {
         "turned": not frame.aligned,
         "turned_axes": bool(np.any(notation.EYE != frame.Q)),

@@ -50,7 +50,7 @@ class Slopes:
 
     @property
     def writing(self) -> Writing:
-        """How numbers and their slopes are written into dual lanes."""
+        """Way of writing numbers and their slopes into dual lanes."""
         return Writing(self._put, self._put_rows)
 
     def of(self, numbers: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -90,7 +90,7 @@ class Slopes:
                 raise refusal("tangents", target.label, problem, "leave it out")
 
     def places(self) -> Iterator[slice]:
-        """Where in a lane the slopes by each number are."""
+        """Slices of a lane that hold the slopes by each number."""
         width = self._spec.width
         for i in range(1, 1 + self._spec.tangents):
             yield slice(i * width, (i + 1) * width)
@@ -123,7 +123,7 @@ class Slopes:
 
 
 class CopiesPacking(Packing):
-    """What the kernel needs of members and their copies."""
+    """Packing of members and their copies for the kernel."""
 
     def __init__(self, plan: Plan, members: Members):
         self._repeats = repeats(len(plan.ensemble.copies.targets))
@@ -159,7 +159,7 @@ class CopiesPacking(Packing):
         return Frame(**own)
 
     def of_members(self, values: np.ndarray) -> np.ndarray:
-        """Those of the members themselves among values of members and copies."""
+        """Values of the members themselves, out of those of members and copies."""
         return values if len(values) == 1 else values[:: self._repeats]
 
 

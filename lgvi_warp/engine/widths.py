@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many vehicles a packet holds: by a table for each kind of processor, or as it was measured on this machine.
+"""Number of vehicles in a packet: by a table for each kind of processor, or as it was measured on this machine.
 
 What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> HASHES -> hash
 of a kernel -> its width.

@@ -37,7 +37,7 @@ Ends = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True)
 class Work:
-    """What an executor does with each block: advance it, and write it to the store if there is one.
+    """Work of an executor on each block: advance it, and write it to the store if there is one.
 
     It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted; one that
     the store holds is not run again. A copy in another process returns once its block is durable; the run waits for its own.
@@ -70,7 +70,7 @@ class Work:
     def _closed(
         self, block: Block, halted: Callable[[], bool], advanced: Callable[[int], None]
     ) -> tuple[Any, ...] | None:
-        """What each keeper closed with."""
+        """Closing value of each keeper."""
         steps_made = 0
 
         def add(vehicle_steps: int) -> None:

@@ -35,7 +35,7 @@ SAMPLES = 20
 
 @dataclass(frozen=True)
 class Candidate:
-    """How to solve: method, step, precision and solver.
+    """Setting of a run: method, step, precision and solver.
 
     Attributes:
         method: name of the method.

@@ -67,7 +67,7 @@ def readings(kinds: Sequence[Kind], read: Callable[[np.ndarray], np.ndarray]) ->
 
 @dataclass(frozen=True)
 class Kind:
-    """Which readings measure the same work: the kernel, the step [s], and whether a longer step is more work."""
+    """Key of readings that measure the same work: the kernel, the step [s], and whether a longer step is more work."""
 
     kernel: Hashable
     h: float
@@ -173,6 +173,6 @@ def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
 
 
 def agreement_text(spreads: Sequence[float]) -> str:
-    """How costs were read and how well the readings agree."""
+    """Sentence on the readings of costs and their agreement."""
     most = max((spread for spread in spreads if math.isfinite(spread)), default=1.0)
     return f"CPU time of one thread, the least of several readings; their median is at most {most:.2f} times that"

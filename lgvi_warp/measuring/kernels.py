@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What compiles, runs and prices the plans of a comparison."""
+"""Compiler, runner and cost meter of the plans of a comparison."""
 
 from __future__ import annotations
 

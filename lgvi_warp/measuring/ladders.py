@@ -140,7 +140,7 @@ class Ladders:
 
 
 def step_cost(plan: Plan, kernels: Kernels) -> float:
-    """What one step of a plan costs [us per vehicle]."""
+    """Cost of one step of a plan [us per vehicle]."""
     return kernels.costs([plan], ROUNDS)[0].us_per_vehicle_second * plan.grid.h
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What errors are measured from: two precise runs that agree; and how fast small differences grow."""
+"""Reference of errors: two precise runs that agree; and how fast small differences grow."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ STEEPEST = 3.0
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What errors are measured from: the finer of two runs that share no step and, at best, no method.
+    """Reference of errors: the finer of two runs that share no step and, at best, no method.
 
     text: the two methods and their steps, in words.
     own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
@@ -173,7 +173,7 @@ def time_over(seconds: float, more: float, share: float) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Growth:
-    """How a small difference between two starts grows.
+    """Growth of a small difference between two starts.
 
     Attributes:
         rate: growth rate of its logarithm, by least squares [1/s].

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How large a step each method bears: limits of stability measured by method, or computed.
+"""Largest stable step of each method: limits of stability measured by method, or computed.
 
 Limits are in h times the angular frequency of an oscillation (`python -m benchmarks table warning_limits` writes them): the
 fastest one whose amplitude stays bounded, for the Munk moment with M = (1, 100, 100) and 0.3 rad, and for the restoring

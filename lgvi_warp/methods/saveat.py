@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""When to keep a sample, and the uniform grid of steps that meets every sample time."""
+"""Times of samples, and the uniform grid of steps that meets every sample time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_SAMPLES = 10_000_000
 
 @dataclass(frozen=True)
 class SaveAt:
-    """Which samples a run keeps; the start and the end are always kept.
+    """Samples that a run keeps; the start and the end are always kept.
 
     Args:
         every: Interval of samples [s], from the start on; default None, the end only.

@@ -88,12 +88,12 @@ def _momenta(result: Sampled) -> np.ndarray:
 
 
 def _momenta_of_vehicle(result: Sampled, relative: np.ndarray) -> np.ndarray:
-    """Those of the vehicle's own inertia at the velocities `relative` (k, n, 6)."""
+    """Momenta of the vehicle's own inertia at the velocities `relative` (k, n, 6)."""
     return np.einsum("nij,knj->kni", *_broadcast(vehicle.inertia6(result.parameters), relative))
 
 
 def _inner(result: Sampled, relative: np.ndarray) -> list[Inner]:
-    """What masses that move in the vehicle add."""
+    """Momenta and energy of masses that move in the vehicle."""
     down, time = result.attitude[..., 2, :].astype(np.float64), result.time
     each = (term.inner(result.own(term), time, relative, down, result.parameters) for term in result.terms)
     return [inner for inner in each if inner is not None]

@@ -53,7 +53,7 @@ class NoiseDraws:
 
     @property
     def numbers(self) -> int:
-        """How many normals they are."""
+        """Count of normals."""
         return self.count * self.size
 
     @property
@@ -63,12 +63,12 @@ class NoiseDraws:
 
     @property
     def times(self) -> np.ndarray:
-        """When they are drawn (count,) [s]."""
+        """Times of the draws (count,) [s]."""
         return self.first + self.spacing * np.arange(self.count)
 
 
 class DrawTimes(NamedTuple):
-    """When a term or a sensor draws: time between two draws [s], and their number."""
+    """Times at which a term or a sensor draws: time between two draws [s], and their number."""
 
     spacing: float
     draws: int

@@ -113,7 +113,7 @@ def off_diagonal(matrices: np.ndarray) -> np.ndarray:
 
 
 def reduced(operation: np.ufunc, values: np.ndarray) -> np.ndarray:
-    """What an operation makes of the numbers of all members, such as the largest.
+    """Result of an operation over the numbers of all members, such as the largest.
 
     Args:
         operation: np.maximum, np.minimum, np.logical_or or np.bitwise_or, for which the order of members does not matter.
@@ -146,7 +146,7 @@ def only_diagonal(matrices: np.ndarray) -> np.ndarray | None:
 
 
 def rotations(R: np.ndarray, limit: float = ORTHOGONAL) -> np.ndarray:
-    """Which matrices are rotations to within a limit.
+    """Mask of matrices that are rotations to within a limit.
 
     Args:
         R: Matrices (..., 3, 3).

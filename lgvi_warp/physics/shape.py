@@ -14,7 +14,7 @@ REMEDY = 'give length and diameter [m], or mesh = "hull.glb"'
 
 @dataclass(frozen=True)
 class Shape:
-    """How a vehicle is drawn: a hull of revolution along the body's x axis, or a mesh. It is no part of the dynamics.
+    """Drawn shape of a vehicle: a hull of revolution along the body's x axis, or a mesh. It is no part of the dynamics.
 
     Args:
         length: Length of the hull [m].
@@ -46,7 +46,7 @@ class Shape:
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, Any]:
-        """What is given, as the table [vehicle.shape] of a scene file."""
+        """Given fields, as the table [vehicle.shape] of a scene file."""
         return {key: value for key, value in vars(self).items() if value is not None}
 
 

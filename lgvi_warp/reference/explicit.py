@@ -32,7 +32,7 @@ Row = tuple[float, ...]
 
 
 class Tableau(Protocol):
-    """What lgvi_warp.methods.tableaux holds: a, b, c; rows of error estimates, which go as h to the power `estimate`."""
+    """Content of lgvi_warp.methods.tableaux: a, b, c; rows of error estimates, which go as h to the power `estimate`."""
 
     @property
     def a(self) -> tuple[Row, ...]:
@@ -117,7 +117,7 @@ def rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
 
 
 def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
-    """What laws remember, half a step of h [s] later; x.t is the step's start, or its end in the second half.
+    """Memory of laws, half a step of h [s] later; x.t is the step's start, or its end in the second half.
 
     That of laws whose memory is known at every stage stays as it is: see `followed`.
     """

@@ -14,12 +14,12 @@ def direction(y: np.ndarray, goal: float) -> float:
 
 
 def overshoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """How far y goes beyond the goal."""
+    """Distance of y beyond the goal."""
     return max(0.0, float(np.max(direction(y, goal) * (y - goal))))
 
 
 def undershoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """How far y goes the wrong way."""
+    """Distance of y in the wrong direction."""
     return max(0.0, float(np.max(direction(y, goal) * (y[0] - y))))
 
 

@@ -210,7 +210,7 @@ def at_time(x: State, t: float) -> State:
 
 
 def remembered_over(x: State, body: Body, h: float) -> State:
-    """What laws remember, over all of h; x.t is the middle of it."""
+    """Memory of laws, over all of h; x.t is the middle of it."""
     return remembered(remembered(x, body, h, second=False), body, h, second=True)
 
 

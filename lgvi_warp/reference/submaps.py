@@ -90,7 +90,7 @@ def velocity(body: Body, p: Array) -> Array:
 
 
 def look(x: State, body: Body, h: float) -> tuple[View, ...]:
-    """What each law sees of the state: attitude, position, velocities, time and its memory."""
+    """View of the state for each law: attitude, position, velocities, time and its memory."""
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
     memory = x.memory or (np.zeros(0),) * len(body.terms)
     return tuple(View(x.R, x.b, nu, Om, x.t, h, x.step, body.member, remembered) for remembered in memory)
@@ -135,7 +135,7 @@ def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]
 
 
 def remembered(x: State, body: Body, h: float, second: bool, late: float = 0.0) -> State:
-    """What the laws remember, half a kick later; late: see K."""
+    """Memory of the laws, half a kick later; late: see K."""
     views = look(replace(x, t=x.t + late * h), body, h)
     memory = tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True))
     return recorded(x, body, views, memory)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run records of each member besides samples: one line per field, for memory, files and stores alike."""
+"""Records of each member besides samples: one line per field, for memory, files and stores alike."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the members of a run ended, in words: a sentence for each status that occurs."""
+"""Outcomes of a run's members, in words: a sentence for each status that occurs."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def provenance_but_scene(
 
 
 def starts_at(plan: Plan) -> dict[str, Any]:
-    """Where a run starts, in its provenance: nothing where that is at t = 0."""
+    """Start of a run, in its provenance: empty at t = 0."""
     final, time = plan.ensemble.final, float(plan.grid.times[0])
     if final is None:
         return {"start": {"time": time}} if plan.grid.first else {}

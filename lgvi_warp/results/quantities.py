@@ -80,7 +80,7 @@ class OfResult:
         return False
 
     def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
-        """What a run must gather for it, by the name of the estimate."""
+        """Statistics that a run must gather for it, by the name of the estimate."""
         return {}
 
     def values(self, result: Result, members: Any = None) -> np.ndarray:
@@ -118,7 +118,7 @@ ENDS = ("outcome ", "end_time ")
 
 @dataclass(frozen=True)
 class EndQuantity(OfResult):
-    """How or when members ended, or a quantity there or at a time.
+    """Outcome or end time of members, or a quantity then or at a time.
 
     "outcome floor" is 1 for members that ended so, else 0; "end_time floor" says when, and "depth at floor" gives the depth
     there, NaN for members that ended otherwise; "depth at 30" is the depth after 30 s.
@@ -143,7 +143,10 @@ class EndQuantity(OfResult):
         return {"outcome": "1", "end_time": "s"}.get(self.kind, super().unit)
 
     def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
-        """What a run must gather, where several events have the status of this one, which then does not tell them apart."""
+        """Statistics that a run must gather, where several events have the status of this one.
+
+        Which then does not tell them apart.
+        """
         if not self.outcome:
             return {}
         check_outcomes(
@@ -169,7 +172,7 @@ class EndQuantity(OfResult):
         return np.where(so[:, None], numbers, np.nan)
 
     def _so(self, result: Result) -> np.ndarray:
-        """Which members ended so, (n,)."""
+        """Mask of members with this outcome, (n,)."""
         events = events_of(result.provenance["scene"].get("events", ()))
         status, named = np.asarray(result.status), {event.key: event.status for event in events}
         if self.outcome in named and result.event is not None:

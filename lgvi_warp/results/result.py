@@ -262,7 +262,7 @@ class Result(Summarized):
 
     @property
     def final(self) -> Final:
-        """Where the members ended, from which a run can go on: lw.solve(..., start=result.final).
+        """Final states of the members, from which a run can go on: lw.solve(..., start=result.final).
 
         Raises:
             AttributeError: If it was not kept.
@@ -322,7 +322,7 @@ class Result(Summarized):
         return replace(self, **own, **of_members)
 
     def _of_members(self) -> dict[str, np.ndarray]:
-        """What is recorded of each member, (n,) by name."""
+        """Records of each member, (n,) by name."""
         names = [item.name for item in member_fields.EVERY]
         names += [name for name in ("event", "weights") if getattr(self, name) is not None]
         return {name: getattr(self, name) for name in names}

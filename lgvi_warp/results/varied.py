@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What differed between the members of a result: numbers of the scene and of the start."""
+"""Varied inputs of a result's members: numbers of the scene and of the start."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ def run_plan(
 
 
 class _Gathered:
-    """What a run in memory gathers, and the results that are made of it."""
+    """Data that a run in memory gathers, and the results built from it."""
 
     def __init__(
         self, plan: Plan, observed: Observation, fields: Sequence[str] | None, known: Known | None, final: bool
@@ -144,7 +144,7 @@ class _Gathered:
         return {name: values[:, at] for name, values in (kept or {}).items()}
 
     def final(self, n: int, states: Mapping[str, np.ndarray], status: np.ndarray) -> Final | None:
-        """Where the first n members ended; None where it is not wanted, and where none is complete."""
+        """Final states of the first n members; None where not requested, and where none is complete."""
         if self._finals is None or not n:
             return None
         rows = {name: each[:n] for name, each in (self._whole[2] if self._whole else self._finals.rows(n)).items()}

@@ -45,7 +45,7 @@ SPLITTING = {"conservative": 0.01, "damped": 0.03}
 
 @dataclass(frozen=True)
 class Rates:
-    """How fast the motion of the first members changes.
+    """Rates of change of the first members' motion.
 
     modes: rates of the modes of each member (n, 10), complex [1/s]; infinite where damping is beyond float64.
     drag: fastest rate of damping alone [1/s]; None where a term does not tell how it brakes.

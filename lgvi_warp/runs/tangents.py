@@ -214,7 +214,7 @@ def _of_members(ended: np.ndarray, jacobian: dict[str, np.ndarray], members: int
 
 
 def _remarks(fleet: Ensemble, plan: Plan) -> list[str]:
-    """What the derivatives of this run leave out, in sentences."""
+    """Sentences on effects that the derivatives of this run leave out."""
     texts = []
     numbers = fleet.parameters(0, fleet.members)
     parts = fleet.scene.controller.parts if fleet.scene.controller else ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the members of a run ended, with all that they remember: what another run needs to go on as if it were one."""
+"""Final states and memory of a run's members: all that another run needs to continue as if it were one."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_DRIFT = 0.1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Final(Summarized):
-    """Where n members of a run ended: their states, and what forces, actuators and controllers remember.
+    """Final states of n members of a run, and the memory of forces, actuators and controllers.
 
     A run that goes on from it with the same scene, members and settings has the bits of one run: `lw.solve(..., start=final)`,
     `lw.prepare(...).states(final)`. With other settings or other numbers of the members it goes on from the states, with what
@@ -67,7 +67,7 @@ class Final(Summarized):
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def summary_rows(self) -> tuple[str, Rows]:
-        """Where it came from, and what it holds."""
+        """Source and content."""
         remembered = [name.removeprefix(MEMORY) for name, rows in self.lanes.items() if name.startswith(MEMORY)]
         rows = [
             ("step", f"{self.step:g} s, {self.steps:,} steps"),

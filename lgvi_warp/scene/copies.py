@@ -64,7 +64,7 @@ def with_copies(fleet: Ensemble, keys: Sequence[str], surveyed: Ensemble | None 
 
 
 def repeats(targets: int) -> int:
-    """How often each member stands among the copies."""
+    """Number of copies of each member."""
     return 1 + len(OFFSETS) * targets
 
 

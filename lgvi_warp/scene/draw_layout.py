@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the noise of a scene, and its sensors, draw in a run."""
+"""Draws of a scene's noise and sensors in a run."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the numbers of an ensemble's members come from, and these numbers, drawn block by block."""
+"""Sources of the members' numbers, and the numbers themselves, drawn block by block."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Draws:
         return values
 
     def weights_of(self, first: int, stop: int) -> np.ndarray | None:
-        """What members first to stop - 1 count for in statistics, (stop - first,); None where all count alike."""
+        """Weights of members first to stop - 1 in statistics, (stop - first,); None where all count alike."""
         if self.weights is None:
             return None
         return self.weights[slice(first, stop) if self.places is None else self.places[first:stop]]
@@ -249,7 +249,7 @@ def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]
 
 
 def _column(tables: Faults, key: str, column: Any, known: Mapping[str, np.ndarray]) -> tuple[Target, np.ndarray] | None:
-    """What a column of a table sets, and its values; None after a fault in the name."""
+    """Target of a table's column, and its values; None after a fault in the name."""
     (target, *more), also = variations.targets(key), f'; or leave it out: ignore = ["{cut(key)}"]'
     if more:
         tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")

@@ -204,12 +204,12 @@ class Ensemble(Summarized):
 
     @property
     def sampling(self) -> Sampling:
-        """How the members' numbers are chosen."""
+        """Design of the members' numbers."""
         return self._draws.sampling
 
     @property
     def variations(self) -> Sequence[Variation]:
-        """What varies, one entry for each distribution."""
+        """Variations, one for each distribution."""
         return self._draws.variations
 
     @property

@@ -198,7 +198,7 @@ def _entry(content: Mapping[str, Any], section: str, key: str) -> Any:
 
 
 def _start(content: Mapping[str, Any], origin: Any) -> Any:
-    """Where members start, (3,) [m]; None for nothing given."""
+    """Start position of members, (3,) [m]; None if not given."""
     place = _entry(content, "start", "geodetic")
     if place is None or np.shape(place) != (3,) or np.shape(origin) != (2,):
         return _entry(content, "start", "position")

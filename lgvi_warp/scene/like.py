@@ -15,7 +15,7 @@ from lgvi_warp.scene.start import Environment, Start
 
 @runtime_checkable
 class SceneLike(Protocol):
-    """What an ensemble needs of a scene; `Scene` fulfils this protocol."""
+    """Protocol of a scene as an ensemble needs it; `Scene` fulfils it."""
 
     @property
     def vehicle(self) -> Vehicle:
@@ -35,7 +35,7 @@ class SceneLike(Protocol):
 
     @property
     def controller(self) -> Any:
-        """What steers the vehicle; None for nothing."""
+        """Controller of the vehicle, or None."""
 
     @property
     def parts(self) -> Sequence[Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Odd:
-    """How many members have an odd value of one quantity."""
+    """Number of members with an odd value of one quantity."""
 
     text: str
     first: int

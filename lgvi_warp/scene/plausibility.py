@@ -334,7 +334,7 @@ def floats(scene: SceneLike) -> bool:
 
 
 def on_the_way(samples: Mapping[str, np.ndarray]) -> Oddities:
-    """What became odd of members that began well, by samples that are in memory anyway.
+    """Oddities that arose in members that began well, from samples already in memory.
 
     samples: "velocity", (k, n, 3) [m/s], of which the first is the start.
     """

@@ -134,7 +134,7 @@ def _numbers(shape: tuple[Any, ...], number: Schema | None = None) -> Schema:
 
 
 def _meanings(kind: Any) -> dict[str, str]:
-    """What the fields of a class mean, by name, from its docstring."""
+    """Meanings of a class's fields by name, from its docstring."""
     _, _, arguments = (kind.__doc__ or "").partition("Args:\n")
     documented = re.findall(r"^        (\w+): (.*(?:\n {12}.*)*)", arguments.partition("\n\n")[0], re.MULTILINE)
     return {name: " ".join(text.split()) for name, text in documented}

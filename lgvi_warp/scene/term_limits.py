@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How large the numbers of terms and events may be before they are odd: a rule for each, or the reason why there is none.
+"""Plausible ranges of the numbers of terms and events: a rule for each, or the reason for its absence.
 
 Rules are by unit, and by name where a unit does not tell. Other checks of `plausibility` look at some numbers more closely.
 """
@@ -194,7 +194,7 @@ MOST_ROWS = 10_000
 
 
 def _largest(values: np.ndarray) -> np.ndarray:
-    """Of values (n, r, k) those of the largest size, (n, k)."""
+    """Values of the largest size among (n, r, k), as (n, k)."""
     return np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], axis=1)[:, 0]
 
 

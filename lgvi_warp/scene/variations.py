@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What varies, by name: the numbers of a scene that a distribution draws, and the unit cube of the sampling points.
+"""Variations by name: the numbers of a scene that a distribution draws, and the unit cube of the sampling points.
 
 A name is that of a number of the scene, "vehicle.mass", of an entry of it, "start.position[2]" or
 "vehicle.inertia[0,1]", or of several that one distribution draws together, "vehicle.mass, vehicle.buoyancy".

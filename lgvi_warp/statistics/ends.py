@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How and when the members of a block ended: the data that statistics of outcomes are of."""
+"""Outcomes and end times of a block's members: data for statistics of outcomes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Ends:
     events: tuple[str, ...] = ()
 
     def are(self, outcome: str) -> np.ndarray:
-        """Which members (n,) had this outcome."""
+        """Mask of members (n,) with this outcome."""
         if outcome in self.events:
             return np.asarray(self.event == 1 + self.events.index(outcome))
         if outcome == STOPPED:

@@ -216,7 +216,7 @@ class Outcome(OfEnds):
 
     @staticmethod
     def _by(part: Part, kind: float, time: np.ndarray, power: int = 1) -> np.ndarray:
-        """How many members have ended in a way by each time; of weighted ones effective members, or sums of squares."""
+        """Number of members with an outcome by each time; of weighted ones effective members, or sums of squares."""
         so = part["kind"] == kind
         order = np.argsort(part["time"][so], kind="stable")
         by = np.searchsorted(part["time"][so][order], time, "right")
@@ -235,7 +235,7 @@ def _weighted(part: Part) -> Weighted:
 
 
 def _scale(part: Part) -> float:
-    """What turns weights into effective members; 1 for members that count alike."""
+    """Factor from weights to effective members; 1 for members that count alike."""
     return float((part["weight"] / part["square"])[0]) if "weight" in part else 1.0
 
 
@@ -267,7 +267,7 @@ def _curves(part: Part, at: np.ndarray) -> tuple[PassageCurve, PassageCurve]:
 def _counted(
     at: np.ndarray, times: np.ndarray, side: Literal["left", "right"], weights: np.ndarray | None = None
 ) -> np.ndarray:
-    """How many of the times [s] fall to each of `at`, or the sum of their weights; those after the last one fall to none."""
+    """Number of the times [s] that fall to each of `at`, or the sum of their weights; later times fall to none."""
     return np.bincount(np.searchsorted(at, times, side), weights, len(at))[: len(at)]
 
 

@@ -93,7 +93,7 @@ class _Passages(Gatherer):
         return both_measures(own, squares, np.array([np.count_nonzero(self._weight)]))
 
     def _part(self, weights: np.ndarray | None) -> Part:
-        """How many members pass, are lost and stop by each time, or the sums of their weights."""
+        """Numbers of members that pass, are lost and stop by each time, or the sums of their weights."""
         R, length = self._replicates, self._times + 1
         row = np.repeat(np.arange(R), len(self._passed) // R) * length
         piece = np.clip(np.floor(self._share * PIECES), 0, PIECES - 1).astype(np.int64)
@@ -230,7 +230,10 @@ def check_levels(faults: Faults, levels: Any) -> None:
 
 
 def design_effect(weighted: Weighted, share: np.ndarray, squares: np.ndarray) -> np.ndarray:
-    """How many times the effective number is behind a fraction (...) of the weight; share, squares: sums of what it counts."""
+    """Ratio of members behind a fraction (...) of the weight to the effective number.
+
+    Share, squares: sums of what it counts.
+    """
     fraction = (share / weighted.weight[0]).ravel()[None]
     number = weighted.number_of(fraction, squares.ravel()[None]) / np.maximum(weighted.effective[0], 1e-300)
     return np.asarray(number.reshape(share.shape))

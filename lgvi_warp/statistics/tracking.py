@@ -72,7 +72,7 @@ class Channel:
         return np.moveaxis(np.stack([y, goal], axis=1), 1, 2)
 
     def _set_point(self, controller: Any, members: Members) -> np.ndarray | None:
-        """What the members' set points want, (1,) or (n,); None where another kind of guidance says it."""
+        """Values that the members' set points want, (1,) or (n,); None where another kind of guidance says it."""
         if controller is None or self.wish is None:
             return None
         wish, entry = self.wish

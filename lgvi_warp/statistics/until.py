@@ -186,7 +186,7 @@ def _names_of_entries(statistic: Statistic) -> dict[str, dict[str, int]]:
 
 
 def _target(name: str, known: Mapping[str, Named]) -> Named:
-    """What a name asks to watch: one of those known, or a mean that is added to them."""
+    """Quantity that a name asks to watch: a known one, or a mean that is added to them."""
     alike = (known[spelling] for spelling in known if canonical(spelling) == canonical(name))
     if (target := known.get(name) or next(alike, None)) is not None:
         return target

@@ -32,7 +32,7 @@ def both_measures(own: Part, squares: Part, members: np.ndarray) -> Part:
 
 @dataclass(frozen=True)
 class Weighted:
-    """What a part of weighted members holds: its sums under the weights, and those under their squares.
+    """Content of a part of weighted members: its sums under the weights, and those under their squares.
 
     own, squares: parts with "count", the sum (k,) of what members weigh. members: (k,), number of those that count.
     """
@@ -71,7 +71,7 @@ class Weighted:
         return np.where(more > 1e-9, n / np.where(more > 1e-9, more, 1.0), np.inf)
 
     def off(self, mean: np.ndarray) -> np.ndarray:
-        """How far the mean under the squares lies above a mean, (k, d)."""
+        """Difference of the mean under the squares from a mean, (k, d)."""
         return np.asarray(self.squares["mean"] - mean)
 
     def number_of(self, probability: np.ndarray, squares: np.ndarray) -> np.ndarray:

@@ -188,7 +188,7 @@ Write = Callable[[Path, Report], None]
 
 
 def _whole_store(source: Source) -> Write:
-    """What writes all of a store."""
+    """Writer of a whole store."""
     folder = source.folder
     if folder is None:
         raise refusal("to", "netcdf", "is all that a store holds, and the run is in none", "give a file: to='run.nc'")
@@ -196,7 +196,7 @@ def _whole_store(source: Source) -> Write:
 
 
 def _some_members(result: Result, ending: str, members: Any, given: Environment | None) -> Write:
-    """What writes members of a run into a file with this ending."""
+    """Writer of members of a run into a file with this ending."""
     tracks = tracks_of(result, members, _environment_of(result, given))
     if ending in WRITERS:
         return functools.partial(WRITERS[ending], tracks)

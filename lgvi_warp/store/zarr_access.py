@@ -26,7 +26,7 @@ def checked_store(root: Path, layout: Layout, metadata: bytes) -> Any:
 
 
 class CheckedFolder:
-    """What zarr reads of a store's folder, without zarr.
+    """Folder of a store as zarr reads it, without zarr.
 
     layout: the arrays and chunks that it may hold.
     metadata: content of its zarr.json.
@@ -45,7 +45,7 @@ class CheckedFolder:
         return hash((self.root, self.metadata))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """It is built again in another process, such as one of Dask."""
+        """Build it again in another process, such as one of Dask."""
         return checked_store, (self.root, self.layout, self.metadata)
 
     def __str__(self) -> str:

@@ -76,7 +76,7 @@ def vehicle_tables(name: str) -> dict[str, Any]:
 
 @dataclass
 class Coefficients:
-    """What an importer has read, before it is checked.
+    """Coefficients that an importer has read, before checks.
 
     Drag is force_i = -(l_ij + q_ij |v_j|) v_j - u f_ij v_j, with u the speed ahead.
 
@@ -218,7 +218,7 @@ class Name:
 
 
 def read_name(name: str) -> Name | None:
-    """What the name of a hydrodynamic derivative says, as usually spelt ("X_udot", "Xuu", "X_{u|u|}"); None for another."""
+    """Meaning of the name of a hydrodynamic derivative, as usually spelt ("X_udot", "Xuu", "X_{u|u|}"); None for another."""
     text = re.sub(r"[\s_{}\\$,()*]", "", str(name))
     if len(text) < 2 or text[0] not in FORCES:
         return None

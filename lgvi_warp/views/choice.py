@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a run is shown: which members are drawn, at which times, and which members quantiles are taken of."""
+"""Choice of what is shown of a run: drawn members, times, and members of the quantiles."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ AT_ONCE = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a picture or a recording shows of a run.
+    """Selection of a run for a picture or a recording.
 
     Attributes:
         members: Indices of the members that are drawn, rising, shape (m,).
@@ -47,7 +47,7 @@ class Shown:
 
     @property
     def text(self) -> str:
-        """How many members are drawn of how many, as "1,000 of 100,000 members"."""
+        """Count of drawn members out of all, as "1,000 of 100,000 members"."""
         return of_members(len(self.members), self.total)
 
     def ranked_of(self, members: slice) -> np.ndarray:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is drawn of one run: poses of the members shown at the times shown, and curves of all members."""
+"""Drawing data of one run: poses of the members shown at the times shown, and curves of all members."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """What is drawn of one run.
+    """Drawing data of one run.
 
     source: The members whose samples were kept: the result itself, or its kept members; choice: which of these are drawn.
     few: The members drawn at the times drawn, in memory; counted: which of them are under way at each time, shape (f, m).
@@ -93,7 +93,7 @@ class Drawn:
 
     @property
     def text(self) -> str:
-        """How many members are drawn of how many."""
+        """Count of drawn members out of all."""
         return of_members(len(self.choice.members), self.result.members)
 
     @property
@@ -178,7 +178,7 @@ def _navigation(few: Result, counted: np.ndarray, text: str) -> Iterator[Fan]:
 
 
 def believed_sigma(few: Result, counted: np.ndarray) -> np.ndarray:
-    """What the filters believe of the distance to the estimated place, a root mean square (f,) [m], by the median member."""
+    """Standard deviation of position that the filters report, a root mean square (f,) [m], by the median member."""
     sigma = np.linalg.norm(few.estimate_sigma[..., :3], axis=-1)
     return np.asarray(at_levels(sigma, counted, [0.5])[0])
 
@@ -328,7 +328,7 @@ def _range(values: np.ndarray) -> tuple[float, float]:
 
 
 def first_ended(result: Result, code: Status) -> float:
-    """When the first member ended so [s]."""
+    """Time at which the first member ended with this outcome [s]."""
     return float(stop_time(result)[np.asarray(result.status) == code].min())
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the picture and the recording of a fleet share: styles of outcomes, the title, and curves of members under way."""
+"""Common parts of the picture and the recording of a fleet: styles of outcomes, the title, and curves of members under way."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class OutcomeStyle(NamedTuple):
-    """How members with one outcome are drawn."""
+    """Style of members with one outcome."""
 
     color: str
     marker: str

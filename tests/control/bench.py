@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a controller measures along motions that are given: the parts of a scene on the device, without steps."""
+"""Measurements of a controller along given motions: the parts of a scene on the device, without steps."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ def scene(sensors, faults=(), period=0.1, events=(), **law):
 
 
 def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
-    """What members measure at each tick, (ticks, members, FIELDS), of motions truth (ticks, members or 1, FIELDS)."""
+    """Measurements at each tick, (ticks, members, FIELDS), of motions truth (ticks, members or 1, FIELDS)."""
     controller = ensemble.scene.controller
     plan = make_plan(ensemble, "psi_s", h, 1.0, dtype=dtype, width=width)
     n, ticks = ensemble.members, len(truth)

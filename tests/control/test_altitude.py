@@ -49,7 +49,7 @@ def places(n, tilt, seed=2):
 
 
 def readings(result, direction=(0.0, 0.0, 1.0), point=(0.0, 0.0, 0.0)):
-    """What an altimeter read at each sample (k, n), from the depth that the guidance wanted."""
+    """Readings of an altimeter at each sample (k, n), from the depth that the guidance wanted."""
     beam = np.asarray(direction) / np.linalg.norm(direction, axis=-1, keepdims=True)
     down = result.attitude[..., 2, :]
     level = (

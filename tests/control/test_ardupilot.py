@@ -111,7 +111,7 @@ def test_a_new_start_is_the_first_one_again(vehicle):
 
 
 def test_a_still_vehicle_feels_its_weight_less_its_fall(vehicle):
-    """It is heavier than the water: it falls by (W - B) / (m + m_z) at first, and accelerometers feel that less gravity."""
+    """A vehicle heavier than the water falls by (W - B) / (m + m_z) at first, and accelerometers feel that less gravity."""
     answer = told(vehicle, packet(0, STILL))
     body = lw.Scene.named("bluerov2_heavy").vehicle
     fall = (body.mass * vehicle.gravity[2] - body.buoyancy) / (body.mass + body.added_mass[2, 2])

@@ -18,7 +18,7 @@ LAW = StateFeedback(K=-np.eye(12)[[0, 1, 2, 9, 10, 11]])
 
 
 def thrust(command):
-    """What a command makes, by the polynomial that the vehicle gives."""
+    """Thrust of a command, by the vehicle's polynomial."""
     return np.sign(command) * np.polynomial.polynomial.polyval(np.abs(command), [0.0, *THRUSTERS.polynomial])
 
 

@@ -120,7 +120,7 @@ def mended(t, y, r, members):
 
 
 def test_a_stopped_run_goes_on_with_the_mended_function(tmp_path):
-    """It is another function than the run began with: that is refused, or taken and told."""
+    """A function other than the run's first one is refused, or taken and reported."""
     settings, mended.now = dict(method="psi_s", h=H, t1=1.0, threads=1), False
     with pytest.raises(RuntimeError, match="no solution"):
         lw.solve(scene([lw.control.Callback(mended)], 300), **settings, store=tmp_path / "run.zarr")
@@ -241,7 +241,7 @@ def test_a_sweep_shares_nothing_in_doubt(tmp_path):
 
 
 def test_a_changed_metric_is_run_anew(tmp_path):
-    """What a function of `CustomMetric` names, holds and leaves at the end."""
+    """Changes in names, closures and end of a function of `CustomMetric`."""
 
     def of(k, method):
         return lambda state, tick: getattr(np, method)(tick["position"][:, 0] if state is None else state, k)

@@ -42,6 +42,6 @@ def test_the_simulators_euler_step_errs_with_order_one():
 
 @pytest.mark.slow
 def test_its_current_has_no_part_along_the_vehicle():
-    """It takes the current for level in body axes, whatever the pitch: that is what differs most."""
+    """The other simulator takes the current for level in body axes, whatever the pitch: the largest difference."""
     depth, _, _ = apart(theirs(CURRENT, remus.Choices()), ours(CURRENT))
     assert 1.0 < depth < 1.5

@@ -57,7 +57,7 @@ def test_waypoints_are_their_twin(method, words):
 
 
 def across(result):
-    """How far a member is from the line of the x axis at its last sample."""
+    """Distance of a member from the line of the x axis at its last sample."""
     return abs(result.position[-1, 0, 1])
 
 

@@ -58,7 +58,7 @@ def plant():
 
 
 def after(A, B, time):
-    """What a time does to x, and to x by a held d."""
+    """Transition over a time, of x and of a held d."""
     n = len(A)
     whole = expm(np.block([[A, B], [np.zeros((1, n + 1))]]) * time)
     return whole[:n, :n], whole[:n, n:]

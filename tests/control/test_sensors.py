@@ -127,7 +127,7 @@ def twins(case, m):
 
 
 def of_twin(case, truth):
-    """What the twin measures, (ticks, members, FIELDS)."""
+    """Measurements of the twin, (ticks, members, FIELDS)."""
     seen = np.zeros_like(truth)
     for m in range(truth.shape[1]):
         parts = twins(case, m)

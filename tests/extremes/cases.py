@@ -236,7 +236,7 @@ METHODS, DTYPES = ("psi_s", "psi_x"), ("float64", "float32")
 
 @dataclass(frozen=True)
 class Measured:
-    """What came of a group, per member: status; error and bound of attitude and momenta (relative); of position, way [m]."""
+    """Outcome of a group, per member: status; error and bound of attitude and momenta (relative); of position, way [m]."""
 
     status: np.ndarray
     error: np.ndarray

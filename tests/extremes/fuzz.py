@@ -335,14 +335,14 @@ def run_two_steps(plan):
 
 
 def judged_file(data):
-    """What becomes of the bytes of a file."""
+    """Verdict on the bytes of a file."""
     with tempfile.NamedTemporaryFile(suffix=".toml") as file:
         Path(file.name).write_bytes(data)
         return judged(lambda: lw.Scene.load(file.name), data.decode("utf-8", "replace"))
 
 
 def judged_set(seed):
-    """What becomes of broken --set arguments."""
+    """Verdict on broken --set arguments."""
     chosen = cli.parser().parse_args(case_of_set(seed))
     return judged(lambda: lw.Scene.load(chosen.scene, cli.overrides(chosen)), " ".join(chosen.set))
 

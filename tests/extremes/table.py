@@ -51,7 +51,7 @@ Machine: {cpu}, {simd}. Written by `python -m tests.extremes.table`; do not edit
 
 
 def cell(found, i):
-    """What came of one case in one run."""
+    """Outcome of one case in one run."""
     status = Status(int(found.status[i]))
     if status != OK:
         return status.name
@@ -64,7 +64,7 @@ def cell(found, i):
 
 
 def expected(case):
-    """What must come of it: the same for every method, or by method."""
+    """Expected outcome: the same for every method, or by method."""
     words = {
         method: " or ".join("accurate" if s == OK else s.name for s in case.expected(method)) for method in METHODS
     }

@@ -109,7 +109,7 @@ def munk_numbers(group):
 
 
 def fleet_residual(fleet):
-    """What is left of m g - B for bodies meant to be weightless [N]: the round-off of the scene."""
+    """Remainder of m g - B for bodies meant to be weightless [N]: the round-off of the scene."""
     p = fleet.parameters(0, fleet.members)
     return np.abs(p["vehicle.mass"] * p["environment.gravity"] - p["vehicle.buoyancy"])
 
@@ -140,7 +140,7 @@ def test_kernel_and_twin_agree_on_the_status(examples):
 
 
 def energy(case, p, pi):
-    """Of a body without forces [J]."""
+    """Energy of a body without forces [J]."""
     return 0.5 * (p @ (p / case.M) + pi @ (pi / case.J))
 
 

@@ -22,7 +22,7 @@ DAMPED = lw.Scene(SCENE.vehicle, SCENE.environment, terms=[FALL])
 
 
 def lost_products():
-    """How many products of NumPy that are subnormal come out as zero in this thread."""
+    """Number of subnormal products of NumPy that are zero in this thread."""
     return sum(int((x * x == 0.0).sum()) for x in (np.full(64, 1e-20, np.float32), np.full(64, 1e-155)))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How an argument travels from `lw.solve` to the kernel: `python -m tests.house.path h [scene.toml]` prints its walk.
+"""Path of an argument from `lw.solve` to the kernel: `python -m tests.house.path h [scene.toml]` prints its walk.
 
 A real run of a scene's first members is watched. A stay is a function that has the value in a name, in a container or in an
 attribute that it reads, or a class whose object holds it. A climb is a step of this walk, in the order of first visits, from a
@@ -40,7 +40,7 @@ def attributes(value):
 
 
 def entries(value):
-    """What a container of the language holds."""
+    """Entries of a container of the language."""
     if isinstance(value, Mapping):
         return list(value.values())[:MOST_ENTRIES] if type(value) is dict else []
     return list(value[:MOST_ENTRIES]) if type(value) in (tuple, list) else []
@@ -102,7 +102,7 @@ def walked(argument, scene=ROOT / "examples" / "paper.toml"):
 
 
 def climbs(stays):
-    """How often the walk goes on in a higher room than that in which it is."""
+    """Number of steps of the walk into a higher room."""
     floors = [FLOORS.get(room, -1) for _, room, _ in stays]
     return sum(after > before for before, after in zip(floors, floors[1:], strict=False))
 

@@ -11,7 +11,7 @@ LINE = f"# SPDX-License-Identifier: {PROJECT['license']}"
 
 
 def without_line(paths):
-    """Those files whose head does not name the licence: the first line, or the second below a `#!`."""
+    """Files whose head does not name the licence: the first line, or the second below a `#!`."""
     heads = ((path, path.read_text().splitlines()[:2]) for path in paths)
     return [path for path, head in heads if LINE not in (head if "".join(head[:1]).startswith("#!") else head[:1])]
 

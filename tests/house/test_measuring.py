@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What benchmarks read of the machine: energy counters, nodes of memory, and the operations of instructions."""
+"""Readings of the machine by benchmarks: energy counters, nodes of memory, and the operations of instructions."""
 
 import json
 import os

@@ -128,7 +128,7 @@ def test_python_of_a_page_has_its_names(page):
 
 
 def run_alone(page, folder):
-    """What a page's blocks print, run in order in a fresh interpreter in a folder that has the examples."""
+    """Output of a page's blocks, run in order in a fresh interpreter in a folder that has the examples."""
     parts = [
         f"exec(compile({code!r}, '{page}, block {i}', 'exec'), names)" for i, code in enumerate(blocks(page, "python"))
     ]

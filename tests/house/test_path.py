@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far an argument of `lw.solve` goes before the kernel has it."""
+"""Length of an argument's path from `lw.solve` to the kernel."""
 
 import pytest
 

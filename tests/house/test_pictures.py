@@ -73,7 +73,7 @@ def test_the_table_of_fronts_follows_from_its_rows():
 
 @pytest.mark.parametrize("name", fronts.SCENES)
 def test_the_rows_are_of_the_methods_that_the_scene_takes_now(name):
-    """What a scene began to take, or ceased to, makes its rows stale: measure again."""
+    """A method that a scene began or ceased to take makes its rows stale: measure again."""
     fleet, t1 = fronts.SCENES[name]()
     methods = fronts.METHODS[fronts.KINDS[name]]
     taken, _ = Sample(fleet, t1).accepted(methods)

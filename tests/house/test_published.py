@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is published agrees with pyproject.toml: addresses, versions, requirements; and it runs where nothing else is."""
+"""Published facts agree with pyproject.toml: addresses, versions, requirements; and it runs where nothing else is."""
 
 import os
 import re

@@ -178,7 +178,7 @@ def test_broken_links_are_found(tmp_path):
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """What the build said, and the folder of the site."""
+    """Output of the build, and the folder of the site."""
     pytest.importorskip("sphinx")
     folder = tmp_path_factory.mktemp("site")
     site = folder / "html"

@@ -44,7 +44,7 @@ def without_link(text):
 
 
 def fault_of(page, text):
-    """What the site could not show of a page."""
+    """Parts of a page that the site could not show."""
     lines = equations.FENCE.sub("", text)
     whole = [(each.tex, True) for each in equations.equations_of(page, text)]
     for tex, block in [*whole, *((tex, False) for tex in re.findall(r"\$([^$]+)\$", lines))]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is built for others is whole: it is installed into an empty environment and runs there."""
+"""The wheel is complete: it is installed into an empty environment and runs there."""
 
 import os
 import re

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a case of a law is: its term beside its twin."""
+"""Case of a law: its term beside its twin."""
 
 from importlib import import_module
 from typing import NamedTuple

@@ -29,7 +29,7 @@ GRID = 0.005
 
 
 def arrays(numbers):
-    """As the twins take them."""
+    """Numbers as the twins take them."""
     return {key: np.asarray(value) for key, value in numbers.items()}
 
 

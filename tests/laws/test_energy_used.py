@@ -190,7 +190,7 @@ def test_the_law_of_powered_thrusters_passes_its_check():
 
 @wp.func
 def pump_power(watts: Any, view: Any, p: Any):
-    """What a pump takes that works against the pressure at a point of the body."""
+    """Power of a pump that works against the pressure at a point of the body."""
     depth = view.b.z + dot(view.down, p.outlet)
     return watts + p.rate * depth
 
@@ -239,7 +239,7 @@ def test_slopes_of_the_energy_used(method):
 
 @wp.func
 def cubic_power(watts: Any, view: Any, p: Any):
-    """What grows with the cube of the time."""
+    """Power that grows with the cube of the time."""
     return watts + (view.t * view.t * view.t) * p.rate
 
 

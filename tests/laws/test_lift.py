@@ -35,7 +35,7 @@ def view(velocity, **named):
 
 
 def velocities(n=200):
-    """Of all sizes, and in special directions."""
+    """Velocities of all sizes, and in special directions."""
     rng = np.random.default_rng(3)
     return np.concatenate([rng.normal(size=(n, 6)) * 10.0 ** rng.uniform(-12, 1, (n, 1)), np.eye(6), -np.eye(6)])
 
@@ -106,7 +106,7 @@ def test_at_rest_fins_do_nothing():
 
 
 def deflections(fins, h, steps):
-    """What the first fin's deflection is after each step [rad]."""
+    """Deflection of the first fin after each step [rad]."""
     plan = make_plan(one(scene(fins), nu=(2.0, 0.0, 0.0)), "psi_s", h=h, t1=h * steps)
     packets = Packets(plan, plan.ensemble.select(0, 1))
     found = []

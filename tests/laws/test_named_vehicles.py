@@ -99,7 +99,7 @@ def test_it_comes_back_from_20_degrees_as_the_equations_say(name):
 
 
 def period(run, member):
-    """Of a swing: from the first passage through upright to the third [s]."""
+    """Period of a swing: from the first passage through upright to the third [s]."""
     angle, time = run.angle(member), run.time
     turned = np.flatnonzero(np.diff(np.sign(angle)) != 0)
     cross = time[turned] - angle[turned] * np.diff(time)[turned] / np.diff(angle)[turned]

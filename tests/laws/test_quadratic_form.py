@@ -117,7 +117,7 @@ ADDED = {"Xu": -7.6e-3, "Yp": 1.2e-4, "Yr": 1.2e-3, "Yv": -5.5e-2, "Zq": -6.8e-3
 
 
 def size_of(name):
-    """What a dimensionless coefficient is multiplied with; one velocity alone stands beside u."""
+    """Factor of a dimensionless coefficient; one velocity alone stands beside u."""
     return 0.5 * RHO * LENGTH ** (2 + (name[0] in "KMN") + sum(letter in "pqr" for letter in name[1:]))
 
 

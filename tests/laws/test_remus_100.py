@@ -162,7 +162,7 @@ def test_steady_turn(rudder):
 
 
 def jacobian(f, x, *args):
-    """Of f at x, by central differences."""
+    """Jacobian of f at x, by central differences."""
     columns = [(f(x + d, *args) - f(x - d, *args)) / 2e-6 for d in 1e-6 * np.eye(len(x))]
     return np.array(columns).T
 

@@ -63,7 +63,7 @@ def fleet(name):
 
 @functools.cache
 def moved(name):
-    """How far each member of a fleet is moved along its axis [m], by LSODA from kink to kink."""
+    """Displacement of each member of a fleet along its axis [m], by LSODA from kink to kink."""
     acceleration, found = ACTUATORS[name][2], []
     for tau, rate in CHANNELS:
 

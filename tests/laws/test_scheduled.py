@@ -21,7 +21,7 @@ SQUARE = dict(coefficient=(20.0, 20.0, 10.0))
 
 
 def memories_of(term, time):
-    """What the device code remembers (k, 3): after the halves of a kick, and after a time that ends at `time`."""
+    """Memory of the device code (k, 3): after the halves of a kick, and after a time that ends at `time`."""
     bench = Bench(term, built_in("laws", term.device_in(True)), SCENE, PACKETS, 5)
     views = replace(bench.views, time=np.repeat(np.linspace(*time, PACKETS), bench.width))
     bank = Bank(bench, replace(bench.context(bench.parameters), aligned=True), views)

@@ -169,7 +169,7 @@ FLOW = {"velocity": np.array([0.2, -0.1, 0.3]), "acceleration": np.array([0.05, 
 
 
 def lagrangian(b, R, v, Om, t):
-    """Of body and water, whose potential is phi = u.x + x.S x / 2; v [m/s] and b in inertial axes.
+    """Lagrangian of body and water, whose potential is phi = u.x + x.S x / 2; v [m/s] and b in inertial axes.
 
     The rigid body's energy; that of the fluid which moves with the body, of its velocity through the water; work of the
     undisturbed pressure, rho (dphi/dt + u.u / 2), on the displaced volume; and weight.

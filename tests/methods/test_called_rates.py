@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where laws are many, a method of many stages calls their code, in place of code for each stage."""
+"""With many laws, a method of many stages calls their code, in place of code for each stage."""
 
 import numpy as np
 import pytest

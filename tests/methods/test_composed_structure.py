@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the compositions keep: linear momentum, reversal of time, and an energy that does not drift."""
+"""Invariants of the compositions: linear momentum, reversal of time, and an energy that does not drift."""
 
 import numpy as np
 import pytest

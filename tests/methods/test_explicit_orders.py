@@ -47,7 +47,7 @@ def test_rk8_reaches_the_truth(run, example):
 
 @pytest.fixture(scope="module")
 def drift(run):
-    """How far R is from the rotations at the end."""
+    """Distance of R from the rotations at the end."""
 
     def of(method, h):
         R = run(method, h)[1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run does with members that fail: freeze them, raise after the run, or divide the steps that have no solution."""
+"""Treatment of members that fail: freeze them, raise after the run, or divide the steps that have no solution."""
 
 import numpy as np
 import pytest

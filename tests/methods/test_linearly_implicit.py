@@ -31,7 +31,7 @@ def matrices():
 
 
 def amplification(z, w):
-    """Of y' = lambda y over a step: z = h lambda, and w the h times the matrix that stands for lambda."""
+    """Amplification of y' = lambda y over a step: z = h lambda, and w the h times the matrix that stands for lambda."""
     a, g, b = matrices()
     stages = np.linalg.solve(np.eye(4) - np.multiply.outer(z, a) - np.multiply.outer(w, g), np.ones((len(z), 4, 1)))
     return 1.0 + z * (stages[..., 0] @ b)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the discrete maps keep: momenta, orthogonality, reversibility, the symplectic form; exactly the true claims."""
+"""Invariants of the discrete maps: momenta, orthogonality, reversibility, the symplectic form; exactly the true claims."""
 
 import numpy as np
 import pytest

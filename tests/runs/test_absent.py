@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a scene does not ask for leaves no code: asserted on the source that Warp generates; and varying compiles nothing."""
+"""Absent parts leave no code: asserted on the source that Warp generates; and varying compiles nothing."""
 
 import dataclasses
 import re

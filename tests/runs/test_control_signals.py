@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What controllers measure, want, demand and command, and where actuators are: saved with every sample, for every member."""
+"""Measured, wanted, demanded and commanded values, and actuators' places: saved with every sample, for every member."""
 
 from dataclasses import dataclass
 from typing import Any, ClassVar

@@ -33,7 +33,7 @@ def scene_of(*terms, events=(), **more):
 
 
 def ending(terms, capacity, method, h, t1=3.0, **settings):
-    """When the battery of one member ends [s], and what it has used then [J]."""
+    """Time at which the battery of one member ends [s], and the energy used then [J]."""
     events = [lw.events.Battery(capacity=capacity)]
     result = lw.solve(scene_of(*terms, events=events), method, h=h, t1=t1, save=SAVE, threads=1, **settings)
     assert result.status.counts() == {"battery": 1}

@@ -122,7 +122,7 @@ def test_a_users_condition():
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_all_that_begin_beyond_an_event_are_stopped_at_once(method, dtype):
-    """Of members about the floor half rise at 20 m/s: through it within the first step of 0.1 s, if they began below."""
+    """Half of the members about the floor rise at 20 m/s: through it within the first step of 0.1 s, if they began below."""
     depth = np.array([6.9, 7.0, 7.1, 7.5, 8.5, 30.0])
     b = np.stack([np.zeros(12), np.zeros(12), np.repeat(depth, 2)], axis=1)
     nu = np.zeros((12, 3))
@@ -219,7 +219,7 @@ def true():
 
 
 def error(result, true):
-    """How far a member's arrival is from the true one, in place and in time."""
+    """Error of a member's arrival, in place and in time."""
     assert result.status[0] == lw.Status.FLOOR
     assert abs(result.position[-1, 0, 2] - 6.5) < 1e-13
     return max(difference(last(result), true[0]), abs(result.end_time[0] - true[1]))

@@ -46,7 +46,7 @@ def memory():
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """Of the long run, from threads."""
+    """Result of the long run, from threads."""
     path = tmp_path_factory.mktemp("executors") / "run.zarr"
     lw.solve(fleet(MANY), **LONG, store=path)
     return path
@@ -54,7 +54,7 @@ def whole(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def client():
-    """Of two workers, which start again when they are killed."""
+    """Client of two workers, which start again when they are killed."""
     import logging
 
     from distributed import Client, LocalCluster

@@ -144,7 +144,7 @@ def test_single_precision_stays(single, tmp_path):
 
 
 def faults_of(path):
-    """What the CF checker says of a file, of high and of medium weight."""
+    """Findings of the CF checker on a file, of high and of medium weight."""
     from compliance_checker.runner import CheckSuite
 
     suite = CheckSuite()
@@ -204,7 +204,7 @@ def stored(result, tmp_path_factory):
 
 
 def content_of(path):
-    """What a file says, whatever wrote it: without the provenance, which tells where the run was kept."""
+    """Content of a file, whatever wrote it: without the provenance, which tells where the run was kept."""
     if path.suffix == ".nc":
         with xarray.open_dataset(path) as run:
             return run.load().drop_attrs()
@@ -224,7 +224,7 @@ def test_every_kind_of_run_gives_the_same_file(kind, stored, tmp_path):
 
 @pytest.mark.parametrize("kind", FILES)
 def test_many_pieces_are_the_same_file(kind, result, tmp_path):
-    """What does not fit into one piece is written member by member, or time by time."""
+    """Data that do not fit into one piece are written member by member, or time by time."""
     if kind == "mcap":
         pytest.importorskip("mcap_ros2")
     whole = tracks_of(result, None, Environment(origin=ORIGIN, start=DATE))

@@ -38,7 +38,7 @@ def picture(path):
 
 
 def writers(run, folder):
-    """What writes a file, by the name of the file."""
+    """Writers of files, by the name of the file."""
     rows = [{"a": i, "b": f"text {i}"} for i in range(500)]
     made = {
         f"run{ending}": (lambda to=folder / f"run{ending}": lw.export(run, to=to, overwrite=True)) for ending in ENDINGS

@@ -19,7 +19,7 @@ SECONDS = 120.0
 
 
 def answers_of(folder, ways):
-    """What each way came to, by name; a way that hangs, or that did not come to its end, has none."""
+    """Answer of each way by name; none for a way that hangs or does not end."""
     env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     process = subprocess.Popen([sys.executable, "-m", "tests.support.forking", str(folder), *ways], env=env, cwd=ROOT,
                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)  # fmt: skip

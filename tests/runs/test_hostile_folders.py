@@ -128,7 +128,7 @@ def snapshot(folder):
 
 @contextlib.contextmanager
 def harmless(home):
-    """What is done in it takes nothing of the user's, changes nothing of it, and runs nothing."""
+    """Work inside takes nothing of the user's, changes nothing of it, and runs nothing."""
     before = snapshot(home)
     yield
     assert snapshot(home) == before
@@ -142,7 +142,7 @@ def peak():
 
 @contextlib.contextmanager
 def bounded(seconds):
-    """What is done in it ends soon, in little memory."""
+    """Work inside ends soon, in little memory."""
     memory, begun = peak(), time.perf_counter()
     yield
     assert time.perf_counter() - begun < seconds
@@ -150,7 +150,7 @@ def bounded(seconds):
 
 
 def code_of(call, path):
-    """As the exit code of a verb: 2 where a function refuses."""
+    """Exit code like a verb's: 2 where a function refuses."""
     try:
         call(path)
     except lw.SceneError as error:
@@ -192,7 +192,10 @@ def read(path):
 
 
 def special(folder):
-    """What is no plain file in a folder: name -> its number on the disk, and where it leads or of which kind it is."""
+    """Entries of a folder that are no plain files.
+
+    Name -> its number on the disk, and where it leads or of which kind it is.
+    """
     found = {}
     for name in os.listdir(folder):
         path = folder / name
@@ -274,7 +277,7 @@ STRANGE = (
 
 
 def leaves(value, path=()):
-    """Where the values of nested tables and lists are."""
+    """Paths of the values of nested tables and lists."""
     yield path
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, inner in items:
@@ -311,7 +314,7 @@ def test_any_value_of_its_metadata_may_be_another(seed, theirs, home):
 @pytest.mark.parametrize("kind", [Tradeoff, StabilityMap, Indices])
 @pytest.mark.parametrize("seed", range(3))
 def test_any_value_of_a_study_may_be_another(kind, seed, good, tmp_path):
-    """What is not refused can be told and written."""
+    """Accepted content can be summarised and written."""
     name = {Tradeoff: "tradeoff", StabilityMap: "stability", Indices: "sensitivity"}[kind]
     whole, taken = json.loads((good / name / f"{name}.json").read_text()), 0
     for content in mutated(whole, seed, 60):
@@ -348,7 +351,7 @@ def test_a_link_that_is_put_there_meanwhile_is_not_followed(theirs, home):
 
 
 def test_the_user_may_name_a_link_himself(good, theirs, tmp_path):
-    """As on clusters, where a run lies on another disk."""
+    """A run may lie on another disk, as on clusters."""
     disk, link = theirs("store") / "run.zarr", tmp_path / "mine.zarr"
     link.symlink_to(disk)
     (link / "blocks" / "000000000.json").unlink()
@@ -386,7 +389,7 @@ def test_names_that_no_folder_may_have_are_refused_before_the_run():
 
 
 def left_alone(write, path, kind, home, capsys):
-    """What lies in the place of a file that is written is told in a line, and stays. Returns: the line."""
+    """An object in the place of a written file is reported in a line, and stays. Returns: the line."""
     hostile.PLACES[kind](path, home)
     odd = special(path.parent)
     with harmless(home):
@@ -490,7 +493,7 @@ def test_a_writer_follows_the_links_of_the_user_and_replaces_plain_files_alone(n
 
 
 def test_a_device_is_not_replaced(tmp_path):
-    """As root, the null device of a container would become a plain file."""
+    """With root's rights the null device of a container would become a plain file."""
     node = tmp_path / "null"
     try:
         os.mknod(node, 0o600 | 0o020000, os.makedev(1, 3))

@@ -158,7 +158,7 @@ def test_a_lost_group_is_not_silently_none(copy):
 
 
 def interrupted(path, whole):
-    """As if the run had been killed before its kept members were run again."""
+    """Leave the run as if killed before its kept members were run again."""
     shutil.copytree(whole, path)
     Folder(path).reopen()
     shutil.rmtree(path / "kept")

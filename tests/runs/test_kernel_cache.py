@@ -48,7 +48,7 @@ def cache(tmp_path, monkeypatch):
 
 
 def forget():
-    """As a new process."""
+    """Forget loaded kernels, like a new process."""
     kernel_cache.loaded.discard(MODULE)
     MODULE.unload()
 
@@ -160,7 +160,7 @@ def header(cache):
 
 
 def headers_while_it_compiles():
-    """How many precompiled headers Clang finds."""
+    """Count of precompiled headers that Clang finds."""
     found, load_module = [], wp.load_module
 
     def load(*asked, **named):

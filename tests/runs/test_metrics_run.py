@@ -286,7 +286,7 @@ def test_a_metric_may_read_nothing_at_ticks(keep, fleet, coarse):
 
 
 def test_samples_at_all_ticks_give_the_metrics_of_the_run(paths, coarse):
-    """What was kept at every tick is what the run looked at, but for round-off.
+    """Samples at every tick equal the run's own view, but for round-off.
 
     The kernel moves ticks to the user's origin, and the host samples: by a sum of three products of some metres.
     """

@@ -25,7 +25,7 @@ def written(path, seed=0):
 
 
 def fleet(path):
-    """As of a scene file."""
+    """Fleet of a scene file."""
     content = speed.example().to_dict() | {"ensemble": {"sampling": {"table": {"file": str(path)}}}}
     return lw.Ensemble.from_scene(lw.Scene.from_dict(content))
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which noise the rows of a prepared run have: frozen by row, or by seed and indices; and a rare event by chains over it."""
+"""Noise of the rows of a prepared run: frozen by row, or by seed and indices; and a rare event by chains over it."""
 
 import functools
 

@@ -63,7 +63,7 @@ ARM = {
 @pytest.mark.parametrize("processor", cross.PROCESSORS)
 @pytest.mark.parametrize("case", ARM)
 def test_code_for_arm_is_of_vectors(case, processor, tmp_path):
-    """Of all arithmetic instructions of the kernel, in hot and cold parts, hardly any makes a single number."""
+    """Hardly any arithmetic instruction of the kernel, in hot and cold parts, makes a single number."""
     scene, method = ARM[case]
     # Two registers a number, as by default there; REMUS 100 takes half as long to compile with one.
     plan = step.plan_of(scene, method, 0.01, registers=1 if case == "remus_100" else 2)
@@ -102,7 +102,7 @@ def test_an_emulated_arm_core_gives_the_same_vehicles(case, dtype, tmp_path):
 @needs_compiler
 @pytest.mark.parametrize(("scene", "method"), [("paper", "psi_s"), ("remus_100", "rk4"), ("bluerov2_heavy", "rk4")])
 def test_a_step_takes_no_more_operations_than_recorded(scene, method, tmp_path):
-    """What was recorded is what `python -m benchmarks table roofline` writes; it counts anew what has changed."""
+    """`python -m benchmarks table roofline` writes the record, and counts anew after a change."""
     recorded = {(one["scene"], one["method"]): one for one in json.loads(ROWS.read_text())}[scene, method]
     entry = operations.scenes()[scene]
     found = step.of_a_step(step.plan_of(entry[0], method, entry[2]), tmp_path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What members ended by, in runs: counted alike by status, outcome, exceedance and passage, in memory and in stores."""
+"""Outcomes of members in runs: counted alike by status, outcome, exceedance and passage, in memory and in stores."""
 
 import dataclasses
 

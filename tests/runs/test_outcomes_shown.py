@@ -82,7 +82,7 @@ def texts(axes):
 
 
 def marks(axes, code):
-    """Where members with an outcome are marked (m, 2)."""
+    """Marks of members with an outcome (m, 2)."""
     color = tuple(part / 255.0 for part in looks.OUTCOME_STYLES[code].rgb)
     found = [
         one for one in axes.collections if one.get_offsets().size and np.allclose(one.get_facecolor()[0, :3], color)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `lgvi-warp predict` says before a run: sizes by arithmetic, so nearly exact; time from a trial, so roughly."""
+"""Predictions of `lgvi-warp predict` before a run: sizes by arithmetic, so nearly exact; time from a trial, so roughly."""
 
 import os
 import subprocess

@@ -29,7 +29,7 @@ def result():
 
 
 class Page(HTMLParser):
-    """What a page names: its tags, those that are open, and what it would load."""
+    """Content of a page: its tags, those that are open, and what it would load."""
 
     def __init__(self, text):
         super().__init__()

@@ -42,13 +42,13 @@ def undisturbed(path, members):
 
 @pytest.fixture(scope="module")
 def short(tmp_path_factory):
-    """Of 8 blocks."""
+    """Store of 8 blocks."""
     return undisturbed(tmp_path_factory.mktemp("short") / "run.zarr", 2048)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """Of 16 blocks."""
+    """Store of 16 blocks."""
     return undisturbed(tmp_path_factory.mktemp("whole") / "run.zarr", 4096)
 
 

@@ -99,7 +99,7 @@ def arrival(depth):
 
 
 def off(result, true):
-    """How far time, place and velocity of a member's arrival are from the true ones."""
+    """Errors of time, place and velocity of a member's arrival."""
     assert result.status[0] == lw.Status.FLOOR
     state = np.concatenate([result.position[-1, 0], result.velocity[-1, 0]])
     return max(abs(result.end_time[0] - true[0]), np.abs(state - true[1]).max())

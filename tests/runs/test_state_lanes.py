@@ -93,7 +93,7 @@ def test_the_kernel_has_the_bits_of_its_twin(name, method, dtype):
 
 @pytest.mark.parametrize("width", [1, 2, 4, 16, 32])
 def test_every_part_of_a_start_in_every_width(width):
-    """What members share and what they have of their own, in all of 2^5 forms; numbers that are none stay none."""
+    """Shared and individual parts of a start, in all of 2^5 forms; numbers that are none stay none."""
     rng, members = np.random.default_rng(width), 2 * width + 1
     plan = make_plan(lw.Ensemble(SCENES["paper"], members), "psi_s", h=0.01, t1=0.01, width=width, dtype="float32")
     both = [StateLanes(plan.spec, 3, kernel) for kernel in (kernel_of(plan.spec.width, plan.spec.real), None)]

@@ -87,7 +87,7 @@ def test_blocks_are_handed_over_in_order_with_the_bits_of_the_run(into, memory, 
 
 @pytest.mark.parametrize("into", ["memory", "store"])
 def test_what_takes_blocks_cannot_change_the_run(into, memory, tmp_path):
-    """It writes into all that it is given, at once and when all is done."""
+    """A taker that writes into all its arguments, at once and at the end."""
     handed = []
 
     def spoil(block):
@@ -330,7 +330,7 @@ def test_a_missing_block_is_one_line_with_the_remedy(copy, name, tmp_path, capsy
 
 @pytest.mark.parametrize("to", ["netcdf", "parquet"])
 def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
-    """What is missing would be exported as NaN."""
+    """Missing blocks would be exported as NaN."""
     out = tmp_path / "run.out"
     (copy / "blocks" / "000000256.json").unlink()
     with pytest.raises(lw.SceneError, match=r"1 blocks are not marked as finished; `lgvi-warp resume .*` mends it"):
@@ -431,7 +431,7 @@ def test_a_store_in_use_is_not_replaced_by_a_merge(copy, tmp_path):
 
 
 def test_parts_that_may_only_be_read_are_merged(copy, whole, tmp_path):
-    """What comes of them may be written: modes are not copied."""
+    """Their merge may be written: modes are not copied."""
     for one in copy.rglob("*"):
         one.chmod(0o555 if one.is_dir() else 0o444)
     made = lw.merge([copy], tmp_path / "all").path

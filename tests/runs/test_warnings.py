@@ -25,7 +25,7 @@ PLAIN = {"M": (2.0, 2.0, 3.0)} | LAWS
 
 
 def warned(result, warning):
-    """Which members have it."""
+    """Mask of members with the warning."""
     return result.warnings.has(warning).tolist()
 
 

@@ -20,7 +20,7 @@ FALL = {"t1": TIME, "h": 1.0}
 
 
 def place(result):
-    """How far north members end."""
+    """Final place north of members."""
     return result.position[-1][:, 0]
 
 
@@ -102,7 +102,7 @@ CASES = {
 
 
 def count_held(name, error, seeds):
-    """How many intervals hold the truth; a refusal is an error of the test."""
+    """Count of intervals that hold the truth; a refusal is an error of the test."""
     fleet, of, truth, how = CASES[name][0]()
     found = (lw.estimate(fleet, of, error, seed=seed, **STILL | how) for seed in seeds)
     return sum(each.interval[0] <= truth <= each.interval[1] for each in found)
@@ -110,7 +110,7 @@ def count_held(name, error, seeds):
 
 @pytest.mark.parametrize("name", ["1 in 100 sinks", "1.4 % stop", "1.4 % clipped", "1 % jump", "lognormal"])
 def test_a_few_seeds_hold(name):
-    """Of 6 intervals of 95 % five hold, but in 3 of 100 tries."""
+    """Five of 6 intervals of 95 % hold, but in 3 of 100 tries."""
     assert count_held(name, CASES[name][1][-1], range(6)) >= 5
 
 
@@ -118,7 +118,7 @@ def test_a_few_seeds_hold(name):
 @pytest.mark.parametrize("place_of_error", [0, 1])
 @pytest.mark.parametrize("name", CASES)
 def test_intervals_hold(name, place_of_error):
-    """Of 40 intervals of 95 % 35 hold in 98 of 100 tries."""
+    """At least 35 of 40 intervals of 95 % hold in 98 of 100 tries."""
     assert count_held(name, CASES[name][1][place_of_error], range(40)) >= 35
 
 

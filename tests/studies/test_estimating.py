@@ -49,7 +49,7 @@ def test_answers_are_near_the_truth(name):
 
 
 def test_the_same_seed_gives_the_same_bits():
-    """What is chosen follows costs, which vary; a fixed step, and so few members that none is chosen, do not."""
+    """Choices follow costs, which vary; a fixed step, and so few members that none is chosen, do not."""
     few = [estimated("fall", error=1.0, h=0.5)[0] for _ in range(2)]
     assert few[0].value == few[1].value
     assert few[0].value != estimated("fall", 1, error=1.0, h=0.5)[0].value

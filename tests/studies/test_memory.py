@@ -33,7 +33,7 @@ def of_conditions(**more):
 
 
 def likely(**more):
-    """What is so likely that it is sampled plainly."""
+    """Event so likely that it is sampled plainly."""
     return rare("depth - 0.1", **more)
 
 

@@ -39,7 +39,7 @@ def fleet_of(**scene):
 
 
 def bound_of(p):
-    """How far north a member is with a probability p."""
+    """Quantile p of a member's place north."""
     return WAY - ndtri(p) * np.hypot(NORTH, SPEED * WAY)
 
 

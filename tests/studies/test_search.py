@@ -175,7 +175,7 @@ def test_candidates_meet_the_noise_of_the_members():
 
 @pytest.mark.slow
 def test_searches_by_metrics_of_a_loop():
-    """What is searched for is the metric of a run, at every tick; a loop that never settles is infinitely bad."""
+    """The objective is the metric of a run, at every tick; a loop that never settles is infinitely bad."""
     fleet = lw.Ensemble(regulated(), 4, 3, STARTS)
     tuned = lw.tune_gains(fleet, OVER, "iae depth", risk=lw.metrics.CVaR(0.5), budget=4 * 32, fresh=8, **RUN)
     K = np.zeros((6, 12))

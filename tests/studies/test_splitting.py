@@ -299,7 +299,7 @@ def scene_of(*more, drag=True, **start):
 
 
 def place_of(p, north=0.0):
-    """How far north a member is at the end with a probability p."""
+    """Quantile p of a member's final place north."""
     s = np.linspace(0.0, T1, 20_001)
     of_noise = np.trapezoid((TAU * (1.0 - np.exp(-(T1 - s) / TAU)) * S) ** 2, s)
     return TAU * (1.0 - np.exp(-T1 / TAU)) - ndtri(p) * np.sqrt(of_noise + north**2)

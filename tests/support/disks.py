@@ -11,7 +11,7 @@ from lgvi_warp.common import scratch
 
 
 def refused(number, *ends):
-    """What a disk does that refuses the files whose names end so: "created", "synced" and "named" as it is said in `ends`.
+    """Behaviour of a disk that refuses files whose names end so: "created", "synced" and "named" as it is said in `ends`.
 
     Args:
         number: Number of the error, as errno.ENOSPC.
@@ -100,6 +100,6 @@ class Disk:
 
 
 def identity(descriptor):
-    """What names an open file or folder, whatever descriptor it has."""
+    """Identity of an open file or folder, whatever its descriptor."""
     found = os.fstat(descriptor)
     return found.st_dev, found.st_ino

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pictures, recordings and reports show, as it was when they were last looked at: every line, colour, text and setting.
+"""Content of pictures, recordings and reports as last inspected: every line, colour, text and setting.
 
 `python -m tests.support.fixed_pictures --write` records them anew, after a change that was looked at (`make gallery`, and
 tests/unit/views/test_seen.py). An array is kept as its size, its sum, and a sum in which each place weighs differently.
@@ -206,13 +206,13 @@ def sweeps():
 
 
 def picture(name):
-    """What one picture shows."""
+    """Content of one picture."""
     draw, arguments = pictures()[name]
     return of_figure(np.ravel(draw(*arguments))[0].figure)
 
 
 def recording(name, folder):
-    """What one recording shows."""
+    """Content of one recording."""
     return of_recording(lw.record(RECORDINGS[name](), Path(folder) / "fleet.rrd"))
 
 
@@ -284,7 +284,7 @@ def rounded(text):
 
 
 def summed_up(result, folder):
-    """What the command says of a run, in words and as a document."""
+    """Summary of a run by the command, in words and as a document."""
     files = [Path(folder) / name for name in ("result.npz", "fleet.png", "fleet.rrd")]
     for i, path in enumerate(files):
         path.write_bytes(b"x" * 10_000 * (i + 1))
@@ -302,7 +302,7 @@ def page(result, folder):
 
 
 def reports(folder):
-    """What is said of runs and studies, by name."""
+    """Texts on runs and studies, by name."""
     refused = dataclasses.replace(of_methods(), refused={"cg3": "remembers nothing", "psi": "draws no noise"})
     studies = {"tradeoff": of_methods(), "a refused method": refused, "stability": of_cells(), "a map": region(),
                "sobol": sobol(), "morris": morris()}  # fmt: skip
@@ -312,7 +312,7 @@ def reports(folder):
 
 
 def libraries():
-    """What drawings depend on: the libraries that draw."""
+    """Dependencies of drawings: the libraries that draw."""
     return {"matplotlib": ".".join(mpl.__version__.split(".")[:2]), "rerun": rr.__version__}
 
 

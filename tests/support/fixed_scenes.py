@@ -179,7 +179,7 @@ RUNS: dict[str, Callable[[], str]] = _terms() | _methods() | _samplings() | _oth
 
 
 def machine() -> str:
-    """What bits depend on, or may: the processor, versions of Warp and of NumPy."""
+    """Possible dependencies of bits: the processor, versions of Warp and of NumPy."""
     flags = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
     vectors = next((name for name in ("avx512f", "avx2") if name in flags), "unknown")
     vendor = next((name for name in ("AuthenticAMD", "GenuineIntel") if name in flags), "unknown")

@@ -121,7 +121,7 @@ def hull(D: Any, p: Any, u: Any, v: Any, w: Any, r: Any):
 
 @wp.func
 def without_munk(D: Any, p: Any, u: Any, v: Any, w: Any):
-    """What the kernel has of the added mass's Coriolis force and the other simulator has not, taken off."""
+    """Damping without the part of the added mass's Coriolis force that the other simulator lacks."""
     a = p.added_ahead * u
     b = p.added_across * v
     c = p.added_across * w
@@ -215,7 +215,7 @@ def remus_report(state: Any, view: Any, p: Any):
 
 
 class OnDevice:
-    """What a module of lgvi_kernels.laws would hold."""
+    """Device code as a module of lgvi_kernels.laws would hold it."""
 
     params = staticmethod(functools.cache(params))
     law, damping = remus_law, remus_damping

@@ -47,7 +47,7 @@ def work(folder, threads=2):
 
 
 def answer(folder):
-    """What the work comes to, or how it failed."""
+    """Answer of the work, or its failure."""
     try:
         return work(folder)
     except BaseException:
@@ -143,7 +143,7 @@ def unpickled(sent):
 
 
 def celery(folder):
-    """As Celery's prefork: daemons that live for several tasks each, deaf to the keyboard, ended by SIGTERM."""
+    """Workers like Celery's prefork: daemons that live for several tasks each, deaf to the keyboard, ended by SIGTERM."""
     context = multiprocessing.get_context("fork")
     tasks, answers = context.SimpleQueue(), context.SimpleQueue()
 

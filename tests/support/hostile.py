@@ -40,7 +40,7 @@ def link(to):
 
 
 def special(make):
-    """What is no plain file, in the place of a file."""
+    """Special file in the place of a file."""
 
     def harm(path, home):
         path.unlink(missing_ok=True)
@@ -220,7 +220,7 @@ def long_list(path, home):
 
 
 def said(path):
-    """What a store's root says, with its texts read."""
+    """Content of a store's root, with its texts read."""
     content = json.loads((path / ROOT).read_text())
     for name in TEXTS:
         content["attributes"][name] = json.loads(content["attributes"][name])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the compiler makes of a kernel's loop over steps: its floating-point vector instructions, and seconds to compile it.
+"""Compiled form of a kernel's loop over steps: its floating-point vector instructions, and seconds to compile it.
 
 A figure that no load of the machine changes: every scene is compiled for one processor, x86-64-v4, whichever this one is,
 and not run. `python -m tests.support.hot_loops --write` records them anew, after a change that is meant.

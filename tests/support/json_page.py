@@ -27,7 +27,7 @@ PLAIN = {
 
 
 def differing(document, name):
-    """What of a document differs from a table of the page: texts, none where it is as stated."""
+    """Differences of a document from a table of the page: texts, none where it is as stated."""
     return _table(document, TABLES["every document"] | TABLES[name], name)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""As much of JSON schema as the schema of scene files uses."""
+"""Part of JSON schema that the schema of scene files uses."""
 
 KINDS = {"object": dict, "array": list, "string": str, "boolean": bool, "number": (int, float), "integer": int}
 
@@ -13,7 +13,7 @@ def is_a(value, kind):
 
 
 def faults(value, schema, where=""):
-    """What is wrong with a value: texts that begin with its place; none where it fits."""
+    """Faults of a value: texts that begin with its place; none where it fits."""
     assert schema.keys() <= KNOWN, schema.keys() - KNOWN
     kinds = schema.get("type", [])
     if kinds and not any(is_a(value, kind) for kind in ([kinds] if isinstance(kinds, str) else kinds)):

@@ -124,7 +124,7 @@ def combine(folder):
 
 
 class Record:
-    """What one run of the tests executed."""
+    """Record of one run of the tests."""
 
     def __init__(self, folder):
         import coverage
@@ -294,7 +294,7 @@ PYTEST = ["-q", "--tb=line", "-p", "no:cacheprovider", "-p", "tests.support.muta
 
 
 def copy_tree(folder):
-    """What git knows of the tree, and new files, with their times."""
+    """Copy of the tree as git knows it, and new files, with their times."""
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     for name in subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0"):
         if name and (ROOT / name).is_file():
@@ -459,7 +459,7 @@ def try_room(name, count, seed, limit, jobs, only):
 
 
 def unsound(slot, names, tests):
-    """Which of these tests fail without a fault."""
+    """Tests that fail without a fault."""
     known = {test["test"]: test for chosen in tests.values() for test in chosen}
     passed = set(PRISTINE.read_text().splitlines()) if PRISTINE.exists() else set()
     left, failing = [known[name] for name in sorted(names - passed) if name in known], set()

@@ -144,7 +144,7 @@ class Finder(ast.NodeVisitor):
     visit_AsyncFunctionDef = visit_FunctionDef  # noqa: N815
 
     def visit_Raise(self, node):
-        """It is deleted; its message is left."""
+        """Delete it; its message is left."""
         self.deleted(node)
 
     def visit_Assert(self, node):

@@ -48,7 +48,8 @@ METHODS = ("psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "kl8(psi_x)", "su4(psi_
 
 
 def judged(fleet, found, asked, rounds=5):
-    """Of a suggestion: the largest error of all members over the asked one, and its cost over the best of all settings.
+    """Judgement of a suggestion: the largest error of all members over the asked one, and its cost over the best of all
+    settings.
 
     The best is searched for in steps 1.2 times apart, for every method of the paper's family in both precisions.
     """

@@ -15,7 +15,7 @@ ALONG, TOUCH = 60, 1.0
 
 
 def unread(figure):
-    """What cannot be read in a figure: pairs of a text and what lies under it."""
+    """Unreadable parts of a figure: pairs of a text and what lies under it."""
     figure.draw_without_rendering()
     words = [text for text in words_of(figure) if text.get_visible() and text.get_text().strip()]
     boxes = {text: shrunk(text.get_window_extent()) for text in words}
@@ -68,7 +68,7 @@ def shrunk(box):
 
 
 def data_of(axes):
-    """What axes show of numbers: lines, marks, areas and bars, but for lines across the whole axes."""
+    """Data that axes show: lines, marks, areas and bars, but for lines across the whole axes."""
     artists = [artist for artist in axes.get_children() if isinstance(artist, Line2D | Collection | Patch)]
     return [
         artist
@@ -111,7 +111,7 @@ def along(points):
 
 
 def inside_of(box, points):
-    """Which points (n, 2) lie in a box."""
+    """Mask of points (n, 2) in a box."""
     return (points >= box.min).all(axis=1) & (points <= box.max).all(axis=1)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a user reads, above all where a call is refused."""
+"""Texts for users, above all refusals."""
 
 import pytest
 

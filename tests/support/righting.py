@@ -121,7 +121,7 @@ def moments(forces, attitudes):
 
 
 def of_sdf(path, model, main, density=None, gravity=None):
-    """What Gazebo's forces are, about the origin of the main link and in its axes; density and gravity in their place."""
+    """Forces of Gazebo, about the origin of the main link and in its axes; density and gravity in their place."""
     root = tree(path)
     world = root.find("world")
     elements = {m.get("name"): m for m in root.iter("model")}

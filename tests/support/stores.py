@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of stores need: a small run, and whether two folders hold the same bytes."""
+"""Tools of the tests of stores: a small run, and whether two folders hold the same bytes."""
 
 import contextlib
 import multiprocessing
@@ -61,7 +61,7 @@ def forked(work, *arguments):
 
 
 def finished(path):
-    """How many blocks are marked."""
+    """Count of marked blocks."""
     return len(markers(path))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What several tests need: vehicles, one-scene ensembles, states of results and of the reference."""
+"""Tools of several tests: vehicles, one-scene ensembles, states of results and of the reference."""
 
 from pathlib import Path
 from unittest import mock

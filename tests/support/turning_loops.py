@@ -58,7 +58,7 @@ def heading_loops(members):
 
 
 def loop_of(fleet, i):
-    """That of member i, opened."""
+    """Open loop of member i."""
     p = numbers(fleet, fleet.members)
     gains = [p[f"heading_pid.{k}"][i : i + 1] for k in ("kp", "ki", "kd")]
     return opened(*gains, J, round(p["controller.delay"][i] / H))

@@ -46,7 +46,7 @@ class Viewer:
         return shots
 
     def complaints(self):
-        """What views report and the log warns of."""
+        """Complaints of views and warnings of the log."""
         views = [f"{view.origin}: {note.summary}" for view in self.client.get_state().views for note in view.reports]
         logs = [entry.message for entry in self.client.get_logs() if entry.level in ("WARN", "ERROR")]
         return views + [message for message in logs if not EXPECTED.search(message)]

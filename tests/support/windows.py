@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Windows has not, taken away from this process: a plugin of pytest (-p tests.support.windows).
+"""Removal of what Windows lacks from this process: a plugin of pytest (-p tests.support.windows).
 
 No locks of files, no descriptors of folders, no O_NOFOLLOW, no statvfs, no SIGHUP, no set_blocking (Python 3.11), no fork; a
 descriptor that is only read is not synced; a file that is open is neither replaced nor removed. It is an imitation: what else

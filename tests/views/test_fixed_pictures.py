@@ -16,7 +16,7 @@ pytestmark = [
 
 
 def check(known, shown):
-    """Where a picture differs from the recorded one, and the remedy."""
+    """Difference of a picture from the recorded one, and the remedy."""
     faults = differing(known, json.loads(json.dumps(shown)))
     remedy = "look at it (make gallery), then python -m tests.support.fixed_pictures --write"
     assert not faults, "\n".join([*faults[:20], remedy])

@@ -19,7 +19,7 @@ QUICK = [name for name in RUNS if name in ("some of each outcome", "173 of 400 f
 
 
 def unread_of(result):
-    """What cannot be read in the pictures of a run."""
+    """Unreadable parts of a run's pictures."""
     drawn = {name: np.ravel(getattr(lw.plots, name)(result))[0].figure for name in OF_A_RUN}
     angle = lw.plots.fan(result, "euler[2]").figure
     return {name: found for name, figure in (drawn | {"fan of yaw": angle}).items() if (found := unread(figure))}

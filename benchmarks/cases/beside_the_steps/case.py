@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a launch costs beside its steps: a + b n of launches of n steps and one sample, beside the core's peak.
+"""Cost of a launch beside its steps: a + b n of launches of n steps and one sample, beside the core's peak.
 
 a, per vehicle: the state and the constants are read, the start and the end are looked at, a sample and the state are written.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What surrounds the kernel: a call of a prepared run, a whole solve and the set-up of a member, beside the kernel alone.
+"""Overhead around the kernel: a call of a prepared run, a whole solve and the set-up of a member, beside the kernel alone.
 
 And what noise that a call gives costs, beside noise that it draws.
 """
@@ -107,7 +107,7 @@ def given_draws(rounds):
 
 
 def set_up(name, scene, vary, method, members, rounds):
-    """What a member costs before its first step."""
+    """Cost of a member before its first step."""
     fleet = lw.Ensemble(scene, members, 1, vary)
     plan = make_plan(fleet, method, h=0.01, t1=0.01)
     plan.compile()

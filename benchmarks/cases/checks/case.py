@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What each level of checks costs, and a fleet in which every tenth member fails, frozen or by divided steps."""
+"""Cost of each level of checks, and of a fleet in which every tenth member fails, frozen or by divided steps."""
 
 import numpy as np
 

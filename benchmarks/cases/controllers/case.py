@@ -103,7 +103,7 @@ def ratios(name, scenes, method, dtype, quick):
 
 
 def allocations(dtype, quick):
-    """What a tick takes by allocation, with no thruster at its limit and with some there."""
+    """Cost of a tick by allocation, with no thruster at its limit and with some there."""
     for where, place in (("within the limits", HERE), ("at the limits", FAR)):
         for label, allocation in ALLOCATIONS.items():
             scenes = {f"every {every}": bluerov2(every, allocation, place) for every in (10, 1)}

@@ -82,7 +82,7 @@ def environments(members, steps, rounds):
 
 
 def ticks(members, steps, rounds):
-    """What an exchange with the host takes beside the launches: answers written, ticks read."""
+    """Cost of an exchange with the host beside the launches: answers written, ticks read."""
     fleet = lw.Ensemble(scene(lw.control.Callback(heading), lw.control.HeadingPID(**GAINS)), members, 1, VARY)
     plan = make_plan(fleet, "psi_x", STEP, STEP * EVERY * steps * (2 * rounds + 2), lw.SaveAt(fields=("position",)))
     plan.compile()

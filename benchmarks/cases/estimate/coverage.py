@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many intervals of lw.estimate hold what independent runs say, by seeds, in pieces that add up.
+"""Coverage of lw.estimate's intervals against independent runs, by seeds, in pieces that add up.
 
 python -m benchmarks.cases.estimate.coverage SCENE ERROR FIRST LAST
 

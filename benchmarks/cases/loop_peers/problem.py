@@ -54,7 +54,7 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """How many members, ticks, steps between ticks, and the step [s]."""
+    """Size of a problem: members, ticks, steps between ticks, and the step [s]."""
 
     members: int
     ticks: int

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What parts of navigation cost a tick, by processor time: REMUS 100 with more and more of them, in turn, on one thread."""
+"""Cost of parts of navigation per tick, in processor time: REMUS 100 with more and more of them, in turn, on one thread."""
 
 import numpy as np
 

@@ -174,7 +174,7 @@ def make_ordinary(real):
 
     @wp.func
     def part(t: real, times: numbers, i: int):
-        """How far t is along the segment, 0 to 1."""
+        """Position of t along the segment, 0 to 1."""
         return wp.clamp((t - times[i]) / (times[i + 1] - times[i]), real(0.0), real(1.0))
 
     @wp.func

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a member costs before its first step, beside its kernel and beside writing its numbers into memory; short runs."""
+"""Cost of a member before its first step, beside its kernel and beside writing its numbers into memory; short runs."""
 
 import itertools
 import time

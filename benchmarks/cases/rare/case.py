@@ -39,7 +39,7 @@ def found_of(event: Event, seed: int) -> tuple[lw.studies.RareEvent, float]:
 
 
 def summary(found: list[tuple[lw.studies.RareEvent, float]], truth: float) -> dict[str, Any]:
-    """What runs with other seeds say together."""
+    """Summary of runs with different seeds."""
     ratios = np.array([each.probability for each, _ in found]) / truth
     told = np.array([each.relative_error for each, _ in found])
     members = [sum(each.members.values()) for each, _ in found]

@@ -75,7 +75,7 @@ def importable(name: str) -> bool:
 
 
 def records(name: str, event: Event, p: float, runs: int, quick: bool) -> Iterator[dict[str, Any]]:
-    """What each peer says of an event; nothing of one with noise, which a model draws anew by row and not by chain."""
+    """Answers of each peer on an event; none for one with noise, which a model draws anew by row and not by chain."""
     present = [peer for peer in PEERS if importable(peer)]
     if not present or not event.fleet.vary or any(term.type == "wrench_noise" for term in event.fleet.scene.terms):
         return

@@ -103,7 +103,7 @@ def _gusts(count: int, p: float) -> Event:
 
 
 def _of_ramp(left: np.ndarray) -> np.ndarray:
-    """Where a force leads that grows by 1 N/s for the time that is left."""
+    """Displacement by a force that grows by 1 N/s for the remaining time."""
     t = np.maximum(0.0, left)
     return np.asarray((0.5 * t**2 - TAU * t - TAU**2 * np.expm1(-t / TAU)) / DRAG)
 

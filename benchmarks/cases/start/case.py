@@ -29,7 +29,7 @@ CODES = {
 
 
 def new_python(code, bytecode):
-    """What a new Python prints. All packages are compiled to bytecode in that folder, as an installer does."""
+    """Output of a new Python. All packages are compiled to bytecode in that folder, as an installer does."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     environment["PYTHONPYCACHEPREFIX"] = bytecode
     run = subprocess.run(

@@ -116,7 +116,7 @@ def into_files(folder, threads, sizes):
 
 
 def sink_record(folder, quick, members, times):
-    """How fast the store takes what is ready."""
+    """Rate at which the store takes finished data."""
     threads = machine.thread_count()
     plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=0.1 * (times - 1), save=SaveAt(every=0.1))
     count = blocks(members)[0].count

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What both programs by hand share: numbers of the scene, metrics of a path, and the answer with its intervals."""
+"""Common parts of both programs by hand: numbers of the scene, metrics of a path, and the answer with its intervals."""
 
 import numpy as np
 

@@ -103,7 +103,7 @@ def disagreements(apart, order):
 
 
 def compared(sweep, way):
-    """What a line says of a program by hand, and the call that is timed; no call where a package is missing."""
+    """Line on a program by hand, and the call that is timed; no call where a package is missing."""
     module, order, timed, count = PEERS[way]
     row = {"way": way, "lines": lines_of("by_hand.py", f"{module}.py")}
     try:

@@ -44,7 +44,7 @@ def entries(quick=False):
 
 
 def spread(name):
-    """What varies in the scene of this name."""
+    """Variations of the scene of this name."""
     return SPREAD | (PLACES if name in GRIDS else {})
 
 

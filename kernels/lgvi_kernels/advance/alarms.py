@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What follows from alarms: which lanes fail, whether a step is made again in parts, and where a lane rests.
+"""Consequences of alarms: lanes that fail, steps repeated in parts, and lanes at rest.
 
 Alarms are rare. What follows is apart from the loop over chunks and takes references, so that chunks without one have no
 trace of it: neither copies of states nor registers.

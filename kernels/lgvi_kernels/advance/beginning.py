@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a launch does before its first step: looks at the start, the controller's first commands, lanes that end there.
+"""Beginning of a launch before its first step: looks at the start, the controller's first commands, lanes that end there.
 
 A run begins with its first launch, from states that start, or that go on from where another run ended. What goes on has its
 memory, in which the last tick of its controller has been made.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is gathered at a controller's ticks, and the signals that samples write."""
+"""Values gathered at a controller's ticks, and signals that samples write."""
 
 import functools
 from typing import Any

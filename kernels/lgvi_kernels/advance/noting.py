@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a tick of a controller notes in rows of the memory: the demand, the measurement and the reference."""
+"""Notes of a controller's tick in rows of the memory: the demand, the measurement and the reference."""
 
 from typing import Any
 

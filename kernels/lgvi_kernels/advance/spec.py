@@ -19,7 +19,7 @@ CHUNK = 128
 
 
 class Control(NamedTuple):
-    """What a scene's controller puts into its kernel."""
+    """Parts of a scene's controller in its kernel."""
 
     parts: tuple  # modules: sensors, guidance, laws, allocation, then what commands pass on their way
     numbers: tuple  # the declared numbers of each part (see params_of)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What water that varies along a slender hull does to its strips, beyond what the water at the body's origin does.
+"""Loads on the strips of a slender hull by varying water, beyond those of the water at the body's origin.
 
 Each strip carries the momentum a w per length across the hull's axis, w its velocity through the water where it is. With
 alpha = Du/Dt of the water, U the strip's velocity through it along the axis, and G = du/db, the force per length is

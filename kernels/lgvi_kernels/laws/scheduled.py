@@ -80,7 +80,7 @@ PIECE = 2
 
 
 def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words=()):
-    """As make_driven, for an actuator whose commands are a table of pieces, behind the rows of all channels.
+    """Device code like make_driven's, for an actuator whose commands are a table of pieces, behind the rows of all channels.
 
     `knots` counts the times of the schedule but for the first, so that there are knots + 2 pieces.
     """

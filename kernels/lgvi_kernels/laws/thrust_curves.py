@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How thrust follows from a command: its square, a polynomial or a table, and the inverse of each.
+"""Thrust as a function of a command: its square, a polynomial or a table, and the inverse of each.
 
 Each curve takes (view, p, first, w): the law's numbers, the row where those of the curve begin, and the command less the dead
 band. Inverses take the thrust ahead or astern, without its sign, and the same of one side.

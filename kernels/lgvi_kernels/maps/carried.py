@@ -98,7 +98,7 @@ def make_carried(spec, velocities):
 
 
 def make_carried_rates(Rates, Wrench, everything, velocities, kind, drifts, power_at=None):
-    """As make_rates, whatever the inertia. velocities: see Carried."""
+    """Rates like make_rates', for any inertia. velocities: see Carried."""
     group = kind != "vector"
 
     @wp.func

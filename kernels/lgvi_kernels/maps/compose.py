@@ -123,7 +123,7 @@ def _handing_on(nested):
 
 
 def _superpose_seeing(laws, role):
-    """As superpose, (sum, view, params, params of all laws) -> sum."""
+    """Sum like superpose, (sum, view, params, params of all laws) -> sum."""
     if not any(plays(law, role) for law in laws):
         return None
     function, rest = plays(laws[0], role), _superpose_seeing(laws[1:], role)

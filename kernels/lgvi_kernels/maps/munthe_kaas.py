@@ -35,7 +35,7 @@ def make_turned(Rotation, real):
 
 
 def make_act(turned):
-    """How the group moves a state. docs/theory/runge_kutta.md, (K11)."""
+    """Action of the group on a state. docs/theory/runge_kutta.md, (K11)."""
 
     @wp.func
     def act(x: Any, k: Any, s: Any):

@@ -52,7 +52,7 @@ class DualShape(NamedTuple):
 
     @property
     def length(self):
-        """How many numbers a lane is to Warp: the values, the slopes by each tangent, and what pads them.
+        """Length of a lane for Warp: the values, the slopes by each tangent, and what pads them.
 
         By its length alone Warp tells a dual lane from a plain one, a power of two long, and from one with more tangents. So
         with one tangent half a width more follows, which nothing reads: 5 times a power of two; with two it is 3 times one.
@@ -172,5 +172,5 @@ def snippets(shape):
 
 @functools.cache
 def digest(shape):
-    """What a kernel with dual lanes is hashed by, since overloads do not count (see lanes/overloads.py)."""
+    """Hash of a kernel with dual lanes, since overloads do not count (see lanes/overloads.py)."""
     return hashlib.sha256("".join(f"{name} {text}" for name, text in snippets(shape).items()).encode()).hexdigest()[:16]

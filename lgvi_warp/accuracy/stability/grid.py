@@ -38,7 +38,7 @@ FORM = '"NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":se
 
 @dataclass(frozen=True)
 class Axis:
-    """What varies along an axis of a map, from a low to a high value.
+    """Quantity along an axis of a map, from a low to a high value.
 
     Attributes:
         name: "h" [s]; "angular_velocity" [rad/s] or "speed" [m/s]: size of the start's, direction kept;
@@ -354,7 +354,7 @@ class StabilityGrid:
         return Ensemble.from_states(self.scene, b, R, nu, Om, varied)
 
     def rates(self) -> dict[str, np.ndarray]:
-        """How fast every member moves at its start: names of accuracy.stability.limits.LIMITS -> rate (n,) [rad/s or 1/s]."""
+        """Rates of every member at its start: names of accuracy.stability.limits.LIMITS -> rate (n,) [rad/s or 1/s]."""
         every = np.arange(len(self.h))
         return member_rates.rates(self.parameters(every), self.state["velocity"], self.state["angular_velocity"])
 

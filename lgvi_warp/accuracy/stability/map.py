@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a method holds: maps of accurate, bounded, flagged, failed and silently wrong runs over two parameters."""
+"""Regions in which a method holds: maps of accurate, bounded, flagged, failed and silently wrong runs over two parameters."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ SHORTEST = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
 
 @dataclass
 class CellRuns:
-    """What a method's runs showed, for each member (n,).
+    """Outcomes of a method's runs, per member (n,).
 
     error: largest error up to the error time [unit of the quantity]; infinite where there is none.
     growth: largest growth of energy over the energy available [1].
@@ -105,7 +105,7 @@ def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str,
 
 
 def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
-    """How energies are judged: "conservative" where kept, "dissipative" where lost, "driven" where a force may supply them."""
+    """Judgement of energies: "conservative" where kept, "dissipative" where lost, "driven" where a force may supply them."""
     laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").kernel_choice.laws
     if any(getattr(module, "NOISE", False) for _, module in laws):
         raise SceneError(["terms: noise acts, whose path differs from step to step; leave it out for a stability map"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What executors share: their protocol, and how work travels to other processes."""
+"""Common parts of executors: their protocol, and how work travels to other processes."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Finals:
             self.parts[block.first] = part[0]
 
     def rows(self, members: int) -> Rows:
-        """What the first members left, all of whose blocks have ended."""
+        """Final rows of the first members, all of whose blocks have ended."""
         return joined({first: part for first, part in self.parts.items() if first < members})
 
     def to_arrays(self, part: Part) -> Part:
@@ -56,7 +56,7 @@ class Finals:
         return part
 
     def from_arrays(self, arrays: Rows, content: Any) -> Part:
-        """What a block left."""
+        """Final rows of a block."""
         return arrays, content
 
 

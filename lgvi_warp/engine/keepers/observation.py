@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run keeps of its members, samples, statistics or both, and the condition under which it stops early."""
+"""Data that a run keeps of its members, samples, statistics or both, and the condition under which it stops early."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def replicates_of(ensemble: Mapping[str, Any]) -> int:
 
 @dataclass(frozen=True)
 class Observation:
-    """What is to be kept of a run, and the condition `until` that ends it before the last member; None for none."""
+    """Data to keep of a run, and the condition `until` that ends it before the last member; None for none."""
 
     statistics: tuple[Statistic, ...] = ()
     keep: Any = "all"
@@ -56,7 +56,7 @@ class Observation:
         return any(statistic.ticks for statistic in self.statistics)
 
     def read_at_ticks(self) -> dict[str, tuple[int, ...]]:
-        """What statistics read of the motion at the ticks of a controller."""
+        """Fields of the motion that statistics read at the ticks of a controller."""
         entries: dict[str, tuple[int, ...]] = {}
         for quantity in (statistic.quantity for statistic in self.statistics if statistic.ticks):
             few = dict(quantity.entries)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class BlockKeeper(Protocol):
-    """What keeps something of one block, in the thread or process that runs the block."""
+    """Keeper of data of one block, in the thread or process that runs the block."""
 
     def take(self, when: slice, samples: Fields) -> None:
         """Receive samples of the block (times, members, ...) by field; each time comes once, in order."""
@@ -32,7 +32,7 @@ class BlockKeeper(Protocol):
 
 
 class Keeper(Protocol):
-    """What a run keeps of its members: all samples, statistics or files."""
+    """Keeper of a run's data: all samples, statistics or files."""
 
     def open(self, plan: Plan, block: Block, members: Members) -> BlockKeeper:
         """Prepare for a block, before its first step, in the thread or process that runs it."""
@@ -60,7 +60,7 @@ class BlockStore(Keeper, Protocol):
     """A keeper that writes blocks to disk, where they outlive the run, and knows which it already holds."""
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
-        """What each keeper closed with for a block; None if the store does not hold it."""
+        """Closing value of each keeper for a block; None if the store does not hold it."""
 
     def finish(self, block: Block, arrays: Any, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
         """Make a block durable."""

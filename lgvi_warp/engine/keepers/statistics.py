@@ -86,7 +86,7 @@ class Gathered:
         return {part.key for statistic in self.statistics if statistic.at_end for part in statistic.parts()}
 
     def __getstate__(self) -> dict[str, Any]:
-        """What another process needs to gather blocks, without what was gathered here."""
+        """State for another process to gather blocks, without data gathered here."""
         return {name: value for name, value in vars(self).items() if name != "trees"}
 
     @staticmethod

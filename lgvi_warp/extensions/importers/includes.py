@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an SDF file includes: put in its place from files that the user names; no path or address of the file is opened."""
+"""Includes of an SDF file: put in their place from files that the user names; no path or address of the file is opened."""
 
 from __future__ import annotations
 

@@ -184,7 +184,7 @@ def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
 
 
 def shared(faults: Faults, tag: str, values: Sequence[Any], remedy: str) -> Any:
-    """What plugins of one body say of its water, each alike; None where none says it."""
+    """Common statement of one body's plugins on its water; None where none has one."""
     said = [value for value in values if value is not None]
     if any(not np.array_equal(value, said[0]) for value in said):
         shown = "; ".join(" ".join(f"{x:g}" for x in np.atleast_1d(value)) for value in said)

@@ -19,7 +19,7 @@ LONGEST_CHAIN = 200
 
 
 class Pose(NamedTuple):
-    """Where a frame lies in another one: position (3,) [m] of its origin, and rotation matrix (3, 3)."""
+    """Pose of a frame in another one: position (3,) [m] of its origin, and rotation matrix (3, 3)."""
 
     position: np.ndarray
     rotation: np.ndarray

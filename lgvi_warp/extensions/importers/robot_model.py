@@ -48,7 +48,7 @@ GAZEBO_DENSITY = 1000.0  # kg/m3: of Gazebo's Buoyancy system, if none is given
 
 @dataclass
 class Water:
-    """What the <world> of a file says about the water: gravity [m/s2] and density [kg/m3]."""
+    """Water of a file's <world>: gravity [m/s2] and density [kg/m3]."""
 
     gravity: float | None = None
     density: float | None = None

@@ -51,7 +51,7 @@ class Episodes:
         self.steps += self.every
 
     def signals(self) -> tuple[CallbackInput, CallbackInput]:
-        """What is measured and what is wanted now: (measured, wanted)."""
+        """Values measured and wanted now: (measured, wanted)."""
         return last_tick(self.packets)
 
     def status(self) -> np.ndarray:
@@ -61,7 +61,7 @@ class Episodes:
         return self.packets.ended()[0]
 
     def room_for(self, count: int) -> int:
-        """How many members to draw for some that are prepared: few different numbers, for each of which packets are kept."""
+        """Number of members to draw for some that are prepared: few different numbers, for each of which packets are kept."""
         width = self.plan.spec.width
         return width << (-(-count // width) - 1).bit_length()
 
@@ -97,7 +97,7 @@ class Episodes:
         return last_tick(aside, places)
 
     def signals_of(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
-        """What members that have ended measure and want in their last state; in the block itself they rest meanwhile.
+        """Values that ended members measure and want in their last state; in the block itself they rest meanwhile.
 
         lanes: (r,), which of the m lanes. Returns: (measured, wanted), (r, ...).
         """

@@ -478,13 +478,13 @@ def _endless(fleet: Ensemble) -> bool:
 
 
 def _arguments(function: Callable[..., Any]) -> int:
-    """How many arguments a function takes by place."""
+    """Number of positional arguments of a function."""
     kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     return sum(item.kind in kinds for item in inspect.signature(function).parameters.values())
 
 
 def _mask(options: Mapping[str, Any] | None, count: int) -> np.ndarray:
-    """Which environments are to be reset."""
+    """Mask of the environments to reset."""
     mask = (options or {}).get("reset_mask")
     if mask is None:
         return np.ones(count, bool)

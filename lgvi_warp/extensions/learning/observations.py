@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a learner may see: names for numbers that a controller measures and wants, those of `lw.control.Policy` among them."""
+"""Observations of a learner.
+
+Names for numbers that a controller measures and wants, those of `lw.control.Policy` among them.
+"""
 
 from __future__ import annotations
 

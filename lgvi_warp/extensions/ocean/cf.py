@@ -25,7 +25,7 @@ MOST_OF_STEP = 3.0
 
 @dataclass(frozen=True)
 class OceanQuantity:
-    """What a variable may be known by: its standard_name in the CF conventions, or the name that models give it."""
+    """Names of an ocean variable: its standard_name in the CF conventions, or the name that models give it."""
 
     meaning: str
     standard_names: tuple[str, ...]
@@ -232,7 +232,7 @@ def _ordered(variable: Any, axes: Axes) -> Any:
 
 
 def _rising(where: str, values: np.ndarray, unit: str) -> slice:
-    """What puts the values of an axis in rising order; SceneError where they neither rise nor fall."""
+    """Slice that puts the values of an axis in rising order; SceneError where they neither rise nor fall."""
     steps = np.diff(values)
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise refusal(where, brief(values), "neither rises nor falls", f"sort it [{unit}] and drop repetitions")

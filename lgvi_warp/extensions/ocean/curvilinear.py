@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where places are in a grid of cells with four corners each, such as a turned or a curved grid: how far along y and x."""
+"""Coordinates of places in a grid of cells with four corners each, such as a turned or a curved grid.
+
+How far along y and x.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wanted of a data set with a current, and what became of it."""
+"""Request for a current from a data set, and its result."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MUCH = 0.05
 
 @dataclass(frozen=True, eq=False)
 class FieldRequest:
-    """What is wanted of a data set; numbers that are None follow from it.
+    """Request for data from a data set; numbers that are None follow from it.
 
     Args:
         origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,); needed.
@@ -49,7 +49,7 @@ class FieldRequest:
 
 @dataclass(frozen=True, eq=False)
 class FieldData:
-    """Where a field comes from, and what became of the data on the way.
+    """Source of a field, and the changes of the data on the way.
 
     Attributes:
         file: Path of the file; None for a Dataset.
@@ -97,7 +97,7 @@ class FieldData:
         return tuple(sentences)
 
     def table(self) -> dict[str, Any]:
-        """What reads the same numbers again, as keys of a scene file."""
+        """Keys of a scene file that read the same numbers again."""
         request = {item.name: getattr(self.request, item.name) for item in dataclasses.fields(self.request)}
         plain = {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in request.items()}
         return {"file": self.file} | {name: value for name, value in plain.items() if value is not None}

@@ -346,7 +346,7 @@ def _gap(seconds: np.ndarray) -> tuple[float, float] | None:
 
 
 def _steps_of_time(seconds: np.ndarray) -> int:
-    """How many equal steps the times become: so many that each time of the data is one of them, where there are such.
+    """Number of equal steps that replace the times: so many that each time of the data is one of them, where there are such.
 
     Else as many as the least interval asks for, up to four times as many as the data have; a gap would smear them then.
     """

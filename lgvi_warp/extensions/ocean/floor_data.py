@@ -31,7 +31,7 @@ class DepthSource(Protocol):
     positive: str
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
-        """Which places [m] have data around them."""
+        """Mask of places [m] with data around them."""
 
     def bounds(self) -> np.ndarray:
         """Least and largest north and east of the data, (2, 2) [m]."""
@@ -83,7 +83,7 @@ def read_floor(file: Any, request: FloorRequest) -> FloorNumbers:
 
 @contextlib.contextmanager
 def _source(file: Any, request: FloorRequest, plane: LocalPlane, region: np.ndarray | None) -> Iterator[DepthSource]:
-    """What the file holds."""
+    """Content of the file."""
     with contextlib.ExitStack() as stack:
         if isinstance(file, str | os.PathLike):
             path, held = stack.enter_context(regular_file(file, "file"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wanted of a file with the depth of the sea floor."""
+"""Request for the depth of the sea floor from a file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ POSITIVE = ("", "up", "down")
 
 @dataclass(frozen=True, eq=False)
 class FloorRequest:
-    """What is wanted of a file; numbers that are None follow from it.
+    """Request for depths from a file; numbers that are None follow from it.
 
     Args:
         origin: Latitude and longitude [deg] of the origin of the inertial axes, (2,).

@@ -32,7 +32,7 @@ def filled(field: np.ndarray, spacing: tuple[float, float], fill: str) -> np.nda
 
 
 def _nearest_level(holes: np.ndarray) -> np.ndarray:
-    """Of each place the nearest level above that has a value, and above the first, the first (k, y, x)."""
+    """Nearest level above each place that has a value; above the first, the first (k, y, x)."""
     level = np.arange(len(holes))[:, None, None]
     above = np.maximum.accumulate(np.where(holes, -1, level), axis=0)
     first = np.argmin(holes, axis=0)[None]

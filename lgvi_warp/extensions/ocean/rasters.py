@@ -71,7 +71,7 @@ class Raster:
         return np.asarray(row - 0.5), np.asarray(column - 0.5)
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
-        """Which places [m] have four pixels around them."""
+        """Mask of places [m] with four pixels around them."""
         inside = np.ones(np.shape(north), bool)
         for at, count in zip(self.pixels(north, east), self.shape, strict=True):
             inside &= (at >= -ROUND_OFF) & (at <= count - 1 + ROUND_OFF)

@@ -63,7 +63,7 @@ class Placed:
         return _numbered(latitude, self.grid.latitude), _numbered(longitude, self.grid.longitude)
 
     def contains(self, north: np.ndarray, east: np.ndarray) -> np.ndarray:
-        """Which places are within the outermost nodes; along an axis of one node all are."""
+        """Mask of places within the outermost nodes; along an axis of one node all are."""
         inside = np.ones(np.shape(north), bool)
         for at, count in zip(self.fractions(north, east), self.grid.shape[3:], strict=True):
             if count > 1:

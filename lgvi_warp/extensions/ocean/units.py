@@ -17,7 +17,7 @@ WORDS = ((r"\bmet(?:er|re)s?\b", "m"), (r"\bseconds?\b|\bsec\b", "s"), (r"\bhour
 
 
 def factor(where: str, text: Any, unit: str) -> float:
-    """How much of the unit "m/s" or "m" the unit of a variable is."""
+    """Size of a variable's unit in "m/s" or "m"."""
     known = UNITS[unit]
     if text is None or not str(text).strip():
         raise refusal(f"{where}.units", "", "is missing", f"write the attribute units, {unit!r} for instance")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What actuators have in common that a controller drives, or that follow a schedule with a lag and at a limited rate."""
+"""Common parts of actuators that a controller drives, or that follow a schedule with lag and rate limit."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class Commanded(Term):
 
 
 def motion(term: Any) -> dict[str, bool]:
-    """How the channels of a driven actuator follow their commands, by the scene's own numbers."""
+    """Way in which a driven actuator's channels follow commands, by the scene's own numbers."""
     lag, rate = term.time_constant, term.rate_limit
     return {
         "lag": lag is not None and bool(np.any(lag > 0.0)),

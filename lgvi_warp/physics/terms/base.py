@@ -34,7 +34,7 @@ CONSERVED = frozenset({"energy", "horizontal_momentum", "vertical_angular_moment
 
 @dataclass(frozen=True)
 class PackingContext:
-    """What a term may look at when it packs its numbers for the device: the scene's parameters, the frame, the run.
+    """Inputs of a term when it packs its numbers for the device: the scene's parameters, the frame, the run.
 
     Args:
         parameters: All parameters of the scene by name ("vehicle.mass"), each of shape (1, ...) or (n, ...).
@@ -93,7 +93,7 @@ class Packed(NamedTuple):
 
 
 class Inner(NamedTuple):
-    """What a mass that moves in the vehicle adds to its momenta and its energy, each (k, n, ...).
+    """Contribution of a mass that moves in the vehicle to its momenta and energy, each (k, n, ...).
 
     Args:
         momenta: Linear and angular momentum about the body's origin, (k, n, 6) [N s, N m s], body axes.
@@ -408,7 +408,7 @@ class Term:
         }
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """Which members have numbers that this term cannot take: not finite, or out of bounds.
+        """Members with numbers that this term cannot take: not finite, or out of bounds.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -449,7 +449,7 @@ class Term:
 
     @property
     def conserves(self) -> frozenset[str]:
-        """Which quantities of `CONSERVED` a motion keeps where this law alone acts.
+        """Quantities of `CONSERVED` that a motion keeps where this law alone acts.
 
         By default it is the energy, for a law whose device code is POTENTIAL and has no other role, if `potential` is defined
         and does not depend on time; for any other law it is nothing. A law whose potential depends only on depth and on the
@@ -562,7 +562,7 @@ class Term:
         return np.zeros_like(position) if still is None else still[0]
 
     def braking(self, numbers: Numbers, speeds: Array, water_density: Array) -> Array:
-        """How strongly the term brakes at some speeds: minus the derivative of its wrench by the velocity, or a bound.
+        """Braking of the term at some speeds: minus the derivative of its wrench by the velocity, or a bound.
 
         A run without a method looks at it, to choose one that is stable (lgvi_warp.runs.default_method).
 
@@ -580,7 +580,7 @@ class Term:
         raise NotImplementedError(f"{type(self).__name__} does not tell how strongly it brakes")
 
     def effect(self, numbers: Numbers, parameters: Numbers, speed: Array) -> Array:
-        """What a unit of effort of each channel makes: thrust of thrusters, the angle of fins.
+        """Effect of a unit of effort of each channel: thrust of thrusters, the angle of fins.
 
         Args:
             numbers: The term's numbers by field, each of shape (1 or n, ...).
@@ -618,7 +618,7 @@ class Term:
         return 0.0
 
     def inner(self, numbers: Numbers, time: Array, twist: Array, down: Array, parameters: Numbers) -> Inner | None:
-        """What a mass that moves in the vehicle adds to momenta and energy at sampled states.
+        """Contribution of a mass that moves in the vehicle to momenta and energy at sampled states.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).
@@ -704,7 +704,7 @@ def _checked(
 
 
 def _amount(shape: tuple[Any, ...]) -> str:
-    """How many numbers a shape asks for, in words."""
+    """Count of numbers in a shape, in words."""
     return f"numbers of shape {shape}" if shape else "a number"
 
 

@@ -156,7 +156,7 @@ class ControlFins(Commanded, Fins):
 
     @property
     def pattern_device(self) -> str:  # type: ignore[override]
-        """That of fixed fins, where they stand and are of no other kind."""
+        """Device code of fixed fins, where they stand and are of no other kind."""
         return Fins.pattern_device if self.device_in(True) == "fins" else ""
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:

@@ -264,5 +264,5 @@ def _with_data(field: Any, data: Any) -> Any:
 
 
 def _no_scenario(scenario: np.ndarray, count: int) -> np.ndarray:
-    """Which numbers (n,) are no index of so many scenarios."""
+    """Mask of numbers (n,) that are no index of so many scenarios."""
     return (scenario != np.rint(scenario)) | (scenario > count - 1)

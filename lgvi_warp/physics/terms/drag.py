@@ -53,7 +53,7 @@ class Drag(Term):
     quadratic: Any = number((6,), "N s2/m2, N m s2", ZEROS, least=0.0)
 
     def parts(self, numbers: Numbers) -> tuple[str, ...]:
-        """Which parts of the exact flow some member has.
+        """Parts of the exact flow that some member has.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, 6).
@@ -206,7 +206,7 @@ BESIDE = ~np.eye(6, dtype=bool)
 
 
 def creates_energy(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Which of the matrices (n, 6, 6) would speed a vehicle up, and the worst velocity (n, 6) for each.
+    """Mask of matrices (n, 6, 6) that would speed a vehicle up, and the worst velocity (n, 6) for each.
 
     The test is nu.D nu: for linear matrices by eigenvalues, for quadratic ones by descents from the worst of many directions.
     """
@@ -246,7 +246,7 @@ def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
 
 
 def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
-    """As `creates_energy`, for matrices that no inequality decides."""
+    """Search like `creates_energy`, for matrices that no inequality decides."""
     if not quadratic:
         limit = -1e-9 * np.abs(matrices).max(axis=(1, 2))
         # Divided by a power of two, which keeps all digits, lest two of the largest numbers add up to none.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What water that varies along a slender hull does to it, by strips."""
+"""Loads of water that varies along a slender hull, by strips."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ def channel(key: str) -> int:
 
 
 def key_of(name: str, context: PackingContext) -> dict[str, Any]:
-    """What keys random numbers, besides the number of the draw: the low 64 bits of the seed, the member, who draws."""
+    """Keys of random numbers, besides the number of the draw: the low 64 bits of the seed, the member, who draws."""
     return {"member": context.members.astype(np.int32), **words_of(context.seed, name)}
 
 
@@ -65,7 +65,7 @@ class NoisyTerm(Term):
     noise_step: float | None = positive(None, unit="s")
 
     def draws(self, h: float) -> int:
-        """How many draws one step of a run takes.
+        """Number of draws in one step of a run.
 
         Args:
             h: Step of the run [s].
@@ -76,7 +76,7 @@ class NoisyTerm(Term):
         return 1 if self.noise_step is None else max(1, round(h / self.noise_step))
 
     def streams(self, acting: Collection[str]) -> tuple[Stream, ...]:
-        """What it draws: by default two streams of three numbers each, where it acts.
+        """Streams of its draws: by default two of three numbers each, where it acts.
 
         Args:
             acting: Names of its numbers that vary, or are not zero.
@@ -90,7 +90,7 @@ class NoisyTerm(Term):
         return () if idle else (Stream("0"), Stream("1", number=1))
 
     def noise_key(self, context: PackingContext) -> dict[str, Any]:
-        """What keys the random numbers of this term (see `key_of`).
+        """Keys of the random numbers of this term (see `key_of`).
 
         Args:
             context: The scene's parameters, the frame and the run.

@@ -32,7 +32,7 @@ class Product(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As it is written: X_vr, Y_|v|r, Y_|vw|v."""
+        """Name in the usual spelling: X_vr, Y_|v|r, Y_|vw|v."""
         factor = "vw" if self.kind == "h" else VELOCITIES[self.j]
         factor = factor if self.kind == "c" else f"|{factor}|"
         return f"{FORCES[self.i]}_{factor}{VELOCITIES[self.k]}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What terms that cut a slender hull into strips have in common."""
+"""Common parts of terms that cut a slender hull into strips."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How thrust follows from a command on the host: polynomials and tables, their values, and where they reach a thrust."""
+"""Thrust as a function of the command, on the host: polynomials and tables, their values, and where they reach a thrust."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ SHAFT = ("shaft_speed", "efficiency")
 
 
 def kind_of(term: Any) -> str:
-    """How power follows from a command: "watts" of a table, that of the "shaft", or "" for a term that tells none."""
+    """Relation of power to command: "watts" of a table, that of the "shaft", or "" for a term that tells none."""
     if term.power is not None:
         return "watts"
     return "shaft" if term.shaft_speed is not None else ""

@@ -151,12 +151,12 @@ class Thrusters(Commanded):
 
     @property
     def powered(self) -> str:
-        """How its power follows from a command, in a scene that accounts it (see thruster_power.kind_of)."""
+        """Relation of its power to the command, in a scene that accounts it (see thruster_power.kind_of)."""
         return thruster_power.kind_of(self) if self.accounted else ""
 
     @property
     def shape(self) -> str:
-        """How thrust follows from a command: "square", "polynomial" or "table"."""
+        """Relation of thrust to command: "square", "polynomial" or "table"."""
         if self.table_commands is not None:
             return "table"
         return "square" if self.is_square else "polynomial"

@@ -57,7 +57,10 @@ class Waves(Harmonics):
 
 
 def components(numbers: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Of each wave wavenumber north, east and in all, omega, phase, and speed at the surface likewise: (n, k) each."""
+    """Components of each wave.
+
+    Wavenumber north, east and in all, omega, phase, and speed at the surface likewise: (n, k) each.
+    """
     omega, heading = 2.0 * np.pi / numbers["periods"], np.radians(numbers["headings_deg"])
     k = omega**2 / gravity[:, None]
     speed, along, across = numbers["amplitudes"] * omega, np.cos(heading), np.sin(heading)

@@ -11,7 +11,7 @@ from lgvi_warp.reference.rotation import Array
 
 @dataclass(frozen=True)
 class Measurement:
-    """What is taken for the motion at a tick: the truth, until a sensor changes it.
+    """Motion as measured at a tick: the truth, until a sensor changes it.
 
     position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
     angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick, numbers of the step that begins and of the tick;

@@ -29,7 +29,7 @@ class Ground:
         return float(total)
 
     def along(self, start: Array, beam: Array, most: float) -> float:
-        """How far along a beam the floor is: in each cell on its way the height is quadratic, known by three values."""
+        """Distance to the floor along a beam: in each cell on its way the height is quadratic, known by three values."""
         crossings = [0.0, most]
         for axis in (0, 1):
             if beam[axis] != 0.0:

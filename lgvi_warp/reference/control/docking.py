@@ -18,7 +18,7 @@ class Docking(Part):
         self.phase, self.J = "not begun", 0.0
 
     def next_phase(self, left: float, off: float) -> str:
-        """What the vehicle does, `left` before the dock's plane and `off` the centre line."""
+        """Next phase of the vehicle, `left` before the dock's plane and `off` the centre line."""
         outside = off > self.mouth + max(left, 0.0) * np.tan(self.funnel)
         if self.phase == "not begun":
             return "on the line" if left > 0.0 else "going round"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sensor reads, as numbers that a part may change."""
+"""Readings of a sensor, as numbers that a part may change."""
 
 from dataclasses import replace
 from typing import Any

@@ -12,7 +12,7 @@ from lgvi_warp.reference.rotation import Array
 
 @dataclass(frozen=True)
 class View:
-    """What a law may look at.
+    """Inputs of a law.
 
     R (3, 3) body to inertial; b (3,) [m] of the body's origin; nu (3,) [m/s] and Om (3,) [rad/s], body axes, relative to
     the water; t [s]; h [s], the length of the kick; step and member, which key random numbers; memory (rows,), what the
@@ -73,7 +73,7 @@ class Law:
         return np.zeros((6, 6))
 
     def flow(self, view: View) -> Flow:
-        """How the water moves at view.b."""
+        """Motion of the water at view.b."""
         return STILL
 
     def load(self, view: View, water_at: WaterAt) -> tuple[Array, Array]:
@@ -85,7 +85,7 @@ class Law:
         return np.zeros((6, 6)), np.zeros(6)
 
     def depart(self, view: View) -> Array:
-        """What it remembers of the step of view.h that begins at view.t."""
+        """Memory for the step of view.h that begins at view.t."""
         return view.memory
 
     def power(self, view: View) -> float:
@@ -105,13 +105,13 @@ class Law:
         return self
 
     def start(self) -> Array:
-        """What it remembers at t = 0."""
+        """Memory at t = 0."""
         return np.zeros(0)
 
     def evolve(self, view: View, second: bool) -> Array:
-        """What it remembers after the first or second half of a kick of view.h, view.t being the middle of the kick."""
+        """Memory after the first or second half of a kick of view.h, view.t being the middle of the kick."""
         return view.memory
 
     def follow(self, view: View) -> Array:
-        """What it remembers at view.t, exactly, from what it remembered view.h before; of time and memory alone."""
+        """Memory at view.t, exactly, from that view.h before; a function of time and memory alone."""
         return view.memory

@@ -47,7 +47,10 @@ class DrivenThrusters(Thrusters):
         return float(side * self.thrust(command)[i])
 
     def _range(self, i: int, side: float) -> float:
-        """Where the thrust of channel i, from the edge of the dead band, ends to rise: at the limit, or where it turns."""
+        """Command at which the thrust of channel i stops rising, from the edge of the dead band.
+
+        At the limit, or where it turns.
+        """
         reach = max(self.limit[i] - self.dead_band[i], 0.0)
         if self._thrust(i, side, 1e-9 * reach) <= 0.0 and self.table_commands is None:
             return 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all but the actuators of a vehicle take; the sum of all powers over time is in the state (see submaps.py)."""
+"""Power of everything but the actuators of a vehicle; the sum of all powers over time is in the state (see submaps.py)."""
 
 import numpy as np
 

@@ -39,11 +39,11 @@ class Following(Law):
         return np.zeros(len(self.limit)) if self.driven else self.commanded(0.0)
 
     def place(self, view: View) -> Array:
-        """What is remembered, or the command."""
+        """Remembered command, or the command itself."""
         return view.memory if self.moves else self.commanded(view.t)
 
     def evolve(self, view: View, second: bool) -> Array:
-        """As follow, over the half of a kick that ends in its middle, or begins there."""
+        """Follow over the half of a kick that ends in its middle, or begins there."""
         half = 0.5 * view.h
         return self.follow(replace(view, t=view.t + second * half, h=half))
 

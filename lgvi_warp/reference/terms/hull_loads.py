@@ -16,7 +16,7 @@ class HullLoads(Law):
     """Numbers as those of `lw.terms.HullLoads`, added_mass given; density [kg/m3]."""
 
     def points(self) -> list[tuple[float, float, float, float, float, float]]:
-        """Of each Gauss point x, its weight, Cd D, area S, (S^2 / 4 pi)' and added mass per length."""
+        """Gauss points: x, weight, Cd D, area S, (S^2 / 4 pi)' and added mass per length."""
         strips = []
         for i in range(len(self.stations) - 1):
             length = self.stations[i + 1] - self.stations[i]
@@ -67,5 +67,5 @@ class HullLoads(Law):
 
 
 def material(water: Flow, v: Array) -> Array:
-    """How the water changes for what moves at v in it [m/s2], inertial axes."""
+    """Acceleration of the water as seen by a point that moves at v in it [m/s2], inertial axes."""
     return water.rate + water.gradient @ v

@@ -33,7 +33,7 @@ class Waves(Law):
         return Flow(wave.real, (1j * omega * wave).real, np.outer(wave, by_place).real)
 
     def elevation(self, view: View) -> float:
-        """How far the surface is above still water at view.b [m]."""
+        """Height of the surface above still water at view.b [m]."""
         total = 0.0
         for a, period, heading_deg, phase in zip(
             self.amplitudes, self.periods, self.headings_deg, self.phases, strict=True

@@ -59,7 +59,7 @@ class Motion:
         return Motion(**states, memory={key: rows[places] for key, rows in self.memory.items()})
 
     def copied_memory(self) -> dict[str, np.ndarray]:
-        """What the members remember, to be changed."""
+        """Memory of the members, a copy to change."""
         return {key: rows.copy() for key, rows in self.memory.items()}
 
     def moved(self, by: np.ndarray) -> Motion:
@@ -74,7 +74,7 @@ class Motion:
             angular_velocity=self.angular_velocity + rate)  # fmt: skip
 
     def apart(self, others: Motion) -> np.ndarray:
-        """How far these are beside others, in the coordinates of `moved` (m, 12)."""
+        """Difference from others, in the coordinates of `moved` (m, 12)."""
         R = np.swapaxes(others.attitude, 1, 2) @ self.attitude
         skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
         sine = np.linalg.norm(skew, axis=1, keepdims=True)
@@ -188,7 +188,7 @@ class MotionBench:
         return rows | ({"": slice(0, self.bus.rows)} if self.bus else {})
 
     def _memory(self, packets: Packets) -> dict[str, np.ndarray]:
-        """What the members remember, as of `Motion`."""
+        """Memory of the members, as of `Motion`."""
         view, m = packets.laws.memory.view, packets.members.count
         return {
             key: view[:, rows].transpose(0, 2, 1).reshape(-1, rows.stop - rows.start)[:m].copy()

@@ -139,7 +139,7 @@ def disks(opened: Opened, skew: float, period: float) -> dict[str, np.ndarray]:
 
 
 def intercepts(disk: np.ndarray, skew: float) -> dict[str, np.ndarray]:
-    """What a disk margin (m,) says of gain alone, and of phase alone [rad]."""
+    """Gain margins and phase margins [rad] that a disk margin (m,) implies."""
     with np.errstate(all="ignore"):
         lower = np.maximum((1.0 - 0.5 * disk * (1.0 - skew)) / (1.0 + 0.5 * disk * (1.0 + skew)), 0.0)
         rest = 1.0 - 0.5 * disk * (1.0 + skew)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where members pass from one answer to the other: all brackets are divided at once."""
+"""Bisection of members from one answer to the other: all brackets are divided at once."""
 
 from __future__ import annotations
 

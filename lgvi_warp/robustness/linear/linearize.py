@@ -248,7 +248,7 @@ def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
 
 
 def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray]) -> list[Row]:
-    """What a closed loop remembers after a tick.
+    """Memory of a closed loop after a tick.
 
     What ticks note of themselves is left out, and what was not delivered: only its sign counts, for integrals that wait.
     """
@@ -269,7 +269,7 @@ def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray]) -> list[Row]
 
 
 def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool) -> list[Row]:
-    """What is remembered beside the commands."""
+    """Memory beside the commands."""
     choice = bench.plan.kernel_choice
     each = (term for term, _ in (choice.laws if terms else choice.parts_of_control) if term.key in memory)
     rows = []

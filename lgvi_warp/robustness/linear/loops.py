@@ -118,14 +118,14 @@ class Study:
 
 
 def held(controller: Any) -> frozenset[str]:
-    """What laws follow and a set-point holds: where it runs away beyond a limit of a law, all else may repeat."""
+    """Quantities that laws follow and a set-point holds: where one runs away beyond a limit of a law, all else may repeat."""
     guides = {wish: part for part in controller.guidance for wish in part.gives}
     wishes = {wish for law in controller.laws for wish in law.needs if isinstance(guides.get(wish), SetPoint)}
     return frozenset(wishes & {"depth", "heading", "position"} | ({"heading"} if "attitude" in wishes else set()))
 
 
 def _what_repeats(values: Mapping[str, np.ndarray], wishes: Collection[str]) -> np.ndarray:
-    """What must repeat, of samples (k, m, ...): velocities, rates, down, commands; and what is held."""
+    """Quantities that must repeat, of samples (k, m, ...): velocities, rates, down, commands; and what is held."""
     place, attitude = values["position"], values["attitude"]
     wished = {"depth": place[..., 2:], "position": place, "heading": attitude[..., :2, 0]}
     always = values["velocity"], values["angular_velocity"], attitude[..., 2, :], values["command"]
@@ -138,12 +138,12 @@ def _commands(repeating: np.ndarray, limits: np.ndarray) -> np.ndarray:
 
 
 def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """Which commands (m, channels) are at their limits: not those that can be nothing but 0."""
+    """Mask of commands (m, channels) at their limits: not those that can be nothing but 0."""
     return np.asarray((limits > 0.0) & (np.abs(command) >= limits * (1.0 - AT_LIMIT)))
 
 
 def _apart(repeating: np.ndarray, before: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """How far what must repeat is from before (m, ...): of what is large, as a part of its size."""
+    """Difference of repeating quantities from before (m, ...); relative for large ones."""
     size = np.maximum(1.0, np.abs(before))
     of_commands = _commands(size, limits)
     of_commands[:] = np.minimum(of_commands, np.maximum(limits, np.finfo(float).tiny))
@@ -222,7 +222,7 @@ class Loops:
 
 
 def _aside(attitude: np.ndarray, begun: np.ndarray, heading: bool) -> np.ndarray:
-    """How far the vertical, and the heading where it is held, are aside of where they began (k, m) [rad]."""
+    """Angles of the vertical, and of the heading where it is held, from where they began (k, m) [rad]."""
     apart = np.abs(attitude - begun)
     down = apart[..., 2, :].max(axis=-1)
     return np.maximum(down, apart[..., :2, 0].max(axis=-1)) if heading else down

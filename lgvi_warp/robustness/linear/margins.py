@@ -84,7 +84,7 @@ class Margins(Saved):
 
     @property
     def reasons(self) -> dict[str, int]:
-        """How many members have no margins, by the reason."""
+        """Number of members without margins, by reason."""
         return dict(Counter(each for each in self.why.tolist() if each).most_common())
 
     @property

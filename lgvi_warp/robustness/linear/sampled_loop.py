@@ -87,7 +87,7 @@ class SampledLoop:
         self._each = [with_loop - tick(1.0 - np.eye(6)[i])[1] for i in apart]
 
         def written(i: int) -> np.ndarray:
-            """What a unit of component i of the demand writes to commands and parts at a tick (n, C + m)."""
+            """Effect of a unit of component i of the demand on commands and parts at a tick (n, C + m)."""
             ends = []
             for sign in (1.0, -1.0):
                 numbers = {FACTOR: of_all(zero + 1.0), ADDED: np.tile(sign * STEP * np.eye(6)[i], (n, 1)), DELAY: zero}
@@ -206,7 +206,7 @@ class SampledLoop:
 
 
 def _of_states(tick: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """What a tick does (rows, 12 + m) of the motion at it and of parts, by states (s) and parts a period before."""
+    """Effect of a tick (rows, 12 + m) on the motion at it and on parts, by states (s) and parts a period before."""
     return np.concatenate([tick[:, :12] @ P[:12], tick[:, 12:]], axis=1)
 
 

@@ -165,7 +165,7 @@ def trim(
 
 
 class _Problem:
-    """What is free, and the accelerations that follow."""
+    """Free numbers, and the accelerations that follow."""
 
     def __init__(
         self, scene: Scene, bench: MotionBench, speed: float | None, free: Sequence[str] | None, fixed: dict[str, float]
@@ -206,7 +206,7 @@ class _Problem:
         self.ahead = float(np.linalg.norm(velocity)) or 1.0
 
     def guess(self, part: float) -> np.ndarray:
-        """Where to begin: the speed of the start, and parts of the largest commands."""
+        """Initial guess: the speed of the start, and parts of the largest commands."""
         values = np.where(np.isfinite(self.most), part * np.minimum(self.most, 1e3), self.ahead)
         return np.where(self.angles, 0.0, values)
 

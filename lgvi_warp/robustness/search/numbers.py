@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a search is about: one number of each member, a quantity of interest or a metric of a loop."""
+"""Objective of a search: one number of each member, a quantity of interest or a metric of a loop."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class Tuned(Saved):
 
     @property
     def optimism(self) -> float:
-        """How much less the risk seemed than it is of fresh members."""
+        """Difference between the risk of fresh members and that seen in the search."""
         return self.fresh_cost - self.cost
 
     def to_dict(self) -> dict[str, Any]:

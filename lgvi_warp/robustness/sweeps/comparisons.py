@@ -43,7 +43,7 @@ class PairedComparison:
 
     @property
     def verdict(self) -> str:
-        """What the second is beside the first: "better", "worse", "equivalent" or "undecided"; "" where none was given."""
+        """Verdict on the second beside the first: "better", "worse", "equivalent" or "undecided"; "" where none was given."""
         if np.isnan(self.matters):
             return ""
         return verdict(self.difference, self.matters, self.real, self.more_is_better)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sweep tells its user: comparisons, ranks, the worst members and their causes, as tables, files and words."""
+"""Output of a sweep: comparisons, ranks, the worst members and their causes, as tables, files and words."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ LISTED = 20
 
 
 class Sweep(SweepTable):
-    """What a sweep found: success, comparisons, ranks, the worst members; as tables, files and words.
+    """Answer of a sweep: success, comparisons, ranks, the worst members; as tables, files and words.
 
     Attributes:
         setup: what was run.

@@ -36,7 +36,7 @@ FOLDER = "rare"
 
 @dataclass(frozen=True, eq=False)
 class RareFailure:
-    """What is known of a cell's rare failure: the answer, and the members that other cases run, too; or why there is none."""
+    """Rare failure of a cell: the answer, and the members that other cases run, too; or the reason for its absence."""
 
     found: RareEvent | None
     members: FailingMembers | None = None
@@ -60,14 +60,14 @@ class RareFailure:
 
 
 def _places(u: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """Where each row (m, d) stands among others (k, d)."""
+    """Index of each row (m, d) among others (k, d)."""
     places = {row.tobytes(): i for i, row in enumerate(np.ascontiguousarray(among))}
     return np.array([places[row.tobytes()] for row in np.ascontiguousarray(u)])
 
 
 @dataclass(frozen=True)
 class RareComparison:
-    """How many times as often a second case fails as a first, at one point of the grid; p_holm: p by Holm."""
+    """Ratio of the failure probabilities of a second and a first case, at one point of the grid; p_holm: p by Holm."""
 
     first: str
     second: str
@@ -120,7 +120,7 @@ class RareFailures:
         return {name: defaults[name].default for name in RARE} | (dict(rare) if isinstance(rare, Mapping) else {})
 
     def of(self, cell: SweepCell) -> RareFailure | None:
-        """What is known of a cell; None where nothing was asked."""
+        """Rare failure of a cell; None where none was requested."""
         return self._answers.get(self._key(cell))
 
     def _key(self, cell: SweepCell) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sweep tells of rare failures: records, words, and what they follow from."""
+"""Output of a sweep on rare failures: records, words, and their provenance."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def rare_rows(sweep: SweepTable) -> list[dict[str, Any]]:
 
 
 def provenance_of_rare(sweep: SweepTable, cell: SweepCell) -> dict[str, Any]:
-    """What a sweep's file says of a cell's rare failure; nothing where it was not asked for."""
+    """Content of a sweep's file on a cell's rare failure; empty where none was requested."""
     if sweep.rares is None or (answer := sweep.rares.of(cell)) is None:
         return {}
     said: dict[str, Any] = {"asked": sweep.rares.asked(cell.case), "refused": answer.refused}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one case at one point of the grid showed, member by member, in memory or in a file that a resumed sweep finds."""
+"""Outcome of one case at one point of the grid, member by member, in memory or in a file that a resumed sweep finds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FOLDER = "cells"
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What the members of a cell showed: status (n,) of `Status`, and metrics (n,) by name; or why it was refused."""
+    """Outcome of a cell's members: status (n,) of `Status`, and metrics (n,) by name; or why it was refused."""
 
     status: np.ndarray
     numbers: Mapping[str, np.ndarray]

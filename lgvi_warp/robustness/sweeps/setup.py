@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sweep runs: cases, grid, members and metrics; its cells, and their settings."""
+"""Runs of a sweep: cases, grid, members and metrics; its cells, and their settings."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ END = "time_to_failure"
 
 @dataclass(frozen=True)
 class Setup:
-    """What is to be run: cells and the settings of their runs."""
+    """Runs to make: cells and the settings of their runs."""
 
     scene: Scene
     cases: tuple[Case, ...]
@@ -130,7 +130,7 @@ class SweepCell:
 def setup_of(
     scene: Any, cases: Any, grid: Any, vary: Any, members: Any, seed: Any, sampling: Any, metrics: Any,
     settings: Mapping[str, Any], rare: Any = None, *, predict: Callable[..., Prediction] = predict) -> Setup:  # fmt: skip
-    """What a sweep would run; `settings` are those of solve, all others as of `sweep`."""
+    """Runs that a sweep would make; `settings` are those of solve, all others as of `sweep`."""
     faults = Faults()
     base, together = _base(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
@@ -160,7 +160,7 @@ def setup_of(
 
 
 def too_many_text(setup: Setup, count: int, *, predict: Callable[..., Prediction] = predict) -> str:
-    """What is wrong with so many cells: the time that they would take."""
+    """Problem of so many cells: the time that they would take."""
     try:
         prediction = _prediction(setup, None, predict)
     except SceneError:
@@ -170,13 +170,13 @@ def too_many_text(setup: Setup, count: int, *, predict: Callable[..., Prediction
 
 
 def _prediction(setup: Setup, threads: int | None, predict: Callable[..., Prediction]) -> Prediction:
-    """What the first cell would take."""
+    """Predicted cost of the first cell."""
     fleet, _ = setup.fleet(setup.cases[0], setup.first_point)
     return predict(fleet, threads=threads, **setup.kept(fleet), **setup.settings)
 
 
 def plan_text(setup: Setup, threads: int | None = None, *, predict: Callable[..., Prediction] = predict) -> str:
-    """What a sweep would take, as lines of text, from a trial of its first cell."""
+    """Predicted cost of a sweep, as lines of text, from a trial of its first cell."""
     prediction, count = _prediction(setup, threads, predict), len(setup.cells)
     points, duration = count // len(setup.cases), duration_text((prediction.advance + prediction.set_up) * count)
     lines = [f"cells       {count:,}: {len(setup.cases)} cases at {points:,} points of the grid",

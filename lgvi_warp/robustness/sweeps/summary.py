@@ -131,7 +131,7 @@ def names_of(cells: Sequence[SweepCell]) -> str:
 
 
 def _at(points: Sequence[Mapping[str, Any]]) -> str:
-    """Where points of the grid lie: " at a = 1 or 2, b = 3"; "" without a grid."""
+    """Text of the place of points of the grid: " at a = 1 or 2, b = 3"; "" without a grid."""
     if not points or not points[0]:
         return ""
     values = {name: list(dict.fromkeys(str(point[name]) for point in points)) for name in points[0]}

@@ -33,7 +33,7 @@ SUCCESS, RARE = "success", "rare"
 @explained
 @dataclass(frozen=True, eq=False, repr=False)
 class SweepTable:
-    """What the members of a sweep showed, and how often they passed."""
+    """Outcomes of a sweep's members, and their success rates."""
 
     setup: Setup
     cells: list[SweepCell]
@@ -272,7 +272,7 @@ class SweepTable:
         return row | self._rare_row(cell)
 
     def _rare_row(self, cell: SweepCell) -> dict[str, Any]:
-        """What is known of a cell's rare failure, where it was asked for."""
+        """Columns on a cell's rare failure, where it was requested."""
         answer = None if self.rares is None else self.rares.of(cell)
         if answer is None:
             return {}

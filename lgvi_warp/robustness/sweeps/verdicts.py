@@ -34,7 +34,7 @@ def matters_of(matters: Any, metrics: Sequence[str], success: str) -> dict[str, 
 
 
 def verdict(difference: Difference, matters: float, real: bool, more_is_better: bool) -> str:
-    """What a difference is beside the least that matters, in its unit.
+    """Verdict on a difference beside the least that matters, in its unit.
 
     Equivalent: its interval lies within +-matters. Better and worse: it is real, and its interval lies beyond.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the members' numbers are chosen: designs of the unit cube, tables and grids.
+"""Choice of the members' numbers: designs of the unit cube, tables and grids.
 
 A sampling gives any members by their indices, so that a member is the same in every run that contains it. Distributions turn
 the cube's levels into values (sampling/distributions). The cube's columns are in the order of the names that vary

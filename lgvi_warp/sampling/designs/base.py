@@ -24,7 +24,7 @@ Drawn = dict[str, np.ndarray]
 @explained
 @dataclass(frozen=True)
 class Sampling:
-    """How the points of the members fill the unit cube.
+    """Arrangement of the members' points in the unit cube.
 
     Class attributes: `kind` is the name in a scene file; `fewer` says whether a run may take only the first of the members
     that the sampling brings.
@@ -69,7 +69,7 @@ class Sampling:
         return {}
 
     def own_weights(self) -> np.ndarray | None:
-        """What the members (members,) count for in statistics, of mean 1; None: all count alike."""
+        """Weights of the members (members,) in statistics, of mean 1; None: all count alike."""
         return None
 
     def arrays(self) -> dict[str, np.ndarray]:

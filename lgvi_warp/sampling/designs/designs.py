@@ -107,7 +107,7 @@ class Saltelli(Sampling):
         super().check(faults, space, members)
 
     def replicate_of(self, groups: np.ndarray) -> np.ndarray:
-        """Which sequence each group is of.
+        """Sequence of each group.
 
         Args:
             groups: Indices of groups, (n,).
@@ -127,7 +127,7 @@ class Saltelli(Sampling):
         return space.split(np.where(self.rows(space)[row], AB[:, D:], AB[:, :D]))
 
     def rows(self, space: Space) -> np.ndarray:
-        """Which columns each member of a group has from point B.
+        """Columns that each member of a group takes from point B.
 
         Args:
             space: The cube: which names vary, with how many columns each.

@@ -223,7 +223,7 @@ class Table(Sampling):
 
 
 def moved(file: str, sha256: str | None, beside: Path) -> str:
-    """Where a table is now, if it moved with a store: the file of its checksum, by the last parts of its path."""
+    """Present place of a table that moved with a store: the file with its checksum, by the last parts of its path."""
     parts = Path(file).parts[1:]
     if sha256 is None or Path(file).exists():
         return file

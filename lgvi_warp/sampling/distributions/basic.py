@@ -100,7 +100,7 @@ class Distribution:
         return None
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """What prevents it from drawing quantities of these shapes, and the remedy; None where it fits."""
+        """Problem with drawing quantities of these shapes, and the remedy; None where it fits."""
         if len(shapes) != 1:
             return f"is of one quantity, and there are {len(shapes)}", "give each a distribution"
         (shape,) = shapes

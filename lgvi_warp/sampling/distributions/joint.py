@@ -294,7 +294,7 @@ class PositiveDefinite(JointLaw):
         return f"has {np.asarray(self.sigma).size} sigmas for a {d} x {d} matrix", f"give one number or {d}"
 
     def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
-        """What prevents the distribution from starting at the scene's matrix.
+        """Problem with a start at the scene's matrix.
 
         Args:
             base: The scene's matrix (d, d).

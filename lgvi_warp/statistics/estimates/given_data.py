@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which inputs explain an output, from members at hand: first-order indices by bins, and standardised regression."""
+"""Inputs that explain an output, from given members: first-order indices by bins, and standardised regression."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NOTHING = 1e-20
 
 
 class Explained(NamedTuple):
-    """What of an output one input explains: the share of its variance (first-order index), which may come out just below 0."""
+    """Share of an output's variance that one input explains (first-order index); it may come out just below 0."""
 
     share: float
     lower: float
@@ -90,7 +90,7 @@ def _index(x: np.ndarray, y: np.ndarray, confidence: float) -> tuple[float, floa
 
 
 def _left(x: np.ndarray, y: np.ndarray, bins: np.ndarray, with_lines: bool) -> tuple[np.ndarray, int]:
-    """What the bins leave of each number (n,), and by how many numbers they fit it.
+    """Residual of each number (n,) after the bins, and the number of fitted parameters.
 
     A bin fits the mean of its members, or a line, so that little of a steep dependence is left.
     """

@@ -40,7 +40,7 @@ def all_of(*names: str) -> Quantity:
 
 
 def _nothing(samples: Fields, members: Members) -> np.ndarray:
-    """What numbers are made of that need no samples."""
+    """Empty inputs for numbers that need no samples."""
     return np.zeros((len(samples.time), members.count))
 
 
@@ -84,7 +84,7 @@ class Effort(OfChannels):
 
 @dataclass(frozen=True, eq=False)
 class Travel(OfChannels):
-    """How far the actuators move, |change| from tick to tick summed over channels [unit of the commands]; then statistics.
+    """Travel of the actuators, |change| from tick to tick summed over channels [unit of the commands]; then statistics.
 
     Args:
         of: "actuator" (the default: where they are, after delay, fault, limit and lag), "command", or one channel.
@@ -220,7 +220,7 @@ class TimeToFailure(OfOne):
 
 
 class TickSamples(dict[str, np.ndarray]):
-    """What a user's metric is told of one tick: samples (n, ...) by name, the time t [s], and dt [s] since the tick before."""
+    """Input of a user's metric at one tick: samples (n, ...) by name, the time t [s], and dt [s] since the tick before."""
 
     def __init__(self, samples: Mapping[str, np.ndarray], t: float, dt: float):
         super().__init__(samples)
@@ -287,7 +287,7 @@ class CustomMetric(Metric):
         return values
 
     def _asked(self, state: np.ndarray | None, x: np.ndarray, t: float, dt: float) -> np.ndarray:
-        """What the function returns at a tick; x: (d, n)."""
+        """Value of the function at a tick; x: (d, n)."""
         values = self._real(self.of(state, TickSamples(dict(self._divided(x)), t, dt)))
         if values.shape[-1:] != x.shape[1:] or (state is not None and values.shape != state.shape):
             wanted = f"(..., {x.shape[1]})" if state is None else f"{state.shape}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How each member entered its dock."""
+"""Entry of each member into its dock."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ FIELDS = ("position", "attitude", "velocity")
 
 @dataclass(frozen=True, eq=False)
 class DockContact(Metric):
-    """How each member went through the plane of its dock for the first time within its mouth; then statistics of it.
+    """First passage of each member through the plane of its dock within its mouth; then statistics of it.
 
     The dock is that of a guidance `lw.control.Docking`. Between two ticks the way is a cubic with the places and velocities
     there. A member that did not dock has no number (NaN), and is left out of statistics.
@@ -100,7 +100,7 @@ class DockContact(Metric):
         return {"contact": contact}
 
     def _at_plane(self, a: np.ndarray, b: np.ndarray, t: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, ...]:
-        """What is asked for, the distance from the centre line and the radius of the mouth, where members meet the plane.
+        """Requested quantity, distance from the centre line and radius of the mouth, where members meet the plane.
 
         a, b: numbers at the ticks before and after it (8, m); t: time of the latter (m,) [s]; dt: between them (m,) [s].
         """
@@ -122,7 +122,7 @@ class DockContact(Metric):
 
 
 def _along(v: np.ndarray, heading: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of inertial vectors (..., n, 3) the part against a heading (1 or n,), that to starboard of it, and that downward."""
+    """Parts of inertial vectors (..., n, 3) against a heading (1 or n,), to starboard of it, and downward."""
     c, s = np.cos(heading), np.sin(heading)
     return -(c * v[..., 0] + s * v[..., 1]), c * v[..., 1] - s * v[..., 0], v[..., 2]
 

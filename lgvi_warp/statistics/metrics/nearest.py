@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How near each member came to an event of the scene."""
+"""Closest approach of each member to an event of the scene."""
 
 from __future__ import annotations
 

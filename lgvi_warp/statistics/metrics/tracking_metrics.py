@@ -173,7 +173,7 @@ class Peak(Overshoot):
 
 @dataclass(frozen=True, eq=False)
 class RiseTime(OfCourse):
-    """How long each member takes from 10 % to 90 % of its step [s]; then statistics of it.
+    """Time of each member from 10 % to 90 % of its step [s]; then statistics of it.
 
     From the first tick with at least 10 % of the step done to the first one with at least 90 %. Infinite where a member never
     gets there.
@@ -213,7 +213,7 @@ class RiseTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class SettlingTime(OfCourse):
-    """When each member comes within a band about its goal for good [s]; then statistics of it.
+    """Time after which each member stays within a band about its goal [s]; then statistics of it.
 
     The time of the first tick from which on |d| <= within at every tick of its time under way; infinite where it is outside
     at the last one.

@@ -76,7 +76,7 @@ class OfPath(MemberStatistic):
 
     @property
     def reduction(self) -> Reduction:
-        """How samples (replicates, d components, members) become the number of each path."""
+        """Reduction of samples (replicates, d components, members) to the number of each path."""
         return self._reduction
 
     def open(self, time: np.ndarray, count: int) -> _Walk:

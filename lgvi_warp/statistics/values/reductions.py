@@ -15,7 +15,7 @@ def _as_it_is(x: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Reduction:
-    """How the samples of paths become one number for each path.
+    """Reduction of the samples of paths to one number for each path.
 
     step: function (state, before, x, dt, share) that returns the state after another sample x. `before` is the sample before
         it, dt the time [s] between the two, share that time divided by the time since the first sample.

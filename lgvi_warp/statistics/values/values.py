@@ -69,7 +69,7 @@ class Values:
 
     @property
     def weights(self) -> np.ndarray:
-        """What each member weighs at each time, (k, n); 0 where it does not count."""
+        """Weight of each member at each time, (k, n); 0 where it does not count."""
         return np.ones((len(self.x), self.x.shape[2])) if self._measure is None else self._measure
 
     def with_numbers(self, x: np.ndarray) -> Values:

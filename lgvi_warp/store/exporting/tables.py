@@ -52,7 +52,7 @@ def _write(tracks: Tracks, report: Report, writer_of: Callable[[Any], Any]) -> N
 
 
 def _width(tracks: Tracks) -> int:
-    """How many numbers a row has."""
+    """Count of numbers in a row."""
     return len(_columns(tracks, slice(0, 1)))
 
 
@@ -92,7 +92,7 @@ def _columns(tracks: Tracks, rows: slice) -> Columns:
 
 
 def _ends(tracks: Tracks, rows: slice) -> Columns:
-    """How and when some members ended, and what they count for."""
+    """Outcomes, end times and weights of some members."""
     result = tracks.result
     names = ["status", *(["event"] if result.event is not None else []), "failure_time"]
     ends: Columns = {name: ("s" if name in TIMES else "", tracks.of_members(name, rows)) for name in names}

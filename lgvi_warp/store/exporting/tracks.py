@@ -63,7 +63,7 @@ class Tracks:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the run comes from."""
+        """Provenance of the run."""
         return self.result.provenance
 
     @property
@@ -100,7 +100,7 @@ class Tracks:
         return np.asarray(self.result.samples[name][when][:, places])
 
     def of_members(self, name: str, rows: slice = slice(None)) -> np.ndarray:
-        """What is recorded of some of the members, such as "status"."""
+        """Records of some of the members, such as "status"."""
         return np.asarray(getattr(self.result, name))[self.places[rows]]
 
     def statuses(self) -> list[str]:
@@ -108,7 +108,7 @@ class Tracks:
         return [Status(int(code)).name.lower() for code in self.of_members("status")]
 
     def numbers(self, rows: slice = slice(None)) -> dict[str, np.ndarray]:
-        """What varied of some of the members by name, (m, ...): parameters, and numbers of the start."""
+        """Varied numbers of some of the members by name, (m, ...): parameters, and numbers of the start."""
         varied = {name: _of(self.result.parameters, name, self.places[rows]) for name in self.varied}
         starts = {name: _of(self.result.starts, name, self.places[rows]) for name in self.result.starts}
         return dict(sorted((varied | starts).items()))
@@ -187,7 +187,7 @@ def _identities(result: Result, source: Result) -> np.ndarray:
 
 
 def recorded(provenance: Any, *keys: str) -> Any:
-    """What the provenance of a run, which may come from elsewhere, tells at some keys; None where it has no such."""
+    """Value at some keys of a run's provenance, which may come from elsewhere; None where missing."""
     for key in keys:
         provenance = provenance.get(key) if isinstance(provenance, Mapping) else None
     return provenance
@@ -289,7 +289,7 @@ DERIVED = {
 
 
 def derived_of(tracks: Tracks, names: Sequence[str]) -> tuple[DerivedNumber, ...]:
-    """Those of the names that follow from what the run has kept."""
+    """Derived numbers among the names that follow from kept samples."""
     chosen = (DERIVED[name] for name in names)
     return tuple(
         item

@@ -59,7 +59,7 @@ def netcdf(tracks: Tracks, target: Path, report: Report) -> None:
 
 
 def _attributes(tracks: Tracks) -> dict[str, str]:
-    """What the file is about."""
+    """Attributes of the file."""
     begin, end = (str(np.datetime_as_string(tracks.moments(at), unit="ms")) for at in tracks.time[[0, -1]])
     dated = {"time_coverage_start": begin + "Z", "time_coverage_end": end + "Z"}
     return {
@@ -120,7 +120,7 @@ def _layout(tracks: Tracks, file: Any) -> list[str]:
 
 
 def _described(meaning: str, unit: str, entry: int, entries: int) -> dict[str, str]:
-    """What an entry of a number is, and its unit, where one is known: forces and moments have two, "N, N m"."""
+    """Meaning of an entry of a number, and its unit, where one is known: forces and moments have two, "N, N m"."""
     units = [word.strip().replace("/s", " s-1") for word in unit.split(",")]
     known = len(units) == 1 or 3 * len(units) == entries
     return {"long_name": meaning} | ({"units": units[entry // 3 if len(units) > 1 else 0]} if known and unit else {})
@@ -133,7 +133,7 @@ def _standard(tracks: Tracks, name: str) -> dict[str, str]:
 
 
 def _about(tracks: Tracks, name: str) -> dict[str, str]:
-    """Which coordinates a number has."""
+    """Coordinates of a number."""
     if name in ("lat", "lon"):
         return {}
     if tracks.plane is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `derivatives` answers: derivatives with their errors, and what has none."""
+"""Answer of `derivatives`: derivatives with their errors, and numbers without one."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ NUMBERS = ("jacobian", "error", "increments")
 
 @dataclass(frozen=True, eq=False)
 class SlopesQuestion:
-    """What is asked.
+    """Question of the derivatives.
 
     fleet: of which members. scene: of the copies. interests: what of them. names, targets: by which numbers. alone: of a
     scene, so that answers have no axis of members. rounding: quantum of each sensor that rounds. smoothed: names of those
@@ -150,7 +150,7 @@ class Answering:
         return groups
 
     def _unsure(self, near: Neighbours, slopes: Extrapolated) -> np.ndarray:
-        """Which members (n,) have derivatives that differences at some increments do not give, and others may."""
+        """Mask of members (n,) whose derivatives need other increments."""
         against = [[self._question.known_against(self._question.interests[i], self._question.targets[j])
                     for j in self._live] for i in self._runs.owner]  # fmt: skip
         asked = np.array([[reason is None for reason in row] for row in against], bool)
@@ -214,7 +214,7 @@ class Answering:
         return "; ".join(counted[:3])
 
     def _stop_times(self, members: np.ndarray, near: Neighbours) -> dict[tuple[int, int, int], SlopeOrReason]:
-        """What is told of the times at which events stopped members, by place (row, i, j)."""
+        """Derivatives of the times at which events stopped members, by place (row, i, j)."""
         runs, times = self._runs, dict[tuple[int, int, int], SlopeOrReason]()
         grid, events = runs.plan.grid, undefined.timed_events(self._question.scene)
         settings = self._same_steps()

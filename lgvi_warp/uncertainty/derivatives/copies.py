@@ -46,7 +46,7 @@ class MovedCopies:
 
     @functools.cached_property
     def numbers(self) -> dict[str, np.ndarray]:
-        """What the members have of their own, and what is moved, whole: (n, ...) by name."""
+        """Numbers of the members' own, and the moved ones, whole: (n, ...) by name."""
         fleet, n = self.fleet, self.fleet.members
         parameters = fleet.parameters(0, n)
         known = {f"start.{name}": value[None] for name, value in fleet.scene.start.given().items()}
@@ -70,7 +70,7 @@ class MovedCopies:
 
     @functools.cached_property
     def sizes(self) -> np.ndarray:
-        """What increments are parts of (n, k): the number, or the largest of its array; 1 where all are 0."""
+        """Scale of relative increments (n, k): the number, or the largest of its array; 1 where all are 0."""
         columns = []
         for j, target in enumerate(self.targets):
             values = self.numbers[target.name]
@@ -104,7 +104,7 @@ class MovedCopies:
         return frozenset(self.scene.parameters())
 
     def physical(self, each: np.ndarray, increments: np.ndarray) -> np.ndarray:
-        """Which increments (k, 2, levels) above and below leave all members each (n,) physical; increments: (n, k, levels).
+        """Mask of increments (n, k, levels), as (k, 2, levels) above and below, that leave all members each (n,) physical.
 
         Why a number has none at all is noted in `unmovable`, by its place.
         """
@@ -142,7 +142,7 @@ class MovedCopies:
 
 @dataclass(frozen=True)
 class CopyEnds:
-    """What copies gave: values (N, m), NaN of those that failed, their status (N,) and the time of their end (N,) [s]."""
+    """Ends of copies: values (N, m), NaN of those that failed, their status (N,) and the time of their end (N,) [s]."""
 
     values: np.ndarray
     status: np.ndarray
@@ -185,7 +185,7 @@ class CopyRuns:
     def __call__(
         self, each: np.ndarray, by: np.ndarray, report: Callable[[float], None] | None = None
     ) -> tuple[CopyEnds, np.ndarray]:
-        """What copies of members each (N,) give, moved by (N, k), and how far they were moved (N, k), rounding included."""
+        """Ends of copies of members each (N,), moved by (N, k), and their displacements (N, k), rounding included."""
         parts, added = [], self.copies.at[each] + by - self.copies.at[each]
         for first in range(0, len(each), PATHS_AT_ONCE):
             rows = slice(first, first + PATHS_AT_ONCE)
@@ -211,7 +211,7 @@ class CopyRuns:
         return CopyEnds(values, status, np.asarray(result.end_time))
 
     def nudged(self, final: bool) -> tuple[np.ndarray, Result]:
-        """How often the distance between two starts is larger at the end (n,), and the run from the first ones.
+        """Growth factor of the distance between two starts up to the end (n,), and the run from the first ones.
 
         final: whether its end is kept.
         """
@@ -247,7 +247,7 @@ class Neighbours:
     time: np.ndarray
 
     def part(self, members: np.ndarray) -> Neighbours:
-        """Those of some members."""
+        """Neighbours of some members."""
         return Neighbours(*(values[members] for values in vars(self).values()))
 
 
@@ -281,7 +281,7 @@ def neighbours(
 
 
 def _moves(increments: np.ndarray, good: np.ndarray) -> np.ndarray:
-    """How far copies are moved (n (1 + 2 k levels), k): a member itself, then copies above and below of each increment.
+    """Displacements of copies (n (1 + 2 k levels), k): a member itself, then copies above and below of each increment.
 
     increments: (n, k, levels). good: (k, 2, levels), those that are not good stay where they are.
     """

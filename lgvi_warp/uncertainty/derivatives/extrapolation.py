@@ -43,7 +43,7 @@ class Extrapolated:
     code: np.ndarray
 
     def part(self, members: np.ndarray) -> Extrapolated:
-        """Those of some members, where the first axis is that of members."""
+        """Values of some members, where the first axis is that of members."""
         return Extrapolated(*(values[members] for values in vars(self).values()))
 
 
@@ -132,7 +132,7 @@ def _windows(slopes: np.ndarray, sides: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def _beyond_finer(value: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """How far each derivative is from those of finer increments, less what round-off explains."""
+    """Difference of each derivative from those of finer increments, less round-off."""
     beyond = np.zeros_like(value)
     for i in range(value.shape[-1] - 1):
         apart = np.abs(value[..., i : i + 1] - value[..., i + 1 :]) - 4.0 * noise[..., i + 1 :]
@@ -141,7 +141,7 @@ def _beyond_finer(value: np.ndarray, noise: np.ndarray) -> np.ndarray:
 
 
 def _jump(gaps: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What is left of the gap between slopes to both sides as the increment goes to 0, and how sure that is."""
+    """Limit of the gap between slopes to both sides as the increment goes to 0, and its uncertainty."""
     once = gaps[..., 1:] + np.diff(gaps, axis=-1) / (RATIO - 1.0)
     twice = once[..., 1:] + np.diff(once, axis=-1) / (RATIO**3 - 1.0)
     return twice, np.abs(np.diff(once, axis=-1)) + 8.0 * noise[..., 2:]

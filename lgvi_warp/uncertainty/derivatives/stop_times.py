@@ -54,7 +54,7 @@ class StopTimeRuns(CopyRuns):
 
 
 def _root(distances: np.ndarray, degree: int) -> np.ndarray:
-    """Where the polynomial through samples (4, N) at 0, 1, 2, 3 is 0 (N,); NaN where that is far from them."""
+    """Root of the polynomial through samples (4, N) at 0, 1, 2, 3 (N,); NaN where that is far from them."""
     places = np.arange(degree + 1.0)
     to_powers = np.linalg.inv(np.vander(places, increasing=True))
     powers = to_powers @ distances[: degree + 1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a scene has no derivative, whatever differences say: what goes in steps, jumps by a tick or is known no more."""
+"""Numbers of a scene without derivative, whatever differences say: steps, jumps by a tick, lost memory."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def has_legs(scene: Any) -> bool:
 
 
 def legs_done(scene: Any, result: Result) -> np.ndarray:
-    """How many legs of waypoints, or ways to a dock, members have done at the end of a run (n,), 0 without any."""
+    """Number of legs of waypoints, or ways to a dock, that members have done at the end of a run (n,), 0 without any."""
     done = np.zeros(result.members)
     for part in (part for part in scene.parts if type(part) in COUNTING):
         remembered = result.final.lanes[f"{MEMORY}part {part.key} {type(part).__name__}"]

@@ -138,7 +138,7 @@ class Estimated(Summarized, Saved):
 
 
 def _digits(value: float, half: float) -> int:
-    """How many digits show a value to a hundredth of half its interval."""
+    """Number of digits that show a value to a hundredth of half its interval."""
     if not (math.isfinite(half) and half > 0.0 and value):
         return 6
     return min(12, max(3, 2 + math.ceil(math.log10(max(abs(value) / half, 1.0)))))

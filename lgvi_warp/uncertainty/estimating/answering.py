@@ -88,7 +88,7 @@ def tried(
 
 
 def looked(pilot: Pilot, chosen: Chosen, coarser: Sequence[Setting]) -> Observed:
-    """What the settings have in common, of as many members as are worth their cost."""
+    """Common part of the settings, from as many members as are worth their cost."""
     top, variance, only = chosen.setting, chosen.variance, pilot.estimator
     few = only is None and pilot.plain_members(top, pilot.first, unseen=True) <= FEW
     seen = observed(pilot, top, [] if few else in_single(pilot, top, coarser), pilot.first)

@@ -22,7 +22,7 @@ ALIKE = 2.0
 
 @dataclass(frozen=True)
 class StepChange:
-    """How much a statistic changes from a coarse setting to a fine one, both on the same members and noise.
+    """Change of a statistic from a coarse setting to a fine one, both on the same members and noise.
 
     value: coarse less fine. half: of its 95 % interval. left: 1 - rho^2. members: number of pairs.
     alike: whether both spread about as much, as members that are apart by chaos do, and steps that are too long do not.
@@ -54,7 +54,7 @@ class Bias:
 
     @property
     def mean_square(self) -> float:
-        """What it adds to the square of the error: half an interval is two standard errors."""
+        """Contribution to the squared error: half an interval is two standard errors."""
         return self.value * self.value + 0.25 * self.half * self.half
 
 
@@ -75,7 +75,7 @@ def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0) -> Step
 
 
 def beyond(halvings: Sequence[StepChange], order: int = 1) -> float:
-    """What is left beyond the finest step: the last halving bounds it for order one; a third where halvings fall faster.
+    """Bound of the bias at the finest step, from the last two halvings.
 
     docs/theory/estimators.md, (E24).
 

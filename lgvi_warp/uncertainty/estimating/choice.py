@@ -61,7 +61,7 @@ class Way:
 
 @dataclass(frozen=True)
 class Observed:
-    """What a pilot saw: contributions of the same members in settings, the finest first, and what these cost.
+    """Observations of a pilot: contributions of the same members in settings, the finest first, and what these cost.
 
     z: (settings, n). normals: (n, d) of the members' numbers. least: smallest change of a contribution.
     costs: of a member alone [s]. pair: cost of a member of two settings, by their numbers [s]. settings: in the same order.

@@ -91,7 +91,7 @@ def seems_few(pilot: Pilot, steps: Sequence[Setting]) -> bool:
 
 
 def price(pilot: Pilot, chosen: Chosen) -> float:
-    """What a member costs over the variance that is left [s]."""
+    """Cost of a member over the remaining variance [s]."""
     return pilot.runs.cost(chosen.setting, pilot.grid(chosen.setting)) / chosen.variance
 
 
@@ -121,7 +121,7 @@ def with_rounding(pilot: Pilot, chosen: Chosen) -> Chosen:
 
 
 def difference_of(pilot: Pilot, setting: Setting, twin: Setting) -> StepChange:
-    """How much the target changes from a setting to the same in double precision; SceneError where members fail there."""
+    """Change of the target from a setting to the same in double precision; SceneError where members fail there."""
     y = pilot.y(twin, pilot.grid(setting), pilot.first)
     if not np.isfinite(y).all():
         raise failing(twin, y)

@@ -133,7 +133,7 @@ class VarianceModel:
 
 
 def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceModel:
-    """How the variance of the mean of independent members falls, from some of them (n,)."""
+    """Model of the variance of the mean of independent members, from some of them (n,)."""
     return VarianceModel(plain(y, least).variance * len(y), cost)
 
 

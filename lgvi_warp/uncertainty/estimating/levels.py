@@ -36,7 +36,10 @@ SINGLE, CHEAPER = 0.55, 0.5
 
 @dataclass(frozen=True)
 class Setting:
-    """How members are run: method, step [s], precision, and which scene, 0 the user's, others the cheaper ones in order."""
+    """Setting of members' runs.
+
+    Method, step [s], precision, and which scene, 0 the user's, others the cheaper ones in order.
+    """
 
     method: Any
     h: float
@@ -50,7 +53,7 @@ class Setting:
 
     @property
     def kind(self) -> tuple[Any, ...]:
-        """What settings that differ in their steps alone have in common."""
+        """Common key of settings that differ in their steps alone."""
         return self.method, self.dtype, self.scene
 
     def options(self) -> dict[str, Any]:
@@ -149,7 +152,7 @@ class Runs:
 
     @property
     def members(self) -> int:
-        """How many members were run so far."""
+        """Number of members run so far."""
         return sum(call.members for call in self._calls)
 
     def cost(self, setting: Setting, grid: float | None = None) -> float:

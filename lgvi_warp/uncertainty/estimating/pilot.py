@@ -111,7 +111,7 @@ class Pilot:
             return mean_of(parts, lambda z: (z - mean) ** 2) + (UNSEEN * least) ** 2 / members
 
     def reach(self, setting: Setting) -> float:
-        """How far numbers may be that none of the pilot's members has, by probes far out: of means, and of parts of them."""
+        """Range of numbers that no member of the pilot has, by probes far out: of means, and of parts of them."""
         if self.target.kind not in ("mean", "cvar") or not self.runs.dimensions:
             return 0.0
         if setting not in self.reaches:
@@ -146,7 +146,7 @@ class Pilot:
         return self.error * abs(at.value) if self.relative else self.error
 
     def plain_members(self, setting: Setting, members: int, *, unseen: bool = False) -> float:
-        """How many members plain Monte Carlo needs; unseen: with those that few members do not show."""
+        """Number of members that plain Monte Carlo needs; unseen: with those that few members do not show."""
         error, variance = self.asked(self.solved(setting, members)), self.variance(setting, members)
         if not error * error > 0.0:
             return math.inf if variance > 0.0 else 1.0
@@ -157,11 +157,11 @@ class Pilot:
             return float(half + np.hypot(half, extra / error))
 
     def most_seconds(self, setting: Setting, members: int) -> float:
-        """What the pilot may cost [s]."""
+        """Largest cost of the pilot [s]."""
         return SHARE * self.plain_members(setting, members) * self.runs.cost(setting, self.grid(setting))
 
     def pair(self, coarse: Setting, fine: Setting, members: int) -> StepChange:
-        """How much the target changes from one setting to a finer one."""
+        """Change of the target from one setting to a finer one."""
         grid = self.grid(fine)
         below, above = (self.samples(setting, grid, members) for setting in (coarse, fine))
         at = self.target.solved(above)
@@ -171,7 +171,7 @@ class Pilot:
         return replace(changes[0], value=sum(p * change.value for p, change in parts), half=half)
 
     def _change(self, below: np.ndarray, above: np.ndarray, at: Solved) -> StepChange:
-        """How much the contributions of a stratum's members change."""
+        """Change of the contributions of a stratum's members."""
         spread = float(np.std(above[np.isfinite(above)])) if np.isfinite(above).any() else 0.0
         if self.target.smooth and spread > 0.0:
             width = WIDTH * spread
@@ -345,7 +345,7 @@ def _ended(pilot: Pilot, ladder: Ladder) -> str:
 
 
 def observed(pilot: Pilot, top: Setting, coarser: Sequence[Setting], members: int) -> Observed:
-    """What settings have in common: all of the same members, noise drawn at the step of the top one."""
+    """Observations of several settings: all of the same members, noise drawn at the step of the top one."""
     settings, grid = [top, *coarser], pilot.grid(top)
     y = [pilot.y(setting, grid, members) for setting in settings]
     kept = [i for i, values in enumerate(y) if not np.isnan(values).any()]

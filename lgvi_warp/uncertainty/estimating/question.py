@@ -29,7 +29,7 @@ REMEDY = ('give "mean position[0]", "depth above 3", "outcome floor", lw.statist
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked: a target of one number of each member.
+    """Question of an estimate: a target of one number of each member.
 
     label: of the answer, as "mean position[0]".
     of: a quantity of interest; None where a metric gives the number.
@@ -163,7 +163,7 @@ def _of_statistic(statistic: Statistic) -> Question:
 
 
 def _only(statistic: MemberStatistic) -> Statistic:
-    """What is asked of the number of each member."""
+    """Statistic of the number of each member."""
     if len(statistic.then) != 1:
         raise refusal(
             f"{statistic.type}.then", len(statistic.then), "statistics are asked for", "ask for one at a time"
@@ -172,7 +172,7 @@ def _only(statistic: MemberStatistic) -> Statistic:
 
 
 def _asked_of(question: Question, statistic: Statistic) -> Question:
-    """What a statistic asks of a number."""
+    """Question that a statistic asks of a number."""
     if isinstance(statistic, statistics.Quantiles):
         if len(statistic.levels) != 1:
             raise refusal("of", statistic.levels, "are several levels", "ask for one: levels=[0.95]")

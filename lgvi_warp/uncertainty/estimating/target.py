@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is estimated of the members' numbers: a mean, a probability, a quantile or the mean of the worst part.
+"""Target of an estimate over the members' numbers: a mean, a probability, a quantile or the mean of the worst part.
 
 Levels give signed samples: E g(Y) is the sum of weights times means of g over arrays of members. A quantile and the mean of a
 part are solved for from such sums, and their errors are those of the mean of what each member contributes.
@@ -54,7 +54,7 @@ class Sought:
         return Solved(threshold + beyond / self.level, threshold)
 
     def contributions(self, y: np.ndarray, at: Solved) -> np.ndarray:
-        """What each member contributes (n,): their mean is the value, to first order.
+        """Contribution of each member (n,): their mean is the value, to first order.
 
         docs/theory/estimators.md, (E12).
         """
@@ -110,7 +110,7 @@ def mean_of(samples: Sequence[Weighted], of: Callable[[np.ndarray], np.ndarray])
 
 
 def quantile_of(samples: Sequence[Weighted], level: float) -> float:
-    """Where the weighted distribution reaches a level: it may fall a little between levels of signed weights."""
+    """Quantile of the weighted distribution at a level: it may fall a little between levels of signed weights."""
     values = np.concatenate([y for _, y in samples])
     low, high = float(values.min()), float(values.max())
     for _ in range(HALVINGS):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `rare_event` answers: a probability with its error, what it cost, and the members for which the event happens."""
+"""Answer of `rare_event`: a probability with its error, its cost, and the members for which the event happens."""
 
 from __future__ import annotations
 

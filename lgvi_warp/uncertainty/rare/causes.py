@@ -45,7 +45,7 @@ def mean_and_error(x: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> tu
 
 
 def moves_of(u: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> Moves:
-    """How the normals (m, k) of failing members differ from standard normals. docs/theory/rare_events.md, (B15)."""
+    """Differences of the normals (m, k) of failing members from standard normals. docs/theory/rare_events.md, (B15)."""
     tests = []
     for x, nominal in ((u, 0.0), (np.abs(u), SIZE), (u**2, 1.0)):
         mean, error = mean_and_error(x, weights, chains)
@@ -74,7 +74,7 @@ def noise_score(x: np.ndarray, weights: np.ndarray, chains: np.ndarray, parts: n
 
 
 def moved_text(moved: Mapping[str, Sequence[float]], noise: Mapping[str, float], most: int) -> str:
-    """What is significant, in words, the clearest first; moved: (mean, size, spread, z) by name. noise: z by name."""
+    """Significant differences in words, the clearest first; moved: (mean, size, spread, z) by name. noise: z by name."""
     said = [(abs(z), words) for name, (mean, size, spread, z) in moved.items()
             if abs(z) >= SIGNIFICANT and (words := _words(name, mean, size, spread))]  # fmt: skip
     said += [(z, f"{name} (z = {z:.0f})") for name, z in noise.items() if z >= SIGNIFICANT]

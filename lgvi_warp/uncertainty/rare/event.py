@@ -43,7 +43,7 @@ LESS, MORE = re.compile(rf"(.*\S)\s*([+-])\s*({NUMBER[5:]})"), re.compile(rf"({N
 
 @dataclass(frozen=True)
 class RareCondition:
-    """What happens: a quantity between two bounds, or any of several metrics between theirs, or a status.
+    """Condition of a rare event: a quantity between two bounds, or any of several metrics between theirs, or a status.
 
     label: in words. of: the quantity, None where metrics say it. limits: name -> (above, below), of the quantity or of each
     metric. metrics: by name. statuses: of which each is the event too.
@@ -61,7 +61,7 @@ class RareCondition:
         return () if self.statuses else tuple(_words(name, *ends) for name, ends in self.limits.items())
 
     def arguments(self, scene: Any, h: float | None = None) -> dict[str, Any]:
-        """What `prepare` must know of it; h: step of the run [s], None for that of the scene."""
+        """Arguments of `prepare` for it; h: step of the run [s], None for that of the scene."""
         if self.of is not None:
             return {"of": self.of, "failed": "nan"}
         faults = Faults()
@@ -74,7 +74,7 @@ class RareCondition:
         return {"save": save, "statistics": known["statistics"]}
 
     def distances(self, answer: Any) -> tuple[np.ndarray, np.ndarray]:
-        """How far members are beyond the bounds of each limit (k, n), and which of them failed (n,).
+        """Distances of members beyond the bounds of each limit (k, n), and a mask of failed ones (n,).
 
         answer: What the prepared run returned.
         """
@@ -95,7 +95,7 @@ class RareCondition:
 
 
 def between(values: np.ndarray, above: float, below: float) -> np.ndarray:
-    """How far numbers are between two bounds, below 0 outside; a number that is NaN fulfils nothing."""
+    """Distance of numbers from the nearer of two bounds, below 0 outside; a number that is NaN fulfils nothing."""
     inside = np.minimum(values - above, below - values)
     return np.asarray(np.clip(np.nan_to_num(inside, nan=-SURE), -SURE, SURE))
 

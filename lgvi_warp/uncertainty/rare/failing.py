@@ -38,7 +38,7 @@ class FailingCondition(RareCondition):
         return tuple(_words(name, *limits[name]) if name in limits else self.endings[name][0] for name in self.metrics)
 
     def distances(self, answer: Any) -> tuple[np.ndarray, np.ndarray]:
-        """How far members are beyond each way to fail (k, n), and which of them failed (n,)."""
+        """Distances of members beyond each way to fail (k, n), and a mask of failed ones (n,)."""
         status = np.asarray(answer.status)
         numbers = {name: answer.statistics[f"each {name}"].value[0, 0] for name in self.metrics}
         limits = self.success.limits
@@ -54,7 +54,7 @@ class FailingCondition(RareCondition):
 
 
 def _outside(values: np.ndarray, above: float, below: float) -> np.ndarray:
-    """How far numbers are outside of two bounds, above 0 where they do not lie between them; NaN never does."""
+    """Distance of numbers outside of two bounds, above 0 where they do not lie between them; NaN never does."""
     # A number at a bound does not pass, so that the event begins at the number next to it.
     low, high = np.nextafter(above, np.inf), np.nextafter(below, -np.inf)
     return np.asarray(np.clip(np.nan_to_num(np.maximum(low - values, values - high), nan=FAR), -FAR, FAR))

@@ -53,7 +53,7 @@ AXES = {"values": 1, "distances": 1, "features": 0, "happened": 0, "over": 0, "l
 
 
 class Walk(Protocol):
-    """How members come from look to look.
+    """Motion of members from look to look.
 
     looks: number of the last look. d: number of normals that a member starts with. lasting: (c,), for each number that the
     event is of, whether the event has happened once it is beyond its bounds; else it must be so at the last look.
@@ -80,7 +80,7 @@ class Walk(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ExpectedLimit:
-    """What the limit at the last look is expected to be: linear in what is known of members at a look.
+    """Expected limit at the last look: linear in the numbers of members at a look.
 
     level: the mean. centre, slopes: (f,). missed: standard deviation of what the line misses.
     """
@@ -103,7 +103,7 @@ class ExpectedLimit:
         return cls(float(y.mean()), centre, slopes, float(left.std()))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        """What is expected (n,) at x (n, f); -inf where that is no number."""
+        """Expected limit (n,) at x (n, f); -inf where that is no number."""
         with np.errstate(all="ignore"):
             expected = self.level + (x - self.centre) @ self.slopes
         return np.where(np.isfinite(expected), expected, -np.inf)
@@ -111,7 +111,7 @@ class ExpectedLimit:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """How near members are to the event: what their limit is expected to be at the last look, in what that misses.
+    """Score of members' nearness to the event: their expected limit at the last look, in units of its error.
 
     That is as members of a plain run have it. It steers alone: whatever it says, the answer has the mean that is right.
 
@@ -152,5 +152,5 @@ class Score:
 
 
 def _numbers_of(flock: Flock, spreads: np.ndarray) -> np.ndarray:
-    """What is known of members at a look (n, f), their limit so far among it."""
+    """Numbers of members at a look (n, f), their limit so far among them."""
     return np.column_stack([np.clip(limits_of(flock.distances, spreads), -1e300, 1e300), flock.features])

@@ -46,7 +46,7 @@ class Followed:
 
 
 def followed(condition: RareCondition) -> tuple[Followed, ...]:
-    """How each number of an event is followed. Raises SceneError for one that pieces of a run do not tell."""
+    """Way of following each number of an event. Raises SceneError for one that pieces of a run do not tell."""
     if condition.of is not None:
         (quantity,) = quantities(condition.of)
         return tuple(Followed(_of_quantity(quantity), *ends) for ends in condition.limits.values())
@@ -63,7 +63,7 @@ def _of_quantity(quantity: OfResult) -> Combine:
 
 
 def _of_path(label: str, of: Functional) -> Combine:
-    """How a functional is followed: a length after the greatest entries of a vector is not that of the path."""
+    """Way of following a functional: a length after the greatest entries of a vector is not that of the path."""
     if not of.over_path:
         return None
     name = of.functions[-1]

@@ -127,7 +127,7 @@ class VehicleLimit(Varying):
         return np.where(lost, FAILED, rows)
 
     def tolerant(self, u: np.ndarray) -> np.ndarray:
-        """As `each`, where members that fail are refused: such a member does not meet the event, and refuses nothing."""
+        """Limit like `each`, where failed members would be refused: such a member does not meet the event."""
         rows, lost = self._parts(u)
         return np.where(lost, -SURE if self._refuse else FAILED, rows)
 
@@ -146,7 +146,7 @@ class VehicleLimit(Varying):
         return np.concatenate([rows for rows, _ in parts], axis=1), np.concatenate([lost for _, lost in parts]), seconds
 
     def _answers(self, u: np.ndarray) -> Any:
-        """What the run returns of members with these normals."""
+        """Return values of the run for members with these normals."""
         count = len(self.names)
         xi: dict[str, Any] = {"xi": np.ascontiguousarray(u[:, count:])} if self.draws else {}
         if count:
@@ -168,7 +168,7 @@ def limits_of(distances: np.ndarray, spreads: np.ndarray) -> np.ndarray:
 
 
 def spreads_of(distances: np.ndarray) -> np.ndarray:
-    """What each limit (k, n) is measured in: its standard deviation; 1 where it is alone, and stays in its unit."""
+    """Unit of each limit (k, n): its standard deviation; 1 where it is alone, and stays in its unit."""
     if len(distances) == 1:
         return np.ones(1)
     ordinary = np.where(np.abs(distances) < 1e300, distances, np.nan)

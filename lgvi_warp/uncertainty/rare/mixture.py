@@ -229,7 +229,7 @@ def effective_wanted(weighted: WeightedMembers) -> float:
 
 
 def wanting(weighted: WeightedMembers, asked: float) -> float:
-    """How many times as many draws it takes for this relative error, and for weights as even as they must be."""
+    """Factor on the number of draws for this relative error, and for sufficiently even weights."""
     if not math.isfinite(weighted.spread):
         return math.inf
     return max(

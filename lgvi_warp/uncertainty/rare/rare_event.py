@@ -200,7 +200,7 @@ def check_asked(faults: Faults, relative_error: Any, most: Any) -> None:
 
 
 def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
-    """What a search with many draws of noise will take, told on a terminal, too; nothing for few. Raises SceneError.
+    """Expected cost of a search with many draws of noise, shown on a terminal, too; empty for few. Raises SceneError.
 
     Refused are more numbers of a level than memory should hold.
     """
@@ -233,7 +233,7 @@ def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
 
 
 def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
-    """What is wrong where chains came no nearer to the event."""
+    """Refusal where chains came no nearer to the event."""
     if stuck.kind == "steps":
         problem = "has the same value for most members, so that nothing says how near one is to the event"
         remedy = 'give a number that grows towards it: a distance, "peak depth above 12", or the name of an event'

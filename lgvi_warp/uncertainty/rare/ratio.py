@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many times as often one rare event happens as another, from members of either that are run in both."""
+"""Ratio of the probabilities of two rare events, from members of either that are run in both."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Share:
 
 @dataclass(frozen=True)
 class RareRatio:
-    """How many times as often a second event happens as a first; paired: from members of either in both, or from two answers.
+    """Ratio of the probabilities of a second and a first event; paired: from members of either in both, or from two answers.
 
     p: of the ratio being 1, from the normal law of its logarithm.
     """

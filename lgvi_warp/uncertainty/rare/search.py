@@ -58,7 +58,7 @@ TAKES_MORE = "the error asked takes more than the {:,} members that may be run"
 
 @dataclass(frozen=True, eq=False)
 class RareAnswer:
-    """What a search found, in standard normals.
+    """Answer of a search, in standard normals.
 
     Attributes:
         probability: of the event.

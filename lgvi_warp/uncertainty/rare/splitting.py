@@ -30,7 +30,7 @@ MOVES, ACCEPTANCE = 2, 0.44
 
 @dataclass(frozen=True, eq=False)
 class LevelPilot:
-    """What a small run with adaptive levels says.
+    """Answer of a small run with adaptive levels.
 
     bounds: (m,), of the score; shares: (m + 1,), of members that go on; steps: (m, d), of their starts at each bound.
     """
@@ -42,12 +42,12 @@ class LevelPilot:
 
     @property
     def probability(self) -> float:
-        """Of the event, roughly."""
+        """Rough probability of the event."""
         return float(np.prod(self.shares))
 
     @property
     def variance(self) -> float:
-        """Of the relative error of a run with one member a level, if members of a level were independent."""
+        """Variance of the relative error of a run with one member a level, if members of a level were independent."""
         return float(((1.0 - self.shares) / self.shares).sum())
 
 

@@ -109,7 +109,7 @@ def _walked(
 
 
 def first_reached(walk: Walk, score: Score, stage: Stage, log: Log, bound: float) -> AtLook:
-    """Where members of a stage first reached a bound, from all looks at them."""
+    """First states of members of a stage at a bound, from all looks at them."""
     crossed: dict[int, list[tuple[np.ndarray, Flock]]] = {}
     reached = stage.before >= bound
     for look, (rows, flock) in stage.entrants.items():

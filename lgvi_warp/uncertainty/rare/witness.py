@@ -47,7 +47,7 @@ class Witness:
 
 
 class Surroundings:
-    """Where independent runs went: places are apart that are farther from their members than these are from another run.
+    """Places that independent runs reached: apart if farther from their members than these are from another run.
 
     runs: failing members (m, d) of each.
     """

@@ -159,7 +159,7 @@ def _values(result: Result, of: Sequence[OfResult]) -> tuple[list[np.ndarray], t
 def _messages(
     result: Result, inputs: Mapping[str, np.ndarray], columns: Sequence[np.ndarray], labels: Sequence[str]
 ) -> tuple[str, ...]:
-    """What the user should know of the indices."""
+    """Remarks on the indices for the user."""
     texts = []
     sampling = result.provenance.get("ensemble", {}).get("sampling", "random")
     kind = sampling if isinstance(sampling, str) else next(iter(sampling))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How to run a run again: its scene as it was written, and the command."""
+"""Instructions to repeat a run: its scene as it was written, and the command."""
 
 from __future__ import annotations
 

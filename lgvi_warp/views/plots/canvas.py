@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all pictures share: figures, size of text, colours with a second cue, the axis of depth, and files."""
+"""Common parts of all pictures: figures, size of text, colours with a second cue, the axis of depth, and files."""
 
 from __future__ import annotations
 

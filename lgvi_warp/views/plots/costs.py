@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a member's step costs: against members and threads, and term by term."""
+"""Cost of a member's step: against members and threads, and term by term."""
 
 from __future__ import annotations
 

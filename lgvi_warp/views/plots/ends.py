@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What became of the members, and how their numbers are spread at one time."""
+"""Outcomes of the members, and the spread of their numbers at one time."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ Shares = tuple[np.ndarray, float, str, dict[str, tuple[np.ndarray, str]]]
 
 
 def _gathered(statistic: Estimate, component: int, at: float | None) -> Shares:
-    """What a statistic lw.statistics.Histogram counted at the time nearest to `at`."""
+    """Counts of a statistic lw.statistics.Histogram at the time nearest to `at`."""
     frame = _nearest(statistic.time, at)
     outside = int(statistic["below"][frame, component] + statistic["above"][frame, component])
     more = f", {outside:,} of them outside the bins" if outside else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What members that ended differently had been given: their outcomes over the inputs that tell them apart."""
+"""Inputs of members that ended differently: their outcomes over the inputs that tell them apart."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all pictures take, and what their help says of it."""
+"""Common arguments of all pictures, and their help."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What members are steered by, and how they lie: commands with limits and faults, and roll, pitch and yaw, against time."""
+"""Steering and attitude of members: commands with limits and faults, and roll, pitch and yaw, against time."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def draw_angles(result: Result, axes: Any) -> list[str]:
 
 
 def _bands(members: int) -> str:
-    """What the lines of so many members are, for a title; "" for one."""
+    """Meaning of the lines of so many members, for a title; "" for one."""
     return ": medians, bands of 90 %" if members > 1 else ""
 
 

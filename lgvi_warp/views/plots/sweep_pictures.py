@@ -55,7 +55,7 @@ def _short(sweep: Sweep, case: str, point: Mapping[str, Any]) -> str:
 
 
 def _meaning(sweep: Sweep) -> str:
-    """What the words of `_short` stand for."""
+    """Meanings of the words of `_short`."""
     return ", ".join(["case", *_long(sweep)])
 
 
@@ -99,7 +99,7 @@ def _ends(axes: Any, sweep: Sweep, cells: list[SweepCell], places: list[float], 
 
 
 def _places(values: list[Any]) -> list[float]:
-    """Where values stand on an axis: numbers where they are, if all are finite, else evenly."""
+    """Positions of values on an axis: numbers at their value, if all are finite, else evenly."""
     if all(isinstance(value, int | float) and np.isfinite(value) for value in values):
         return [float(value) for value in values]
     return [float(i) for i in range(len(values))]
@@ -252,7 +252,7 @@ def _most_apart(sweep: Sweep) -> list[SweepCell]:
 
 
 def _tracked(sweep: Sweep, cells: list[SweepCell]) -> str:
-    """What the metric is of whose medians differ most between cells, of numbers tracked over time; "" without one."""
+    """Metric whose medians differ most between cells, of numbers tracked over time; "" without one."""
 
     def apart(name: str) -> float:
         boxes = [_box(sweep, cell, name) for cell in cells]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the eye of a recording stands, and how large things look from there."""
+"""Eye of a recording, and the size of things as seen from it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FIELD, ASPECT, HIGH = 0.9 * TANGENT, 1.3, 600.0
 
 
 def distance(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
-    """How far [m] from the middle of a box, from low to high (3,) [m], the eye must be to see all of it."""
+    """Distance [m] of the eye from the middle of a box, low to high (3,) [m], to see all of it."""
     across = np.cross(SIGHT, (0.0, 0.0, -1.0))
     across /= np.linalg.norm(across)
     above = np.cross(across, SIGHT)
@@ -23,7 +23,7 @@ def distance(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
 
 
 def far_pixel(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
-    """How much one pixel covers across the sight [m] at the far end of a box from low to high (3,) [m]."""
+    """Size of one pixel across the sight [m] at the far end of a box from low to high (3,) [m]."""
     farthest = distance(low, high, aspect) + float((_corners(low, high) @ SIGHT).max())
     return 2.0 * TANGENT * farthest / HIGH
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a vehicle looks like: a hull of revolution, or the user's mesh."""
+"""Shape of a vehicle: a hull of revolution, or the user's mesh."""
 
 from __future__ import annotations
 

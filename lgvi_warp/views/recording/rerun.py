@@ -114,7 +114,7 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
 
 
 def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
-    """What is drawn of each run."""
+    """Drawing data of each run."""
     if not isinstance(result, Mapping):
         return [drawn_of(result_of(result), members)]
     if not result:
@@ -162,7 +162,7 @@ def _layout(runs: list[Drawn]) -> Any:
 
 
 def _scales(runs: list[Drawn], box: WorldBox) -> list[int]:
-    """How many times their size hulls are drawn, of each run in a view of its own."""
+    """Scale of hulls, of each run in a view of its own."""
     return [scale_of(run, box, ASPECT / len(runs)) for run in runs]
 
 

@@ -97,7 +97,7 @@ def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
 
 
 def scale_of(run: Drawn, box: WorldBox, aspect: float = ASPECT) -> int:
-    """How many times its size a hull is drawn, so that it is seen in the box."""
+    """Scale of a hull, so that it is seen in the box."""
     form, length = _length(run)
     thickness = length if isinstance(form, Mesh) else min(form)
     wanted = max(LONG / length, THICK / thickness) * far_pixel(box.low, box.high, aspect)

@@ -36,7 +36,7 @@ STEPS = dict(times=(1.0, 1.5, 12.0, 12.5), command_schedule=((2e-4,), (-1e-4,), 
 
 
 def volume_of_steps(t):
-    """What a pump makes of them: within 0.5 s the command goes faster than it, from then on it follows at its rate."""
+    """Volume that a pump moves for them: within 0.5 s the command goes faster than it, from then on it follows at its rate."""
     down = np.clip(2e-4 - 4e-5 * (t - 1.0), -1e-4, 2e-4)
     return np.where(t < 12.0, down, np.clip(-1e-4 + 4e-5 * (t - 12.0), -1e-4, 2e-4))
 

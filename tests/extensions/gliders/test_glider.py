@@ -181,7 +181,7 @@ POWER, SLIDER, BELOW = 9.0 * GRAVITY, 9.0, 0.05
 
 
 def place_for(pitch, attack, speed):
-    """How far ahead its battery of 9 kg holds it there [m]: the moments of weight, water and added mass are 0."""
+    """Place ahead of its battery of 9 kg that holds it there [m]: the moments of weight, water and added mass are 0."""
     u, w = speed * np.cos(attack), speed * np.sin(attack)
     moment = -50.0 * attack * speed**2 + (70.0 - 5.0) * u * w
     return (moment / POWER - BELOW * np.sin(pitch)) / np.cos(pitch)

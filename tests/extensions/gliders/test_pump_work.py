@@ -84,7 +84,7 @@ def test_above_the_surface_it_takes_nothing():
 
 
 def work_of_a_dive(begun, t1):
-    """Of a body that starts at rest: by DOP853, from the bottom to the full volume, each found as an event."""
+    """Work for a body that starts at rest: by DOP853, from the bottom to the full volume, each found as an event."""
     rate, full = PUMP["pump_rate"], PUMP["volume_up"]
 
     def motion(_, y, q):

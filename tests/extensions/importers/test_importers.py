@@ -452,7 +452,10 @@ def test_a_vehicles_warnings():
 
 
 def test_inertia_that_misses_the_triangle_is_taken_from_a_file():
-    """Those of the ECA A9 in uuv_simulator miss it by (35 - 30.6)/35; by hand they are refused, with the tolerance named."""
+    """The inertia of the ECA A9 in uuv_simulator misses it by (35 - 30.6)/35.
+
+    By hand they are refused, with the tolerance named.
+    """
     inertia = np.array([0.6, 30.0, 35.0])
     rigid = np.diag([*[69.7] * 3, *inertia])
     message = refused(lw.Vehicle, rigid_body_mass_matrix=rigid)

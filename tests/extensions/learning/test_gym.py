@@ -81,7 +81,7 @@ def test_what_is_no_real_number_is_refused(env, odd, words):
 
 
 def test_members_that_come_again_have_other_noise():
-    """Of three given members, two environments: each member's first episode has its own noise, each later one new noise."""
+    """Three given members, two environments: each member's first episode has its own noise, each later one new noise."""
     part = lw.Ensemble(
         replace(scene(LAW).scene, terms=[*scene(LAW).scene.terms, lw.terms.WrenchNoise(force=(1.0, 1.0, 1.0))]), 3, 3
     )

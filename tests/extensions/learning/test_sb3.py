@@ -82,7 +82,7 @@ def test_an_action_without_a_number_ends_its_vehicle_alone():
 
 @pytest.mark.parametrize("both", [False, True])
 def test_episodes_of_one_step(both):
-    """Where a vehicle is both terminated and out of time, it is terminated."""
+    """A vehicle both terminated and out of time is terminated."""
     terminated = (lambda t, y, r: np.arange(N) < 5) if both else None
     env = lw.gym.sb3(environment(**SEEN, duration=PERIOD, terminated=terminated))
     first = env.reset()
@@ -98,7 +98,7 @@ def test_episodes_of_one_step(both):
 
 
 def test_one_vehicle_has_the_bits_of_many():
-    """Of 4,096 and of one, the first sees and does the same."""
+    """The first of 4,096 and a single one see and do the same."""
     seen = []
     for count in (1, 4096):
         env = lw.gym.sb3(environment(**SEEN, num_envs=count, duration=2 * PERIOD))
@@ -219,7 +219,7 @@ def test_the_checker_and_the_wrappers_of_stable_baselines():
 
 
 def test_advantages_are_sums_of_what_surprises():
-    """Of ppo.py, beside the sums over all that follows in the same episode, term by term (Schulman et al. 2016, 16)."""
+    """Advantages of ppo.py, beside the sums over the rest of the same episode, term by term (Schulman et al. 2016, 16)."""
     pytest.importorskip("torch")
     ppo = runpy.run_path(str(ROOT / "examples" / "controllers" / "ppo.py"))
     rng, steps, count = np.random.default_rng(2), 9, 4

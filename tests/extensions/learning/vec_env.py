@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `lw.gym.sb3` uses of Stable-Baselines3's base class, for machines without it, such as those of quick tests."""
+"""Part of Stable-Baselines3's base class that `lw.gym.sb3` uses, for machines without it, such as those of quick tests."""
 
 import sys
 from types import ModuleType

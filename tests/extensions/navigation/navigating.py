@@ -106,7 +106,7 @@ def twin_of_filter(listed, handed, member, seed, gravity):
 
 
 def through(each, truth, member=0, h=0.02, period=PERIOD, then=lambda k: None):
-    """What twins of one member leave of a motion (ticks, 1 or n, 21): (ticks, 21); then: called after each tick."""
+    """Effect of one member's twins on a motion (ticks, 1 or n, 21): (ticks, 21); then: called after each tick."""
     for part in each:
         part.begin()
     seen, every = np.zeros((len(truth), 21)), round(period / h)
@@ -122,7 +122,7 @@ def through(each, truth, member=0, h=0.02, period=PERIOD, then=lambda k: None):
 
 
 def run_twins(listed, truth, member, seed=0, **how):
-    """(what is measured (ticks, 21), of a filter (ticks, 3): NEES, NIS and how many) of one member."""
+    """(measurements (ticks, 21), of a filter (ticks, 3): NEES, NIS and how many) of one member."""
     each, belief = twins(listed, member, seed), np.zeros((len(truth), 3))
 
     def note(k):

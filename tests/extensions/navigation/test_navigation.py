@@ -265,7 +265,7 @@ def allan(rates, m):
 
 
 def allan_of(noise, walk, m):
-    """That of white noise of a density, and of a bias that walks from tick to tick (IEEE Std 952-1997, annex C)."""
+    """Allan variance of white noise of a density, and of a bias that walks from tick to tick (IEEE Std 952-1997, annex C)."""
     return noise**2 / (m * PERIOD) + walk**2 * PERIOD * (2 * m**2 + 1) / (6 * m)
 
 

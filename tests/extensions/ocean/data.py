@@ -47,12 +47,12 @@ def dataset(names, u, v, w=None, *, standard=True, lat=LATITUDE, lon=LONGITUDE, 
 
 
 def cmems(u, v, w=None, **more):
-    """As the Copernicus Marine Service writes it."""
+    """Data set like one of the Copernicus Marine Service."""
     return dataset(("uo", "vo", "wo"), u, v, w, **more)
 
 
 def hycom(u, v, w=None, **more):
-    """As HYCOM writes it: longitudes to 360, packed in 16 bits by `packed`."""
+    """Data set like HYCOM's: longitudes to 360, packed in 16 bits by `packed`."""
     return dataset(("water_u", "water_v", "water_w"), u, v, w,
                    **{"lon": LONGITUDE + 360.0, "axes": ("time", "depth", "lat", "lon"), **more})  # fmt: skip
 

@@ -35,7 +35,7 @@ DEPTH = sea_bed(*np.meshgrid(LATITUDE, LONGITUDE, indexing="ij"))
 
 
 def gebco(depth=DEPTH, latitude=LATITUDE, longitude=LONGITUDE, **attributes):
-    """As GEBCO writes it: elevations, without fill values."""
+    """Data set like GEBCO's: elevations, without fill values."""
     known = {
         "standard_name": "height_above_mean_sea_level",
         "units": "m",

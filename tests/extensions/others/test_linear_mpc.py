@@ -56,7 +56,7 @@ def test_every_state_and_input_is_that_of_the_twin():
 
 @pytest.mark.slow
 def test_its_law_within_the_limits_is_that_of_the_regulator():
-    """Of all states and inputs at once: the regulator's StateFeedback has a test of its own for its signs."""
+    """All states and inputs at once; the regulator's StateFeedback has a test of its own for its signs."""
     scene = lw.Scene.named("bluerov2_heavy", start={"position": [0.0, 0.0, 5.0]})
     model = lw.linear.linearize(scene, period=T, inputs="wrench", method="psi_s", h=0.02).part(list(COORDINATES))
     Q, R = [4.0] * 3 + [9.0] * 3 + [1.0] * 6, [0.01] * 6
@@ -381,7 +381,7 @@ def test_limits_that_exclude_each_other_leave_the_box(heave):
 
 
 def test_singular_weights_have_an_answer():
-    """Where nothing but inputs is weighed the best is none; where only the depth is, the problem still is one of R."""
+    """Weights on inputs alone give no input; weights on the depth alone leave a problem of R."""
     none = twin(Q=np.zeros(3), limit=np.array([1e3, 1e3]))
     H_, f = problem(none, np.ones(3), np.zeros(3))
     np.testing.assert_allclose(none.solved(H_, f, np.zeros(2), None), 0.0, atol=1e-15)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which members are meant is read in one way by every argument that names members."""
+"""One way of reading members, for every argument that names them."""
 
 import re
 

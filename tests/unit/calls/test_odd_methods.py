@@ -107,7 +107,7 @@ def test_every_odd_call_of_a_function_ends_in_a_refusal(made):
 
 @explained
 class Taker:
-    """What an argument of another kind leads to."""
+    """Outcome of an argument of another kind."""
 
     def longer(self, values: np.ndarray, by: int = 2) -> float:
         return float(values[0]) * by

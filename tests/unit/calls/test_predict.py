@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of the machine before a run."""
+"""Knowledge of the machine before a run."""
 
 from pathlib import Path
 

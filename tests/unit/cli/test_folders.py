@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a folder holds: numbers, pictures and damage, as text and as a document; and its pictures drawn again."""
+"""Content of a folder: numbers, pictures and damage, as text and as a document; and its pictures drawn again."""
 
 import json
 from pathlib import Path
@@ -20,7 +20,7 @@ from tests.unit.measuring.test_cost import found as tradeoff_of
 
 @pytest.fixture
 def store(tmp_path):
-    """What a store of three blocks says of itself, of which two are finished."""
+    """Store of three blocks, two of them finished."""
     provenance = told().provenance | {"versions": {"lgvi-warp": "1.0"}, "scene": {"controller": {}}}
     return {
         "path": tmp_path / "run.zarr", "bytes": 1_260_000, "members": 1200, "provenance": provenance, "fields": ["position"],

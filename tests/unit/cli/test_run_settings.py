@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What arguments change of a scene, and which folder, store and blocks they name."""
+"""Changes of a scene by arguments, and the folder, store and blocks that they name."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the command says of a run that ended, line by line, and which files it writes."""
+"""Summary of a finished run by the command, line by line, and which files it writes."""
 
 import dataclasses
 import time
@@ -219,7 +219,10 @@ def test_a_part_of_a_run_is_to_be_merged(tmp_path, capsys):
 
 
 def test_documents_of_a_run(tmp_path):
-    """What no recorded run has (tests/data/pictures.json): times, faults and files that are missing, some members drawn."""
+    """Parts that no recorded run has (tests/data/pictures.json).
+
+    Times, faults and files that are missing, some members drawn.
+    """
     result = dataclasses.replace(told(), substeps=np.array([0, 1, 5, 0]), run_seconds=0.5, compile_seconds=0.25)
     written = Written([tmp_path / "a"], ["a fault"], ["empty"], {"a.png": MissingExtra("plots", "matplotlib", "viz")})
     content = documents.of_run(result, told(3), written, ["b"], 2.5)

@@ -157,7 +157,7 @@ def test_a_live_run_needs_its_library_and_what_it_shows(tmp_path, capsys, option
 
 
 class Suggestion:
-    """What --error leads to."""
+    """Suggestion as --error uses it."""
 
     of, unit, error = "speed", "m/s", 0.5
     settings = {"h": 0.25, "dtype": "float32"}  # noqa: RUF012

@@ -298,7 +298,7 @@ def test_an_interrupted_stability_study_says_which_maps_are_finished(tmp_path, c
 
 
 class Swept:
-    """What a sweep of three cells found, of which some were refused."""
+    """Answer of a sweep of three cells, some of them refused."""
 
     rares = None
 

@@ -197,7 +197,7 @@ MADE = made()
 
 
 def content(value):
-    """What an object says of itself."""
+    """Content of an object."""
     return value.to_dict() if hasattr(value, "to_dict") else repr(value)
 
 
@@ -236,7 +236,7 @@ def test_public_functions_and_classes_are_themselves():
 
 @pytest.fixture(scope="module")
 def ran():
-    """What runs give."""
+    """Results of runs."""
     vary = {"start.velocity[0]": lw.distributions.Normal(std=0.1)}
     fleet = lw.Ensemble(SPHERE, 4, 0, vary)
     settings = dict(method="psi_s", h=0.1, t1=0.5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which function it is: what differs has another identity, what does not has the same one in every process."""
+"""Identity of functions: different for different ones, the same in every process."""
 
 import functools
 import operator

@@ -48,7 +48,7 @@ def drifting(scene):
 
 @pytest.fixture
 def seen(monkeypatch):
-    """What ensembles a model runs, in place of running them: their numbers by name."""
+    """Ensembles that a model would run, recorded in place of runs: their numbers by name."""
     found = {}
 
     def answer(prepared, fleet, progress):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is unknown is refused with the nearest known name: methods, vehicles, keywords of functions, public names."""
+"""Unknown names are refused with the nearest known one: methods, vehicles, keywords of functions, public names."""
 
 import enum
 import inspect

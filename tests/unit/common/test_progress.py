@@ -97,7 +97,7 @@ def test_a_long_line_is_blanked_by_a_short_one():
 
 @shows_progress
 def work(shares, *, progress=None):
-    """What functions of the library do with their progress."""
+    """Use of progress by functions of the library."""
     report = callback(progress) or (lambda share: None)
     for share in shares:
         report(share)
@@ -137,7 +137,7 @@ def test_what_is_no_function_is_refused(wrong):
 
 
 class FakeBar:
-    """What `NotebookBar` uses of tqdm."""
+    """Part of tqdm that `NotebookBar` uses."""
 
     bars: ClassVar[list] = []
 

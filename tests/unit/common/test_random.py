@@ -131,7 +131,7 @@ def kernel(width, name):
 
 
 def drawn(width, name, member, step, channel, seed0, seed1):
-    """What the kernel draws for the members: shape (n, 7)."""
+    """Draws of the kernel for the members: shape (n, 7)."""
     packets = len(member) // width
     given = wp.array(member.astype(np.int32).reshape(packets, width), dtype=int_lane(width), device="cpu")
     out = wp.zeros((7, packets), dtype=lane(width, FORMATS[name]), device="cpu")

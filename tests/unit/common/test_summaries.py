@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What objects show at a prompt and in a notebook: short, with units, whatever their size."""
+"""Summaries of objects at a prompt and in a notebook: short, with units, whatever their size."""
 
 import re
 import subprocess

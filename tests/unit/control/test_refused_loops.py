@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a controller's period, and a vehicle without actuators, are told; no run begins."""
+"""Refusals of a controller's period, and of a vehicle without actuators; no run begins."""
 
 import re
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How members are divided into blocks: stores of all versions depend on it."""
+"""Division of members into blocks: stores of all versions depend on it."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a kernel is asked for, decided before it is compiled."""
+"""Choice of a kernel, made before it is compiled."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a computation reads decides whether its result is shared by all members."""
+"""The inputs of a computation decide whether its result is shared by all members."""
 
 import copy
 

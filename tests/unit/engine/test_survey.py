@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a kernel must be able to do is found from all members, a few at a time."""
+"""The survey finds a kernel's features from all members, a few at a time."""
 
 import tracemalloc
 from dataclasses import replace

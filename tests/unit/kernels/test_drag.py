@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What drag takes off a momentum, as compensated sums need it: v (1 - loss) / (1 + gain |v|) - v on each axis."""
+"""Momentum that drag removes, as compensated sums need it: v (1 - loss) / (1 + gain |v|) - v on each axis."""
 
 import numpy as np
 import pytest

@@ -38,7 +38,7 @@ def hashes():
 
 
 def in_a_new_process(kernels):
-    """What `hashes` prints with the device code of a folder."""
+    """Output of `hashes` with the device code of a folder."""
     environment = os.environ | {"PYTHONPATH": f"{kernels}{os.pathsep}{ROOT}"}
     code = "from tests.unit.kernels.test_overloads import hashes; hashes()"
     run = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, env=environment)

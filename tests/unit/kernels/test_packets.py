@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is done to a packet between steps: every row and entry of an attitude, momentum and position counts alike."""
+"""Operations on a packet between steps: every row and entry of an attitude, momentum and position counts alike."""
 
 import numpy as np
 import pytest

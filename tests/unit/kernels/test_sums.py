@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a change is added to a compensated state, number by number, to the bit: all are sums of float32."""
+"""Addition of a change to a compensated state, number by number, to the bit: all are sums of float32."""
 
 import numpy as np
 import pytest

@@ -840,7 +840,7 @@ def test_a_suggestion_that_no_step_keeps_is_refused(scene):
 
 
 def test_others_are_tried_where_the_short_list_fails(scene):
-    """Of the few none keeps the error; psi_s does."""
+    """None of the short list keeps the error; psi_s does."""
     sizes = dict.fromkeys(("rk8", "kl8(psi_x)", "psi_x", "psi_1"), 0.0) | {"psi_s": 1e-3}
     bad = {"psi_x": 1e12, "psi_1": 1e12}
     of, names = compared.compared_in("position"), ("psi_x", "psi_1", "psi_s")

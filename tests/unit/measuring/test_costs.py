@@ -69,7 +69,7 @@ def test_the_least_reading_counts_without_a_first_call():
 
 
 def test_costs_that_are_unsure_are_read_again():
-    """Of two kernels one is disturbed: it alone is read again, at most three times, until two readings are near."""
+    """One of two kernels is disturbed: it alone is read again, at most three times, until two readings are near."""
     left = [iter([1.0] * 9), iter([1.0, 9.0, 5.0, 3.0, 2.0, 2.05] + [1.0] * 9)]
     read = []
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is told of a kernel's speed, from times that are given here."""
+"""Report of a kernel's speed, from given times."""
 
 import json
 

@@ -138,7 +138,7 @@ def test_the_inverse_of_a_polynomial():
 
 
 def test_the_inverse_of_bluerov2s_polynomial():
-    """As the kernel does it: the start, and a step of Halley's."""
+    """The kernel's way: the start, and a step of Halley's."""
     curve = np.array([8.9, 0.0, 176.0, 0.0, -404.1, 0.0, 389.9, 0.0, -140.3])
     value, slope = np.polynomial.Polynomial([0.0, *curve]), np.polynomial.Polynomial([0.0, *curve]).deriv()
     (inverse, most, top, floor, *start) = inverse_rows(curve[None], np.ones(1))[0]

@@ -47,7 +47,7 @@ RISING = np.linspace(0.1, 2.05, N)
 
 
 def record(overshoot=RISING, iae=1.0, ends=None, messages=()):
-    """What members showed; `ends` has (status, time) of those that did not reach the end."""
+    """Record of members; `ends` has (status, time) of those that did not reach the end."""
     status, end = np.zeros(N, np.uint8), np.full(N, np.inf)
     for i, (code, time) in (ends or {}).items():
         status[i], end[i] = code, time
@@ -56,7 +56,7 @@ def record(overshoot=RISING, iae=1.0, ends=None, messages=()):
 
 
 def half_of_them():
-    """Those of even number are better; one fails, one reaches the floor, one has no overshoot."""
+    """Members of even number are better; one fails, one reaches the floor, one has no overshoot."""
     overshoot = np.where(np.arange(N) % 2 == 0, 0.3, RISING)
     overshoot[7] = np.nan
     return record(overshoot, 3.0, {3: (Status.NON_FINITE, 2.5), 5: (Status.FLOOR, 4.0)}, ("slow",))

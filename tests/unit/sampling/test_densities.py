@@ -99,7 +99,7 @@ def test_one_factor_moves_many_entries():
 
 
 class Gamma:
-    """What OpenTURNS' distributions of one number do: levels in a list give a sample, a point for each."""
+    """Stand-in for OpenTURNS' distributions of one number: levels in a list give a sample, a point for each."""
 
     def getDimension(self):
         return 1

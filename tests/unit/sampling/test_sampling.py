@@ -712,7 +712,7 @@ def test_many_members_take_little_memory(scene):
 
 @pytest.mark.parametrize("axes", [None, {}, [1.0], "vehicle.mass", 3])
 def test_a_grid_names_what_it_is_a_grid_of(axes):
-    """What is no table of axes is one fault, and no error of Python's follows."""
+    """A value that is no table of axes is one fault, and no error of Python's follows."""
     (fault,) = faults(Grid, axes)
     assert fault.startswith("ensemble.sampling.grid.axes = ")
     assert "names nothing" in fault
@@ -728,7 +728,7 @@ def test_a_hypercube_without_its_group_is_told_so():
 
 
 def test_a_posterior_by_chain_and_draw_is_a_table_of_all_draws():
-    """As ArviZ holds it: idata.posterior."""
+    """A posterior in ArviZ' form: idata.posterior."""
     import xarray as xr
 
     buoyancy, start = np.arange(6.0).reshape(2, 3), np.arange(18.0).reshape(2, 3, 3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a newcomer may get wrong: every message names the key, the value and the remedy, and all faults come at once."""
+"""Mistakes of newcomers: every message names the key, the value and the remedy, and all faults come at once."""
 
 import functools
 import importlib.util

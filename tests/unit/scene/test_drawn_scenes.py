@@ -26,7 +26,7 @@ def taken(content):
 
 
 def drawn_and_taken(count, seed):
-    """How many of so many scenes are taken; any other error than a refusal shows."""
+    """Number of accepted scenes out of so many; any other error than a refusal shows."""
     found = 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

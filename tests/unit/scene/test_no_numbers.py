@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What NumPy would take for numbers without a word: masks, texts, truth values, complex numbers; laws without numbers."""
+"""Values that NumPy would silently take for numbers: masks, texts, truth values, complex numbers; laws without numbers."""
 
 from fractions import Fraction
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is odd and most likely a unit is said: on both sides of each limit, by members, and never of what is right."""
+"""Odd values, most likely units, are reported: on both sides of each limit, by members, and never of what is right."""
 
 import math
 from pathlib import Path
@@ -214,7 +214,7 @@ def test_what_becomes_odd_on_the_way_is_said():
 
 
 def test_heights_above_the_surface_count_from_a_limit_on():
-    """Of a start above the surface another message tells; a depth that is no number counts for nothing."""
+    """A start above the surface has a message of its own; a depth that is no number counts for nothing."""
     limit = LIMITS["height"].value
     looked = Heights(scene(), np.array([1.0, 0.0, -2.0, 5.0, 5.0]))
     looked.look(
@@ -391,7 +391,7 @@ NO_LAW, NOT_DRIVEN, NOT_ASKED = "no law of the controller reads the wanted {}", 
 
 
 def looped(guidance, laws, allocation, **sections):
-    """What is said of a LAUV under a controller, or of another vehicle."""
+    """Messages on a LAUV under a controller, or of another vehicle."""
     controller = lw.Controller(period=0.1, guidance=guidance, laws=laws, allocation=allocation)
     name = sections.pop("name", "lauv")
     start = {"velocity": [1.0, 0.0, 0.0], "position": [0.0, 0.0, 5.0]}

@@ -124,7 +124,7 @@ def test_unknown_names_are_told_what_was_meant():
 
 
 def test_a_faulty_term_is_no_reason_to_doubt_the_names_of_its_numbers():
-    """What varies in a term that cannot be built is not known; in other sections a wrong name is still one."""
+    """Variations of a term that cannot be built are unknown; in other sections a wrong name is still one."""
     text = SMALL + '[[terms]]\ntype = "drag"\nlinear = [1.0, 2.0]\n[ensemble.vary]\n'
     text += '"drag.linear[0]" = { normal = { std = 1.0 } }\n"vehicle.mas" = { normal = { std = 1.0 } }\n'
     term, name = faults(text)

@@ -145,7 +145,7 @@ def test_only_whole_paths_count(result):
 
 
 def said_by(door, capsys):
-    """What a door says as it refuses, in one line."""
+    """Refusal of a door, in one line."""
     if isinstance(door, list):
         assert main(door) == 2
         return capsys.readouterr().err.strip()

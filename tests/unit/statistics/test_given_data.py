@@ -99,7 +99,7 @@ def test_what_explains_all_but_a_trace_has_an_interval(noise):
 
 @pytest.mark.parametrize("noise", [1e-2, 1e-4, 1e-7])
 def test_what_an_input_explains_nearly_alone(noise):
-    """What is left is a variance: 95 % intervals of 20 samples hold, but for 4 of them once in 300 tries."""
+    """The remainder is a variance: 95 % intervals of 20 samples hold, but for 4 of them once in 300 tries."""
     rng, hits = np.random.default_rng(8), 0
     for _ in range(20):
         x, z = rng.normal(size=(2, 300))

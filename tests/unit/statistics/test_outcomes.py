@@ -39,7 +39,7 @@ def part_of(ends, at):
 
 
 def gathered(statistic, ends, block=256, order=None, replicates=1, last=None):
-    """What a statistic says of these ends, block by block; last: (n, d), its quantity at the last sample."""
+    """Estimate of a statistic over these ends, block by block; last: (n, d), its quantity at the last sample."""
     n, tree = len(ends.status), Tree(statistic.join)
     for i in order if order is not None else range(-(-n // block)):
         at = slice(i * block, min((i + 1) * block, n))
@@ -121,7 +121,7 @@ def test_without_failures_an_outcome_is_a_fraction_with_wilsons_interval(rates):
 
 
 def test_all_that_are_left_fail():
-    """Of 100 members 20 sink, 50 rise, and then 30 fail: these may sink or rise, all of them."""
+    """Among 100 members 20 sink, 50 rise, and then 30 fail: these may sink or rise, all of them."""
     time = np.repeat([1.0, 1.5, 3.0], [20, 50, 30])
     ends = Ends(np.repeat([FLOOR, SURFACE, FAILED], [20, 50, 30]), np.repeat([1, 2, 0], [20, 50, 30]), time, EVENTS)
     (found,) = gathered(lw.statistics.Outcome("floor"), ends)
@@ -266,7 +266,10 @@ def test_first_passage_knows_when_a_member_was_stopped():
 
 @pytest.mark.parametrize("replicates", [1, 2])
 def test_first_passage_takes_stopped_members_for_what_they_are(replicates):
-    """Of 100 members 50 are stopped elsewhere at 1 s, 26 fail at 5 s and 24 pass at 7 s: of the 50 all would have passed."""
+    """Among 100 members 50 are stopped elsewhere at 1 s, 26 fail at 5 s and 24 pass at 7 s.
+
+    Of the 50 all would have passed.
+    """
     statistic = lw.statistics.FirstPassage(
         lw.statistics.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.4, 0.6)
     )

@@ -60,7 +60,7 @@ def trees(statistic, x, good=None, block=256, order=None, replicates=1, time=Non
 
 
 def gathered(statistic, x, replicates=1, time=None, **named):
-    """What a statistic says of values x (k, n, d); replicates: of a design of so many, member i of the i-th mod R."""
+    """Estimate of a statistic over values x (k, n, d); replicates: of a design of so many, member i of the i-th mod R."""
     time = np.arange(len(x), dtype=float) if time is None else time
     parts = trees(statistic, x, replicates=replicates, time=time, **named).parts()
     if replicates == 1:

@@ -166,7 +166,7 @@ def test_what_are_no_weights_is_refused(weights, text):
 
 
 def test_a_table_keeps_its_weights(tmp_path):
-    """As a column, as numbers, from a file, and as a scene file has it."""
+    """Weights as a column, as numbers, from a file, and as a scene file has them."""
     (tmp_path / "draws.csv").write_text("vehicle.mass,w\n1,1\n2,3\n3,2\n")
     of_file = lw.designs.Table(tmp_path / "draws.csv", weights="w", columns=["vehicle.mass"])
     named = lw.designs.Table({"vehicle.mass": [1.0, 2.0, 3.0], "w": [1.0, 3.0, 2.0]}, weights="w")

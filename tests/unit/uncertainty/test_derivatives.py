@@ -64,7 +64,7 @@ def test_nothing_changes():
 
 
 def test_errors_hold_the_truth_whatever_round_off_is():
-    """Of 1,000 sums of a line and a wave, values with round-off of 1e-16 to 1e-5, not one beyond the error told."""
+    """Among 1,000 sums of a line and a wave, values with round-off of 1e-16 to 1e-5, not one beyond the error told."""
     rng = np.random.default_rng(1)
     told = []
     for seed in range(1000):

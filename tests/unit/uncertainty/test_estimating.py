@@ -251,7 +251,7 @@ def test_the_choice_of_an_estimator():
 
 
 def test_numbers_reach_the_variance():
-    """What levels are predicted to leave is what they leave: their numbers put into the formula by hand."""
+    """Levels leave the predicted variance: their numbers put into the formula by hand."""
     u, rng = cubed(3, 1024), np.random.default_rng(12)
     fine = rng.normal(size=1024)
     coarse = fine + 0.1 * rng.normal(size=1024)
@@ -409,7 +409,7 @@ def test_clusters_and_thin_tails_are_no_heavy_tails():
 
 
 def test_rare_branches_are_strata():
-    """Of a Choice of 1 in 100, the odd level is a stratum; of two Choices the strata are parts of the whole."""
+    """The odd level of a Choice of 1 in 100 is a stratum; with two Choices the strata are parts of the whole."""
     rare = lw.distributions.Choice([0.0] * 99 + [4.0])
     vary = {"start.velocity[2]": rare, "start.position[0]": lw.distributions.Normal(std=1.0),
             "start.position[1]": lw.distributions.Choice([0.0, 1.0, 2.0], weights=[90, 4, 6])}  # fmt: skip

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many times as often one rare event of standard normals happens as another, against closed forms."""
+"""Ratio of the probabilities of two rare events of standard normals, against closed forms."""
 
 from types import SimpleNamespace
 

@@ -244,7 +244,7 @@ def test_the_full_vehicle_loads():
 
 
 def test_the_rov_that_pitches_over_is_said_to(capsys):
-    """Where thrusters push below the centre of gravity by more than buoyancy rights it, there is no steady pitch."""
+    """Thrusters that push below the centre of gravity by more than buoyancy rights leave no steady pitch."""
     scene, said = lw.Scene.named("bluerov2_heavy"), "15.5 N"
     body, (thrusters,) = scene.vehicle, [term for term in scene.terms if term.type == "thrusters"]
     arm, righting = thrusters.position[:4, 2], float(body.buoyancy) * abs(body.center_of_buoyancy[2])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all pictures share: sizes of text, also side by side in threads; legends; and what their help says."""
+"""Common parts of all pictures: sizes of text, also side by side in threads; legends; and what their help says."""
 
 import inspect
 import threading

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is shown of a run: a fair choice of members, even times."""
+"""Choice of what is shown of a run: a fair choice of members, even times."""
 
 import dataclasses
 

@@ -39,7 +39,7 @@ def test_a_member_that_ended_is_marked_on_the_turn_on_which_it_ended(turns, end)
 
 
 def test_a_direction_is_known_though_all_that_are_drawn_have_ended():
-    """Of more members than are drawn a few turn on, and none of these is drawn."""
+    """A few of more members than are drawn turn on, and none of these is drawn."""
     end = np.full(4000, 10.0)
     drawn = lw.select_members(turning(2.5, end)[0]).members
     end[np.setdiff1d(np.arange(1000, 3000), drawn)[:10]] = np.nan

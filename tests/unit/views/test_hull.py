@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a vehicle looks like: the hull of its shape, or the user's mesh."""
+"""Shape of a vehicle: the hull of its shape, or the user's mesh."""
 
 import json
 import struct

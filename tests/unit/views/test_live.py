@@ -102,7 +102,7 @@ def test_the_view_is_laid_out_anew_when_it_is_outgrown(tmp_path):
 
 
 def test_blocks_share_the_places_of_a_large_run(tmp_path):
-    """Of 2,400 members a thousand are drawn: 500 of each half."""
+    """A thousand of 2,400 members are drawn: 500 of each half."""
     path = recorded(tmp_path / "live.rrd", blocks(made(np.zeros((2, 2400, 3)) + 5.0), 1200, 1200))
     for first in (0, 1200):
         assert len(rows(path, f"/world/from_{first}/bodies/ok", "translations")[0.0]) == 500

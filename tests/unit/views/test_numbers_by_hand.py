@@ -83,7 +83,7 @@ def test_what_cannot_be_drawn_says_why():
 
 
 def test_factors_without_effect_take_no_rows():
-    """Of three factors the second has indices of zero for both quantities, the third for one of them."""
+    """The second of three factors has indices of zero for both quantities, the third for one of them."""
     numbers = np.array([[0.7, 0.0, 0.0], [0.4, 0.0, 0.6]])
     found = SimpleNamespace(name="Sobol indices", quantities=["depth", "speed"], factors=["a", "b", "c"], samples=8,
                             members=80, failed=0, confidence=0.95, columns=["first", "total"], first=numbers, total=numbers,

@@ -196,7 +196,7 @@ def test_faults_are_told(tmp_path):
 
 
 def sweep_in(folder):
-    """What a sweep writes, in short."""
+    """Files of a sweep, in short."""
     (folder / "sweep.json").write_text(json.dumps({"members": 20, "cells": [1, 2]}))
     (folder / "summary.md").write_text("# Sweep\nlqr passes <95 %> of 20\n")
     with (folder / "table.csv").open("w", newline="") as file:

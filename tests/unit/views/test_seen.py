@@ -30,13 +30,13 @@ LEAST_BODY = 8
 
 
 def faults_of(paths, times, folder, rgbs=None):
-    """What is wrong with how recordings look in a viewer of their own: the last one opened is in front."""
+    """Faults of recordings in a viewer of their own: the last one opened is in front."""
     with viewer() as window:
         return faults_in(window, paths, times, rgbs)
 
 
 def faults_in(window, paths, times, rgbs=None):
-    """What is wrong with how recordings look in a viewer: the last one opened is in front."""
+    """Faults of recordings in a viewer: the last one opened is in front."""
     window.open(*paths)
     window.pictures(times[0])  # the camera settles
     frames = [window.pictures(t) for t in times]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What begins at a step: faults, and channels that a controller knows to be lost."""
+"""Changes that begin at a step: faults, and channels that a controller knows to be lost."""
 
 from typing import Any
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What laws of the pose have in common: errors on SE(3), their integrals, and the balance of weight and buoyancy."""
+"""Common parts of laws of the pose: errors on SE(3), their integrals, and the balance of weight and buoyancy."""
 
 import functools
 from typing import Any

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sensor reads, as numbers that a part may change: a scalar or a 3-vector of the Measurement."""
+"""Readings of a sensor, as numbers that a part may change: a scalar or a 3-vector of the Measurement."""
 
 import functools
 from typing import Any, NamedTuple

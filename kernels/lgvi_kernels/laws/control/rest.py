@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an allocation leaves of the demand: what its actuators cannot make at all, and what their limits cut off."""
+"""Remainder of the demand after an allocation: impossible components, and parts beyond limits."""
 
 from typing import Any
 

@@ -36,7 +36,7 @@ class BuoyancyEngine(Law):
         return float(volume + np.clip(goal - volume, -most, most))
 
     def met(self, view: View, time: float) -> float | None:
-        """How long after the last look a straight line met the depth where it turns, `time` being since then; or None."""
+        """Time after the last look at which a straight line met the depth where it turns, `time` being since then; or None."""
         _, side, _, before, since, *_ = view.memory
         depth, before = view.b[2], view.b[2] if since < 0.0 else before
         end = self.depth_top if side > 0.0 else self.depth_bottom

@@ -28,7 +28,7 @@ class MovingMass(Following):
         return self.driven and (self.inertia or super().moves)
 
     def start(self) -> Array:
-        """What channels remember, and no velocity."""
+        """Memory of channels, and no velocity."""
         return np.concatenate([super().start() if self.driven else np.zeros(0), np.zeros(3 * self.inertia)])
 
     def _halves(self, view: View) -> tuple[View, Array]:
@@ -37,7 +37,7 @@ class MovingMass(Following):
         return replace(view, memory=view.memory[:count]), view.memory[count:]
 
     def follow(self, view: View) -> Array:
-        """That of channels, if a controller drives them."""
+        """Memory of channels, if a controller drives them."""
         own, rest = self._halves(view)
         return np.concatenate([super().follow(own) if self.driven else own.memory, rest])
 

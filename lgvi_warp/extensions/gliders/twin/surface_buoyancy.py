@@ -29,7 +29,7 @@ class SurfaceBuoyancy(Law):
         return type(self)(**vars(self) | {"waves": tuple(law for law in laws if isinstance(law, Waves))})
 
     def parts(self) -> Iterator[tuple[float, float, float, float]]:
-        """Of each part its place from the centre of buoyancy [m], buoyancy [N], height [m], and length [m]; 0: of any."""
+        """Parts of the hull: place from the centre of buoyancy [m], buoyancy [N], height [m], and length [m]; 0: of any."""
         if len(self.stations) == 1:
             yield 0.0, float(self.buoyancy), float(self.heights[0]), 0.0
             return

@@ -41,7 +41,7 @@ class DVL(Part):
         self.last: Array = np.zeros(3)
 
     def locked(self, y: Measurement, directions: Array) -> Any:
-        """Which beams (4,) have an echo from the floor at this tick."""
+        """Mask of beams (4,) with an echo from the floor at this tick."""
         four = normals(self.seed0, self.seed1, y.member, y.tick, self.channel + 1)
         kept = np.array([0.5 * math.erfc(-z / math.sqrt(2.0)) >= self.dropout for z in four])
         kept &= not self.silent_from <= y.t < self.silent_to

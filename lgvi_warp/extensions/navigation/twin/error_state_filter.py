@@ -111,7 +111,7 @@ class ErrorStateFilter(Part):
         self.nis_count += 1
 
     def by_position(self, now: slice, i: int, place: Array) -> Array:
-        """How number i of the position of a sensor's `place` follows from the error; `now`: P, or THEN, as a fix was sent."""
+        """Row that maps the error to number i of the position of a sensor's `place`; `now`: P, or THEN, as a fix was sent."""
         h = np.zeros(18)
         h[now.start + i] = 1.0
         if now == P:
@@ -129,7 +129,7 @@ class ErrorStateFilter(Part):
         return float(u @ (V_body + np.cross(self.rate, arm))), h
 
     def by_heading(self) -> Array:
-        """How the heading follows from the error."""
+        """Row that maps the error to the heading."""
         R, h = self.R, np.zeros(18)
         h[7:9] = R[0, 0] * R[1, 2] - R[1, 0] * R[0, 2], R[0, 0] * R[1, 1] - R[1, 0] * R[0, 1]
         h[7] = -h[7]
@@ -166,7 +166,7 @@ class ErrorStateFilter(Part):
         self.inject()
 
     def correct_by_delayed(self) -> None:
-        """As a fix is sent, the position is copied with its covariances; as it arrives, it corrects the copy.
+        """Correct by a delayed fix: copy the position with its covariances as it is sent; correct the copy as it arrives.
 
         Stochastic cloning: Roumeliotis & Burdick 2002. One fix is on its way at a time.
         """

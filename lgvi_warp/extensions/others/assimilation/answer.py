@@ -68,7 +68,7 @@ class Assimilated(Summarized, Saved):
     provenance: dict[str, Any]
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """What was learned, and whether innovations are what they should be."""
+        """Learned numbers, and the check of the innovations."""
         rows = [("method", self.method)]
         for name in self.parameters:
             rows.append((name, f"{_text(self.mean[name][-1])} +- {_text(self.std[name][-1])}"))

@@ -154,7 +154,7 @@ def assimilate(
 
 
 def _targets(faults: Faults, fleet: Ensemble, learn: Sequence[str]) -> list[Target]:
-    """What is learned: numbers of the scene that vary."""
+    """Learned quantities: numbers of the scene that vary."""
     targets, known, varied = list[Target](), fleet.scene.parameters(), fleet.varied_names
     if isinstance(learn, str):
         faults.add("learn", learn, "is no list of names", f"give [{learn!r}]")
@@ -478,7 +478,7 @@ class _Track:
         return replace(found, messages=tuple(self.messages + self._remarks() + _doubts(found)))
 
     def _remarks(self) -> list[str]:
-        """What the user should know of the filter."""
+        """Remarks on the filter for the user."""
         remarks = []
         if self.filter == "particles" and not self.noisy and not (self.targets and self.discount):
             remarks.append(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a measurement makes of an ensemble, on arrays: ensemble Kalman filters, and weights of particles.
+"""Update of an ensemble by a measurement, on arrays: ensemble Kalman filters, and weights of particles.
 
 An ensemble is (d, n), numbers by member; what it predicts of the measurements is (m, n). Measurements are (m,), their errors
 independent with standard deviations (m,).

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was measured: one instrument's values at its times."""
+"""Measurements: one instrument's values at its times."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Series:
 
     @property
     def quantity(self) -> OfResult:
-        """What it measures, as a quantity of a result."""
+        """Measured quantity, as one of a result."""
         return quantities(self.of)[0]
 
     @property

@@ -113,7 +113,7 @@ def _named(values: np.ndarray, names: str = "xyz") -> dict[str, float]:
 
 
 def _about(tracks: Tracks) -> dict[str, str]:
-    """What messages cannot say: origin and start of the axes, and how each member ended."""
+    """Metadata that messages cannot hold: origin and start of the axes, and how each member ended."""
     environment = tracks.environment
     about = {"source": tracks.source, "axes": "map: east, north, up; base_link: ahead, port, up"}
     about |= {} if environment.origin is None else {"origin": " ".join(map(repr, environment.origin))}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What users call to run an ensemble: solve, prepare, predict, resume, merge and warm."""
+"""Calls that run an ensemble: solve, prepare, predict, resume, merge and warm."""

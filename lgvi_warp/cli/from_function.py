@@ -40,7 +40,7 @@ COMMA = re.compile(r",(?![^(\[]*[)\]])")
 
 
 class Form(NamedTuple):
-    """How the text of an option is read; read raises ValueError; values of an option given several times are added up."""
+    """Form of an option's text; read raises ValueError; values of an option given several times are added up."""
 
     metavar: str
     read: Callable[[str], Any]

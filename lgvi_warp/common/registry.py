@@ -73,7 +73,7 @@ class Kinds(MutableMapping[str, Any]):
 
 
 def _extensions() -> ModuleType:
-    """What looks words up in extensions: loaded for a word that the core does not know."""
+    """Lookup of words in extensions: loaded for a word that the core does not know."""
     return import_module("lgvi_warp.common.extensions")
 
 

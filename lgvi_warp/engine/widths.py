@@ -120,7 +120,7 @@ def this_machine() -> str:
 
 
 def _content(file: Path) -> dict[str, Any]:
-    """What a file of measured widths holds; nothing, if it is none."""
+    """Content of a file of measured widths; empty for any other file."""
     with contextlib.suppress(OSError, ValueError, SceneError):
         content = safe_files.parsed(safe_files.read(file.parent, file.name, MOST_BYTES))
         return content if isinstance(content, dict) else {}

@@ -13,10 +13,10 @@ _DEFAULTS = {
 
 
 def searched(limit, d, **more):
-    """What a search for the event finds that a limit (n, d) -> (n,) or (k, n) is above 0."""
+    """Answer of a search for the event that a limit (n, d) -> (n,) or (k, n) is above 0."""
     return RareSearch(limit, d, **_DEFAULTS | more).answer()
 
 
 def split(walk, **more):
-    """What splitting finds of the event of a walk."""
+    """Answer of splitting for the event of a walk."""
     return SplitSearch(walk, **_DEFAULTS | more).answer()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the filter believes: rows of the bus, as device/error_state_filter.py writes them."""
+"""Estimates of the filter: rows of the bus, as device/error_state_filter.py writes them."""
 
 from lgvi_warp.control.signals import ESTIMATE, Signal, add_signals
 from lgvi_warp.physics.fields import Field

@@ -420,7 +420,7 @@ class Term:
         return {name: _outside(fields[name], value) | _falling(fields[name], value) for name, value in numbers.items()}
 
     def odd_at(self, numbers: Numbers, position: Array) -> Mapping[str, tuple[Array, str]]:
-        """What is odd about members where they start; by default nothing.
+        """Oddities of members where they start; none by default.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).

@@ -198,7 +198,10 @@ def _spread(ask: _CountedCost, d: int, rng: np.random.Generator) -> int:
 
 
 def _starts(points: np.ndarray, costs: np.ndarray) -> np.ndarray:
-    """Which of points (n, d) are better than all their neighbours, the best first; of equal ones the first is better."""
+    """Indices of points (n, d) that are better than all their neighbours, the best first.
+
+    Of equal ones the first is better.
+    """
     from scipy.spatial import cKDTree
 
     n = len(points)

@@ -194,7 +194,7 @@ class ElectricalEnergy(OfOne, Total):
 
 @dataclass(frozen=True, eq=False)
 class TimeToFailure(OfOne):
-    """When each member failed or an event stopped it [s], infinite for those that went on to the end; then statistics of it.
+    """Time at which each member failed or an event stopped it [s], infinite at the end; then statistics of it.
 
     Only lw.statistics.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed.
     lw.statistics.Outcome is the probability to have ended by each time.

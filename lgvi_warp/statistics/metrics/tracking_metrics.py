@@ -91,7 +91,7 @@ class OfStep(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class Overshoot(Largest, OfStep):
-    """How far each member goes beyond its goal at most [unit, or % of the step], 0 if it never does; then statistics of it.
+    """Largest distance of each member beyond its goal [unit, or % of the step], 0 if it never does; then statistics of it.
 
     Args:
         percent: whether in percent of the step; by default False.
@@ -121,7 +121,7 @@ class Overshoot(Largest, OfStep):
 
 @dataclass(frozen=True, eq=False)
 class Undershoot(Largest, OfStep):
-    """How far each member goes the wrong way from its start at most [unit, or % of the step]; then statistics of it.
+    """Largest distance of each member in the wrong direction [unit, or % of the step]; then statistics of it.
 
     Args:
         percent: whether in percent of the step; by default False.
@@ -138,7 +138,7 @@ class Undershoot(Largest, OfStep):
 
 @dataclass(frozen=True, eq=False)
 class PeakTime(OfCourse):
-    """When each member is farthest in the direction of its step [s], the first such tick; then statistics of it."""
+    """Time at which each member is farthest in the direction of its step [s], the first such tick; then statistics of it."""
 
     type: ClassVar[str] = "peak_time"
     form: ClassVar[str] = "s"

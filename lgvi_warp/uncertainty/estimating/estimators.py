@@ -138,7 +138,7 @@ def spread_of_plain(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceM
 
 
 def spread_of_replicates(y: np.ndarray, cost: float, least: float = 0.0) -> VarianceModel:
-    """How the variance of a replicated design's mean falls, from some of its members (n,), in the order of the design.
+    """Model of the variance of a replicated design's mean, from some of its members (n,), in the order of the design.
 
     Variances of 16 replicates are known to a third. Where they gain less than three times over independent members, as where
     noise acts, most of the gain's logarithm is believed. Elsewhere a quarter of the points shows how fast the variance

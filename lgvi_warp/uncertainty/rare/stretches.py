@@ -20,7 +20,7 @@ PARAMETER = "parameter."
 
 
 class Stretches:
-    """What a walk calls instead of going itself, where a folder keeps its stretches."""
+    """Stretches of a walk that a folder keeps, run or read back."""
 
     def __init__(self, remembered: Remembered):
         self._remembered = remembered

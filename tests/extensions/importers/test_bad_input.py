@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong with a file of a vehicle is said with its place and a remedy."""
+"""Faults of a vehicle's file are reported with place and remedy."""
 
 import pytest
 

@@ -142,7 +142,7 @@ def test_members_leave_the_transforms_as_they_end(result, tmp_path):
 @pytest.mark.parametrize(("off", "extra"), [(0.0, 0), (1e-8, 0), (-1e-8, 0), (0.01, 1), (-0.01, 0)])
 @pytest.mark.parametrize("at", [1, 3])
 def test_a_member_that_ends_at_a_sample_is_written_once(at, off, extra, result, tmp_path, monkeypatch):
-    """Of any end there is one message, and none of the same member has the stamp of another."""
+    """Each end has one message, and no two of one member share a stamp."""
     pytest.importorskip("mcap_ros2")
     ends = result.end_time.copy()
     ends[1] = result.time[at] + off

@@ -95,7 +95,7 @@ def steady():
 
 
 class Rare:
-    """What a search for a rare event found."""
+    """Answer of a search for a rare event."""
 
     def save(self, out):
         (out / "rare.json").write_text("{}")
@@ -176,7 +176,7 @@ CASES = [
 
 @pytest.mark.parametrize(("verb", "options", "expected"), CASES)
 def test_options_reach_the_function(verb, options, expected, tmp_path, capsys):
-    """What is not given is not passed on: the function's own default holds."""
+    """An absent option is not passed on: the function's own default holds."""
     study = Study(FOUND[verb]())
     words = [word.replace("_above_", " above ") for word in options.split()]
     for loud in ([], ["-q"]):

@@ -42,7 +42,7 @@ add_signals(Signal(Field("own_signal", (2,), "m", "a signal"), "own"))
 
 
 def told_by(code, folder):
-    """What a new Python that sees this folder prints as JSON."""
+    """Output of a new Python that sees this folder, read as JSON."""
     paths = os.pathsep.join([str(folder), str(ROOT), str(ROOT / "kernels")])
     done = subprocess.run(
         [sys.executable, "-W", "always", "-c", code], cwd=folder, env=os.environ | {"PYTHONPATH": paths},

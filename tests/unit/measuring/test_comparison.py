@@ -900,7 +900,7 @@ def test_damping_limits_a_step_above_twice_its_rate(scene):
 
 
 def test_a_step_that_more_members_need_shorter_is_shortened_by_its_order(scene):
-    """Of 256 members 128 are searched; the error grows with the member."""
+    """Among 256 members 128 are searched; the error grows with the member."""
     runs = Runs(BAD | {"rk8": 0.0, "kl8(psi_x)": 0.0, "psi_s": 0.1})
     found = suggestion_by(runs, fleet_of(scene, 256), 1e-2, ["psi_s"])
     assert found.members == 256

@@ -88,7 +88,10 @@ def two_peaks(d, seed, width):
 
 
 def peaks_found(d, most, part, seeds):
-    """How many narrow peaks a search finds, to a thousandth, whose two widths are the radius of a part of the cube; before."""
+    """Number of narrow peaks that a search finds, to a thousandth, whose two widths are the radius of a part of the cube.
+
+    Before.
+    """
     found = np.zeros(2, int)
     for seed in seeds:
         cost, least = two_peaks(d, seed, 0.5 * radius_of(part, d))
@@ -121,7 +124,7 @@ def test_separate_peaks_are_found_over_seeds(d, times):
 
 @pytest.mark.parametrize("d", [1, 2, 4, 6])
 def test_spread_points_meet_what_they_are_said_to(d):
-    """Of balls anywhere that take the part which is told, at least 95 % have a point within."""
+    """At least 95 % of balls anywhere with the reported part have a point within."""
     asked = []
     found = box.search(lambda x: (asked.append(x), np.zeros(len(x)))[1], d, 3000, d, 1, spend=True)
     assert found.runs <= 3000

@@ -211,7 +211,7 @@ def test_what_is_no_file_is_refused(kind, door, tmp_path, monkeypatch):
 
 
 def check_refused(load, kind, tmp_path):
-    """What reads a file refuses one of this kind, with a remedy, and writes nothing."""
+    """A reader refuses a file of this kind, with a remedy, and writes nothing."""
     made, words = KINDS[kind]
     if callable(made):
         made(tmp_path / "odd", tmp_path)

@@ -65,7 +65,7 @@ def by_grid(limit, reach=8.0, count=1601):
 
 
 def held(limit, d, p, seeds, **more):
-    """How many of the intervals hold a probability."""
+    """Count of intervals that hold a probability."""
     intervals = [searched(limit, d, seed=seed, **more).interval() for seed in seeds]
     assert all(high > 1.005 * low > 0.0 for low, high in intervals)
     return sum(low <= p <= high for low, high in intervals)

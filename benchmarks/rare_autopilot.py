@@ -41,10 +41,10 @@ def read(path):
     return {"seed": 0, "members": 0, "above": [0] * len(BOUNDS), "answers": []}
 
 
-def write(path, known):
+def write(path, allowed):
     """Put it in place of what was known before, whole or not at all."""
     new = path.with_suffix(".new")
-    new.write_text(json.dumps(known))
+    new.write_text(json.dumps(allowed))
     new.replace(path)
 
 
@@ -84,13 +84,13 @@ def add_rare(path, above, by, seed, error):
     write(path, known)
 
 
-def lines(known):
+def lines(allowed):
     """The answers beside plain members, a line each: how far apart they are, in both errors."""
-    yield f"{known['members']:,} plain members"
-    for answer in known["answers"]:
-        hits = known["above"][int(np.argmin(np.abs(BOUNDS - answer["above"])))]
-        share, p = hits / max(1, known["members"]), answer["probability"]
-        error = math.hypot(math.sqrt(max(1, hits)) / max(1, known["members"]), answer["relative_error"] * p)
+    yield f"{allowed['members']:,} plain members"
+    for answer in allowed["answers"]:
+        hits = allowed["above"][int(np.argmin(np.abs(BOUNDS - answer["above"])))]
+        share, p = hits / max(1, allowed["members"]), answer["probability"]
+        error = math.hypot(math.sqrt(max(1, hits)) / max(1, allowed["members"]), answer["relative_error"] * p)
         yield (
             f"above {answer['above']:g} m by {answer['by']}, seed {answer['seed']}: {p:.3g} "
             f"({100.0 * answer['relative_error']:.2g} %), plain {share:.3g} ({hits} members), "

@@ -29,9 +29,9 @@ class Tally(NamedTuple):
     vector: float = 0
     scalar: float = 0
 
-    def plus(self, other, times=1):
+    def plus(self, second, times=1):
         """This and `times` the other."""
-        return Tally(*(a + times * b for a, b in zip(self, other, strict=True)))
+        return Tally(*(a + times * b for a, b in zip(self, second, strict=True)))
 
     def over(self, count):
         """Its part in one of so many."""

@@ -106,20 +106,20 @@ def lift(body: Body, writer: Writer) -> list[str]:
     return [f"u1 * ({one})" if one else "" for one in sums]
 
 
-def fin(i: int, one: Fin, writer: Writer) -> list[str]:
+def fin(i: int, first: Fin, writer: Writer) -> list[str]:
     """Lift l (un c - uc n) and drag -d (uc c + un n), with l = lift uc un / V and d = drag V + drag_normal un^2 / V."""
-    uc = writer.let(f"c{i}", writer.total(one.chord, VELOCITY))
-    un = writer.let(f"n{i}", writer.total(one.normal, VELOCITY))
+    uc = writer.let(f"c{i}", writer.total(first.chord, VELOCITY))
+    un = writer.let(f"n{i}", writer.total(first.normal, VELOCITY))
     V = writer.let(f"v{i}", f"root({uc} * {uc} + {un} * {un} + {writer.number(LITTLE)})")
     part = writer.let(f"e{i}", f"{un} / {V}")
-    across = writer.let(f"l{i}", f"{writer.number(one.lift)} * {uc} * {part}")
-    against = writer.total((one.drag, one.drag_normal), (V, f"{un} * {part}"))
+    across = writer.let(f"l{i}", f"{writer.number(first.lift)} * {uc} * {part}")
+    against = writer.total((first.drag, first.drag_normal), (V, f"{un} * {part}"))
     along_chord, along_normal = f"{across} * {un}", f"-{across} * {uc}"
     if against:
         against = writer.let(f"d{i}", against)
         along_chord, along_normal = f"{along_chord} - {against} * {uc}", f"{along_normal} - {against} * {un}"
     names = writer.let(f"g{i}", along_chord), writer.let(f"h{i}", along_normal)
-    return [writer.total(pair, names) for pair in zip(one.chord, one.normal, strict=True)]
+    return [writer.total(pair, names) for pair in zip(first.chord, first.normal, strict=True)]
 
 
 def with_quaternion(body: Body, writer: Writer) -> list[str]:

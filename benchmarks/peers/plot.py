@@ -99,10 +99,10 @@ def draw(records: list[Record], path: Path) -> None:
     plt.close(figure)
 
 
-def _panel(panel: Any, found: dict[tuple[str, str], list[tuple[float, float]]], colors: Any) -> None:
-    peers = [HOME, *dict.fromkeys(peer for peer, _ in found if peer != HOME)]
+def _panel(panel: Any, answer: dict[tuple[str, str], list[tuple[float, float]]], colors: Any) -> None:
+    peers = [HOME, *dict.fromkeys(peer for peer, _ in answer if peer != HOME)]
     seen: dict[str, int] = defaultdict(int)
-    for (peer, name), points in found.items():
+    for (peer, name), points in answer.items():
         marker = "os^vDPX*<>dphH1"[seen[peer] % 15]
         seen[peer] += 1
         style = {"color": colors[peers.index(peer)], "marker": marker, "ms": 5}

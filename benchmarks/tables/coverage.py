@@ -64,13 +64,13 @@ def last(statistic, x, replicates=1):
     return said(statistic, tree, len(x), replicates)
 
 
-def held(found, truth, value=""):
-    return float(np.mean((found[f"{value}lower"] <= truth) & (truth <= found[f"{value}upper"])))
+def held(answer, truth, value=""):
+    return float(np.mean((answer[f"{value}lower"] <= truth) & (truth <= answer[f"{value}upper"])))
 
 
-def held_on_circle(found, truth):
-    away = np.abs((found.value - truth + np.pi) % (2.0 * np.pi) - np.pi)
-    return float(np.mean(away <= found.half_width))
+def held_on_circle(answer, truth):
+    away = np.abs((answer.value - truth + np.pi) % (2.0 * np.pi) - np.pi)
+    return float(np.mean(away <= answer.half_width))
 
 
 def passages(repetitions, members, loss):

@@ -18,13 +18,13 @@ SHAPES = ("paper", "slender", "plate")
 LENGTHS = ("0.003", "0.1", "0.9")
 
 
-def cells(one):
+def cells(first):
     """A row of a table."""
-    steps = one.get("iterations")
-    name = one["solver"] + ("" if steps is None else f", {steps} steps")
-    time = one.get("ns_per_solve_and_turn", one.get("ns_per_solve"))
-    residuals = [f"{one[f'at {at}']['residual']:.1e}" for at in LENGTHS]
-    return [name, f"{time:.1f}", *residuals, f"{one['at 0.1']['orthogonality']:.1e}", f"{one['range']:.2f}"]
+    steps = first.get("iterations")
+    name = first["solver"] + ("" if steps is None else f", {steps} steps")
+    time = first.get("ns_per_solve_and_turn", first.get("ns_per_solve"))
+    residuals = [f"{first[f'at {at}']['residual']:.1e}" for at in LENGTHS]
+    return [name, f"{time:.1f}", *residuals, f"{first['at 0.1']['orthogonality']:.1e}", f"{first['range']:.2f}"]
 
 
 def table(records, dtype, shape):

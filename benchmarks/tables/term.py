@@ -50,11 +50,11 @@ def numbers(pair, columns):
     return [f"{one[key]:.{digits}f}" for one in pair for key, digits in columns]
 
 
-def tables(found):
+def tables(answer):
     """Tables of terms, of driven vehicles, and of methods for coupled inertia."""
     columns = (("ns_per_vehicle_step", 1), ("more_than_none", 1))
     terms, driven, methods = {}, [], []
-    for (kind, name, method), pair in found.items():
+    for (kind, name, method), pair in answer.items():
         if kind == "vehicle":
             driven.append([name, method, *numbers(pair, RATIOS[:1])])
         elif method in ("psi_s", "rk4"):

@@ -37,11 +37,11 @@ def fleet():
     return lw.Ensemble(scene, vary=vary)
 
 
-def likeliest(members, found):
+def likeliest(members, answer):
     """Run the likeliest member that hits the floor again, with its own noise."""
     run = lw.prepare(members, draws="given", save=lw.SaveAt(every=0.5), **RUN)
-    numbers = {name: [value] for name, value in found.likeliest.items()}
-    return run(numbers, found.likeliest_draws[None, :])
+    numbers = {name: [value] for name, value in answer.likeliest.items()}
+    return run(numbers, answer.likeliest_draws[None, :])
 
 
 if __name__ == "__main__":

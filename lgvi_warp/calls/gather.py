@@ -91,12 +91,12 @@ def _weights(weights: Any, members: int) -> np.ndarray | None:
     return np.asarray(numbers / numbers.mean())
 
 
-def _checked(kept: KeptSamples, asked: tuple[Statistic, ...]) -> tuple[Statistic, ...]:
+def _checked(kept: KeptSamples, requested: tuple[Statistic, ...]) -> tuple[Statistic, ...]:
     """The statistics, where they fit the scene and the samples that were kept."""
     faults, result, events = Faults(), kept.result, kept.events
     known = outcomes([event.key for event in events], [event.status for event in events])
     alike = {event.key for event in events if sum(other.status == event.status for other in events) > 1}
-    for statistic in asked:
+    for statistic in requested:
         with faults.including():
             check_outcomes(f"{statistic.type}.{'at' if statistic.at else 'of'}", statistic.outcomes, known)
         for name in alike.intersection(statistic.outcomes) if result.event is None else ():
@@ -108,14 +108,14 @@ def _checked(kept: KeptSamples, asked: tuple[Statistic, ...]) -> tuple[Statistic
             if field not in result.samples:
                 with faults.including():
                     raise not_kept(f"statistics, {statistic.key!r}", field, tuple(result.samples))
-    of_ticks = {statistic.key: statistic for statistic in asked if statistic.ticks}
+    of_ticks = {statistic.key: statistic for statistic in requested if statistic.ticks}
     if of_ticks and kept.period is not None:
         with faults.including():
             kept.tick_rows(f"statistics, {next(iter(of_ticks))!r}")
         with faults.including():
             check_wanted(faults, "statistics", of_ticks, kept.scene.controller)
     faults.raise_if_any()
-    return asked
+    return requested
 
 
 def _part_of_block(kept: KeptSamples, run: Gathered, block: Block) -> list[Part]:

@@ -90,11 +90,11 @@ class Remembered:
         remedy = "give the arguments that it was begun with, or another folder"
         return refusal("store", str(self._folder), problem, remedy)
 
-    def _key(self, fleets: Sequence[Ensemble], asked: Mapping[str, Any]) -> str:
+    def _key(self, fleets: Sequence[Ensemble], requested: Mapping[str, Any]) -> str:
         """Text that identifies the arguments. Raises SceneError where a function of the user's cannot be told from others."""
         told = {f"[{i}] {place}": each for i, fleet in enumerate(fleets)
                 for place, each in identities(functions_of(fleet)).items()}  # fmt: skip
-        told |= {name: identity(value) for name, value in asked.items() if name not in NO_MATTER}
+        told |= {name: identity(value) for name, value in requested.items() if name not in NO_MATTER}
         if unknown := [place for place, text in told.items() if text == UNKNOWN]:
             problem = f"cannot tell {', '.join(unknown[:3])} from others in a later call"
             raise refusal("store", str(self._folder), problem, "leave store out, or give functions a version")

@@ -74,20 +74,20 @@ def _make(measure, Loop, width, real, shared):
         rows[i, at + 2] = v.z
 
     @wp.kernel(module="unique", enable_backward=False)
-    def run(given: wp.array2d(dtype=Lane), loop: wp.array(dtype=Loop), table: wp.array2d(dtype=Number),
+    def run(supplied: wp.array2d(dtype=Lane), loop: wp.array(dtype=Loop), table: wp.array2d(dtype=Number),
             memory: wp.array2d(dtype=Lane), every: int, h: wp.float64, ticks: int, out: wp.array2d(dtype=Lane)):  # fmt: skip
         i = wp.tid()
         p = loop[i % loop.shape[0]]
         for k in range(ticks):
             at = k * wp.static(FIELDS)
             y = Measurement()
-            y.position = three(given, i, at)
-            y.north = three(given, i, at + 3)
-            y.east = three(given, i, at + 6)
-            y.down = three(given, i, at + 9)
-            y.velocity = three(given, i, at + 12)
-            y.water_velocity = three(given, i, at + 15)
-            y.angular_velocity = three(given, i, at + 18)
+            y.position = three(supplied, i, at)
+            y.north = three(supplied, i, at + 3)
+            y.east = three(supplied, i, at + 6)
+            y.down = three(supplied, i, at + 9)
+            y.velocity = three(supplied, i, at + 12)
+            y.water_velocity = three(supplied, i, at + 15)
+            y.angular_velocity = three(supplied, i, at + 18)
             y.h = real(h)
             y.step = k * every
             y.tick = k

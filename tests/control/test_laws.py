@@ -109,7 +109,7 @@ def run(scene):
 
 
 @pytest.fixture(scope="module")
-def other(scene):
+def second(scene):
     """The same kernel with other words: straight pieces, speeds, two numbers filtered, another policy, no waiting."""
     guidance = [
         lw.control.Trajectory(times=(0.0, 1.0, 2.0, 2.5), positions=[(0, 0, 3), (1, 1, 4), (1, -2, 6), (1, 0, 5)],
@@ -144,8 +144,8 @@ def test_a_law_is_its_twin(law, steps, scene, run):
 
 
 @pytest.mark.parametrize("law", ["speed_pid", "pose_pid", "policy", "heading_smc"])
-def test_so_it_is_with_other_words(law, other):
-    check(law, 60, *other)
+def test_so_it_is_with_other_words(law, second):
+    check(law, 60, *second)
 
 
 def test_laws_act(run):

@@ -50,16 +50,16 @@ Machine: {cpu}, {simd}. Written by `python -m tests.extremes.table`; do not edit
 """
 
 
-def cell(found, i):
+def cell(answer, i):
     """Outcome of one case in one run."""
-    status = Status(int(found.status[i]))
+    status = Status(int(answer.status[i]))
     if status != OK:
         return status.name
-    if found.bound[i] > 1.0:
+    if answer.bound[i] > 1.0:
         return "*lost*"
-    text = f"{found.error[i]:.1e} < {found.bound[i]:.0e}"
-    if found.position_error[i] > TELLING * found.way[i] > 0.0:
-        text += f"; position off by {found.position_error[i]:.1g} m on a way of {found.way[i]:.1g} m"
+    text = f"{answer.error[i]:.1e} < {answer.bound[i]:.0e}"
+    if answer.position_error[i] > TELLING * answer.way[i] > 0.0:
+        text += f"; position off by {answer.position_error[i]:.1g} m on a way of {answer.way[i]:.1g} m"
     return text
 
 

@@ -120,10 +120,10 @@ def circles_of_folders():
     return found
 
 
-def inner_folder(module, one):
+def inner_folder(module, first):
     """The folder of a room in which a module lies, or a loose file; None outside of the room, and for the room itself."""
     parts = module.split(".")
-    if parts[:2] != ["lgvi_warp", one]:
+    if parts[:2] != ["lgvi_warp", first]:
         return None
     return parts[2] if len(parts) > 2 else None
 

@@ -45,13 +45,13 @@ def parameters(thing):
     return {name: one.default for name, one in found.items() if one.default is not inspect.Parameter.empty}
 
 
-def same(one, other):
+def same(first, second):
     """Whether two defaults are the same value; a number stands for an array of it, None for one that is chosen later."""
-    if one is None or other is None or one == () or other == ():
+    if first is None or second is None or first == () or second == ():
         return True
-    if isinstance(one, str) or isinstance(other, str):
-        return one == other
-    return isinstance(one, bool) == isinstance(other, bool) and bool(np.all(np.asarray(one) == np.asarray(other)))
+    if isinstance(first, str) or isinstance(second, str):
+        return first == second
+    return isinstance(first, bool) == isinstance(second, bool) and bool(np.all(np.asarray(first) == np.asarray(second)))
 
 
 def docstrings():

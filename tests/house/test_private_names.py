@@ -48,11 +48,11 @@ def is_private_attribute(node: ast.AST) -> bool:
     return isinstance(node, ast.Attribute) and is_private(node.attr)
 
 
-def taken(nodes: list[ast.AST], own: set[str], others: set[str]) -> list[str]:
+def taken(nodes: list[ast.AST], local: set[str], others: set[str]) -> list[str]:
     """Uses of private names that another file defines and this one does not."""
     attributes = [node for node in nodes if is_private_attribute(node)]
     of_self = {node.attr for node in attributes if ast.unparse(node.value) == "self"}
-    uses = [f"{node.lineno}: {ast.unparse(node)}" for node in attributes if node.attr in others - own]
+    uses = [f"{node.lineno}: {ast.unparse(node)}" for node in attributes if node.attr in others - local]
     for node in nodes:
         if isinstance(node, ast.ImportFrom):
             uses += [f"{node.lineno}: import {alias.name}" for alias in node.names if is_private(alias.name)]

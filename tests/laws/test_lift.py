@@ -26,8 +26,8 @@ HEAVY = lw.Vehicle(
 )  # fmt: skip
 
 
-def scene(*given, vehicle=HEAVY):
-    return lw.Scene(vehicle, lw.Environment(gravity=9.8, water_density=DENSITY), terms=list(given))
+def scene(*inputs, vehicle=HEAVY):
+    return lw.Scene(vehicle, lw.Environment(gravity=9.8, water_density=DENSITY), terms=list(inputs))
 
 
 def view(velocity, **named):

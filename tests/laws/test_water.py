@@ -18,9 +18,9 @@ ERRORS = 5.0
 MEMBERS = 4096
 
 
-def scene(*given, **named):
+def scene(*inputs, **named):
     """A neutrally buoyant vehicle, nothing but these terms acting on it."""
-    return lw.Scene(vehicle(**named), lw.Environment(gravity=GRAVITY), terms=list(given))
+    return lw.Scene(vehicle(**named), lw.Environment(gravity=GRAVITY), terms=list(inputs))
 
 
 UNFELT = (1e-30, 1e-30, 0.0)
@@ -147,9 +147,9 @@ def test_frequency_of_encounter(course_deg):
 WANDER = dict(standard_deviation=(0.3, 0.2, 0.0), time_constant=2.0)
 
 
-def ensemble(*given, members=MEMBERS, seed=7, **named):
+def ensemble(*inputs, members=MEMBERS, seed=7, **named):
     """Members that differ by their random numbers alone."""
-    return lw.Ensemble(scene(*given, **named), members, seed)
+    return lw.Ensemble(scene(*inputs, **named), members, seed)
 
 
 def test_statistics_of_the_wandering_current():

@@ -204,11 +204,11 @@ class Weighed(Law):
         return (MASS - DISPLACED) * down, MASS * np.cross(CENTER, down)
 
 
-def lopsided(*given, center=CENTER, added=ADDED):
+def lopsided(*inputs, center=CENTER, added=ADDED):
     """A scene with the body above."""
     rigid = np.block([[MASS * np.eye(3), -MASS * hat(center)], [MASS * hat(center), RIGID[3:, 3:]]])
     body = lw.Vehicle(rigid_body_mass_matrix=rigid, added_mass_matrix=added, buoyancy=DISPLACED * GRAVITY)
-    return lw.Scene(body, lw.Environment(GRAVITY), terms=list(given))
+    return lw.Scene(body, lw.Environment(GRAVITY), terms=list(inputs))
 
 
 @pytest.mark.parametrize(

@@ -31,8 +31,8 @@ def member_errors(scene, states, *arguments, width=None):
     fleet = one(scene, *states)
     truth = run(fleet, *arguments, dtype="float64")
 
-    def error(other):
-        return np.array([difference(last(other, i), last(truth, i)) for i in range(fleet.members)])
+    def error(second):
+        return np.array([difference(last(second, i), last(truth, i)) for i in range(fleet.members)])
 
     compensated, plain = (error(run(fleet, *arguments, dtype=dtype, width=width)) for dtype in (COMPENSATED, "float32"))
     return compensated, plain, error(run(one(rounded(scene), *states), *arguments, dtype="float64"))

@@ -117,14 +117,14 @@ def compiler_or_skip(module):
         pytest.skip(str(error))
 
 
-def by_hand(one, method, dtype, *rates):
+def by_hand(first, method, dtype, *rates):
     """Position and attitude of lanes by hand, for each number of steps a second."""
     module = importlib.import_module("benchmarks.peers.peer_hand_lanes")
     compiler_or_skip(module)
     ends = []
-    lanes = module.Lanes(one, method, dtype, module.LANES[dtype][0])
+    lanes = module.Lanes(first, method, dtype, module.LANES[dtype][0])
     for rate in rates:
-        run = lanes.run(one, method, dtype, rate, 1, None)
+        run = lanes.run(first, method, dtype, rate, 1, None)
         run.call()
         ends.append(run.end())
     return ends

@@ -34,9 +34,9 @@ def truth():
     return {name: reference.solve(problem.make_problem(MEMBERS, T1, name)) for name in ("vehicle", "rigid")}
 
 
-def twin(one):
+def twin(single):
     """The problem's body for the reference."""
-    return Body(np.diag(one.M), np.diag(one.J), (Weight(net=one.net), Restoring(moment=one.d)))
+    return Body(np.diag(single.M), np.diag(single.J), (Weight(net=single.net), Restoring(moment=single.d)))
 
 
 def test_rates(small):

@@ -14,7 +14,7 @@ TOLERANCES = {"rtol": 1e-8, "atol": 1e-8}
 ESTIMATES_NONE = "estimates no error; use one of rk5, rk5_ck, rk8, or leave them out"
 
 
-@pytest.mark.parametrize(("words", "said"), [
+@pytest.mark.parametrize(("words", "output"), [
     ({"name": "kl8(rk8)"}, "not symmetric"), ({"name": "su4(rkw3)"}, "not symmetric"),
     ({"name": "bm6(phi)"}, "not symmetric"), ({"name": "bm4(psi_1)"}, "divide D"),
     ({"name": "kl6(rkn4_6)"}, "not of order 2"), ({"name": "bm5(psi_x)"}, "did you mean 'bm"),
@@ -23,8 +23,8 @@ ESTIMATES_NONE = "estimates no error; use one of rk5, rk5_ck, rk8, or leave them
     ({"name": "rk8", "rtol": 1e-8}, "is given alone"),
     ({"name": "rk8", "rtol": -1.0, "atol": 1e-8}, "is not between 0 and 1"),
 ])  # fmt: skip
-def test_methods_that_do_not_exist(words, said):
-    with pytest.raises(lw.SceneError, match=said):
+def test_methods_that_do_not_exist(words, output):
+    with pytest.raises(lw.SceneError, match=output):
         lw.Method(**words)
 
 
@@ -36,7 +36,7 @@ ROUGH = together("thrusters", "control fins with rates").terms
 NO_POTENTIAL = "needs potentials of position plus those of attitude; {} has none such"
 
 
-@pytest.mark.parametrize(("method", "given", "said"), [
+@pytest.mark.parametrize(("method", "inputs", "output"), [
     ("rkn6_14", [TETHER], NO_POTENTIAL.format("tether")),
     ("rkn6_11", [DRAG], NO_POTENTIAL.format("drag")),
     # Nor do compositions take what these laws remember.
@@ -55,9 +55,9 @@ NO_POTENTIAL = "needs potentials of position plus those of attitude; {} has none
     ("cg3", ROUGH, "before the step's start, where it is not known what thrusters remembers; use rkmk4"),
     ("kl6(psi_x)", ROUGH, "use psi_x"),
 ])  # fmt: skip
-def test_laws_that_do_not_fit(method, given, said):
-    scene = lw.Scene(VEHICLE, lw.Environment(gravity=9.8, water_density=1025.0), terms=list(given))
-    with pytest.raises(lw.SceneError, match=said):
+def test_laws_that_do_not_fit(method, inputs, output):
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=9.8, water_density=1025.0), terms=list(inputs))
+    with pytest.raises(lw.SceneError, match=output):
         lw.solve(scene, method, h=0.1, t1=0.1)
 
 

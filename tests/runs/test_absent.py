@@ -103,10 +103,10 @@ def test_energy_is_not_looked_at_where_forces_create_it(tmp_path):
     assert "NoMonitor" in text
 
 
-@pytest.mark.parametrize(("name", "there"), [("current harmonics", False), ("waves", True)])
-def test_water_that_is_the_same_everywhere_has_no_code_for_its_slopes(name, there, tmp_path):
+@pytest.mark.parametrize(("name", "present"), [("current harmonics", False), ("waves", True)])
+def test_water_that_is_the_same_everywhere_has_no_code_for_its_slopes(name, present, tmp_path):
     text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=list(CASES[name].terms)), tmp_path)
-    assert bool(re.search(r"^static (?!.*adj_).*slopes_in_body_\d+\(", text, re.MULTILINE)) == there
+    assert bool(re.search(r"^static (?!.*adj_).*slopes_in_body_\d+\(", text, re.MULTILINE)) == present
     # A force at the origin gives no torque: nothing is said of where the centre of mass is.
     assert "dry_lever" not in text
 

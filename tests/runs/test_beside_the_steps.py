@@ -83,12 +83,12 @@ def test_no_function_gets_a_copy_of_what_the_packet_holds(case, tmp_path):
 
 
 # The attitude of a Runge-Kutta method is looked at in any case; the energy there is read by a warning of checks="all" alone.
-@pytest.mark.parametrize(("checks", "looks"), [("none", 0), ("safe", 1), ("all", 2)])
-def test_energy_is_computed_where_something_reads_it(checks, looks, tmp_path):
+@pytest.mark.parametrize(("checks", "views"), [("none", 0), ("safe", 1), ("all", 2)])
+def test_energy_is_computed_where_something_reads_it(checks, views, tmp_path):
     text = source(lw.Scene.named("nordkvist_sanyal"), tmp_path, "rk4", checks=checks)
-    assert len(re.findall(r"= make_watching__locals__created_\d+\(", text)) == looks
-    assert len(re.findall(r"^ +make_energy__locals__energies_\d+\(", text, re.MULTILINE)) == (looks > 0) * 2
-    assert bool(re.search(r"> energy;", text)) == (looks > 0)
+    assert len(re.findall(r"= make_watching__locals__created_\d+\(", text)) == views
+    assert len(re.findall(r"^ +make_energy__locals__energies_\d+\(", text, re.MULTILINE)) == (views > 0) * 2
+    assert bool(re.search(r"> energy;", text)) == (views > 0)
 
 
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])

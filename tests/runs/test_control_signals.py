@@ -96,7 +96,7 @@ def fleet(members=MEMBERS, spoiled=(), **settings):
 
 
 @pytest.fixture(scope="module")
-def whole():
+def complete():
     return lw.solve(fleet(), "psi_s", **SETTINGS)
 
 
@@ -111,7 +111,7 @@ def looked():
 
 
 @pytest.mark.slow
-def test_a_scene_names_what_is_saved(whole):
+def test_a_scene_names_what_is_saved(complete):
     names = ("position", "command")
     run = lw.Scene.from_dict({**scene().to_dict(), "run": {"save_every": H, "save_fields": list(names)}})
     assert list(lw.Scene.from_dict(run.to_dict()).run.save_fields) == list(names)
@@ -119,7 +119,7 @@ def test_a_scene_names_what_is_saved(whole):
     members.scene = run
     result = lw.solve(members, "psi_s", h=H, t1=STEPS * H)
     assert tuple(result.samples) == names
-    assert same(result, whole, names=names)
+    assert same(result, complete, names=names)
     # The call decides, where it says something.
     assert lw.solve(members, "psi_s", h=H, t1=H, save=lw.SaveAt(fields=("velocity",))).samples.keys() == {"velocity"}
     bare = lw.Scene.from_dict({**scene(controller=False).to_dict(), "run": {"save_fields": ["command"]}})
@@ -132,41 +132,41 @@ def free(result):
     return np.flatnonzero(result.status == 0)
 
 
-def test_a_sample_on_a_tick_shows_what_that_tick_demands(whole):
-    at, well = looked(), free(whole)
+def test_a_sample_on_a_tick_shows_what_that_tick_demands(complete):
+    at, well = looked(), free(complete)
     assert 50 < len(well) < MEMBERS
-    assert set(whole.status) == {0, Status.FLOOR}
-    R, Om = whole.attitude[:, well], whole.angular_velocity[:, well]
+    assert set(complete.status) == {0, Status.FLOOR}
+    R, Om = complete.attitude[:, well], complete.angular_velocity[:, well]
     heading = np.arctan2(R[..., 1, 0], R[..., 0, 0])
     error = np.arctan2(np.sin(0.5 - heading), np.cos(0.5 - heading))
     # Of the state at the tick itself, t = 0 among them, and held until the next one.
     demand = np.zeros((STEPS + 1, len(well), 6))
     demand[..., 2], demand[..., 5] = LEVEL, (KP * error - KD * Om[..., 2])[at]
-    np.testing.assert_allclose(whole.demand[:, well], demand, atol=1e-13)
-    delivered = np.clip(whole.demand, [-1e3] * 5 + [-LIMIT], [1e3] * 5 + [LIMIT])
-    assert (delivered != whole.demand).any()
-    assert (delivered[..., 5] == whole.demand[..., 5]).any()
-    np.testing.assert_allclose(whole.command, delivered, atol=1e-13)
-    np.testing.assert_allclose(whole.unmet, whole.demand - delivered, atol=1e-13)
+    np.testing.assert_allclose(complete.demand[:, well], demand, atol=1e-13)
+    delivered = np.clip(complete.demand, [-1e3] * 5 + [-LIMIT], [1e3] * 5 + [LIMIT])
+    assert (delivered != complete.demand).any()
+    assert (delivered[..., 5] == complete.demand[..., 5]).any()
+    np.testing.assert_allclose(complete.command, delivered, atol=1e-13)
+    np.testing.assert_allclose(complete.unmet, complete.demand - delivered, atol=1e-13)
 
 
-def test_actuators_follow_the_commands_late_and_slowly(whole):
-    well = free(whole)
-    command, where = whole.command[:, well], np.zeros((STEPS + 1, len(well), 6))
+def test_actuators_follow_the_commands_late_and_slowly(complete):
+    well = free(complete)
+    command, where = complete.command[:, well], np.zeros((STEPS + 1, len(well), 6))
     for k in range(STEPS):
         u = command[k - DELAY] if k >= DELAY else np.zeros_like(command[0])
         where[k + 1] = u + (where[k] - u) * np.exp(-H / LAG)
-    np.testing.assert_allclose(whole.actuator[:, well], where, atol=1e-13)
+    np.testing.assert_allclose(complete.actuator[:, well], where, atol=1e-13)
 
 
-def test_measured_and_wanted(whole):
-    at, well = looked(), free(whole)
-    R = whole.attitude[at][:, well]
-    truth = {name: getattr(whole, name)[at][:, well] for name in FIELDS}
+def test_measured_and_wanted(complete):
+    at, well = looked(), free(complete)
+    R = complete.attitude[at][:, well]
+    truth = {name: getattr(complete, name)[at][:, well] for name in FIELDS}
     truth["water_velocity"] = truth["velocity"] - np.einsum("knji,j->kni", R, CURRENT)
     truth |= {"depth": truth["position"][..., 2], "heading": np.arctan2(R[..., 1, 0], R[..., 0, 0])}
     for name, value in truth.items():
-        np.testing.assert_allclose(getattr(whole, f"measured_{name}")[:, well], value, atol=1e-14, err_msg=name)
+        np.testing.assert_allclose(getattr(complete, f"measured_{name}")[:, well], value, atol=1e-14, err_msg=name)
     c, s = np.cos(0.5), np.sin(0.5)
     wanted = {"attitude": [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], "depth": 10.0, "heading": 0.5, "speed": 0.0}
     wanted |= {"position": [0.0, 0.0, 10.0], "velocity": [0.0] * 3, "angular_velocity": [0.0] * 3}
@@ -175,40 +175,40 @@ def test_measured_and_wanted(whole):
         name for name in SIGNALS if "_" in name
     }
     for name, value in wanted.items():
-        values = getattr(whole, f"reference_{name}")
+        values = getattr(complete, f"reference_{name}")
         np.testing.assert_allclose(values, np.broadcast_to(value, values.shape), atol=1e-15, err_msg=name)
 
 
-def test_a_member_that_an_event_stops_keeps_the_signals_of_its_last_whole_step(whole):
-    stopped = np.flatnonzero(whole.status == Status.FLOOR)
-    last = np.floor(whole.failure_time[stopped] / H).astype(int)
+def test_a_member_that_an_event_stops_keeps_the_signals_of_its_last_whole_step(complete):
+    stopped = np.flatnonzero(complete.status == Status.FLOOR)
+    last = np.floor(complete.failure_time[stopped] / H).astype(int)
     # In the first step after a tick, and in others.
     assert len(stopped) > 50
     assert set(last % EVERY) == set(range(EVERY))
     for name in SIGNALS:
-        values = getattr(whole, name)
+        values = getattr(complete, name)
         for member, k in zip(stopped, last, strict=True):
             assert (values[k + 1 :, member] == values[k, member]).all(), name
 
 
-def test_threads_launches_and_blocks_give_the_same_bits(whole, monkeypatch):
-    assert same(whole, lw.solve(fleet(), "psi_s", **SETTINGS, threads=1))
+def test_threads_launches_and_blocks_give_the_same_bits(complete, monkeypatch):
+    assert same(complete, lw.solve(fleet(), "psi_s", **SETTINGS, threads=1))
     few = lw.solve(fleet(), "psi_s", **SETTINGS | {"save": lw.SaveAt(at=[0.1, 0.23], fields=SAVED)}, threads=2)
     for name in SAVED:
-        assert getattr(few, name).tobytes() == getattr(whole, name)[[0, 10, 23, STEPS]].tobytes()
+        assert getattr(few, name).tobytes() == getattr(complete, name)[[0, 10, 23, STEPS]].tobytes()
     monkeypatch.setattr(launches, "SEGMENT_SAMPLE_BYTES", 7 * 256 * 100 * 8)
     plan = make_plan(fleet(), "psi_s", **SETTINGS)
     assert len(list(plan.launches.segments(256))) > 5
-    assert same(whole, lw.solve(fleet(), "psi_s", **SETTINGS))
+    assert same(complete, lw.solve(fleet(), "psi_s", **SETTINGS))
 
 
-def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks(whole):
+def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks(complete):
     settings = SETTINGS | {"save": lw.SaveAt(every=H)}
     plan = make_plan(fleet(), "psi_s", **settings)
     assert not plan.spec.control.reports
     assert not plan.spec.control.headings
     assert plan.layout.signal_rows == ()
-    assert same(whole, lw.solve(fleet(), "psi_s", **settings), names=FIELDS)
+    assert same(complete, lw.solve(fleet(), "psi_s", **settings), names=FIELDS)
     # What a tick writes anyway needs no other kernel.
     everything = SETTINGS | {"save": lw.SaveAt(every=H, fields=("demand", "measured_position", "reference_attitude"))}
     assert make_plan(fleet(), "psi_s", **everything).spec == plan.spec
@@ -216,7 +216,7 @@ def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks
     assert make_plan(fleet(), "psi_s", **held).spec == plan.spec
     result = lw.solve(fleet(), "psi_s", **held)
     assert set(result.samples) == {"command", "unmet"}
-    assert same(whole, result, names=("command", "unmet"))
+    assert same(complete, result, names=("command", "unmet"))
     with pytest.raises(AttributeError, match=r"demand was not kept: add 'demand' to SaveAt\(fields="):
         _ = result.demand
 
@@ -225,13 +225,13 @@ def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks
 SPOILED = {1: 0.0, 7: 0.3, 301: 0.0, 599: 0.3}
 
 
-def check_spoiled(whole, spoiled):
+def check_spoiled(complete, spoiled):
     """Members whose law gives no number fail at that tick; no other bit changes."""
     members = np.array([*SPOILED])
-    assert (whole.status[members] == 0).all()
+    assert (complete.status[members] == 0).all()
     others = np.setdiff1d(np.arange(MEMBERS), members)
-    assert same(whole, spoiled, others)
-    assert (spoiled.status[others] == whole.status[others]).all()
+    assert same(complete, spoiled, others)
+    assert (spoiled.status[others] == complete.status[others]).all()
     assert (spoiled.status[members] == Status.CONTROL_NON_FINITE).all()
     np.testing.assert_allclose(spoiled.failure_time[members], [max(0.0, at - H) for at in SPOILED.values()], atol=1e-12)
     for member, at in SPOILED.items():
@@ -239,39 +239,39 @@ def check_spoiled(whole, spoiled):
         for name in FIELDS:
             # At the first tick a member rests at its start.
             np.testing.assert_array_equal(
-                getattr(spoiled, name)[: k + 1, member], getattr(whole, name)[: k + 1, member]
+                getattr(spoiled, name)[: k + 1, member], getattr(complete, name)[: k + 1, member]
             )
-            held, stop = getattr(spoiled, name)[k + 1 :, member], getattr(whole, name)[k, member]
+            held, stop = getattr(spoiled, name)[k + 1 :, member], getattr(complete, name)[k, member]
             # The lead of the next step is made and undone.
             round_off = 8 * np.finfo(held.dtype).eps * max(1.0, np.abs(stop).max())
             np.testing.assert_allclose(held, np.broadcast_to(stop, held.shape), rtol=0.0, atol=round_off)
         for name in SIGNALS:
             values = getattr(spoiled, name)[:, member]
             if k:
-                assert values[: k + 1].tobytes() == getattr(whole, name)[: k + 1, member].tobytes(), name
+                assert values[: k + 1].tobytes() == getattr(complete, name)[: k + 1, member].tobytes(), name
             assert values[k:].tobytes() == np.repeat(values[k : k + 1], len(values) - k, axis=0).tobytes(), name
         if not k:
             assert np.isnan(spoiled.demand[0, member, 2])
             assert (spoiled.command[:, member] == 0.0).all()
 
 
-def test_a_law_that_gives_no_number_ends_its_member_alone(whole):
+def test_a_law_that_gives_no_number_ends_its_member_alone(complete):
     spoiled = lw.solve(fleet(spoiled=SPOILED), "psi_s", **SETTINGS)
-    check_spoiled(whole, spoiled)
+    check_spoiled(complete, spoiled)
     assert "a command of the controller is not finite" in Status.CONTROL_NON_FINITE.text
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("method", "dtype"), [("rk4", "float64"), ("psi_s", "float32")])
-def test_of_other_methods_and_numbers(whole, method, dtype):
+def test_of_other_methods_and_numbers(complete, method, dtype):
     unlike = {} if method == "psi_s" else {"lag": 0.0}
     well = lw.solve(fleet(**unlike), method, dtype=dtype, **SETTINGS)
     check_spoiled(well, lw.solve(fleet(spoiled=SPOILED, **unlike), method, dtype=dtype, **SETTINGS))
     assert all(getattr(well, name).dtype == np.dtype(dtype) for name in SAVED)
     if dtype == "float32":
-        both = (whole.status == 0) & (well.status == 0)
+        both = (complete.status == 0) & (well.status == 0)
         for name in set(SAVED) - {"unmet"}:
-            a, b = getattr(whole, name)[:, both], getattr(well, name)[:, both]
+            a, b = getattr(complete, name)[:, both], getattr(well, name)[:, both]
             np.testing.assert_allclose(b, a, atol=STEPS * 2.0**-23 * max(1.0, np.abs(a).max()), err_msg=name)
     else:
         # Without a lag an actuator is at once where the command is, once that arrives.
@@ -290,22 +290,22 @@ def test_a_tick_sees_both_parts_of_compensated_sums():
         np.testing.assert_allclose(there, here, rtol=0.0, atol=2.0**-22 * np.abs(here).max(), err_msg=name)
 
 
-def test_a_store_holds_them_and_goes_on(whole, tmp_path):
+def test_a_store_holds_them_and_goes_on(complete, tmp_path):
     path, part = tmp_path / "whole.zarr", tmp_path / "part.zarr"
     stored = lw.solve(fleet(), "psi_s", **SETTINGS, store=path)
-    assert same(whole, stored)
+    assert same(complete, stored)
     lw.solve(fleet(), "psi_s", **SETTINGS, store=part, only=range(1))
     assert not Folder(part).complete
     lw.resume(part)
     assert differing(path, part) == []
     opened = lw.open_run(path)
-    assert same(whole, opened)
+    assert same(complete, opened)
     assert opened.dataset["command"].dims == ("time", "realization", "command_0")
     for name in SAVED:
-        here, there = whole.dataset[name], opened.dataset[name]
+        here, there = complete.dataset[name], opened.dataset[name]
         assert (here.dims, here.attrs) == (there.dims, there.attrs), name
-    loaded = lw.Result.load(whole.save(tmp_path / "result.npz"))
-    assert same(whole, loaded)
+    loaded = lw.Result.load(complete.save(tmp_path / "result.npz"))
+    assert same(complete, loaded)
     assert set(loaded.samples) == set(SAVED)
 
 
@@ -330,47 +330,49 @@ def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
         assert (tmp_path / "fleet.png").stat().st_size > 0
 
 
-def test_members_that_are_kept_after_all_have_them(whole, tmp_path):
+def test_members_that_are_kept_after_all_have_them(complete, tmp_path):
     kept = lw.solve(fleet(), "psi_s", **SETTINGS, keep=[5, 300]).kept
     stored = lw.solve(fleet(), "psi_s", **SETTINGS, keep=[5, 300], store=tmp_path / "run.zarr").kept
     for name in SAVED:
-        assert getattr(kept, name).tobytes() == getattr(whole, name)[:, [5, 300]].tobytes(), name
-        assert getattr(stored, name).tobytes() == getattr(whole, name)[:, [5, 300]].tobytes(), name
+        assert getattr(kept, name).tobytes() == getattr(complete, name)[:, [5, 300]].tobytes(), name
+        assert getattr(stored, name).tobytes() == getattr(complete, name)[:, [5, 300]].tobytes(), name
 
 
-def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
-    path, early = lw.record(whole, tmp_path / "fleet.rrd"), under_way(whole)[3]
+def test_a_recording_shows_commands_and_actuators(complete, tmp_path):
+    path, early = lw.record(complete, tmp_path / "fleet.rrd"), under_way(complete)[3]
     for name in ("command", "actuator"):
-        median = np.median(getattr(whole, name)[3, early, 5])
+        median = np.median(getattr(complete, name)[3, early, 5])
         assert rows(path, f"/{name}/5", "scalars")[3 * H] == pytest.approx([median])
     assert not rows(path, "/demand/5", "scalars")
     assert not rows(path, "/command/6", "scalars")
 
 
 @pytest.mark.slow
-def test_statistics_and_quantities_of_interest(whole):
+def test_statistics_and_quantities_of_interest(complete):
     statistics = [Mean("command[5]"), Mean("measured_depth"), Mean("max(norm(demand))")]
     statistics += [Quantiles("actuator[2]"), Mean("reference_speed")]
     lean = lw.solve(fleet(), "psi_s", **SETTINGS, statistics=statistics, keep="none")
     found = lean.statistics
-    np.testing.assert_allclose(found["mean command[5]"].value[:, 0], whole.command[..., 5].mean(axis=1), rtol=1e-12)
-    np.testing.assert_allclose(found["mean measured_depth"].value[:, 0], whole.measured_depth.mean(axis=1), rtol=1e-12)
-    size = np.linalg.norm(whole.demand, axis=-1).max(axis=0)
+    np.testing.assert_allclose(found["mean command[5]"].value[:, 0], complete.command[..., 5].mean(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(
+        found["mean measured_depth"].value[:, 0], complete.measured_depth.mean(axis=1), rtol=1e-12
+    )
+    size = np.linalg.norm(complete.demand, axis=-1).max(axis=0)
     np.testing.assert_allclose(found["mean max(norm(demand))"].value, size.mean(), rtol=1e-12)
     run = lw.prepare(
         fleet(), of=["max(norm(demand))", "command[5]"], method="psi_s", h=H, t1=STEPS * H, save=SETTINGS["save"]
     )
-    np.testing.assert_allclose(run(), np.stack([size, whole.command[-1, :, 5]], axis=1), rtol=1e-12)
+    np.testing.assert_allclose(run(), np.stack([size, complete.command[-1, :, 5]], axis=1), rtol=1e-12)
 
 
-@pytest.mark.parametrize(("asked", "text"), [
+@pytest.mark.parametrize(("requested", "text"), [
     ({"save": lw.SaveAt(fields=("position", "demand"))}, "save.fields = 'demand'"),
     ({"statistics": [Mean("command[0]")]}, "statistics = 'command'"),
 ])  # fmt: skip
-def test_a_scene_without_a_controller_has_none(asked, text):
+def test_a_scene_without_a_controller_has_none(requested, text):
     why = r": is a signal of a controller, which this scene has not; give \[controller\]"
     with pytest.raises(lw.SceneError, match=text + why):
-        lw.solve(scene(controller=False), "psi_s", h=H, t1=1.0, **asked)
+        lw.solve(scene(controller=False), "psi_s", h=H, t1=1.0, **requested)
 
 
 def test_names_that_are_not_known():

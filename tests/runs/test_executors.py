@@ -45,7 +45,7 @@ def memory():
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def complete(tmp_path_factory):
     """Result of the long run, from threads."""
     path = tmp_path_factory.mktemp("executors") / "run.zarr"
     lw.solve(fleet(MANY), **LONG, store=path)
@@ -95,13 +95,13 @@ def children():
     return [child.pid for child in multiprocessing.active_children()]
 
 
-def check_killed(killer, store, whole):
+def check_killed(killer, store, complete):
     """One was killed, what was finished then was not run again, and the bytes are those of the whole run."""
     assert killer.killed is not None
     assert 0 < len(killer.finished) < 16
     after = markers(store)
     assert all(after[name] == written for name, written in killer.finished.items())
-    assert differing(store, whole) == []
+    assert differing(store, complete) == []
 
 
 def run_and_kill(executor, work):
@@ -121,14 +121,14 @@ def run_and_kill(executor, work):
     return killed, finished, told
 
 
-def check_run_and_kill(work, killed, finished, told):
+def check_run_and_kill(work, killed, finished, reported):
     """Every block once, what was finished by then begun once, what the killed worker was at twice; both told how far."""
     assert sorted(first for first, _ in finished) == list(range(0, 2048, 256))
     times = Counter(first for first, _ in work.begun())
     assert times[killed] == 2
     assert all(times[first] == 1 for first, _ in finished[:4])
     pids = dict(finished)
-    half_done = {pids[first] for first, steps in told if 0 < steps < 256 * STEPS and first in dict(finished[:4])}
+    half_done = {pids[first] for first, steps in reported if 0 < steps < 256 * STEPS and first in dict(finished[:4])}
     assert half_done == {pid for _, pid in finished[:4]}
     assert len(half_done) == 2
     return times
@@ -161,19 +161,19 @@ def test_processes(memory):
 
 
 @pytest.mark.slow
-def test_a_killed_process_costs_its_block_only(tmp_path, whole):
+def test_a_killed_process_costs_its_block_only(tmp_path, complete):
     killer = Killer(children, tmp_path / "run.zarr")
     lw.solve(fleet(MANY), **LONG, executor=Processes(2), store=tmp_path / "run.zarr", progress=killer)
-    check_killed(killer, tmp_path / "run.zarr", whole)
+    check_killed(killer, tmp_path / "run.zarr", complete)
 
 
 @pytest.mark.slow
 @pytest.mark.slow
-def test_a_killed_process_in_memory(whole):
+def test_a_killed_process_in_memory(complete):
     killer = Killer(children)
     result = lw.solve(fleet(MANY), **LONG, executor="processes", threads=2, progress=killer)
     assert killer.killed is not None
-    assert same(result, lw.open_run(whole))
+    assert same(result, lw.open_run(complete))
 
 
 @pytest.mark.slow
@@ -276,24 +276,24 @@ def test_statistics_on_dask_end_with_the_run(client, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_killed_dask_worker_costs_its_block_only(client, tmp_path, whole):
+def test_a_killed_dask_worker_costs_its_block_only(client, tmp_path, complete):
     from lgvi_warp.engine.executors.dask import Dask
 
     pids = list(client.run(os.getpid).values())
     killer = Killer(lambda: pids, tmp_path / "run.zarr")
     lw.solve(fleet(MANY), **LONG, executor=Dask(client), store=tmp_path / "run.zarr", progress=killer)
-    check_killed(killer, tmp_path / "run.zarr", whole)
+    check_killed(killer, tmp_path / "run.zarr", complete)
 
 
 @pytest.mark.slow
-def test_a_killed_dask_worker_in_memory(client, whole):
+def test_a_killed_dask_worker_in_memory(client, complete):
     from lgvi_warp.engine.executors.dask import Dask
 
     pids = list(client.run(os.getpid).values())
     killer = Killer(lambda: pids)
     result = lw.solve(fleet(MANY), **LONG, executor=Dask(client), progress=killer)
     assert killer.killed is not None
-    assert same(result, lw.open_run(whole))
+    assert same(result, lw.open_run(complete))
 
 
 def test_a_worker_of_another_kind_is_refused(client, monkeypatch):

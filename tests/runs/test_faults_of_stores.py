@@ -78,7 +78,7 @@ def at_once(*calls):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def complete(tmp_path_factory):
     """A complete store, which no test changes."""
     path = tmp_path_factory.mktemp("whole") / "run.zarr"
     lw.solve(fleet(), **SETTINGS, store=path)
@@ -93,7 +93,7 @@ def results(tmp_path_factory):
 
 
 @pytest.mark.parametrize(("mode", "count"), [("refuse", 2), ("refuse", 4), ("resume", 4), ("overwrite", 4)])
-def test_runs_that_start_together(whole, tmp_path, mode, count):
+def test_runs_that_start_together(complete, tmp_path, mode, count):
     """One of them runs; the others are refused, or find it done."""
     path, here = tmp_path / "runs" / "run.zarr", tmp_path / "here"
     here.mkdir()
@@ -109,11 +109,11 @@ def test_runs_that_start_together(whole, tmp_path, mode, count):
     for one in refused:
         text = (here / f"said{one.pid}").read_text()
         assert "another run is writing into it" in text or "holds a run already" in text
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
     assert [one.name for one in path.parent.iterdir()] == ["run.zarr"]
 
 
-def test_threads_of_one_process_are_kept_apart_as_well(whole, tmp_path):
+def test_threads_of_one_process_are_kept_apart_as_well(complete, tmp_path):
     path, said = tmp_path / "run.zarr", []
 
     def run():
@@ -124,14 +124,14 @@ def test_threads_of_one_process_are_kept_apart_as_well(whole, tmp_path):
 
     at_once(run, run, run)
     assert len(said) == 2
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
 
 
 @pytest.mark.slow
-def test_processes_of_one_run_write_side_by_side(whole, tmp_path):
+def test_processes_of_one_run_write_side_by_side(complete, tmp_path):
     """Workers are the run's own: they take no lock."""
     lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", executor="processes", threads=2)
-    assert differing(whole, tmp_path / "run.zarr") == []
+    assert differing(complete, tmp_path / "run.zarr") == []
     assert [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
 
 
@@ -296,17 +296,17 @@ NOTES = {
 
 @pytest.mark.parametrize("name", NOTES)
 @pytest.mark.parametrize("verb", ["run", "merge"])
-def test_what_no_run_wrote_is_not_overwritten(whole, tmp_path, name, verb, capsys):
+def test_what_no_run_wrote_is_not_overwritten(complete, tmp_path, name, verb, capsys):
     notes, with_run = NOTES[name]
     path = tmp_path / "run.zarr"
     if with_run:
-        shutil.copytree(whole, path)
+        shutil.copytree(complete, path)
     (path / notes).parent.mkdir(parents=True, exist_ok=True)
     (path / notes).write_text("mine")
     before = tree(tmp_path)
     arguments = {
         "run": [str(ROOT / "examples" / "paper.toml"), "--store", "zarr", "--members", "5"],
-        "merge": [str(whole)],
+        "merge": [str(complete)],
     }[verb]
     assert cli.main([verb, *arguments, "--out", str(tmp_path), "--overwrite"]) == 2
     said = capsys.readouterr().err
@@ -315,13 +315,13 @@ def test_what_no_run_wrote_is_not_overwritten(whole, tmp_path, name, verb, capsy
     assert tree(tmp_path) == before
 
 
-def test_a_link_is_not_overwritten_but_what_it_leads_to(whole, tmp_path):
+def test_a_link_is_not_overwritten_but_what_it_leads_to(complete, tmp_path):
     """A run on another disk; a link within a run is no run's."""
-    shutil.copytree(whole, tmp_path / "disk" / "run.zarr")
+    shutil.copytree(complete, tmp_path / "disk" / "run.zarr")
     (tmp_path / "run.zarr").symlink_to(tmp_path / "disk" / "run.zarr")
     lw.solve(fleet(), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", existing="overwrite"))
     assert (tmp_path / "run.zarr").is_symlink()
-    assert differing(whole, tmp_path / "disk" / "run.zarr") == []
+    assert differing(complete, tmp_path / "disk" / "run.zarr") == []
     shutil.rmtree(tmp_path / "disk" / "run.zarr" / "status")
     (tmp_path / "notes").mkdir()
     (tmp_path / "disk" / "run.zarr" / "status").symlink_to(tmp_path / "notes")
@@ -329,18 +329,18 @@ def test_a_link_is_not_overwritten_but_what_it_leads_to(whole, tmp_path):
         lw.solve(fleet(), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", existing="overwrite"))
 
 
-def test_a_damaged_run_may_be_overwritten(whole, tmp_path):
+def test_a_damaged_run_may_be_overwritten(complete, tmp_path):
     for name in ("zarr.json", "created.json"):
-        path = shutil.copytree(whole, tmp_path / name / "run.zarr")
+        path = shutil.copytree(complete, tmp_path / name / "run.zarr")
         (path / name).write_bytes(b"{")
         lw.solve(fleet(), **SETTINGS, store=lw.Store(path, existing="overwrite"))
-        assert differing(whole, path) == []
+        assert differing(complete, path) == []
 
 
-def test_an_empty_folder_is_taken(whole, tmp_path):
+def test_an_empty_folder_is_taken(complete, tmp_path):
     (tmp_path / "run.zarr").mkdir()
     lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
-    assert differing(whole, tmp_path / "run.zarr") == []
+    assert differing(complete, tmp_path / "run.zarr") == []
 
 
 # Where an overwriting run dies: what it is doing, how often it has done that before, and whether folders can be exchanged.
@@ -348,9 +348,9 @@ DEATHS = [("rename", 0, "no"), ("rename", 1, "no"), ("sync", 20, "yes"), ("remov
 
 
 @pytest.mark.parametrize(("place", "count", "exchange"), DEATHS)
-def test_killed_while_it_overwrites(whole, tmp_path, place, count, exchange):
+def test_killed_while_it_overwrites(complete, tmp_path, place, count, exchange):
     """The old run is there, or the new one, which goes on; nothing is left of the other."""
-    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    path = shutil.copytree(complete, tmp_path / "run.zarr")
     process = forked(dying, path, place, count, exchange)
     process.join(120)
     assert process.exitcode == 9
@@ -359,7 +359,7 @@ def test_killed_while_it_overwrites(whole, tmp_path, place, count, exchange):
     folder = store.Folder(path)
     assert folder.recipe["members"] in (300, MEMBERS)
     if folder.recipe["members"] == MEMBERS:
-        assert differing(whole, path) == []
+        assert differing(complete, path) == []
     else:
         assert lw.resume(path).members == 300
     assert [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
@@ -374,13 +374,13 @@ def test_folders_are_exchanged_in_one_step(tmp_path):
     assert (os.listdir(tmp_path / "a"), os.listdir(tmp_path / "b")) == (["b"], ["a"])
 
 
-def test_nobody_elses_folder_beside_a_run_is_removed(whole, tmp_path):
+def test_nobody_elses_folder_beside_a_run_is_removed(complete, tmp_path):
     """The names that earlier versions took for their own, and one of ours that holds notes."""
     mark = f"{scratch.host()}-{2**22 + 5}-0123abcd"
     for name in ("run.zarr.new", "run.zarr.old", f"run.zarr.{mark}.new"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "notes.txt").write_text("mine")
-    shutil.copytree(whole, tmp_path / f"run.zarr.{mark[:-1]}e.new")
+    shutil.copytree(complete, tmp_path / f"run.zarr.{mark[:-1]}e.new")
     before = {name for name in os.listdir(tmp_path) if not name.endswith("e.new")}
     lw.solve(fleet(300), **SETTINGS, store=tmp_path / "run.zarr")
     lw.solve(fleet(300), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", existing="overwrite"))
@@ -398,24 +398,24 @@ FAULTS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("number", "file", "said"), FAULTS)
-def test_a_disk_that_takes_no_more(whole, tmp_path, number, file, said):
+@pytest.mark.parametrize(("number", "file", "output"), FAULTS)
+def test_a_disk_that_takes_no_more(complete, tmp_path, number, file, output):
     """A line says so, what was finished is kept, and the run goes on when there is room."""
     path = tmp_path / "run.zarr"
-    with Disk(refused(number, ("created", f"/{file}"))), pytest.raises(OSError, match=said) as told:
+    with Disk(refused(number, ("created", f"/{file}"))), pytest.raises(OSError, match=output) as told:
         lw.solve(fleet(), **SETTINGS, store=path)
     assert "\n" not in str(told.value)
     assert file in str(told.value)
     assert not list(tmp_path.rglob("*.part"))
     assert {one.name for one in tmp_path.iterdir()} <= {"run.zarr"}
     lw.solve(fleet(), **SETTINGS, store=lw.Store(path, existing="resume"))
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
 
 
-@pytest.mark.parametrize(("number", "said"), [(errno.EACCES, WRITE), (errno.EROFS, WRITE), (errno.ENOSPC, ROOM)])
-def test_a_folder_that_takes_no_lock(tmp_path, number, said):
+@pytest.mark.parametrize(("number", "output"), [(errno.EACCES, WRITE), (errno.EROFS, WRITE), (errno.ENOSPC, ROOM)])
+def test_a_folder_that_takes_no_lock(tmp_path, number, output):
     name = write_lock.lock_file(tmp_path / "run.zarr").name
-    with Disk(refused(number, ("created", name))), pytest.raises(OSError, match=said):
+    with Disk(refused(number, ("created", name))), pytest.raises(OSError, match=output):
         lw.solve(fleet(10), **SETTINGS, store=tmp_path / "run.zarr")
     assert list(tmp_path.iterdir()) == []
 
@@ -428,14 +428,14 @@ def test_a_full_disk_does_not_undo_a_saved_result(results, tmp_path):
     assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
 
 
-def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path):
-    path = shutil.copytree(whole, tmp_path / "run.zarr")
+def test_a_full_disk_does_not_undo_what_is_overwritten(complete, tmp_path):
+    path = shutil.copytree(complete, tmp_path / "run.zarr")
     with Disk(full(("created", "created.json"))):
         with pytest.raises(OSError, match="No space left"):
             lw.solve(fleet(300), **SETTINGS, store=lw.Store(path, existing="overwrite"))
         with pytest.raises(OSError, match="No space left"):
             lw.merge([path], tmp_path, overwrite=True)
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
     assert [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
 
 

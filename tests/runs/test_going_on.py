@@ -38,21 +38,21 @@ def one_run(fleet, method, pieces=PIECES, length=0.1, **settings):
     return lw.solve(fleet, method, **{"h": STEPS, "t1": pieces * length, "save": save} | settings)
 
 
-def in_pieces(fleet, method, pieces=PIECES, length=0.1, **settings):
+def in_pieces(fleet, method, chunks=PIECES, length=0.1, **settings):
     """One run after the other."""
     result, save = None, lw.SaveAt(**settings.pop("saved", {}))
-    for i in range(1, pieces + 1):
+    for i in range(1, chunks + 1):
         start = None if result is None else result.final
         how = {"h": STEPS, "t1": round(i * length, 9), "save": save} | settings
         result = lw.solve(fleet, method, **how, start=start)
     return result
 
 
-def differences(whole, last):
+def differences(complete, last):
     """Names of what differs at the end of two runs; nothing where all bits agree."""
-    names = [name for name in whole.samples if not equal(whole.samples[name][-1], last.samples[name][-1])]
+    names = [name for name in complete.samples if not equal(complete.samples[name][-1], last.samples[name][-1])]
     of_members = [item.name for item in member_fields.EVERY]
-    return names + [name for name in of_members if not equal(getattr(whole, name), getattr(last, name))]
+    return names + [name for name in of_members if not equal(getattr(complete, name), getattr(last, name))]
 
 
 def equal(a, b):
@@ -162,10 +162,10 @@ def autopilot(members=20, vary=None, **changes):
 
 @pytest.mark.slow_but("2-0.1", "10-0.13")
 @pytest.mark.parametrize("length", [0.1, 0.5, 0.13])
-@pytest.mark.parametrize("pieces", [2, 10])
-def test_a_controller(pieces, length):
+@pytest.mark.parametrize("chunks", [2, 10])
+def test_a_controller(chunks, length):
     # Pieces end at ticks, and between them; a fault begins on the way.
-    how = dict(h=0.01, pieces=pieces, length=length, saved={"fields": MOTION + SIGNALS})
+    how = dict(h=0.01, pieces=chunks, length=length, saved={"fields": MOTION + SIGNALS})
     check(autopilot(), "psi_x", **how)
 
 

@@ -284,11 +284,11 @@ def leaves(value, path=()):
         yield from leaves(inner, (*path, key))
 
 
-def mutated(whole, seed, count):
+def mutated(complete, seed, count):
     """Copies of nested tables, in each of which one value is another, at so many of all places."""
-    dice, places = np.random.default_rng(seed), [path for path in leaves(whole) if path]
+    dice, places = np.random.default_rng(seed), [path for path in leaves(complete) if path]
     for _ in range(count):
-        table = content = json.loads(json.dumps(whole))
+        table = content = json.loads(json.dumps(complete))
         *keys, last = places[dice.integers(len(places))]
         for key in keys:
             table = table[key]
@@ -508,15 +508,15 @@ def test_a_device_is_not_replaced(tmp_path):
     assert os.listdir(tmp_path) == ["null"]
 
 
-@pytest.mark.parametrize("found", [tradeoff_of(4.0), sobol(), region()], ids=["tradeoff", "sensitivity", "stability"])
-def test_a_study_is_saved_into_its_folder_alone(found, home):
+@pytest.mark.parametrize("answer", [tradeoff_of(4.0), sobol(), region()], ids=["tradeoff", "sensitivity", "stability"])
+def test_a_study_is_saved_into_its_folder_alone(answer, home):
     """The two or three files of a study have names of their own: none of them is a way out of its folder."""
     folder = home.parent / "study"
-    for path in list(found.save(folder)):
+    for path in list(answer.save(folder)):
         path.unlink()
         path.symlink_to(home / "notes.txt")
         with harmless(home), pytest.raises(lw.SceneError, match=hostile.OUT):
-            found.save(folder)
+            answer.save(folder)
         path.unlink()
 
 

@@ -37,7 +37,7 @@ def memory():
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def complete(tmp_path_factory):
     """A complete store of the members that failed: more than one block of them, and no test changes it."""
     path = tmp_path_factory.mktemp("kept") / "run.zarr"
     lw.solve(failing(), **SETTINGS, keep="failed", store=path)
@@ -45,15 +45,15 @@ def whole(tmp_path_factory):
 
 
 @pytest.fixture
-def copy(whole, tmp_path):
-    return shutil.copytree(whole, tmp_path / "run.zarr")
+def copy(complete, tmp_path):
+    return shutil.copytree(complete, tmp_path / "run.zarr")
 
 
-def test_it_has_the_bits_of_a_run_in_memory(whole, memory):
+def test_it_has_the_bits_of_a_run_in_memory(complete, memory):
     failed = np.flatnonzero(memory.status)
     assert 256 < len(failed) < 512
     assert set(memory.status[failed]) == {Status.STEP_TOO_LARGE}
-    result, asked = lw.open_run(whole), lw.solve(failing(), **SETTINGS, keep="failed")
+    result, asked = lw.open_run(complete), lw.solve(failing(), **SETTINGS, keep="failed")
     np.testing.assert_array_equal(result.kept_members, failed)
     assert not result.samples
     assert result.kept.members == len(failed)
@@ -66,28 +66,28 @@ def test_it_has_the_bits_of_a_run_in_memory(whole, memory):
     assert result.kept.energy.tobytes() == asked.kept.energy.tobytes()
 
 
-def test_xarray_opens_the_group_alone_and_with_the_run(whole, memory, recwarn):
+def test_xarray_opens_the_group_alone_and_with_the_run(complete, memory, recwarn):
     import xarray
 
     failed = np.flatnonzero(memory.status)
-    group = xarray.open_zarr(whole, group="kept")
+    group = xarray.open_zarr(complete, group="kept")
     assert group.position.dims == ("time", "member", "component")
     assert group.position.attrs["units"] == "m"
     np.testing.assert_array_equal(group.member.values, failed)
     one = group.position.sel(member=failed[7]).isel(time=-1)
     np.testing.assert_array_equal(one.values, memory.position[-1, failed[7]])
-    tree = xarray.open_datatree(whole, engine="zarr")
+    tree = xarray.open_datatree(complete, engine="zarr")
     assert tree["kept"].sizes["member"] == len(failed)
     assert tree.sizes["realization"] == MEMBERS
-    assert lw.open_run(whole).kept.dataset.sizes["realization"] == len(failed)
+    assert lw.open_run(complete).kept.dataset.sizes["realization"] == len(failed)
     assert len(recwarn) == 0
 
 
 @pytest.mark.parametrize("executor", [pytest.param("processes", marks=pytest.mark.slow), "threads"])
-def test_the_same_run_leaves_the_same_bytes(executor, whole, tmp_path):
+def test_the_same_run_leaves_the_same_bytes(executor, complete, tmp_path):
     path = tmp_path / "run.zarr"
     result = lw.solve(failing(), **SETTINGS, keep="failed", store=path, executor=executor, threads=1)
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
     assert result.kept.members == len(result.kept_members) > 256
     before = tree(path)
     assert lw.resume(path).kept is not None
@@ -123,19 +123,19 @@ DAMAGED = (("kept/position/c.0.1.0", flip, "has changed"), ("kept/attitude/c.0.0
 
 
 @pytest.mark.parametrize(("name", "harm", "word"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h, _ in DAMAGED])
-def test_damage_is_seen_and_mended(copy, whole, name, harm, word, capsys):
+def test_damage_is_seen_and_mended(copy, complete, name, harm, word, capsys):
     harm(copy / name)
     assert cli.main(["info", str(copy)]) == 1
     said = capsys.readouterr().out
     assert f"damage      {name} {word}" in said
     assert "not complete: lgvi-warp resume" in said
     lw.resume(copy)
-    assert differing(whole, copy) == []
+    assert differing(complete, copy) == []
     assert cli.main(["info", str(copy)]) == 0
 
 
 @pytest.mark.parametrize(
-    ("harm", "said"),
+    ("harm", "output"),
     [
         ((), "nothing was missing: 4 of 4 blocks were there and whole"),
         (("kept/blocks/000000000.json",), "went on: 4 of 4 blocks were there and whole, 0 ran, and 1 of kept members"),
@@ -144,11 +144,11 @@ def test_damage_is_seen_and_mended(copy, whole, name, harm, word, capsys):
     ],
     ids=["nothing", "a kept block", "a block", "all kept"],
 )
-def test_a_resume_counts_what_ran(copy, whole, harm, said):
+def test_a_resume_counts_what_ran(copy, complete, harm, output):
     for name in harm:
         shutil.rmtree(copy / name) if (copy / name).is_dir() else (copy / name).unlink()
-    assert lw.resume(copy).messages[-1] == said
-    assert differing(whole, copy) == []
+    assert lw.resume(copy).messages[-1] == output
+    assert differing(complete, copy) == []
 
 
 def test_a_lost_group_is_not_silently_none(copy):
@@ -157,34 +157,34 @@ def test_a_lost_group_is_not_silently_none(copy):
         lw.open_run(copy)
 
 
-def interrupted(path, whole):
+def interrupted(path, complete):
     """Leave the run as if killed before its kept members were run again."""
-    shutil.copytree(whole, path)
+    shutil.copytree(complete, path)
     Folder(path).reopen()
     shutil.rmtree(path / "kept")
     return path
 
 
-def test_a_run_is_complete_only_with_them(whole, tmp_path, capsys):
-    path = interrupted(tmp_path / "run.zarr", whole)
+def test_a_run_is_complete_only_with_them(complete, tmp_path, capsys):
+    path = interrupted(tmp_path / "run.zarr", complete)
     with pytest.raises(lw.SceneError, match=r"members that it keeps have not been run again yet.*resume"):
         lw.open_run(path)
     assert lw.open_run(path, incomplete=True).kept is None
     assert cli.main(["info", str(path)]) == 1
     # What is left of others that were killed there.
-    shutil.copytree(whole / "kept", path / "kept.new")
+    shutil.copytree(complete / "kept", path / "kept.new")
     result = lw.resume(path)
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
     assert result.kept.members == len(result.kept_members)
 
 
-def test_other_members_than_those_that_failed_are_run_anew(whole, tmp_path):
-    path = interrupted(tmp_path / "run.zarr", whole)
+def test_other_members_than_those_that_failed_are_run_anew(complete, tmp_path):
+    path = interrupted(tmp_path / "run.zarr", complete)
     other = lw.solve(failing(), **SETTINGS, keep=[3, 5], store=tmp_path / "other.zarr")
     assert (list(other.kept_members), other.kept.members) == ([3, 5], 2)
     shutil.copytree(tmp_path / "other.zarr" / "kept", path / "kept")
     lw.resume(path)
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
 
 
 def kept_run(path):
@@ -241,23 +241,23 @@ def test_members_that_share_their_steps_lie_beside_those_that_are_kept(tmp_path)
         assert one.kept.provenance["ensemble"]["indices"] == [5, 6, 29]
 
 
-def test_parts_are_merged_with_their_kept_members(whole, tmp_path):
+def test_parts_are_merged_with_their_kept_members(complete, tmp_path):
     for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
         lw.solve(failing(), **SETTINGS, keep="failed", store=tmp_path / name / "run.zarr", only=only)
         assert not (tmp_path / name / "run.zarr" / "kept").exists()
     folder = lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all")
     assert folder.complete
-    assert differing(whole, folder.path) == []
+    assert differing(complete, folder.path) == []
     again = lw.merge([folder.path], tmp_path / "again")
     assert again.complete
-    assert differing(whole, again.path) == []
+    assert differing(complete, again.path) == []
 
 
-def test_the_last_part_into_one_folder_runs_them(whole, tmp_path):
+def test_the_last_part_into_one_folder_runs_them(complete, tmp_path):
     path = tmp_path / "run.zarr"
     for only in (range(2, 4), range(0, 2)):
         lw.solve(failing(), **SETTINGS, keep="failed", store=lw.Store(path, existing="resume"), only=only)
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
 
 
 def test_all_are_told_with_exit_code_and_files(tmp_path, capsys):
@@ -282,11 +282,11 @@ def cli_scene():
 
 
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
-def test_netcdf_has_them_in_a_group(whole, memory, tmp_path):
+def test_netcdf_has_them_in_a_group(complete, memory, tmp_path):
     import xarray
 
     failed = np.flatnonzero(memory.status)
-    path = lw.export(whole, "netcdf", tmp_path / "run.nc")
+    path = lw.export(complete, "netcdf", tmp_path / "run.nc")
     with xarray.open_dataset(path, group="kept", engine="netcdf4") as group:
         np.testing.assert_array_equal(group.member.values, failed)
         np.testing.assert_array_equal(group.attitude.values, memory.attitude[:, failed])
@@ -296,11 +296,11 @@ def test_netcdf_has_them_in_a_group(whole, memory, tmp_path):
         assert tree["kept"].sizes["member"] == len(failed)
 
 
-def test_parquet_has_the_rows_of_those_that_are_kept(whole, memory, tmp_path):
+def test_parquet_has_the_rows_of_those_that_are_kept(complete, memory, tmp_path):
     import pandas
 
     failed = np.flatnonzero(memory.status)
-    table = pandas.read_parquet(lw.export(whole, "parquet", tmp_path / "run.parquet"))
+    table = pandas.read_parquet(lw.export(complete, "parquet", tmp_path / "run.parquet"))
     assert len(table) == len(failed) * 31
     assert table.attrs["units"]["velocity_2"] == "m s-1"
     one = table[table.realization == failed[300]]

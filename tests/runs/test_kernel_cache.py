@@ -163,9 +163,9 @@ def headers_while_it_compiles():
     """Count of precompiled headers that Clang finds."""
     found, load_module = [], wp.load_module
 
-    def load(*asked, **named):
+    def load(*requested, **named):
         found.extend(warp_setup.header_folder().glob("*.pch"))
-        return load_module(*asked, **named)
+        return load_module(*requested, **named)
 
     with mock.patch.object(wp, "load_module", load):
         assert works()
@@ -233,10 +233,10 @@ def test_a_full_disk_is_told_before_llvm_ends_the_process(cache):
     assert works()
 
 
-@pytest.mark.parametrize(("files", "left", "full"), [(1000, 3, True), (1000, 900, False), (0, 0, False)])
-def test_no_files_left_is_no_room(tmp_path, files, left, full):
+@pytest.mark.parametrize(("files", "remaining", "full"), [(1000, 3, True), (1000, 900, False), (0, 0, False)])
+def test_no_files_left_is_no_room(tmp_path, files, remaining, full):
     fields = list(os.statvfs(tmp_path))[:10]
-    fields[5], fields[7] = files, left
+    fields[5], fields[7] = files, remaining
     system = SimpleNamespace(statvfs=lambda path: os.statvfs_result(fields), posix_fallocate=os.posix_fallocate)
     with pytest.raises(OSError, match="No files left") if full else contextlib.nullcontext():
         kernel_cache.seek_room(tmp_path, system=system)

@@ -41,10 +41,10 @@ def test_a_run_that_turns_out_short_keeps_its_width(measured_widths):
     assert (clock.readings, widths.measured()) == (4, {})
 
 
-@pytest.mark.parametrize("asked", [{"width": 8}, {"method": "rk5"}])
-def test_a_width_that_was_asked_for_and_steps_that_are_chosen_stay(measured_widths, asked):
-    method = lw.Method("rk5", rtol=1e-6, atol=1e-9) if "method" in asked else "psi_s"
-    plan = make_plan(speed.fleet(2_000_000), method, h=0.01, t1=0.1, width=asked.get("width"))
+@pytest.mark.parametrize("requested", [{"width": 8}, {"method": "rk5"}])
+def test_a_width_that_was_asked_for_and_steps_that_are_chosen_stay(measured_widths, requested):
+    method = lw.Method("rk5", rtol=1e-6, atol=1e-9) if "method" in requested else "psi_s"
+    plan = make_plan(speed.fleet(2_000_000), method, h=0.01, t1=0.1, width=requested.get("width"))
     clock = Clock(1e3)
     assert with_best_width(plan, 1, clock) is plan
     assert clock.readings == 0

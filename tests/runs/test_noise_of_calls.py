@@ -150,12 +150,12 @@ def subset_simulation(depth, seed, keyed):
         u, k, y = (np.concatenate(values, axis=1) for values in zip(*chain, strict=True))
 
 
-def within(found):
+def within(answer):
     """Whether the 95 % interval of the mean logarithm of independent estimates holds the truth, and that logarithm's estimate.
 
     Logarithms of estimates spread by 0.4: their mean is low by half the variance, 0.08, of a half width of 0.3.
     """
-    logs = np.log(found)
+    logs = np.log(answer)
     half = stats.t.ppf(0.975, len(logs) - 1) * logs.std(ddof=1) / np.sqrt(len(logs))
     return abs(logs.mean() - np.log(RARE)) <= half, logs.mean()
 

@@ -47,7 +47,7 @@ def short(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def complete(tmp_path_factory):
     """Store of 16 blocks."""
     return undisturbed(tmp_path_factory.mktemp("whole") / "run.zarr", 4096)
 
@@ -61,7 +61,7 @@ def killed(path, seconds):
     return process.exitcode != 0
 
 
-def goes_on(path, whole, members=4096):
+def goes_on(path, complete, members=4096):
     """Finish a run by lw.resume, or start it again where it had not begun; compare all files."""
     if path.exists():
         lw.resume(path)
@@ -69,7 +69,7 @@ def goes_on(path, whole, members=4096):
         process = start(path, members=members)
         process.join()
         assert process.exitcode == 0
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
     assert sorted(one.name for one in path.parent.iterdir()) == ["run.zarr"]
     shutil.rmtree(path)
 
@@ -88,12 +88,12 @@ def test_three_kills(short, tmp_path):
 
 
 @pytest.mark.slow
-def test_twenty_kills_at_random_moments(whole, tmp_path):
+def test_twenty_kills_at_random_moments(complete, tmp_path):
     """Ten from the start of the process to a little beyond its end, ten a moment after some block was marked.
 
     The moments of the second ten do not depend on how busy the machine is: most of them hit the run in its middle.
     """
-    path, before, after = whole
+    path, before, after = complete
     dice = random.Random(20)
     found = []
     for i in range(20):
@@ -107,11 +107,11 @@ def test_twenty_kills_at_random_moments(whole, tmp_path):
 
 
 @pytest.mark.slow
-def test_killed_again_and_again(whole, tmp_path):
+def test_killed_again_and_again(complete, tmp_path):
     """Each attempt is killed after two more blocks or a few more; the run still ends, with the same bytes."""
     here, kills = tmp_path / "run.zarr", 0
     while killed_after(here, finished(here) + 2, 0.0, run, 1, 4096):
         kills += 1
         assert kills < 10
     assert kills >= 3
-    assert differing(whole[0], here) == []
+    assert differing(complete[0], here) == []

@@ -391,12 +391,12 @@ def test_blocks_at_work_come_to_their_end(threads):
     assert got == [0]
 
 
-@pytest.mark.parametrize("there", [False, True])
-def test_an_interrupt_among_the_pictures_saves_the_result(there, tmp_path, capsys):
-    if there:
+@pytest.mark.parametrize("present", [False, True])
+def test_an_interrupt_among_the_pictures_saves_the_result(present, tmp_path, capsys):
+    if present:
         (tmp_path / "result.npz").write_bytes(b"of a week")
     assert main([*SHORT, "--out", str(tmp_path), "--quiet"], finish=Study(KeyboardInterrupt())) == 130
-    path = tmp_path / ("result_part.npz" if there else "result.npz")
+    path = tmp_path / ("result_part.npz" if present else "result.npz")
     assert lw.Result.load(path).members == 20
     text = f"lgvi-warp: interrupted; the run is finished: its 20 members are saved in {path}\n"
     assert capsys.readouterr().err == text
@@ -466,11 +466,11 @@ def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkey
 
     draw = plots.summary
 
-    def slow(*given, **more):
+    def slow(*inputs, **more):
         time.sleep(0.2)  # until the other files are begun
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(0.2)
-        return draw(*given, **more)
+        return draw(*inputs, **more)
 
     monkeypatch.setattr(plots, "summary", slow)
     assert cli.main([*SHORT, "--out", str(tmp_path), "--quiet"]) == 130

@@ -98,8 +98,8 @@ def test_every_part_of_a_start_in_every_width(width):
     plan = make_plan(lw.Ensemble(SCENES["paper"], members), "psi_s", h=0.01, t1=0.01, width=width, dtype="float32")
     both = [StateLanes(plan.spec, 3, kernel) for kernel in (kernel_of(plan.spec.width, plan.spec.real), None)]
 
-    def numbers(own, *shape):
-        return rng.normal(size=(members if own else 1, *shape))
+    def numbers(local, *shape):
+        return rng.normal(size=(members if local else 1, *shape))
 
     for turned, shifted, carried, full, inertial in itertools.product((False, True), repeat=5):
         own = rng.integers(2, size=8).astype(bool)

@@ -55,7 +55,7 @@ SETTINGS = {"h": 0.01, "t1": 0.75, "save": lw.SaveAt(every=0.25)}
 
 
 @pytest.fixture(scope="module")
-def whole(fleet):
+def complete(fleet):
     return lw.solve(fleet, **SETTINGS, statistics=EVERY)
 
 
@@ -69,16 +69,16 @@ def same(first, second):
     )
 
 
-def test_statistics_are_those_of_the_samples(whole):
-    s, b = whole.statistics, whole.position
-    speed = np.linalg.norm(whole.velocity, axis=-1)
+def test_statistics_are_those_of_the_samples(complete):
+    s, b = complete.statistics, complete.position
+    speed = np.linalg.norm(complete.velocity, axis=-1)
     np.testing.assert_allclose(s["mean position"].value, b.mean(axis=1), rtol=0, atol=1e-14)
     joint = np.concatenate([b, speed[..., None]], axis=-1)
     for t in range(4):
         np.testing.assert_allclose(s["covariance position, speed"].value[t], np.cov(joint[t].T), rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(s["extremes velocity"]["maximum"], whole.velocity.max(axis=1))
+    np.testing.assert_array_equal(s["extremes velocity"]["maximum"], complete.velocity.max(axis=1))
     np.testing.assert_allclose(s["exceedance depth above 0.5"].value[:, 0], (b[..., 2] > 0.5).mean(axis=1), rtol=1e-14)
-    np.testing.assert_allclose(s["mean energy"].value[:, 0], whole.energy.mean(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(s["mean energy"].value[:, 0], complete.energy.mean(axis=1), rtol=1e-12)
     np.testing.assert_allclose(s["mean path_maximum speed"].value[0], speed.max(axis=0).mean(), rtol=1e-13)
     passed = (b[..., 2] > 1.0).any(axis=0).mean()
     assert s["first_passage depth above 1.0"].value[-1] == pytest.approx(passed, rel=1e-12)
@@ -87,11 +87,11 @@ def test_statistics_are_those_of_the_samples(whole):
     np.testing.assert_allclose(ranks, (0.05, 0.5, 0.95), atol=s["quantiles depth"]["rank_error"][-1] + 1 / 1003)
 
 
-def test_quantities_are_those_of_the_result(fleet, whole):
-    inertial = np.einsum("knij,knj->kni", whole.attitude, whole.velocity)
+def test_quantities_are_those_of_the_result(fleet, complete):
+    inertial = np.einsum("knij,knj->kni", complete.attitude, complete.velocity)
     names = ("velocity_inertial", "attitude", "angular_velocity", "speed")
-    truths = (inertial, whole.attitude.reshape(4, -1, 9), whole.angular_velocity,
-              np.linalg.norm(whole.velocity, axis=-1)[..., None])  # fmt: skip
+    truths = (inertial, complete.attitude.reshape(4, -1, 9), complete.angular_velocity,
+              np.linalg.norm(complete.velocity, axis=-1)[..., None])  # fmt: skip
     found = lw.solve(fleet, **SETTINGS, statistics=[Mean(name) for name in names]).statistics
     for name, truth in zip(names, truths, strict=True):
         np.testing.assert_allclose(found[f"mean {name}"].value, truth.mean(axis=1), rtol=0, atol=1e-14)
@@ -124,9 +124,9 @@ def test_every_statistic_is_among_them():
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
-def test_threads_change_no_bit(fleet, whole, threads):
+def test_threads_change_no_bit(fleet, complete, threads):
     alone = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", threads=threads)
-    assert same(alone.statistics, whole.statistics)
+    assert same(alone.statistics, complete.statistics)
     assert (alone.samples, alone.members) == ({}, 1003)
     with pytest.raises(AttributeError, match="keep='all'"):
         _ = alone.position
@@ -144,17 +144,17 @@ class Ordered:
 
 
 @pytest.mark.parametrize("order", [(3, 2, 1, 0), (2, 0, 3, 1)])
-def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, whole, order):
+def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, complete, order):
     found = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", executor=Ordered(order))
-    assert same(found.statistics, whole.statistics)
+    assert same(found.statistics, complete.statistics)
 
 
-def test_segments_change_no_bit(fleet, whole, monkeypatch):
+def test_segments_change_no_bit(fleet, complete, monkeypatch):
     monkeypatch.setattr("lgvi_warp.engine.launches.SEGMENT_SAMPLE_BYTES", 1)
-    assert same(lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none").statistics, whole.statistics)
+    assert same(lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none").statistics, complete.statistics)
 
 
-def test_parts_pass_through_files(fleet, whole, tmp_path):
+def test_parts_pass_through_files(fleet, complete, tmp_path):
     """A store may keep a block's part, and merge it later: to the same bits, in any order."""
     plan = make_plan(fleet, **SETTINGS)
     statistics = tuple(EVERY)
@@ -173,7 +173,7 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
     for i in (3, 1, 0, 2):
         with np.load(tmp_path / f"{i}.npz") as data:
             again.merge(blocks(1003)[i], again.from_arrays({k.replace("|", "/"): data[k] for k in data.files}, content))
-    assert same(again.result(), whole.statistics)
+    assert same(again.result(), complete.statistics)
 
 
 @pytest.mark.parametrize(("sampling", "words"), [
@@ -181,20 +181,22 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
     (Sobol(replicates=2), "balanced at powers of two: 512 or 1024 members"), (Halton(replicates=2), ""),
     (Grid({"start.position[0]": 4, "vehicle.mass": 4}), "do not rely"), ("random", ""),
 ])  # fmt: skip
-def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, words):
+def test_intervals_of_dependent_members_are_said_to_be(scene, complete, sampling, words):
     sampled = lw.Ensemble(
         scene, 16, 1, {"start.position[0]": Normal(std=1.0), "vehicle.mass": Normal(std=1.0)}, sampling
     )
     apart = Gathered(np.zeros(1), 1003, EVERY).apart
-    (text,) = observation.messages_about(whole.statistics, sampled.to_dict(), np.zeros(1003, np.uint8), apart) or ("",)
+    (text,) = observation.messages_about(complete.statistics, sampled.to_dict(), np.zeros(1003, np.uint8), apart) or (
+        "",
+    )
     assert words in text
     assert bool(text) == bool(words)
 
 
-def test_the_result_keeps_its_statistics(fleet, whole, tmp_path):
+def test_the_result_keeps_its_statistics(fleet, complete, tmp_path):
     r = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep=[3, 1002])
     back = lw.Result.load(r.save(tmp_path / "r.npz"))
-    assert same(back.statistics, whole.statistics)
+    assert same(back.statistics, complete.statistics)
     assert back.statistics["mean position"].unit == "m"
     assert back.kept_members.tolist() == [3, 1002]
     assert back.kept.position.tobytes() == r.kept.position.tobytes()
@@ -205,9 +207,9 @@ def test_the_result_keeps_its_statistics(fleet, whole, tmp_path):
     json.dumps(r.provenance)
 
 
-def test_kept_members_are_those_of_the_whole(fleet, whole):
+def test_kept_members_are_those_of_the_whole(fleet, complete):
     kept = lw.solve(fleet, **SETTINGS, keep=[1002, 513, 0]).kept
-    assert all(kept.samples[f].tobytes() == whole.samples[f][:, [0, 513, 1002]].tobytes() for f in FIELDS)
+    assert all(kept.samples[f].tobytes() == complete.samples[f][:, [0, 513, 1002]].tobytes() for f in FIELDS)
 
 
 @pytest.mark.slow  # for its kernels: rk8 that chooses its steps
@@ -536,7 +538,7 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
     assert not any("balanced" in text for text in both.messages)
 
 
-@pytest.mark.parametrize(("given", "text"), [
+@pytest.mark.parametrize(("inputs", "text"), [
     ({"statistics": "mean"}, "no list"), ({"statistics": [3]}, "no statistic"), ({"keep": "some"}, "keep"),
     ({"keep": [5]}, "is none of the"), ({"keep": [-1]}, "is negative"), ({"keep": 3}, "is no list of members"),
     ({"statistics": [Mean("depth"), Mean("depth")]}, "name of 2 statistics"),
@@ -546,20 +548,20 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
     ({"until": {"statistic": "mean depth"}}, "half_width"), ({"until": lw.Until("mean depth", 1.0, at=0.3)}, "no sample time"),
     ({"statistics": [Extremes("depth")], "until": lw.Until("extremes depth", 1.0)}, "no interval"),
 ])  # fmt: skip
-def test_what_a_run_refuses(scene, given, text):
+def test_what_a_run_refuses(scene, inputs, text):
     with pytest.raises(lw.SceneError, match=text):
-        lw.solve(lw.Ensemble(scene, 3), **SETTINGS, **given)
+        lw.solve(lw.Ensemble(scene, 3), **SETTINGS, **inputs)
 
 
-def test_a_function_of_ones_own(fleet, whole):
+def test_a_function_of_ones_own(fleet, complete):
     def drop(samples, members):
         return samples["position"][..., 2] - members.position[None, :, 2]
 
     pair = Quantity("pair", lambda s, m: s["velocity"][..., :2], "m/s", ("velocity",), ("u", "v"))
     found = lw.solve(fleet, **SETTINGS, statistics=[Mean(drop), Mean(pair)], keep="none").statistics
-    expected = (whole.position[..., 2] - whole.position[0, :, 2]).mean(axis=1)
+    expected = (complete.position[..., 2] - complete.position[0, :, 2]).mean(axis=1)
     np.testing.assert_allclose(found["mean drop"].value[:, 0], expected, atol=1e-14)
-    np.testing.assert_allclose(found["mean pair"].value, whole.velocity[..., :2].mean(axis=1), atol=1e-14)
+    np.testing.assert_allclose(found["mean pair"].value, complete.velocity[..., :2].mean(axis=1), atol=1e-14)
     wrong = Quantity("wrong", lambda s, m: s["velocity"][0], "m/s")
     with pytest.raises(ValueError, match=r"quantity wrong: gave shape .*; \(\d+, \d+\) is wanted"):
         lw.solve(fleet, **SETTINGS, statistics=[Mean(wrong)])

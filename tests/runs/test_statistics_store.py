@@ -29,19 +29,19 @@ def memory():
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def complete(tmp_path_factory):
     """A complete store without samples."""
     path = tmp_path_factory.mktemp("statistics") / "run.zarr"
     lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none", store=path)
     return path
 
 
-def test_a_store_without_samples_has_statistics_and_arrays_of_members(whole, memory):
-    stored = lw.open_run(whole)
+def test_a_store_without_samples_has_statistics_and_arrays_of_members(complete, memory):
+    stored = lw.open_run(complete)
     assert bits(stored) == bits(memory)
     assert len(stored.samples) == 0
-    assert not (whole / "position").exists()
-    assert len(list((whole / "parts").glob("*.npy"))) == 4
+    assert not (complete / "position").exists()
+    assert len(list((complete / "parts").glob("*.npy"))) == 4
     np.testing.assert_array_equal(stored.parameters["vehicle.mass"], memory.parameters["vehicle.mass"])
     for name in ("status", "failure_time", "warnings", "warning_time", "warning_value", "substeps"):
         np.testing.assert_array_equal(getattr(stored, name), getattr(memory, name))
@@ -52,20 +52,20 @@ def test_a_store_without_samples_has_statistics_and_arrays_of_members(whole, mem
 
 
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
-def test_it_is_exported_with_its_statistics(whole, memory, tmp_path):
+def test_it_is_exported_with_its_statistics(complete, memory, tmp_path):
     import pyarrow.parquet as pq
     import xarray
 
-    with xarray.open_dataset(lw.export(whole, "netcdf", tmp_path / "run.nc"), group="statistics") as found:
+    with xarray.open_dataset(lw.export(complete, "netcdf", tmp_path / "run.nc"), group="statistics") as found:
         np.testing.assert_array_equal(found.mean_position.values, memory.statistics["mean position"].value)
-    table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
+    table = pq.read_table(lw.export(complete, "parquet", tmp_path / "run.parquet"))
     starts = [f"start.angular_velocity_{i}" for i in range(3)]
     assert table.column_names == ["realization", *starts, "vehicle.mass", "status", "failure_time", "end_time"]
     assert table.num_rows == 1003
 
 
-def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
-    path = shutil.copytree(whole, tmp_path / "run.zarr")
+def test_statistics_of_damaged_parts_are_refused(complete, tmp_path):
+    path = shutil.copytree(complete, tmp_path / "run.zarr")
     part = path / "parts" / "000000256.npy"
     hostile.flipped(part, None)
     with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
@@ -76,13 +76,13 @@ def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
 
 
 @pytest.mark.parametrize("harm", [hostile.flipped, hostile.torn(0.99), hostile.removed])
-def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, whole, memory, tmp_path):
-    path = shutil.copytree(whole, tmp_path / "run.zarr")
+def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, complete, memory, tmp_path):
+    path = shutil.copytree(complete, tmp_path / "run.zarr")
     harm(path / "parts/000000512.npy", None)
     assert any("parts/000000512.npy" in text for text in state(path)["damage"])
     before = markers(path)
     assert bits(lw.resume(path)) == bits(memory)
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
     after = markers(path)
     assert [name for name in after if after[name] != before[name]] == ["000000512.json"]
 
@@ -94,7 +94,7 @@ def test_samples_and_statistics_together(memory, tmp_path):
     assert bits(result) == bits(memory)
 
 
-def test_members_kept_are_run_again_and_after_a_resume(whole, tmp_path):
+def test_members_kept_are_run_again_and_after_a_resume(complete, tmp_path):
     every = lw.solve(fleet(), **SETTINGS)
     result = lw.solve(fleet(), **SETTINGS, keep=[3, 1002], store=tmp_path / "run.zarr")
     (tmp_path / "run.zarr/blocks/000000256.json").unlink()
@@ -105,11 +105,11 @@ def test_members_kept_are_run_again_and_after_a_resume(whole, tmp_path):
 
 
 @pytest.mark.parametrize("executor", [pytest.param("processes", marks=pytest.mark.slow), "threads"])
-def test_executors_give_the_same_bits(executor, memory, whole, tmp_path):
+def test_executors_give_the_same_bits(executor, memory, complete, tmp_path):
     settings = {**SETTINGS, "statistics": STATISTICS, "keep": "none", "executor": executor, "threads": 2}
     assert bits(lw.solve(fleet(), **settings)) == bits(memory)
     assert bits(lw.solve(fleet(), **settings, store=tmp_path / "run.zarr")) == bits(memory)
-    assert differing(whole, tmp_path / "run.zarr") == []
+    assert differing(complete, tmp_path / "run.zarr") == []
 
 
 @pytest.mark.slow
@@ -212,8 +212,8 @@ def test_statistics_of_functions_are_asked_for_again(tmp_path):
     assert bits(lw.open_run(tmp_path, statistics=statistics)) == bits(first)
 
 
-def test_another_observation_is_another_run(whole):
-    store = lw.Store(whole, existing="resume")
+def test_another_observation_is_another_run(complete):
+    store = lw.Store(complete, existing="resume")
     with pytest.raises(lw.SceneError, match=r"observed\.statistics"):
         lw.solve(fleet(), **SETTINGS, statistics=[lw.statistics.Mean("position")], keep="none", store=store)
 
@@ -239,17 +239,17 @@ def test_a_run_in_parts_has_no_until(tmp_path):
         lw.solve(fleet(), **SETTINGS, until=UNTIL, store=tmp_path / "run.zarr", only=range(1))
 
 
-def test_parts_of_a_run_are_merged_with_their_statistics(whole, memory, tmp_path):
+def test_parts_of_a_run_are_merged_with_their_statistics(complete, memory, tmp_path):
     for i, only in enumerate((range(0, 2), range(2, 4))):
         lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none", store=tmp_path / f"{i}.zarr", only=only)
     lw.merge([tmp_path / "0.zarr", tmp_path / "1.zarr"], tmp_path / "run.zarr")
-    assert differing(whole, tmp_path / "run.zarr") == []
+    assert differing(complete, tmp_path / "run.zarr") == []
     assert bits(lw.open_run(tmp_path / "run.zarr")) == bits(memory)
 
 
-@pytest.mark.parametrize("given", [[], STATISTICS])
-def test_an_observation_is_told_and_read(given):
-    observed = observe(lw.Ensemble.from_scene(lw.Scene.load(ROOT / "examples/paper.toml")), given, "failed", UNTIL)
+@pytest.mark.parametrize("inputs", [[], STATISTICS])
+def test_an_observation_is_told_and_read(inputs):
+    observed = observe(lw.Ensemble.from_scene(lw.Scene.load(ROOT / "examples/paper.toml")), inputs, "failed", UNTIL)
     assert observation_of(observed.to_dict() | {"fields": ["position"]}).to_dict() == observed.to_dict()
 
 

@@ -43,7 +43,7 @@ def memory():
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def complete(tmp_path_factory):
     """A complete store, which no test changes."""
     path = tmp_path_factory.mktemp("store") / "run.zarr"
     lw.solve(fleet(), **SETTINGS, store=path)
@@ -51,12 +51,12 @@ def whole(tmp_path_factory):
 
 
 @pytest.fixture
-def copy(whole, tmp_path):
-    return shutil.copytree(whole, tmp_path / "run.zarr")
+def copy(complete, tmp_path):
+    return shutil.copytree(complete, tmp_path / "run.zarr")
 
 
-def test_it_has_the_bits_of_a_run_in_memory(whole, memory):
-    stored = lw.open_run(whole.parent)
+def test_it_has_the_bits_of_a_run_in_memory(complete, memory):
+    stored = lw.open_run(complete.parent)
     for name in FIELDS:
         assert stored.samples[name].tobytes() == memory.samples[name].tobytes()
     for name in ("time", *(one.name for one in member_fields.present(make_plan(fleet(), **SETTINGS)))):
@@ -114,28 +114,28 @@ def test_what_takes_blocks_cannot_change_the_run(into, memory, tmp_path):
         result.statistics[statistic.key].value, clean.statistics[statistic.key].value)  # fmt: skip
 
 
-def test_some_members_alone_are_read(whole, memory):
-    some = lw.open_run(whole, [5, 1002, 300])
+def test_some_members_alone_are_read(complete, memory):
+    some = lw.open_run(complete, [5, 1002, 300])
     assert some.position.tobytes() == memory.position[:, [5, 1002, 300]].tobytes()
     assert some.members == 3
-    assert lw.open_run(whole, slice(250, 260)).parameters["vehicle.mass"].shape == (10,)
+    assert lw.open_run(complete, slice(250, 260)).parameters["vehicle.mass"].shape == (10,)
 
 
-def test_zarr_cannot_write_into_it(whole):
-    read_only = store.Folder(whole).checked()
-    before = tree(whole)
+def test_zarr_cannot_write_into_it(complete):
+    read_only = store.Folder(complete).checked()
+    before = tree(complete)
     for write in (lambda: read_only.set("position/c/0/0/0", None), lambda: read_only.delete("position/c/0/0/0")):
         with pytest.raises(ValueError, match="read-only"):
             asyncio.run(write())
     with pytest.raises(ValueError, match="only read"):
         read_only.with_read_only(False)
-    assert tree(whole) == before
+    assert tree(complete) == before
 
 
-def test_xarray_opens_it_without_a_remark(whole, memory, recwarn):
+def test_xarray_opens_it_without_a_remark(complete, memory, recwarn):
     import xarray
 
-    dataset = xarray.open_zarr(whole)
+    dataset = xarray.open_zarr(complete)
     assert dataset.attrs["Conventions"] == "CF-1.11"
     assert dataset.attrs["complete"]
     assert dataset.position.dims == ("time", "realization", "component")
@@ -146,14 +146,14 @@ def test_xarray_opens_it_without_a_remark(whole, memory, recwarn):
     np.testing.assert_array_equal(dataset.realization.values, np.arange(MEMBERS))
     assert dataset.provenance == json.dumps(json.loads(dataset.provenance))
     assert len(recwarn) == 0
-    view = lw.open_run(whole).dataset
+    view = lw.open_run(complete).dataset
     assert float(view.position.isel(time=-1, realization=7, component=2)) == memory.position[-1, 7, 2]
 
 
-def test_chunks_are_raw_numbers_with_a_checksum_one_block_each(whole, memory):
-    array = zarr.open_array(whole / "position", mode="r")
+def test_chunks_are_raw_numbers_with_a_checksum_one_block_each(complete, memory):
+    array = zarr.open_array(complete / "position", mode="r")
     assert array.chunks == (31, 256, 3)
-    data = (whole / "position" / "c.0.1.0").read_bytes()
+    data = (complete / "position" / "c.0.1.0").read_bytes()
     assert data[:-4] == memory.position[:, 256:512].tobytes()
     assert int.from_bytes(data[-4:], "little") == durable.checksum(data[:-4])
 
@@ -249,39 +249,39 @@ BLOCK_OF = {"position/c.0.2.0": 512, "status/c.1": 256, "vehicle.mass/c.3": 768,
 
 
 @pytest.mark.parametrize(("name", "word"), DAMAGED)
-def test_damage_is_seen_and_its_block_alone_runs_again(copy, whole, name, word, capsys):
+def test_damage_is_seen_and_its_block_alone_runs_again(copy, complete, name, word, capsys):
     HARMS[word](copy / name, None)
     word = "is damaged" if name == "created.json" else word
     assert cli.main(["info", str(copy)]) == 1
     assert f"damage      {name} {word}" in capsys.readouterr().out
     before = markers(copy)
     lw.resume(copy)
-    assert differing(whole, copy) == []
+    assert differing(complete, copy) == []
     assert cli.main(["info", str(copy)]) == 0
     after = markers(copy)
     again = [int(one.removesuffix(".json")) for one in after if after[one] != before[one]]
     assert again == ([BLOCK_OF[name]] if name in BLOCK_OF else [])
 
 
-def test_damaged_times_are_mended_by_the_same_run(copy, whole):
+def test_damaged_times_are_mended_by_the_same_run(copy, complete):
     hostile.flipped(copy / "time" / "c.0", None)
     with pytest.raises(lw.SceneError, match=r"time/c.0 has changed; run the same scene again"):
         lw.resume(copy)
     lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
-    assert differing(whole, copy) == []
+    assert differing(complete, copy) == []
 
 
-def test_metadata_of_the_root_are_mended(copy, whole):
+def test_metadata_of_the_root_are_mended(copy, complete):
     # The root repeats what each array says of itself: xarray would believe the root.
     content = json.loads((copy / "zarr.json").read_text())
     content["consolidated_metadata"]["metadata"]["position"]["attributes"]["units"] = "km"
     (copy / "zarr.json").write_text(json.dumps(content))
     lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
-    assert differing(whole, copy) == []
+    assert differing(complete, copy) == []
     assert lw.open_run(copy).dataset.position.attrs["units"] == "m"
 
 
-def test_lost_times_are_not_taken_for_nan(copy, whole):
+def test_lost_times_are_not_taken_for_nan(copy, complete):
     """A missing chunk reads as NaN: a run that went on with that would write it down as right."""
     for name in ("time/c.0", "step/c.0"):
         (copy / name).unlink()
@@ -293,14 +293,14 @@ def test_lost_times_are_not_taken_for_nan(copy, whole):
             with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
                 lw.open_run(copy)
         lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
-        assert differing(whole, copy) == []
+        assert differing(complete, copy) == []
 
 
-def test_lost_folders_are_made_again(copy, whole):
+def test_lost_folders_are_made_again(copy, complete):
     for name in ("blocks", "parts", "position"):
         shutil.rmtree(copy / name)
     lw.resume(copy)
-    assert differing(whole, copy) == []
+    assert differing(complete, copy) == []
 
 
 def test_what_was_there_is_told(copy):
@@ -346,9 +346,9 @@ def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
 
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
 @pytest.mark.parametrize("to", ["netcdf", "parquet"])
-def test_a_full_disk_is_told_by_an_export(whole, tmp_path, to, capsys):
+def test_a_full_disk_is_told_by_an_export(complete, tmp_path, to, capsys):
     with files_of_at_most(100_000):
-        assert cli.main(["export", str(whole), "--to", to, "--out", str(tmp_path / "run.out")]) == 1
+        assert cli.main(["export", str(complete), "--to", to, "--out", str(tmp_path / "run.out")]) == 1
     said = capsys.readouterr().err
     assert said.startswith(f"lgvi-warp: {tmp_path / 'run.out'}: ")
     assert said.count("\n") == 1
@@ -373,15 +373,15 @@ def test_an_export_that_fails_says_what_the_library_says(error, number, text, tm
     )
 
 
-def test_values_are_read_when_they_are_used(whole):
-    assert lw.open_run(whole).dataset.position.chunks is not None
+def test_values_are_read_when_they_are_used(complete):
+    assert lw.open_run(complete).dataset.position.chunks is not None
 
 
-def test_a_damaged_marker_runs_its_block_again(copy, whole):
+def test_a_damaged_marker_runs_its_block_again(copy, complete):
     hostile.flipped(copy / "blocks" / "000000256.json", None)
     assert state(copy)["finished"] == 3
     lw.resume(copy)
-    assert differing(whole, copy) == []
+    assert differing(complete, copy) == []
 
 
 def test_damaged_settings_are_refused(copy):
@@ -404,15 +404,15 @@ def test_a_run_that_is_not_complete_is_not_opened_by_mistake(tmp_path):
     assert "2 blocks are missing" in some.messages[-1]
 
 
-def test_parts_of_a_run_are_merged(tmp_path, whole):
+def test_parts_of_a_run_are_merged(tmp_path, complete):
     for name, only in (("a", range(0, 1)), ("b", range(2, 4)), ("c", range(0, 2))):
         lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
     assert not lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "some").complete
     folder = lw.merge([tmp_path / name for name in "abc"], tmp_path / "all")
     assert folder.complete
-    assert differing(whole, folder.path) == []
+    assert differing(complete, folder.path) == []
     lw.resume(tmp_path / "some")
-    assert differing(whole, tmp_path / "some" / "run.zarr") == []
+    assert differing(complete, tmp_path / "some" / "run.zarr") == []
     with pytest.raises(lw.SceneError, match="holds a run already"):
         lw.merge([tmp_path / "a"], tmp_path / "all")
     # Nor is what comes of a complete run that has lost a block.
@@ -420,7 +420,7 @@ def test_parts_of_a_run_are_merged(tmp_path, whole):
     lost = lw.merge([folder.path], tmp_path / "lost")
     assert not lost.complete
     assert lw.resume(lost.path).members == MEMBERS
-    assert differing(whole, lost.path) == []
+    assert differing(complete, lost.path) == []
 
 
 def test_a_store_in_use_is_not_replaced_by_a_merge(copy, tmp_path):
@@ -430,31 +430,31 @@ def test_a_store_in_use_is_not_replaced_by_a_merge(copy, tmp_path):
     assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
 
 
-def test_parts_that_may_only_be_read_are_merged(copy, whole, tmp_path):
+def test_parts_that_may_only_be_read_are_merged(copy, complete, tmp_path):
     """Their merge may be written: modes are not copied."""
     for one in copy.rglob("*"):
         one.chmod(0o555 if one.is_dir() else 0o444)
     made = lw.merge([copy], tmp_path / "all").path
-    assert differing(whole, made) == []
+    assert differing(complete, made) == []
     assert all(one.stat().st_mode & 0o200 for one in made.rglob("*"))
     for one in copy.rglob("*"):
         one.chmod(0o755)
 
 
-def test_a_part_that_is_damaged_lends_no_times(tmp_path, whole):
+def test_a_part_that_is_damaged_lends_no_times(tmp_path, complete):
     for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
         lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
     (tmp_path / "a" / "run.zarr" / "time" / "c.0").unlink()
-    assert differing(whole, lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all").path) == []
+    assert differing(complete, lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all").path) == []
     with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
         lw.merge([tmp_path / "a"], tmp_path / "none")
 
 
-def test_only_parts_of_one_run_are_merged(tmp_path, whole):
+def test_only_parts_of_one_run_are_merged(tmp_path, complete):
     lw.solve(fleet(), **{**SETTINGS, "t1": 2.0}, store=tmp_path / "run.zarr", only=range(0, 1))
     with pytest.raises(lw.SceneError, match=r"steps is 200 in .*run.zarr and 300 in .*: these are parts of different"):
-        lw.merge([whole, tmp_path], tmp_path / "all")
-    flipped = shutil.copytree(whole, tmp_path / "flipped.zarr")
+        lw.merge([complete, tmp_path], tmp_path / "all")
+    flipped = shutil.copytree(complete, tmp_path / "flipped.zarr")
     hostile.flipped(flipped / "position" / "c.0.1.0", None)
     with pytest.raises(lw.SceneError, match=r"flipped.zarr.*torn, missing or changed"):
         lw.merge([flipped], tmp_path / "all")
@@ -574,7 +574,7 @@ def test_more_threads_or_another_python_are_no_difference(copy):
     assert lw.resume(copy, threads=2).members == MEMBERS
 
 
-def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole):
+def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, complete):
     """Some systems find out when they sync: the run ends, and all other blocks that were written are there."""
     path = tmp_path / "run.zarr"
     kept = r"No space left on device: the blocks that were finished are kept"
@@ -585,10 +585,10 @@ def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole):
     assert not list(path.rglob(f"*{durable.UNFINISHED}"))
     assert not state(path)["complete"]
     lw.resume(path)
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
 
 
-def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, whole):
+def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, complete):
     def interrupted(fraction):
         if fraction > 0.8:
             raise KeyboardInterrupt
@@ -599,7 +599,7 @@ def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, whole):
     assert state(path)["finished"] == 3
     assert not list(path.rglob(f"*{durable.UNFINISHED}"))
     lw.resume(path)
-    assert differing(whole, path) == []
+    assert differing(complete, path) == []
 
 
 def test_a_file_that_may_not_grow_is_told_as_a_full_disk(tmp_path, capsys):
@@ -684,10 +684,10 @@ def test_keepers_that_cannot_be_stored_are_refused(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
-def test_netcdf(whole, memory, tmp_path):
+def test_netcdf(complete, memory, tmp_path):
     import xarray
 
-    path = lw.export(whole, "netcdf", tmp_path / "run.nc")
+    path = lw.export(complete, "netcdf", tmp_path / "run.nc")
     with xarray.open_dataset(path, engine="netcdf4") as dataset:
         np.testing.assert_array_equal(dataset.attitude.values, memory.attitude)
         assert (dataset.position.attrs["units"], dataset.attrs["Conventions"]) == ("m", "CF-1.11")
@@ -696,10 +696,10 @@ def test_netcdf(whole, memory, tmp_path):
     assert [one.name for one in tmp_path.iterdir()] == ["run.nc"]
 
 
-def test_parquet(whole, memory, tmp_path):
+def test_parquet(complete, memory, tmp_path):
     import pyarrow.parquet as pq
 
-    table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
+    table = pq.read_table(lw.export(complete, "parquet", tmp_path / "run.parquet"))
     assert table.num_rows == MEMBERS * 31
     at = 700 * 31 + 11
     assert table["realization"][at].as_py() == 700
@@ -712,7 +712,7 @@ def test_parquet(whole, memory, tmp_path):
         {b"units": b"kg"},
     ]
     with pytest.raises(lw.SceneError, match=r"to = 'csv'"):
-        lw.export(whole, "csv")
+        lw.export(complete, "csv")
 
 
 def test_what_is_no_run_is_named(tmp_path):

@@ -49,9 +49,9 @@ def scene(tmp_path):
     return path
 
 
-def document(given, capsys):
+def document(inputs, capsys):
     """The document that a verb prints."""
-    assert cli.main([*map(str, given), "--json", "-q"]) == 0
+    assert cli.main([*map(str, inputs), "--json", "-q"]) == 0
     return json.loads(capsys.readouterr().out)
 
 

@@ -45,9 +45,9 @@ CALLS = {"rare": (rare, VehicleLimit), "conditions": (of_conditions, VehicleLimi
          "estimate": (estimate, Runs)}  # fmt: skip
 
 
-def answer(found):
+def answer(finding):
     """All that an answer holds but times, as text and to the bit."""
-    content = {name: value for name, value in found.to_dict().items() if name not in SECONDS}
+    content = {name: value for name, value in finding.to_dict().items() if name not in SECONDS}
     return repr(content)
 
 

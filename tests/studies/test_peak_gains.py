@@ -12,14 +12,14 @@ SETTINGS = dict(of=("peak",), about=80.0, method="psi_s", h=H)
 
 
 @pytest.fixture(scope="module")
-def found():
+def answer():
     fleet = heading_loops(10)
     return fleet, lw.linear.margins(fleet, "heading_pid", to=("rotation[2]", "angular_velocity[2]"), **SETTINGS)
 
 
-def test_ten_loops_beside_python_control(found):
+def test_ten_loops_beside_python_control(answer):
     control = pytest.importorskip("control")
-    fleet, peaks = found
+    fleet, peaks = answer
     assert peaks.steady.all()
     names = ("sensitivity", "complementary", "rotation[2]", "angular_velocity[2]")
     coarse = np.geomspace(1e-3, np.pi / PERIOD, 1000)
@@ -35,8 +35,8 @@ def test_ten_loops_beside_python_control(found):
         assert [peaks.values[f"{name}_peak"][i] for name in names] == pytest.approx(gains, rel=1e-5)
 
 
-def test_the_worst_case_of_the_ensemble_is_the_largest_peak(found):
-    _, peaks = found
+def test_the_worst_case_of_the_ensemble_is_the_largest_peak(answer):
+    _, peaks = answer
     values = peaks.values["sensitivity_peak"]
     assert peaks.worst(3).tolist() == np.argsort(-values)[:3].tolist()
     assert peaks.percentiles((100.0,))["sensitivity_peak"][0] == values.max()
@@ -50,8 +50,8 @@ def test_the_worst_case_of_the_ensemble_is_the_largest_peak(found):
     ]
 
 
-def test_of_one_component_the_peak_of_s_is_one_over_the_disk_of_skew_one(found):
-    fleet, peaks = found
+def test_of_one_component_the_peak_of_s_is_one_over_the_disk_of_skew_one(answer):
+    fleet, peaks = answer
     disk = lw.linear.margins(fleet, "heading_pid", skew=1.0, **SETTINGS | {"of": ("disk",)}).values["disk"]
     assert peaks.values["sensitivity_peak"] == pytest.approx(1.0 / disk, rel=1e-9)
 

@@ -44,75 +44,75 @@ def bound_of(p):
 
 
 @pytest.fixture(scope="module")
-def found():
+def answer():
     return lw.rare_event(fleet_of(), f"position[0] - {bound_of(1e-5):.12g}", **RUN)
 
 
-def test_the_probability_of_a_place_is_that_of_a_normal(found):
+def test_the_probability_of_a_place_is_that_of_a_normal(answer):
     # The step's error, of second order, moves the place by 1e-5 of itself, and the probability by less than 0.1 %.
-    assert found.estimator == "importance"
-    assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.relative_error
-    assert found.relative_error < 0.1
-    assert found.members == {"the scene's own": pytest.approx(12_000, rel=0.4)}
-    assert found.interval[0] < found.probability < found.interval[1]
-    assert found.plain_members == pytest.approx(1e5 / found.relative_error**2, rel=0.2)
+    assert answer.estimator == "importance"
+    assert abs(answer.probability / 1e-5 - 1.0) < 3.0 * answer.relative_error
+    assert answer.relative_error < 0.1
+    assert answer.members == {"the scene's own": pytest.approx(12_000, rel=0.4)}
+    assert answer.interval[0] < answer.probability < answer.interval[1]
+    assert answer.plain_members == pytest.approx(1e5 / answer.relative_error**2, rel=0.2)
     # The failing members' mean lies along (0.5, 0.3 WAY), a little beyond the 4.26 sd of the event.
     toward = np.array([NORTH, SPEED * WAY]) / np.hypot(NORTH, SPEED * WAY)
-    moved = np.array([found.moved["start.position[0]"], found.moved["start.velocity[0]"]])
+    moved = np.array([answer.moved["start.position[0]"], answer.moved["start.velocity[0]"]])
     np.testing.assert_allclose(moved / np.linalg.norm(moved), toward, atol=0.05)
     assert np.linalg.norm(moved) == pytest.approx(
         np.exp(-0.5 * ndtri(1e-5) ** 2) / np.sqrt(2.0 * np.pi) / 1e-5, rel=0.02
     )
-    assert found.distance == pytest.approx(-ndtri(1e-5), rel=0.03)
+    assert answer.distance == pytest.approx(-ndtri(1e-5), rel=0.03)
 
 
-def test_failing_members_fail_again(found):
-    again = lw.solve(lw.Ensemble(scene_of(), sampling=found.failing), **RUN)
-    assert again.members == len(found.weights) > 300
+def test_failing_members_fail_again(answer):
+    again = lw.solve(lw.Ensemble(scene_of(), sampling=answer.failing), **RUN)
+    assert again.members == len(answer.weights) > 300
     assert (again.samples["position"][-1, :, 0] > bound_of(1e-5)).all()
-    assert found.weights.sum() == pytest.approx(1.0)
-    place = found.likeliest["start.position[0]"] + WAY * found.likeliest["start.velocity[0]"]
+    assert answer.weights.sum() == pytest.approx(1.0)
+    place = answer.likeliest["start.position[0]"] + WAY * answer.likeliest["start.velocity[0]"]
     assert place == pytest.approx(bound_of(1e-5), rel=0.02)
 
 
-def test_the_answer_says_what_it_is(found):
-    text = str(found)
+def test_the_answer_says_what_it_is(answer):
+    text = str(answer)
     assert text.startswith("probability 1")
     for word in ("95 % interval", "event       position[0] above", "weights of members", "plain       would take", "likeliest",
                  "moved       "):  # fmt: skip
         assert word in text
-    for again in (pickle.loads(pickle.dumps(found)), copy.copy(found), copy.deepcopy(found)):
+    for again in (pickle.loads(pickle.dumps(answer)), copy.copy(answer), copy.deepcopy(answer)):
         assert str(again) == text
-        assert repr(again) == repr(found)
-    assert found.provenance["versions"]
-    assert found.provenance["scene"]["vehicle"]
+        assert repr(again) == repr(answer)
+    assert answer.provenance["versions"]
+    assert answer.provenance["scene"]["vehicle"]
 
 
-def test_the_answer_is_kept_in_files(found, tmp_path):
-    paths = found.save(tmp_path)
+def test_the_answer_is_kept_in_files(answer, tmp_path):
+    paths = answer.save(tmp_path)
     assert sorted(path.name for path in paths) == ["rare.csv", "rare.json", "rare.txt"]
     again = lw.studies.RareEvent.load(tmp_path / "rare.json")
-    assert str(again) == str(found)
-    np.testing.assert_array_equal(again.normals, found.normals)
+    assert str(again) == str(answer)
+    np.testing.assert_array_equal(again.normals, answer.normals)
     np.testing.assert_array_equal(
-        again.failing.own_values()["start.velocity[0]"], found.failing.own_values()["start.velocity[0]"]
+        again.failing.own_values()["start.velocity[0]"], answer.failing.own_values()["start.velocity[0]"]
     )
-    assert json.loads((tmp_path / "rare.json").read_text())["probability"] == found.probability
+    assert json.loads((tmp_path / "rare.json").read_text())["probability"] == answer.probability
     table = lw.designs.Table(tmp_path / "rare.csv", ignore=["weight"])
-    assert lw.Ensemble(scene_of(), sampling=table).members == len(found.weights)
+    assert lw.Ensemble(scene_of(), sampling=table).members == len(answer.weights)
 
 
-def test_the_same_seed_has_the_same_answer(found):
+def test_the_same_seed_has_the_same_answer(answer):
     again = lw.rare_event(fleet_of(), f"position[0] - {bound_of(1e-5):.12g}", **RUN)
-    assert again.probability == found.probability
-    np.testing.assert_array_equal(again.normals, found.normals)
+    assert again.probability == answer.probability
+    np.testing.assert_array_equal(again.normals, answer.normals)
 
 
 @pytest.mark.slow
-def test_ways_to_say_an_event(found):
+def test_ways_to_say_an_event(answer):
     bound = bound_of(1e-5)
     for limit in (f"position[0] above {bound:.12g}", {"position[0]": {"above": float(f"{bound:.12g}")}}):
-        assert lw.rare_event(fleet_of(), limit, **RUN).probability == found.probability
+        assert lw.rare_event(fleet_of(), limit, **RUN).probability == answer.probability
     below = lw.rare_event(fleet_of(), f"{2.0 * WAY - bound:.12g} - position[0]", **RUN)
     assert abs(below.probability / 1e-5 - 1.0) < 3.0 * below.relative_error
     assert below.event == f"position[0] below {2.0 * WAY - bound:g}"
@@ -121,7 +121,7 @@ def test_ways_to_say_an_event(found):
         return result.samples["position"][-1, :, 0] - bound
 
     of_function = lw.rare_event(fleet_of(), beyond, save=lw.SaveAt(at=[T1]), **RUN)
-    assert of_function.probability == pytest.approx(found.probability, rel=1e-3)
+    assert of_function.probability == pytest.approx(answer.probability, rel=1e-3)
     assert of_function.event == "beyond above 0"
 
 
@@ -233,20 +233,20 @@ def test_a_metric_of_an_event_that_is_not_there():
         lw.metrics.Nearest("floor", measured=True)
 
 
-def test_chains_at_a_cheaper_setting(found):
+def test_chains_at_a_cheaper_setting(answer):
     limit = f"position[0] - {bound_of(1e-5):.12g}"
     cheap = lw.rare_event(fleet_of(), limit, cheaper=[{"drag.linear[0]": 21.0}], **RUN)
     assert abs(cheap.probability / 1e-5 - 1.0) < 3.0 * cheap.relative_error
     assert cheap.members["drag.linear[0] = 21.0"] > cheap.members["the scene's own"]
-    assert cheap.members["the scene's own"] < 0.5 * found.members["the scene's own"]
+    assert cheap.members["the scene's own"] < 0.5 * answer.members["the scene's own"]
 
 
-def test_a_cheaper_scene_that_tells_nothing_is_left_out(found):
+def test_a_cheaper_scene_that_tells_nothing_is_left_out(answer):
     limit = f"position[0] - {bound_of(1e-5):.12g}"
     # Ten times the drag: where members end is where they began.
     told = lw.rare_event(fleet_of(), limit, cheaper=[{"drag.linear[0]": 4000.0}], **RUN)
     assert any("name a setting nearer to the scene's own" in message for message in told.messages)
-    assert told.probability == found.probability
+    assert told.probability == answer.probability
 
 
 def test_members_that_fail_are_the_event_and_told_apart():
@@ -376,19 +376,19 @@ def test_faulty_arguments_are_told_at_once():
         lw.rare_event(lw.Ensemble(scene_of(), sampling=table), "position[0] - 9.0", **RUN)
 
 
-def test_the_picture(found, tmp_path):
+def test_the_picture(answer, tmp_path):
     pytest.importorskip("matplotlib")
-    axes = lw.plots.rare(found, path=tmp_path / "rare.png")
+    axes = lw.plots.rare(answer, path=tmp_path / "rare.png")
     assert len(axes) == 2
     assert (tmp_path / "rare.png").stat().st_size > 10_000
     from lgvi_warp.views.plots.rare import survival
 
-    limits, chances = survival(found.runs[0])
+    limits, chances = survival(answer.runs[0])
     assert (np.diff(limits) >= 0.0).all()
     assert chances[0] == 1.0
     # At the event the curve is the run's probability.
     at_event = chances[np.searchsorted(limits, 0.0)]
-    assert at_event == pytest.approx(found.runs[0].probability, rel=0.02)
+    assert at_event == pytest.approx(answer.runs[0].probability, rel=0.02)
 
 
 @pytest.mark.slow

@@ -77,14 +77,14 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def found(scene, folder):
+def answer(scene, folder):
     return swept(scene, out=folder)
 
 
 @pytest.mark.slow
-def test_rare_failures_are_those_of_the_normal_law(found):
+def test_rare_failures_are_those_of_the_normal_law(answer):
     for case, p in (("near", NEAR), ("aside", FAR)):
-        rare = found.rare(case)
+        rare = answer.rare(case)
         assert abs(rare.probability / p - 1.0) < 3.0 * rare.relative_error
         assert rare.estimator == "subset"
         assert rare.event == "way 3.6 or more or not ok"
@@ -100,7 +100,7 @@ def test_rare_failures_are_those_of_the_normal_law(found):
     assert (rare.failing.own_values()["start.position[2]"] >= FLOOR).any()
 
 
-def test_rare_failures_run_where_the_cells_do(scene, found):
+def test_rare_failures_run_where_the_cells_do(scene, answer):
     class Counting:
         def __init__(self):
             self.members = 0
@@ -112,41 +112,41 @@ def test_rare_failures_run_where_the_cells_do(scene, found):
 
     counting = Counting()
     again = swept(scene, cases=CASES[:1], executor=counting).rare("near")
-    assert again.probability == found.rare("near").probability
+    assert again.probability == answer.rare("near").probability
     assert counting.members >= again.members["the scene's own"] > 10_000
 
 
-def test_cases_are_compared_by_the_same_failing_members(found):
-    (row,) = found.compare_rare("near", "aside")
+def test_cases_are_compared_by_the_same_failing_members(answer):
+    (row,) = answer.compare_rare("near", "aside")
     assert row.ratio.paired
     assert row.ratio.lower < FAR / NEAR < row.ratio.upper
     assert row.real
     # Two answers to 10 and 12 % would leave it between ends 1.96 times 2 times 16 % apart.
     assert np.log(row.ratio.upper / row.ratio.lower) < 0.8 * 2.0 * 1.96 * np.hypot(0.1, 0.12)
-    (back,) = found.compare_rare("aside", "near")
+    (back,) = answer.compare_rare("aside", "near")
     assert back.ratio.value == pytest.approx(1.0 / row.ratio.value)
-    assert found.compare_rare("near", "unasked") == []
+    assert answer.compare_rare("near", "unasked") == []
 
 
-def test_the_sweep_tells_of_them(found):
-    near, aside, unasked = found.rows()
-    assert near["rare"] == found.rare("near").probability
+def test_the_sweep_tells_of_them(answer):
+    near, aside, unasked = answer.rows()
+    assert near["rare"] == answer.rare("near").probability
     assert near["rare lower"] < near["rare"] < near["rare upper"]
     assert aside["rare members"] > 10_000
     assert "rare" not in unasked
-    assert found.table["rare"].shape == (3,)
-    assert np.isnan(found.table["rare"].values[2])
-    text = str(found)
+    assert answer.table["rare"].shape == (3,)
+    assert np.isnan(answer.table["rare"].values[2])
+    text = str(answer)
     says(text, "## Rare failures", "- near: fails with probability", "- aside: fails ", "times as often as near", "not")
     assert "- unasked: fails with" not in text
     with pytest.raises(lw.SceneError, match="did not ask for its rare failure; give the case rare = true"):
-        found.rare("unasked")
-    assert pickle.loads(pickle.dumps(found.rare("near"))).probability == near["rare"]
+        answer.rare("unasked")
+    assert pickle.loads(pickle.dumps(answer.rare("near"))).probability == near["rare"]
 
 
-def test_files_of_rare_failures_are_found_again(scene, folder, found, tmp_path):
+def test_files_of_rare_failures_are_found_again(scene, folder, answer, tmp_path):
     pytest.importorskip("matplotlib")
-    names = {path.name for path in found.save(folder)}
+    names = {path.name for path in answer.save(folder)}
     assert {"rare.csv", "rare_comparison.csv"} <= names
     kept = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in (folder / "rare").iterdir()}
     assert len(kept) == 2
@@ -157,17 +157,17 @@ def test_files_of_rare_failures_are_found_again(scene, folder, found, tmp_path):
     assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in (folder / "rare").iterdir()} == kept
     # Files hold no times, which differ from run to run.
     assert np.isnan([again.rare("near").seconds, again.rare("near").plain_seconds]).all()
-    timed = {name: getattr(found.rare("near"), name) for name in ("seconds", "plain_seconds")}
-    assert str(dataclasses.replace(again.rare("near"), **timed)) == str(found.rare("near"))
-    np.testing.assert_array_equal(again.rare("near").draws, found.rare("near").draws)
+    timed = {name: getattr(answer.rare("near"), name) for name in ("seconds", "plain_seconds")}
+    assert str(dataclasses.replace(again.rare("near"), **timed)) == str(answer.rare("near"))
+    np.testing.assert_array_equal(again.rare("near").draws, answer.rare("near").draws)
     rare = json.loads((folder / "sweep.json").read_text())["cells"][0]["rare"]
-    assert rare["probability"] == found.rare("near").probability
+    assert rare["probability"] == answer.rare("near").probability
     # What is torn is run again, and comes to the same.
     torn = next(iter(kept))
     torn.write_bytes(torn.read_bytes()[:-50])
     assert swept(scene, out=folder).rare("near").probability == rare["probability"]
     assert torn.read_bytes() == kept[torn][1]
-    drawn = pictures(found)["rare.png"](found, tmp_path / "rare.png")
+    drawn = pictures(answer)["rare.png"](answer, tmp_path / "rare.png")
     assert drawn[0].get_xscale() == "log"
     assert (tmp_path / "rare.png").stat().st_size > 5_000
 

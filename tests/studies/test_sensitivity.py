@@ -40,18 +40,18 @@ FIRST, TOTAL = np.array([V1, V2, 0.0]) / V, np.array([V1 + V13, V2, V13]) / V
 
 
 @pytest.fixture(scope="module")
-def found(scene):
+def answer(scene):
     return uq.sobol(scene, [ishigami, "position[1]"], samples=2048, vary=BOX, seed=3, **RUN)
 
 
-def test_what_a_scene_keeps_of_its_own_runs_is_no_matter(scene, found):
+def test_what_a_scene_keeps_of_its_own_runs_is_no_matter(scene, answer):
     own = {"keep": "none", "statistics": [{"type": "mean", "of": "depth"}],
            "until": {"statistic": "mean depth", "half_width": 1e9}}  # fmt: skip
     told = scene.to_dict()
     other = lw.Scene.from_dict(told | {"run": told.get("run", {}) | own})
     again = uq.sobol(other, [ishigami, "position[1]"], samples=2048, vary=BOX, seed=3, **RUN)
-    assert again.members == found.members
-    assert np.array_equal(again.first, found.first)
+    assert again.members == answer.members
+    assert np.array_equal(again.first, answer.first)
     X = np.random.default_rng(0).uniform(-PI, PI, (1500, 3))
     np.testing.assert_array_equal(*(uq.model(one, BOX, "position[1]", **RUN)(X) for one in (scene, other)))
     # A run may leave them out as well.
@@ -64,22 +64,22 @@ def assert_close(values, errors, exact):
     assert (np.abs(values - exact) <= FIVE * errors + 1e-12).all(), (values, errors, exact)
 
 
-def test_indices_of_ishigamis_function(found):
-    assert found.factors == tuple(BOX)
-    assert found.quantities == ("ishigami", "position[1]")
-    assert (found.samples, found.members, found.failed) == (2048, 2048 * 8, 0)
-    assert_close(found.first[0], found.first_confidence[0], FIRST)
-    assert_close(found.total[0], found.total_confidence[0], TOTAL)
+def test_indices_of_ishigamis_function(answer):
+    assert answer.factors == tuple(BOX)
+    assert answer.quantities == ("ishigami", "position[1]")
+    assert (answer.samples, answer.members, answer.failed) == (2048, 2048 * 8, 0)
+    assert_close(answer.first[0], answer.first_confidence[0], FIRST)
+    assert_close(answer.total[0], answer.total_confidence[0], TOTAL)
     second = np.array([[np.nan, 0.0, V13 / V], [0.0, np.nan, 0.0], [V13 / V, 0.0, np.nan]])
     at = ~np.eye(3, dtype=bool)
-    assert_close(found.second[0][at], found.second_confidence[0][at], second[at])
+    assert_close(answer.second[0][at], answer.second_confidence[0][at], second[at])
     # The intervals mean something: a factor taken for another would be outside.
-    assert found.first_confidence[0].max() < 0.08
-    assert found.second_confidence[0][at].max() < 0.1
+    assert answer.first_confidence[0].max() < 0.08
+    assert answer.second_confidence[0][at].max() < 0.1
     # Points of a sequence: the variance is much better than the 1 % of as many random ones.
-    assert abs(found.std[0] ** 2 / V - 1.0) < 0.02
+    assert abs(answer.std[0] ** 2 / V - 1.0) < 0.02
     # In 0.02 s the vehicle drifts by 4 mm: its place is where it starts.
-    assert_close(found.first[1], found.first_confidence[1], [0.0, 1.0, 0.0])
+    assert_close(answer.first[1], answer.first_confidence[1], [0.0, 1.0, 0.0])
 
 
 # Of Sobol's g, by factor; the vehicle's start has a factor for each.
@@ -108,17 +108,17 @@ def test_indices_of_sobols_g(scene):
     assert abs(found.std[0] ** 2 / whole - 1.0) < 0.02
 
 
-def test_the_table_and_its_files(found, tmp_path):
-    text = str(found)
+def test_the_table_and_its_files(answer, tmp_path):
+    text = str(answer)
     assert all(word in text for word in ("ishigami", "start.position[1]", "2048 samples", "16384 members", "0 failed"))
     assert "start.position[0] with start.position[2]" in text
-    paths = found.save(tmp_path)
+    paths = answer.save(tmp_path)
     assert [path.name for path in paths] == ["sensitivity.txt", "sensitivity.csv", "sensitivity.json"]
     with paths[1].open() as file:
         rows = list(csv.DictReader(file))
     # 2 quantities: 3 factors with first and total, 3 pairs.
     assert len(rows) == 2 * (3 * 2 + 3)
-    assert float(rows[0]["value"]) == found.first[0, 0]
+    assert float(rows[0]["value"]) == answer.first[0, 0]
     assert rows[0]["index"] == "first"
     content = json.loads(paths[2].read_text())
     assert content["provenance"]["ensemble"]["sampling"] == {"saltelli": {"replicates": 8}}
@@ -126,7 +126,7 @@ def test_the_table_and_its_files(found, tmp_path):
     back = lw.Ensemble.from_scene(
         lw.Scene.from_dict(content["provenance"]["scene"] | {"ensemble": content["provenance"]["ensemble"]})
     )
-    assert back.members == found.members
+    assert back.members == answer.members
 
 
 # A vehicle with a known answer -----------------------------------------------------------------------------------------

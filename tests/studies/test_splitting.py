@@ -193,10 +193,10 @@ def test_runs_with_fixed_levels_have_the_right_mean_over_seeds(p, more):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bound, looks", [(1.9, 20), (2.6, 20), (3.05, 100)])
-def test_runs_with_fixed_levels_have_the_right_mean_of_a_largest_speed(bound, looks):
-    p, per = passing(bound, 100, 0.97, np.sqrt(0.03)), 100 // looks
-    check_mean(shares_of(lambda seed: LinearWalk(seed, bound, 1, True, per=per, looks=looks), range(10), 200, 64), p)
+@pytest.mark.parametrize("bound, views", [(1.9, 20), (2.6, 20), (3.05, 100)])
+def test_runs_with_fixed_levels_have_the_right_mean_of_a_largest_speed(bound, views):
+    p, per = passing(bound, 100, 0.97, np.sqrt(0.03)), 100 // views
+    check_mean(shares_of(lambda seed: LinearWalk(seed, bound, 1, True, per=per, looks=views), range(10), 200, 64), p)
 
 
 def test_the_grid_of_densities_knows_reflection():
@@ -315,34 +315,34 @@ def both(**more):
 
 # A run goes on from one prepared piece, whose samples are at every step: one kernel for all of these tests.
 @pytest.fixture(scope="module")
-def found():
+def answer():
     return lw.rare_event(
         both(), f"position[0] - {place_of(1e-5, NORTH):.12g}", by="splitting", relative_error=0.2, **RUN
     )
 
 
 @pytest.mark.slow
-def test_noise_and_numbers_are_both_moved(found):
-    assert found.estimator == "splitting"
+def test_noise_and_numbers_are_both_moved(answer):
+    assert answer.estimator == "splitting"
     # Steps of 0.1 s have 0.1 % less variance, 2 % less probability.
-    assert abs(found.probability / 1e-5 - 1.0) < 3.0 * found.relative_error
-    assert found.relative_error < 0.3
-    assert found.interval[0] < found.probability < found.interval[1]
-    assert found.members["the scene's own"] < 60_000
+    assert abs(answer.probability / 1e-5 - 1.0) < 3.0 * answer.relative_error
+    assert answer.relative_error < 0.3
+    assert answer.interval[0] < answer.probability < answer.interval[1]
+    assert answer.members["the scene's own"] < 60_000
     # Of the 4.3 sd, numbers have their share of the variance.
     share = NORTH**2 / ((place_of(1e-5, NORTH) - place_of(0.5)) / -ndtri(1e-5)) ** 2
-    assert found.moved["start.position[0]"] == pytest.approx(4.4 * np.sqrt(share), abs=0.5)
-    assert found.draws.shape == (len(found.weights), 0)
-    assert any("draws of noise are no numbers" in message for message in found.messages)
-    assert len(found.runs) % 16 == 0
+    assert answer.moved["start.position[0]"] == pytest.approx(4.4 * np.sqrt(share), abs=0.5)
+    assert answer.draws.shape == (len(answer.weights), 0)
+    assert any("draws of noise are no numbers" in message for message in answer.messages)
+    assert len(answer.runs) % 16 == 0
 
 
-def test_a_failing_path_is_run_again(found):
-    assert len(found.paths) == len(found.weights) > 100
-    levels = ndtr(found.normals)
+def test_a_failing_path_is_run_again(answer):
+    assert len(answer.paths) == len(answer.weights) > 100
+    levels = ndtr(answer.normals)
     runs = {}
-    for i in np.random.default_rng(0).choice(len(found.paths), 5, replace=False):
-        times, indices = found.paths[i]
+    for i in np.random.default_rng(0).choice(len(answer.paths), 5, replace=False):
+        times, indices = answer.paths[i]
         assert (times[0], times[-1]) == (0.0, T1)
         end = None
         for begin, stop, index in zip(times[:-1], times[1:], indices, strict=True):
@@ -355,23 +355,23 @@ def test_a_failing_path_is_run_again(found):
         assert end.position[0, 0] > place_of(1e-5, NORTH)
 
 
-def test_the_answer_is_kept_in_files(found, tmp_path):
-    found.save(tmp_path)
+def test_the_answer_is_kept_in_files(answer, tmp_path):
+    answer.save(tmp_path)
     again = lw.studies.RareEvent.load(tmp_path / "rare.json")
-    assert str(again) == str(found) == str(pickle.loads(pickle.dumps(found)))
-    np.testing.assert_array_equal(again.paths[3][1], found.paths[3][1])
-    assert "splitting in time" in str(found)
+    assert str(again) == str(answer) == str(pickle.loads(pickle.dumps(answer)))
+    np.testing.assert_array_equal(again.paths[3][1], answer.paths[3][1])
+    assert "splitting in time" in str(answer)
     pytest.importorskip("matplotlib")
-    assert len(lw.plots.rare(found, path=tmp_path / "rare.png")) == 2
+    assert len(lw.plots.rare(answer, path=tmp_path / "rare.png")) == 2
 
 
-def test_failing_members_have_starts_of_their_own(found):
+def test_failing_members_have_starts_of_their_own(answer):
     # They were copied at each of some ten levels; steps from the copies' starts tell them apart.
-    starts, weight = np.unique(found.normals, return_inverse=True)
-    shares = np.bincount(weight.ravel(), found.weights)
+    starts, weight = np.unique(answer.normals, return_inverse=True)
+    shares = np.bincount(weight.ravel(), answer.weights)
     assert len(starts) > 100
     assert 1.0 / np.sum(shares**2) > 50.0
-    assert not any("different starts" in message for message in found.messages)
+    assert not any("different starts" in message for message in answer.messages)
 
 
 def test_the_same_seed_has_the_same_answer():

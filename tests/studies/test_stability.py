@@ -22,73 +22,73 @@ METHODS = ["psi_s", "psi_x"]
 
 
 @pytest.fixture(scope="module")
-def found(scene):
+def answer(scene):
     """Step against angular velocity of the paper's vehicle, coarse."""
     axes = ("h", 0.01, 2.0), ("angular_velocity", 0.5, 20.0)
     return lw.stability_map(scene, *axes, METHODS, points=8, t1=10.0, error_time=2.0, directions=3)
 
 
-def number(found):
+def number(answer):
     """h |Omega| of every cell."""
-    return found.y.values[:, None] * found.x.values
+    return answer.y.values[:, None] * answer.x.values
 
 
-def test_beyond_the_solvable_step_every_cell_is_flagged(found):
+def test_beyond_the_solvable_step_every_cell_is_flagged(answer):
     # h |J^-1 pi| = 2 for psi_s; a little less, since weight and Munk moment spin some starts up, or down by h |Om| / 2.
-    beyond = number(found) > 2.0 * 1.2
+    beyond = number(answer) > 2.0 * 1.2
     assert beyond.sum() > 8
-    assert np.all(found.classes["psi_s"][beyond] == Cell.FLAGGED)
-    assert np.all(found.statuses["psi_s"][beyond] == lw.Status.STEP_TOO_LARGE)
+    assert np.all(answer.classes["psi_s"][beyond] == Cell.FLAGGED)
+    assert np.all(answer.statuses["psi_s"][beyond] == lw.Status.STEP_TOO_LARGE)
 
 
-def test_short_steps_are_accurate(found):
+def test_short_steps_are_accurate(answer):
     # Order 2: the error over error_time is of the size of (h |Om|)^2 |Om| error_time / 12, far below 1e-2 here.
-    fine = (number(found) ** 2 * found.y.values[:, None] * found.error_time < 1e-2) & (found.x.values < 0.03)
+    fine = (number(answer) ** 2 * answer.y.values[:, None] * answer.error_time < 1e-2) & (answer.x.values < 0.03)
     assert fine.sum() >= 4
-    assert all(np.all(found.classes[method][fine] == Cell.ACCURATE) for method in METHODS)
+    assert all(np.all(answer.classes[method][fine] == Cell.ACCURATE) for method in METHODS)
 
 
-def test_between_they_are_bounded(found):
-    h_w = found.x.values * 1.42  # w of the Munk oscillation at the start, the fastest besides the spin
-    middle = (number(found) > 0.5) & (number(found) < 1.5) & (h_w < 0.5)
+def test_between_they_are_bounded(answer):
+    h_w = answer.x.values * 1.42  # w of the Munk oscillation at the start, the fastest besides the spin
+    middle = (number(answer) > 0.5) & (number(answer) < 1.5) & (h_w < 0.5)
     assert middle.sum() >= 4
-    assert np.all(found.classes["psi_s"][middle] == Cell.BOUNDED)
-    assert np.all(found.energies["psi_s"][middle] <= 1.0)
-    assert np.all(found.errors["psi_s"][middle] > 1e-2)
+    assert np.all(answer.classes["psi_s"][middle] == Cell.BOUNDED)
+    assert np.all(answer.energies["psi_s"][middle] <= 1.0)
+    assert np.all(answer.errors["psi_s"][middle] > 1e-2)
 
 
-def test_the_measured_limit_is_the_analytic_one(found):
-    limit = found.limit("psi_s")
-    ratios = found.ratios["psi_s"]["rotation"]
-    assert np.allclose(ratios, number(found) / 2.0)
-    assert np.allclose(found.ratios["psi_x"]["rotation"], number(found) / 4.0)
-    fast = found.y.values > 4.0
-    factor = found.x.values[1] / found.x.values[0]
+def test_the_measured_limit_is_the_analytic_one(answer):
+    limit = answer.limit("psi_s")
+    ratios = answer.ratios["psi_s"]["rotation"]
+    assert np.allclose(ratios, number(answer) / 2.0)
+    assert np.allclose(answer.ratios["psi_x"]["rotation"], number(answer) / 4.0)
+    fast = answer.y.values > 4.0
+    factor = answer.x.values[1] / answer.x.values[0]
     # The last good step lies within a cell below, and never beyond h |Om| = 2.
-    assert np.all(limit[fast] * found.y.values[fast] <= 2.0 * 1.001)
-    assert np.all(limit[fast] * found.y.values[fast] * factor > 2.0 / 1.2)
+    assert np.all(limit[fast] * answer.y.values[fast] <= 2.0 * 1.001)
+    assert np.all(limit[fast] * answer.y.values[fast] * factor > 2.0 / 1.2)
 
 
-def test_turns_that_are_too_long_are_flagged(found):
+def test_turns_that_are_too_long_are_flagged(answer):
     # psi_x has no equation without solution: the angle of its turns tells, and nothing breaks silently.
-    assert np.any(found.statuses["psi_x"] == lw.Status.STEP_TOO_LARGE)
-    assert not np.any(found.classes["psi_x"] == Cell.SILENT)
+    assert np.any(answer.statuses["psi_x"] == lw.Status.STEP_TOO_LARGE)
+    assert not np.any(answer.classes["psi_x"] == Cell.SILENT)
 
 
-def test_classes_and_numbers_agree(found):
+def test_classes_and_numbers_agree(answer):
     for method in METHODS:
-        classes = found.classes[method]
-        assert np.all(found.errors[method][classes == Cell.ACCURATE] <= found.error_bound)
-        assert np.all(found.energies[method][classes < Cell.FAILED] <= 1.0)
-        assert sum(found.counts(method).values()) == 64
-    assert (found.unverified, found.judged) == (0, "conservative")
+        classes = answer.classes[method]
+        assert np.all(answer.errors[method][classes == Cell.ACCURATE] <= answer.error_bound)
+        assert np.all(answer.energies[method][classes < Cell.FAILED] <= 1.0)
+        assert sum(answer.counts(method).values()) == 64
+    assert (answer.unverified, answer.judged) == (0, "conservative")
 
 
-def test_errors_are_those_of_a_run_of_its_own(found, scene):
+def test_errors_are_those_of_a_run_of_its_own(answer, scene):
     """One cell again by lw.solve: the error against a step 16 times shorter of a method of order 8."""
     i, j = 2, 2
-    h, Om = float(found.x.values[j]), float(found.y.values[i])
-    steps = int(np.ceil(found.error_time / h))
+    h, Om = float(answer.x.values[j]), float(answer.y.values[i])
+    steps = int(np.ceil(answer.error_time / h))
     start = dataclasses.replace(
         scene.start, angular_velocity=Om * scene.start.angular_velocity / np.linalg.norm(scene.start.angular_velocity)
     )
@@ -98,7 +98,7 @@ def test_errors_are_those_of_a_run_of_its_own(found, scene):
     R = np.swapaxes(coarse.attitude[-1, 0], 0, 1) @ fine.attitude[-1, 0]
     angle = np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0))
     # The largest of 3 starts and of all times is at least this one's at the end.
-    assert 1e-5 < angle <= found.errors["psi_s"][i, j] * 1.001
+    assert 1e-5 < angle <= answer.errors["psi_s"][i, j] * 1.001
 
 
 def test_the_reference_is_verified_by_another(scene):

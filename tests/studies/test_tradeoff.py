@@ -49,7 +49,7 @@ def kernels_of_other_tests():
 
 
 @pytest.fixture(scope="module")
-def found(scene):
+def answer(scene):
     """The trade-off of two methods over four seconds."""
     fleet = lw.Ensemble(scene, 8, 1, scene.ensemble_settings.vary)
     return lw.tradeoff(fleet, 4.0, methods=METHODS, seconds=ENOUGH)
@@ -57,34 +57,34 @@ def found(scene):
 
 @pytest.mark.parametrize("of", ["position", "attitude"])
 @pytest.mark.parametrize("kind", tradeoffs.KINDS)
-def test_the_front_is_monotone_and_nothing_beats_it(found, of, kind):
-    front = found.front(of, kind)
+def test_the_front_is_monotone_and_nothing_beats_it(answer, of, kind):
+    front = answer.front(of, kind)
     costs, errors = [one.us_per_vehicle_second for one in front], [one.error(of, kind) for one in front]
     assert len(front) > 3
     assert costs == sorted(costs)
     assert errors == sorted(errors, reverse=True)
-    for one in found.shown(of, kind):
+    for one in answer.shown(of, kind):
         assert any(
             c <= one.us_per_vehicle_second and e <= one.error(of, kind) for c, e in zip(costs, errors, strict=True)
         )
 
 
-def test_what_is_shown_is_ten_times_the_reference(found):
+def test_what_is_shown_is_ten_times_the_reference(answer):
     for of in ("position", "attitude", "velocity"):
-        least = min(one.error(of) for one in found.shown(of))
-        assert least >= TRUST * found.reference_error[of] > 0.0
+        least = min(one.error(of) for one in answer.shown(of))
+        assert least >= TRUST * answer.reference_error[of] > 0.0
 
 
 @pytest.mark.parametrize(("method", "order", "least"), [("psi_s", 2, 1e-9), ("su4(psi_x)", 4, 1e-9)])
-def test_errors_scale_with_the_order(found, method, order, least):
-    line = [one for one in found.shown("attitude") if one.setting.name == method and one.setting.dtype == "float64"]
+def test_errors_scale_with_the_order(answer, method, order, least):
+    line = [one for one in answer.shown("attitude") if one.setting.name == method and one.setting.dtype == "float64"]
     fine = [one for one in line if least < one.error("attitude") < 1e-3]
     slope = np.polyfit(np.log([one.setting.h for one in fine]), np.log([one.error("attitude") for one in fine]), 1)[0]
     assert len(fine) >= 3
     assert abs(slope - order) < 0.3
 
 
-def test_the_reference_is_the_truth(found, scene):
+def test_the_reference_is_the_truth(answer, scene):
     sample = Sample(scene, 4.0)
     reference = make_reference(sample, seconds=ENOUGH)
     other = sample.run(sample.candidate("kl6(psi_x)", 40))
@@ -93,17 +93,17 @@ def test_the_reference_is_the_truth(found, scene):
     assert reference.error("position") < 1e-11
 
 
-def test_one_cost_a_step_for_each_kernel(found):
+def test_one_cost_a_step_for_each_kernel(answer):
     by_kernel = {}
-    for one in found.measurements:
+    for one in answer.measurements:
         by_kernel.setdefault((one.setting.name, one.setting.dtype), []).append(
             one.us_per_vehicle_second * one.setting.h
         )
     assert len(by_kernel) == 2 * len(METHODS) + len(set(METHODS) & set(settings.COMPENSATED))
     assert all(np.ptp(steps) <= 1e-12 * max(steps) for steps in by_kernel.values())
     assert any(len(steps) > 3 for steps in by_kernel.values())
-    doubtful = [one for one in found.measurements if one.cost_spread > cost.DISAGREE]
-    assert bool(doubtful) == any("readings of cost disagree" in message for message in found.messages)
+    doubtful = [one for one in answer.measurements if one.cost_spread > cost.DISAGREE]
+    assert bool(doubtful) == any("readings of cost disagree" in message for message in answer.messages)
 
 
 def test_cpu_time_is_that_of_the_run(scene):
@@ -189,10 +189,10 @@ def test_compositions_of_one_method_share_a_kernel(scene):
     assert specs[0] == specs[1] == specs[2] != sample.plan(sample.candidate("psi_x", 1)).spec
 
 
-def test_steps_near_the_front_are_between_those_tried_first(found):
+def test_steps_near_the_front_are_between_those_tried_first(answer):
     """Steps are halved, and beside the best ones a few are tried that are 1.4 times longer or shorter."""
     steps = {}
-    for each in found.measurements:
+    for each in answer.measurements:
         steps.setdefault((each.setting.name, each.setting.dtype), []).append(each.setting.h)
     ratios = [max(h) / np.array(h) for h in steps.values()]
     assert any(np.any(np.abs(np.log2(ratio) - np.log2(ratio).round()) > 0.2) for ratio in ratios)

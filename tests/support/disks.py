@@ -71,10 +71,10 @@ class Disk:
         for patch in self._patches:
             patch.stop()
 
-    def _do(self, what, path, call, *given, **named):
+    def _do(self, what, path, call, *inputs, **named):
         path = path.with_name(path.name.split(f".{scratch.host()}-")[0])
         self.fault(what, path)
-        result = self._system[call](*given, **named)
+        result = self._system[call](*inputs, **named)
         self.done.append((what, path))
         return result
 

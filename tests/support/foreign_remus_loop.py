@@ -332,10 +332,10 @@ def theirs(sea: remus.Sea, choices: remus.Choices, time: float = TIME) -> tuple[
     return position, angles[:, 2]
 
 
-def apart(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+def apart(single: tuple[np.ndarray, np.ndarray], compared: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """The largest differences of depth [m], of the place on the map [m] and of the heading [rad], (3,)."""
-    step = one[0] - other[0]
-    turn = np.remainder(one[1] - other[1] + np.pi, 2.0 * np.pi) - np.pi
+    step = single[0] - compared[0]
+    turn = np.remainder(single[1] - compared[1] + np.pi, 2.0 * np.pi) - np.pi
     return np.array([np.abs(step[:, 2]).max(), np.linalg.norm(step[:, :2], axis=1).max(), np.abs(turn).max()])
 
 

@@ -151,11 +151,11 @@ def loops_of(blocks: dict[int, Block]) -> dict[int, set[int]]:
     return loops
 
 
-def dominates(header: int, one: int, nearest: dict[int, int]) -> bool:
+def dominates(header: int, single: int, nearest: dict[int, int]) -> bool:
     """Whether every way to a block goes through another, or these are the same."""
-    while one != header and nearest[one] != one:
-        one = nearest[one]
-    return one == header
+    while single != header and nearest[single] != single:
+        single = nearest[single]
+    return single == header
 
 
 def nearest_dominators(blocks: dict[int, Block], before: dict[int, list[int]]) -> dict[int, int]:

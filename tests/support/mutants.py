@@ -64,10 +64,10 @@ def is_device(path):
     return "lgvi_kernels" in path.parts or "device" in path.parts
 
 
-def sampled(found, sources, count, seed):
+def sampled(answer, sources, count, seed):
     """Some of the faults: each line is as likely as any other, then each kind of fault in it."""
     lines = defaultdict(lambda: defaultdict(list))
-    for path, mutant in found:
+    for path, mutant in answer:
         lines[path, mutant.line][mutant.kind].append((path, mutant))
     known, draw, chosen = equivalent(), random.Random(seed), []
     places = list(lines)

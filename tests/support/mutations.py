@@ -93,13 +93,13 @@ class Finder(ast.NodeVisitor):
             line = self.source.count("\n", 0, start) + 1
             self.found.append(Mutant(line, kind, start, end, text))
 
-    def between(self, left, right, old, new, kind):
+    def between(self, remaining, right, old, new, kind):
         """Note a fault of the operator between two nodes."""
-        start, end = self.span(left)[1], self.span(right)[0]
+        start, end = self.span(remaining)[1], self.span(right)[0]
         gap = self.source[start:end]
         at = gap.find(old)
         if at >= 0 and "#" not in gap:
-            self.add(left, kind, new, (start + at, start + at + len(old)))
+            self.add(remaining, kind, new, (start + at, start + at + len(old)))
 
     # What is not touched: imports, annotations, decorators, texts.
     def visit_Import(self, node):

@@ -47,22 +47,22 @@ def random_scene(seed):
 METHODS = ("psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "kl8(psi_x)", "su4(psi_s)", "kl6(psi_s)", "kl8(psi_s)")
 
 
-def judged(fleet, found, asked, rounds=5):
+def judged(fleet, answer, requested, rounds=5):
     """Judgement of a suggestion: the largest error of all members over the asked one, and its cost over the best of all
     settings.
 
     The best is searched for in steps 1.2 times apart, for every method of the paper's family in both precisions.
     """
-    sample = Sample(fleet, asked["t1"], fleet.members, suggestion.TIMES)
-    reference = make_reference(sample, asked["of"], asked["error"] / 100.0)
-    own = tried(sample, found.setting, reference)
+    sample = Sample(fleet, requested["t1"], fleet.members, suggestion.TIMES)
+    reference = make_reference(sample, requested["of"], requested["error"] / 100.0)
+    own = tried(sample, answer.setting, reference)
     good = [own]
     for method in METHODS:
         for dtype in PRECISIONS:
             m, last = sample.coarsest(3.0), None
-            while sample.h(m) > 0.5 * found.setting.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
+            while sample.h(m) > 0.5 * answer.setting.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
                 one = tried(sample, sample.candidate(method, m, dtype), reference)
-                if one.error(asked["of"]) <= asked["error"]:
+                if one.error(requested["of"]) <= requested["error"]:
                     last = one
                     break
                 m = max(m + 1, round(1.2 * m))
@@ -70,4 +70,4 @@ def judged(fleet, found, asked, rounds=5):
                 good.append(last)
     prices = [price.us_per_vehicle_second for price in costs([one.plan for one in good], rounds)]
     best = min(range(len(good)), key=prices.__getitem__)
-    return own.error(asked["of"]) / asked["error"], prices[0] / prices[best], good[best].candidate
+    return own.error(requested["of"]) / requested["error"], prices[0] / prices[best], good[best].candidate

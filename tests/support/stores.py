@@ -38,9 +38,9 @@ def tree(path):
     return {one.relative_to(path).as_posix(): one.read_bytes() for one in Path(path).rglob("*") if one.is_file()}
 
 
-def differing(path, other):
+def differing(path, second):
     """Names of files that are not in both folders with the same bytes."""
-    left, right = tree(path), tree(other)
+    left, right = tree(path), tree(second)
     return sorted(name for name in left.keys() | right.keys() if left.get(name) != right.get(name))
 
 

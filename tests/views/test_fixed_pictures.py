@@ -15,9 +15,9 @@ pytestmark = [
 ]
 
 
-def check(known, shown):
+def check(allowed, shown):
     """Difference of a picture from the recorded one, and the remedy."""
-    faults = differing(known, json.loads(json.dumps(shown)))
+    faults = differing(allowed, json.loads(json.dumps(shown)))
     remedy = "look at it (make gallery), then python -m tests.support.fixed_pictures --write"
     assert not faults, "\n".join([*faults[:20], remedy])
 
@@ -33,13 +33,13 @@ def test_a_recording_shows_what_it_showed(name, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def said(tmp_path_factory):
+def output(tmp_path_factory):
     return fixed_pictures.reports(tmp_path_factory.mktemp("reports"))
 
 
 @pytest.mark.parametrize("name", KNOWN["reports"])
-def test_a_report_says_what_it_said(name, said):
-    check(KNOWN["reports"][name], said[name])
+def test_a_report_says_what_it_said(name, output):
+    check(KNOWN["reports"][name], output[name])
 
 
 def test_a_difference_is_found_and_round_off_is_none():

@@ -44,11 +44,11 @@ def reference(name):
     return float(means.mean()), float(means.std(ddof=1)) / math.sqrt(REPLICATES), float(y.std())
 
 
-def holds(found, mean, error):
+def holds(answer, mean, error):
     """Whether an interval holds a mean that is known to a standard error."""
-    low, high = found.interval
-    more = [math.hypot(found.value - low, 2.0 * error), math.hypot(high - found.value, 2.0 * error)]
-    return found.value - more[0] <= mean <= found.value + more[1]
+    low, high = answer.interval
+    more = [math.hypot(answer.value - low, 2.0 * error), math.hypot(high - answer.value, 2.0 * error)]
+    return answer.value - more[0] <= mean <= answer.value + more[1]
 
 
 def run(name, part, seeds):

@@ -12,7 +12,7 @@ import numpy as np
 import lgvi_warp as lw
 
 
-def peers(fleet, of, t1, found, error, seeds, truth):
+def peers(fleet, of, t1, answer, error, seeds, truth):
     """A row of members, processor time and error over seeds; none where QMCPy is not there."""
     if not importlib.util.find_spec("qmcpy"):
         return
@@ -20,7 +20,7 @@ def peers(fleet, of, t1, found, error, seeds, truth):
 
     asked = of.of if isinstance(of, lw.statistics.Mean) else of
     drawn = lw.Ensemble(fleet.scene, 1, 0, fleet.vary)
-    run = lw.prepare(drawn, of=asked, levels=True, t1=t1, threads=1, **found.settings)
+    run = lw.prepare(drawn, of=asked, levels=True, t1=t1, threads=1, **answer.settings)
     run(np.full((1, len(run.names)), 0.5))
     members, seconds, apart = [], [], []
     for seed in range(seeds):
@@ -40,7 +40,7 @@ def peers(fleet, of, t1, found, error, seeds, truth):
         members.append(done[0])
         apart.append((float(np.squeeze(value)) - truth) / error)
     yield {
-        "peer": f"QMCPy {qmcpy.__version__}, CubQMCNetG, {found.setting}",
+        "peer": f"QMCPy {qmcpy.__version__}, CubQMCNetG, {answer.setting}",
         "members": int(np.median(members)),
         "seconds": round(float(np.median(seconds)), 4),
         "rms_in_asked": round(float(np.sqrt(np.mean(np.square(apart)))), 2),

@@ -38,15 +38,15 @@ def found_of(event: Event, seed: int) -> tuple[lw.studies.RareEvent, float]:
     return found, time.process_time() - begun
 
 
-def summary(found: list[tuple[lw.studies.RareEvent, float]], truth: float) -> dict[str, Any]:
+def summary(answer: list[tuple[lw.studies.RareEvent, float]], truth: float) -> dict[str, Any]:
     """Summary of runs with different seeds."""
-    ratios = np.array([each.probability for each, _ in found]) / truth
-    told = np.array([each.relative_error for each, _ in found])
-    members = [sum(each.members.values()) for each, _ in found]
-    seen = float(np.std(ratios, ddof=1)) if len(found) > 1 else math.nan
+    ratios = np.array([each.probability for each, _ in answer]) / truth
+    told = np.array([each.relative_error for each, _ in answer])
+    members = [sum(each.members.values()) for each, _ in answer]
+    seen = float(np.std(ratios, ddof=1)) if len(answer) > 1 else math.nan
     return {
         "truth": truth,
-        "runs": len(found),
+        "runs": len(answer),
         "probability": float(ratios.mean()) * truth,
         "told_spread": round(float(np.sqrt(np.mean(told**2))), 4),
         "seen_spread": round(seen, 4),
@@ -54,8 +54,8 @@ def summary(found: list[tuple[lw.studies.RareEvent, float]], truth: float) -> di
         "lowest": round(float(ratios.min()), 3),
         "members": round(float(np.mean(members))),
         "most_members": max(members),
-        "estimators": dict(Counter(each.estimator for each, _ in found)),
-        "seconds": round(float(np.median([seconds for _, seconds in found])), 3),
+        "estimators": dict(Counter(each.estimator for each, _ in answer)),
+        "seconds": round(float(np.median([seconds for _, seconds in answer])), 3),
     }
 
 

@@ -102,9 +102,9 @@ def _gusts(count: int, p: float) -> Event:
     return Event(lw.Ensemble(_scene(gusts), vary=vary), lambda x: x[:, 0] / spread + ndtri(p))
 
 
-def _of_ramp(left: np.ndarray) -> np.ndarray:
+def _of_ramp(remaining: np.ndarray) -> np.ndarray:
     """Displacement by a force that grows by 1 N/s for the remaining time."""
-    t = np.maximum(0.0, left)
+    t = np.maximum(0.0, remaining)
     return np.asarray((0.5 * t**2 - TAU * t - TAU**2 * np.expm1(-t / TAU)) / DRAG)
 
 

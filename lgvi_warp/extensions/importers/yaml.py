@@ -158,7 +158,7 @@ def add_rigid_body(faults: Faults, read: dict[str, Any], matrices: np.ndarray, p
     read |= {"mass": mass, "inertia": inertia.tolist(), "center_of_gravity": (positions * center).tolist()}
 
 
-def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str], told: list[Any]) -> dict[str, Any]:
+def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str], reported: list[Any]) -> dict[str, Any]:
     """Sort values by what their keys mean: aliases resolved, tables opened, Fossen's names gathered.
 
     told: Unknown keys so far.
@@ -178,14 +178,14 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str], tol
         elif isinstance(key, str) and fossen.read_name(key):
             read.setdefault("coefficients", {})[key] = value
         elif isinstance(value, Mapping):
-            read |= by_meaning(faults, value, ignore, told)
+            read |= by_meaning(faults, value, ignore, reported)
         else:
             near = difflib.get_close_matches(str(key), meanings, 1)
             remedy = f"did you mean {near[0]!r}?; or name it in ignore=" if near else "name it in ignore="
             # All that is known, once.
             every = f"known: {', '.join(meanings)}; or name it in ignore=, or the table that is meant in table="
-            faults.add(str(key), value, "is an unknown key", remedy if told else every)
-            told.append(key)
+            faults.add(str(key), value, "is an unknown key", remedy if reported else every)
+            reported.append(key)
     return read
 
 

@@ -322,9 +322,9 @@ class _FieldReader:
             self.checksum = zlib.crc32(np.ascontiguousarray(values, dtype="<f8").tobytes(), self.checksum)
 
 
-def _same_nodes(one: _Component, other: _Component) -> bool:
+def _same_nodes(single: _Component, compared: _Component) -> bool:
     """Whether two components stand at the same nodes."""
-    first, second = one.placed.grid, other.placed.grid
+    first, second = single.placed.grid, compared.placed.grid
     pairs = ((first.latitude, second.latitude), (first.longitude, second.longitude), (first.depth, second.depth))
     none = np.zeros(0)
     same = [np.array_equal(none if a is None else a, none if b is None else b) for a, b in pairs]

@@ -161,16 +161,16 @@ def swept(
     return found
 
 
-def _run_rare(rares: RareFailures, found: Sweep, progress: Any, total: int, execution: Mapping[str, Any]) -> None:
+def _run_rare(rares: RareFailures, answer: Sweep, progress: Any, total: int, execution: Mapping[str, Any]) -> None:
     """Find the rare failures that are asked for, and compare them with those of the baseline."""
-    asking = [cell for cell in found.cells if cell.case.rare and not found.record(cell).refused]
+    asking = [cell for cell in answer.cells if cell.case.rare and not answer.record(cell).refused]
     done = total - RARE_PARTS * len(asking)
     for i, cell in enumerate(asking):
         at = done + RARE_PARTS * i
         share = progress and (lambda part, at=at: progress((at + RARE_PARTS * part) / total))
         assert cell.fleet is not None
-        rares.run(cell, found.records.folder is not None and not found.setup.unknown(cell.fleet), share, execution)
-    rare_against_baseline(found)
+        rares.run(cell, answer.records.folder is not None and not answer.setup.unknown(cell.fleet), share, execution)
+    rare_against_baseline(answer)
     if progress:
         progress(1.0)
 

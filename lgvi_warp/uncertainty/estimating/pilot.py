@@ -314,9 +314,9 @@ def _compared(pilot: Pilot, ladder: Ladder) -> StepChange:
     return found
 
 
-def _stalls(ladder: Ladder, found: StepChange, small: float) -> bool:
+def _stalls(ladder: Ladder, answer: StepChange, small: float) -> bool:
     """Whether a finer step would not make the pairs agree much better than more of them do."""
-    return found.half <= 4.0 * small or bool(ladder.halvings and found.half > STALLED * ladder.halvings[-1].half)
+    return answer.half <= 4.0 * small or bool(ladder.halvings and answer.half > STALLED * ladder.halvings[-1].half)
 
 
 def _too_dear(pilot: Pilot, ladder: Ladder, members: int) -> bool:

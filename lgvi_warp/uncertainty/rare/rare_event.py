@@ -249,7 +249,7 @@ def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
 
 
 def _told(
-    found: RareAnswer,
+    result: RareAnswer,
     own: VehicleLimit | VehicleWalk,
     others: Mapping[str, VehicleLimit],
     condition: RareCondition,
@@ -258,36 +258,36 @@ def _told(
     """The answer in the scene's numbers."""
     limits: dict[str, VehicleLimit | VehicleWalk] = {OWN: own, **others}
     count = len(own.names)
-    nearest = int(np.argmin((found.failing**2).sum(axis=1)))
-    best = found.failing[nearest : nearest + 1]
+    nearest = int(np.argmin((result.failing**2).sum(axis=1)))
+    best = result.failing[nearest : nearest + 1]
     # With splitting, members of one start are related.
-    chains = found.chains if len(found.chains) else np.unique(found.failing, axis=0, return_inverse=True)[1].ravel()
-    parts = found.parts if len(found.parts) else chains % PARTS
-    moves = moves_of(found.failing[:, :count], found.weights, chains)
+    chains = result.chains if len(result.chains) else np.unique(result.failing, axis=0, return_inverse=True)[1].ravel()
+    parts = result.parts if len(result.parts) else chains % PARTS
+    moves = moves_of(result.failing[:, :count], result.weights, chains)
     moved, size, spread, z = (dict(zip(own.names, map(float, column), strict=True)) for column in moves)
     columns: dict[str, list[int]] = {}
     for source in own.sources:
-        columns.setdefault(source.of, []).extend(np.arange(found.failing.shape[1])[count:][source.columns])
-    lost = float(found.weights[np.isinf(found.limits)].sum())
-    messages = [*found.notes, *[ALL_LOST] * (lost >= 1.0 - 1e-12)]
-    of_any = Chance(found.probability, *found.interval())
-    several = len(condition.names) == len(found.rows) > 1
+        columns.setdefault(source.of, []).extend(np.arange(result.failing.shape[1])[count:][source.columns])
+    lost = float(result.weights[np.isinf(result.limits)].sum())
+    messages = [*result.notes, *[ALL_LOST] * (lost >= 1.0 - 1e-12)]
+    of_any = Chance(result.probability, *result.interval())
+    several = len(condition.names) == len(result.rows) > 1
     if condition.statuses:
         messages.append(WITH_STATUS)
     # Runs of splitting are independent; members of one are related, wherever they began.
-    related = found.of_run if isinstance(found, SplitAnswer) else chains
-    plain = (1.0 - found.probability) / (found.probability * max(found.spread, 1e-12) ** 2)
+    related = result.of_run if isinstance(result, SplitAnswer) else chains
+    plain = (1.0 - result.probability) / (result.probability * max(result.spread, 1e-12) ** 2)
     return RareEvent(
         event=condition.label,
-        probability=found.probability,
-        interval=found.interval(),
-        relative_error=found.spread,
-        estimator=found.estimator,
+        probability=result.probability,
+        interval=result.interval(),
+        relative_error=result.spread,
+        estimator=result.estimator,
         members={name: each.members for name, each in limits.items()},
-        failing=own.table(found.failing),
-        normals=found.failing[:, :count],
-        draws=found.failing[:, count:],
-        weights=found.weights,
+        failing=own.table(result.failing),
+        normals=result.failing[:, :count],
+        draws=result.failing[:, count:],
+        weights=result.weights,
         failed_share=lost,
         likeliest={name: value[0] for name, value in own.values(best).items()} if count else {},
         likeliest_draws=best[0, count:],
@@ -297,13 +297,13 @@ def _told(
         moved_spread=spread,
         moved_z=z,
         noise_moved={
-            name: noise_score(found.failing[:, own_], found.weights, chains, parts) for name, own_ in columns.items()
+            name: noise_score(result.failing[:, own_], result.weights, chains, parts) for name, own_ in columns.items()
         },
-        by_condition=chances_of(condition.names, found.rows, found.weights, related, of_any, found.spread)
+        by_condition=chances_of(condition.names, result.rows, result.weights, related, of_any, result.spread)
         if several
         else {},
         chains=chains,
-        runs=found.runs,
+        runs=result.runs,
         plain_members=plain,
         plain_seconds=plain * own.seconds / max(1, own.members),
         seconds=sum(each.seconds for each in limits.values()),

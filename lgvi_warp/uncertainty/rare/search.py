@@ -345,14 +345,15 @@ class RareSearch:
         if not len(found.failing) and groups:
             return self.subset(groups)
         members = FailingGroup.alone(found.failing, found.rows, np.full(len(found.failing), 1.0 / len(found.failing)))
-        return self._found("plain", (found.probability, found.spread, found.degrees), members, (), found.bounds)
+        return self._answer_of("plain", (found.probability, found.spread, found.degrees), members, (), found.bounds)
 
-    def _found(self, estimator: str, told: tuple[float, float, float], members: FailingGroup, runs: Sequence[SubsetRun] = (),
-               bounds: tuple[float, float] | None = None) -> RareAnswer:  # fmt: skip
+    def _answer_of(
+        self, estimator: str, reported: tuple[float, float, float], members: FailingGroup, runs: Sequence[SubsetRun] = (),
+        bounds: tuple[float, float] | None = None) -> RareAnswer:  # fmt: skip
         """The answer; members that chains repeat are one, with the weights of all."""
         distinct, first, place = np.unique(members.u, axis=0, return_index=True, return_inverse=True)
         weights, rows = np.bincount(place.reshape(-1), members.weights, len(distinct)), members.rows[:, first]
-        return RareAnswer(*told, estimator, self.members, distinct, rows.max(axis=0), weights, tuple(runs),
+        return RareAnswer(*reported, estimator, self.members, distinct, rows.max(axis=0), weights, tuple(runs),
                           tuple(self.notes), rows, members.chains[first], members.parts[first], bounds)  # fmt: skip
 
     def importance(self, groups: Groups, chains: tuple[float, float] | None, seen: Witness) -> RareAnswer | None:
@@ -404,7 +405,7 @@ class RareSearch:
                 hidden = unseen(uncovered(found, mixture, [seen.u]), seen.independent)
                 told = found.probability, math.hypot(found.spread, hidden), found.effective
                 members = FailingGroup.alone(found.failing, found.rows, found.weights)
-                return self._found("importance", told, members, runs)
+                return self._answer_of("importance", told, members, runs)
             if attempt + 1 < TRIES:
                 # Beside the members of the chains, those that were drawn, as often as they weigh.
                 densities = [
@@ -420,14 +421,14 @@ class RareSearch:
 
     @staticmethod
     def _with_drawn(
-        points: np.ndarray, found: WeightedMembers, belongs: np.ndarray, rng: np.random.Generator
+        points: np.ndarray, result: WeightedMembers, belongs: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
         """Members of a group, and as many that were drawn and belong to it, as often as they weigh."""
         places = np.flatnonzero(belongs)
-        if not found.weights[places].sum() > 0.0:
+        if not result.weights[places].sum() > 0.0:
             return points
-        shares = found.weights[places] / found.weights[places].sum()
-        return np.concatenate([points, found.failing[places[rng.choice(len(places), size=len(points), p=shares)]]])
+        shares = result.weights[places] / result.weights[places].sum()
+        return np.concatenate([points, result.failing[places[rng.choice(len(places), size=len(points), p=shares)]]])
 
     def _note_beside(self, probability: float) -> None:
         """Say what part of the event chains did not come to, where it is no small one."""
@@ -464,7 +465,7 @@ class RareSearch:
                 f"a second look for other failure modes gives {seen.probability:.2e}: the interval reaches to it"
             )
             bounds = probability, min(1.0, seen.probability * math.exp(2.0 * seen.spread))
-        return self._found(
+        return self._answer_of(
             "subset", (probability, spread, degrees), members, [r for each in runs.values() for r in each], bounds
         )
 

@@ -52,15 +52,15 @@ def rare(found: RareEvent, *, figure: Any = None, path: FilePath | None = None) 
     return np.asarray(grid.ravel())
 
 
-def _levels(axes: Any, found: RareEvent) -> None:
+def _levels(axes: Any, answer: RareEvent) -> None:
     """Draw how probable limits are, by each run."""
-    for i, run in enumerate(found.runs[:4]):
+    for i, run in enumerate(answer.runs[:4]):
         limits, chances = survival(run)
         axes.semilogy(limits, chances, label=f"run {i + 1}, {run.members:,} members", **style(i))
         bounds = run.thresholds[1:]
         axes.semilogy(bounds, np.interp(bounds, limits, chances), "o", color=style(i)["color"], fillstyle="none")
     axes.axvline(0.0, color="0.3", linestyle=":", label="the event")
-    axes.axhline(found.probability, color="0.3", linewidth=0.8)
+    axes.axhline(answer.probability, color="0.3", linewidth=0.8)
     axes.set(xlabel="limit", ylabel="probability of more")
     axes.grid(alpha=0.3)
     axes.legend()
@@ -81,18 +81,18 @@ def survival(run: SubsetRun) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(limits), np.concatenate(chances)
 
 
-def _failing(axes: Any, found: RareEvent) -> None:
+def _failing(axes: Any, answer: RareEvent) -> None:
     """Draw failing members over plain ones, in the two numbers that are moved most."""
-    names = list(found.moved)
-    spread = np.abs(found.weights @ found.normals) + np.sqrt(found.weights @ found.normals**2)
+    names = list(answer.moved)
+    spread = np.abs(answer.weights @ answer.normals) + np.sqrt(answer.weights @ answer.normals**2)
     first, second = (*np.argsort(-spread)[:2], 0)[:2]
     plain = generator(0, "rare picture").standard_normal((PLAIN, 2))
-    chosen = generator(1, "rare picture").choice(len(found.weights), size=MOST, p=found.weights)
+    chosen = generator(1, "rare picture").choice(len(answer.weights), size=MOST, p=answer.weights)
     axes.plot(
         plain[:, 0], plain[:, 1] if len(names) > 1 else 0.0 * plain[:, 1], ".", color=GREY, markersize=3, label="plain"
     )
-    x = found.normals[chosen, first]
-    y = found.normals[chosen, second] if len(names) > 1 else 0.0 * x
+    x = answer.normals[chosen, first]
+    y = answer.normals[chosen, second] if len(names) > 1 else 0.0 * x
     axes.plot(x, y, "^", color=COLORS[1], markersize=3, label="the event")
     axes.set(xlabel=f"{names[first]} [sd]", ylabel=f"{names[second]} [sd]" if len(names) > 1 else "")
     axes.grid(alpha=0.3)

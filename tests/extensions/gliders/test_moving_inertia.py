@@ -202,14 +202,14 @@ def test_chosen_steps():
     assert difference(last(run(fleet, method, h=0.8)), KNOWN) < 1e-6
 
 
-def shifted(vehicle, mass, home, there):
+def shifted(vehicle, mass, home, present):
     """The vehicle in its 6x6 form whose mass has another place for good."""
-    J = [np.hstack([np.eye(3), -hat(np.array(at)[None])[0]]) for at in (there, home)]
+    J = [np.hstack([np.eye(3), -hat(np.array(at)[None])[0]]) for at in (present, home)]
     rigid = np.block([[vehicle.mass * np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), vehicle.inertia]])
     rigid = rigid + mass * (J[0].T @ J[0] - J[1].T @ J[1])
     added = np.zeros((6, 6))
     added[:3, :3] = vehicle.added_mass
-    center = mass * (np.array(there) - home) / vehicle.mass
+    center = mass * (np.array(present) - home) / vehicle.mass
     return lw.Vehicle(
         rigid_body_mass_matrix=rigid, added_mass_matrix=added, weight=vehicle.mass * GRAVITY, center_of_gravity=center,
         buoyancy=float(vehicle.buoyancy), center_of_buoyancy=vehicle.center_of_buoyancy,

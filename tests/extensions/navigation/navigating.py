@@ -105,16 +105,16 @@ def twin_of_filter(listed, handed, member, seed, gravity):
     )  # fmt: skip
 
 
-def through(each, truth, member=0, h=0.02, period=PERIOD, then=lambda k: None):
+def through(item, truth, member=0, h=0.02, period=PERIOD, then=lambda k: None):
     """Effect of one member's twins on a motion (ticks, 1 or n, 21): (ticks, 21); then: called after each tick."""
-    for part in each:
+    for part in item:
         part.begin()
     seen, every = np.zeros((len(truth), 21)), round(period / h)
     for k, row in enumerate(truth):
         row = row[min(member, len(row) - 1)]
         vectors = row[:3], row[3:12].reshape(3, 3), row[12:15], row[15:18], row[18:21]
         y = Measurement(*vectors, t=k * period, period=period, h=h, step=every * k, tick=k, member=member)
-        for part in each:
+        for part in item:
             y = part.measure(y)
         seen[k] = np.concatenate([y.position, y.R.reshape(-1), y.velocity, y.water_velocity, y.angular_velocity])
         then(k)

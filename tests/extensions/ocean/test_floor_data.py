@@ -147,22 +147,22 @@ def band(**attributes):
     return gebco().rename(elevation="Band1").assign(Band1=(("lat", "lon"), -DEPTH, {"units": "m"} | attributes))
 
 
-@pytest.mark.parametrize(("attributes", "asked", "sign"), [
+@pytest.mark.parametrize(("attributes", "requested", "sign"), [
     ({}, "up", 1), ({}, "down", -1), ({"positive": "up"}, "", 1), ({"positive": "down"}, "", -1),
     ({"positive": "down"}, "up", 1), ({"positive": "up"}, "up", 1), ({"standard_name": "altitude"}, "", 1),
     ({"standard_name": "altitude", "positive": "down"}, "", -1),
     ({"standard_name": "sea_floor_depth", "positive": "up"}, "", 1),
 ])  # fmt: skip
-def test_a_variable_is_a_depth_or_an_elevation_by_what_says_so(attributes, asked, sign):
+def test_a_variable_is_a_depth_or_an_elevation_by_what_says_so(attributes, requested, sign):
     known = {"variable": "Band1", "region": REGION}
     depth = lw.events.Floor.from_file(gebco(), ORIGIN, region=REGION).depth
     if sign > 0:
         np.testing.assert_array_equal(
-            lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=asked, **known).depth, depth
+            lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=requested, **known).depth, depth
         )
     else:
         with pytest.raises(lw.SceneError, match=r"dry land, .*; give positive = 'up' if the numbers are elevations"):
-            lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=asked, **known)
+            lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=requested, **known)
 
 
 def test_a_variable_that_nothing_explains_needs_a_word():

@@ -82,14 +82,14 @@ def good(path):
 def instead(make):
     """A file whose `uo` is another: `make(file, shape, name of another file)`."""
 
-    def harm(path, other):
+    def harm(path, second):
         good(path)
         with h5py.File(path, "r+") as file:
             old = file["uo"]
             shape = old.shape
             attributes = {name: old.attrs[name] for name in ("units", "standard_name")}
             del file["uo"]
-            made = make(file, shape, other)
+            made = make(file, shape, second)
             if made is not None:
                 made.attrs.update(attributes)
                 for number, name in enumerate(("time", "depth", "latitude", "longitude")):
@@ -98,26 +98,26 @@ def instead(make):
     return harm
 
 
-def external(file, shape, other):
-    return file.create_dataset("uo", shape, "f8", external=[(other, 0, h5py.h5f.UNLIMITED)])
+def external(file, shape, second):
+    return file.create_dataset("uo", shape, "f8", external=[(second, 0, h5py.h5f.UNLIMITED)])
 
 
-def virtual(file, shape, other):
+def virtual(file, shape, second):
     layout = h5py.VirtualLayout(shape, "f8")
-    layout[...] = h5py.VirtualSource(other, "vo", shape)
+    layout[...] = h5py.VirtualSource(second, "vo", shape)
     return file.create_virtual_dataset("uo", layout)
 
 
-def in_a_group(file, shape, other):
+def in_a_group(file, shape, second):
     file["uo"] = file["vo"]
     inner = file.create_group("a/b")
-    inner["c"] = h5py.ExternalLink(other, "vo")
+    inner["c"] = h5py.ExternalLink(second, "vo")
     inner["back"] = file["a"]
 
 
-def by_reference(file, shape, other):
+def by_reference(file, shape, second):
     """A variable that no group has, behind an axis of one that is."""
-    hidden = file.create_dataset("hidden", (4,), "f8", external=[(other, 0, 32)])
+    hidden = file.create_dataset("hidden", (4,), "f8", external=[(second, 0, 32)])
     file["uo"] = file["vo"]
     made = file.create_dataset("other", (4,), "f8")
     made.attrs.create("DIMENSION_LIST", np.array([np.array([hidden.ref], h5py.ref_dtype), None], object)[:1],
@@ -125,38 +125,38 @@ def by_reference(file, shape, other):
     del file["hidden"]
 
 
-def other_references(file, shape, other):
+def other_references(file, shape, second):
     file["uo"] = file["vo"]
     file["uo"].attrs["region"] = file["vo"].regionref[...]
 
 
-def filtered(file, shape, other):
+def filtered(file, shape, second):
     file.create_dataset("packed", (4,), chunks=(4,), compression="lzf")
     file["uo"] = file["vo"]
 
 
-def chunk(file, shape, other):
+def chunk(file, shape, second):
     file.create_dataset("large", (3000, 3000), "u1", chunks=(2000, 2000))
     file["uo"] = file["vo"]
 
 
-def axis(file, shape, other):
+def axis(file, shape, second):
     file.create_dataset("long", (10**12,), "f8", chunks=(1000,))
     file["uo"] = file["vo"]
 
 
-def crowd(file, shape, other):
+def crowd(file, shape, second):
     file["uo"] = file["vo"]
     for number in range(11):
         file.create_group(f"g{number}")
 
 
-def external_link(file, shape, other):
-    file["uo"] = h5py.ExternalLink(other, "vo")
+def external_link(file, shape, second):
+    file["uo"] = h5py.ExternalLink(second, "vo")
 
 
-def soft_link_through_it(file, shape, other):
-    file["out"] = h5py.ExternalLink(other, "/")
+def soft_link_through_it(file, shape, second):
+    file["out"] = h5py.ExternalLink(second, "/")
     file["uo"] = h5py.SoftLink("/out/vo")
 
 

@@ -127,7 +127,7 @@ def moved(law, name=NAME, by=3.0, learn=None):
         (D.Normal(std=2.0), stats.norm(20.0, 2.0)),
         (D.Derived({NAME: lambda k: 20.0 * k**2}, k=D.Uniform(low=1.0, high=2.0)), None),
     ],
-    ids=lambda each: type(each).__name__,
+    ids=lambda item: type(item).__name__,
 )
 def test_a_number_moves_in_its_own_normal_scores(law, exact):
     before, after, coordinates = moved(law, by=0.25)

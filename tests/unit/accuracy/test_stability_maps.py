@@ -649,8 +649,8 @@ def test_a_map_of_runs_made_by_hand(scene):
 
 
 def test_times_of_a_map_follow_the_fastest_motion(scene):
-    def of(one=scene, t1=None, error_time=None):
-        grid = StabilityGrid(one, ("h", 0.1, 0.4), "angular_velocity", (1, 1), 1, 0, None)
+    def of(single=scene, t1=None, error_time=None):
+        grid = StabilityGrid(single, ("h", 0.1, 0.4), "angular_velocity", (1, 1), 1, 0, None)
         return map_of(grid, ["psi_s"], compared_in("attitude"), "float64", t1=t1, error_time=error_time, error=0.01,
                       energy_bound=2.0, seed=0, threads=1, run=lambda plan, threads: ran(plan),
                       prepare=lambda plan: 0.0)  # fmt: skip

@@ -47,9 +47,9 @@ def label(value):
     return re.sub(r" at 0x\w+", "", str(value))
 
 
-@pytest.mark.parametrize(("given", "meant"), GOOD, ids=label)
-def test_members_are_read(given, meant):
-    found = members_of("members", given, N)
+@pytest.mark.parametrize(("inputs", "meant"), GOOD, ids=label)
+def test_members_are_read(inputs, meant):
+    found = members_of("members", inputs, N)
     assert (found.dtype, found.tolist()) == (np.int64, meant)
 
 

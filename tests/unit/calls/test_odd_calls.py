@@ -24,7 +24,7 @@ PACKAGE = str(Path(lw.__file__).parent)
 
 
 @pytest.fixture(scope="module")
-def given(tmp_path_factory):
+def inputs(tmp_path_factory):
     scene = lw.Scene(lw.Vehicle(**odd_calls.BODY), terms=[lw.terms.Drag(linear=[1.0] * 6)])
     fleet = lw.Ensemble(scene, 4, 1, {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)})
     return scene, fleet, lw.solve(fleet, h=0.1, t1=0.4), tmp_path_factory.mktemp("odd")
@@ -61,24 +61,24 @@ def raw_of(calls):
 
 
 @pytest.mark.kernel
-def test_no_odd_call_ends_in_a_raw_error(given):
-    calls = [call for call in odd_calls.odd_calls(*given) if call[0].split("(")[0] not in LONG]
+def test_no_odd_call_ends_in_a_raw_error(inputs):
+    calls = [call for call in odd_calls.odd_calls(*inputs) if call[0].split("(")[0] not in LONG]
     some = np.random.default_rng(5).choice(len(calls), 600, replace=False)
     assert raw_of(calls[i] for i in some) == []
 
 
 @pytest.mark.kernel
 @pytest.mark.parametrize("name", ["Altitude", "CurrentField", "Trajectory", "Waypoints"])
-def test_no_odd_word_or_array_of_a_part_ends_in_a_raw_error(name, given):
-    calls = [call for call in odd_calls.odd_calls(*given) if call[0].startswith(f"{name}(")]
+def test_no_odd_word_or_array_of_a_part_ends_in_a_raw_error(name, inputs):
+    calls = [call for call in odd_calls.odd_calls(*inputs) if call[0].startswith(f"{name}(")]
     assert len(calls) > 100
     assert raw_of(calls) == []
 
 
 @pytest.mark.slow
 @pytest.mark.kernel
-def test_no_odd_call_of_a_picture_or_a_method_ends_in_a_raw_error(given):
-    scene, _, result, folder = given
+def test_no_odd_call_of_a_picture_or_a_method_ends_in_a_raw_error(inputs):
+    scene, _, result, folder = inputs
     assert raw_of(odd_calls.odd_calls_within(scene, result, folder, (tradeoff_of(4.0), sobol(), region()))) == []
 
 
@@ -113,11 +113,11 @@ def test_members_that_are_none_are_told_by_index(odd):
 
 @pytest.mark.slow
 @pytest.mark.kernel
-def test_every_odd_call(given):
+def test_every_odd_call(inputs):
     # Of the long ones those that no study takes.
     calls = [
         call
-        for call in odd_calls.odd_calls(*given)
+        for call in odd_calls.odd_calls(*inputs)
         if call[0].split("(")[0] not in LONG or any(type(value) is object for value in call[2].values())
     ]
     assert raw_of(calls) == []

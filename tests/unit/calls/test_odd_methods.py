@@ -15,7 +15,7 @@ pytestmark = pytest.mark.kernel
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def built(tmp_path_factory):
     """A scene, members, their result, a folder, and one good object of each kind."""
     folder = tmp_path_factory.mktemp("odd")
     start = lw.Start(position=[0.0, 0.0, 10.0], velocity=[1.0, 0.0, 0.0])
@@ -46,15 +46,15 @@ def elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def calls_of(made):
-    scene, fleet, result, folder, things = made
+def calls_of(built):
+    scene, fleet, result, folder, things = built
     by_name, _ = odd_calls.goods(scene, fleet, result, folder)
     return list(odd_calls.odd_calls_of_objects(things, by_name))
 
 
-def functions_of(made):
+def functions_of(built):
     """Functions that take results, stores and ends, and long ones whose odd arguments are refused before they begin."""
-    scene, fleet, result, folder, _ = made
+    scene, fleet, result, folder, _ = built
     end, within = result.final, {"vehicle.buoyancy": (190.0, 200.0)}
     numbers = {name: getattr(end, name) for name in ("time", "step", "steps", "seed", "settings")}
     run, run2 = folder / "run.zarr", {"h": 0.1, "t1": 0.2, "method": "psi_s"}
@@ -80,29 +80,31 @@ def functions_of(made):
     }  # fmt: skip
 
 
-def test_some_odd_calls_of_methods_end_in_refusals(made):
-    calls = calls_of(made)
+def test_some_odd_calls_of_methods_end_in_refusals(built):
+    calls = calls_of(built)
     some = np.random.default_rng(3).choice(len(calls), 800, replace=False)
     assert raw_of(calls[i] for i in some) == []
 
 
 @pytest.mark.slow
-def test_every_odd_call_of_a_method_ends_in_a_refusal(made):
-    assert raw_of(calls_of(made)) == []
+def test_every_odd_call_of_a_method_ends_in_a_refusal(built):
+    assert raw_of(calls_of(built)) == []
 
 
 LONG = {"worst_case", "tune_gains", "predict", "resume", "merge", "export"}
 
 
-def test_odd_calls_of_functions_end_in_refusals(made):
-    calls = [call for call in odd_calls.odd_calls_of_functions(functions_of(made)) if call[0].split("(")[0] not in LONG]
+def test_odd_calls_of_functions_end_in_refusals(built):
+    calls = [
+        call for call in odd_calls.odd_calls_of_functions(functions_of(built)) if call[0].split("(")[0] not in LONG
+    ]
     some = np.random.default_rng(4).choice(len(calls), 300, replace=False)
     assert raw_of(calls[i] for i in some) == []
 
 
 @pytest.mark.slow
-def test_every_odd_call_of_a_function_ends_in_a_refusal(made):
-    assert raw_of(odd_calls.odd_calls_of_functions(functions_of(made))) == []
+def test_every_odd_call_of_a_function_ends_in_a_refusal(built):
+    assert raw_of(odd_calls.odd_calls_of_functions(functions_of(built))) == []
 
 
 @explained

@@ -83,8 +83,8 @@ def runs():
     result, means = lw.solve(fleet, **how), [lw.statistics.Mean("depth"), lw.statistics.Mean("speed")]
     two, vary, X = ["depth", "speed"], ["vehicle.buoyancy"], [[196.0], [197.0]]
 
-    def estimates(found):
-        return {name: estimate.value for name, estimate in found.statistics.items()}
+    def estimates(answer):
+        return {name: estimate.value for name, estimate in answer.statistics.items()}
 
     return {
         ("solve", "statistics"): (lambda v: estimates(lw.solve(fleet, **how, statistics=v)), means),

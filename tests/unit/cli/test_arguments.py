@@ -21,10 +21,10 @@ OPTIONS = list(options())
 
 
 @pytest.mark.parametrize(
-    ("verb", "option", "default", "told"), OPTIONS, ids=[f"{verb} {name}" for verb, name, *_ in OPTIONS]
+    ("verb", "option", "default", "reported"), OPTIONS, ids=[f"{verb} {name}" for verb, name, *_ in OPTIONS]
 )
-def test_a_default_is_what_the_help_says(verb, option, default, told):
-    assert type(default)(told) == default
+def test_a_default_is_what_the_help_says(verb, option, default, reported):
+    assert type(default)(reported) == default
 
 
 def test_there_are_defaults_to_look_at():

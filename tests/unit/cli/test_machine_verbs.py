@@ -194,13 +194,13 @@ def test_values_become_plain():
     assert plain["c"] is True
 
 
-@pytest.mark.parametrize(("quiet", "json_wanted", "text", "said"), [
+@pytest.mark.parametrize(("quiet", "json_wanted", "text", "printed"), [
     (False, False, "note        a", "note        a\n"), (True, False, "a", ""), (False, True, "a", ""),
     (False, False, "", ""),
 ])  # fmt: skip
-def test_what_is_said(capsys, quiet, json_wanted, text, said):
+def test_what_is_said(capsys, quiet, json_wanted, text, printed):
     output.say(argparse.Namespace(quiet=quiet, json=json_wanted), text)
-    assert capsys.readouterr().out == said
+    assert capsys.readouterr().out == printed
 
 
 def test_labels_have_their_colors():

@@ -75,18 +75,18 @@ def test_libraries_are_imported_until_one_is_missing():
         assert thread.daemon
 
 
-@pytest.mark.parametrize(("outcome", "faults", "code", "said"), [
+@pytest.mark.parametrize(("outcome", "faults", "code", "output"), [
     (result_of(), ["a"], 1, ["a"]), (result_of(status=Status.NON_FINITE), [], 1, []),
     (result_of(status=Status.FLOOR), [], 0, []),
     (MembersFailed("2 members failed", result_of()), [], 1, ["2 members failed"]),
 ])  # fmt: skip
-def test_exit_codes_of_a_run(tmp_path, capsys, outcome, faults, code, said):
+def test_exit_codes_of_a_run(tmp_path, capsys, outcome, faults, code, output):
     report = Report(faults)
     assert main(["run", PAPER, "--out", str(tmp_path), "-q"], simulate=Study(outcome), finish=report) == code
-    assert capsys.readouterr() == ("", "".join(f"lgvi-warp: {fault}\n" for fault in said))
+    assert capsys.readouterr() == ("", "".join(f"lgvi-warp: {fault}\n" for fault in output))
     ((result, _, failures, _),) = report.calls
     assert result is getattr(outcome, "result", outcome)
-    assert failures == (said if isinstance(outcome, MembersFailed) else [])
+    assert failures == (output if isinstance(outcome, MembersFailed) else [])
 
 
 def test_an_interrupted_run_says_what_is_saved(tmp_path, capsys):

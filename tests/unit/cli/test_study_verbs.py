@@ -65,7 +65,7 @@ def test_options_are_the_arguments_of_the_function(verb):
             assert text in action.help.replace("%%", "%"), name
 
 
-def draw(found, *, path):
+def draw(finding, *, path):
     """Stands for what draws a picture."""
     path.write_text("a picture")
 
@@ -196,7 +196,7 @@ def test_options_reach_the_function(verb, options, expected, tmp_path, capsys):
 ESTIMATE = ["estimate", PAPER, "--of", "depth", "--error", "1"]
 
 
-@pytest.mark.parametrize(("given", "words"), [
+@pytest.mark.parametrize(("inputs", "words"), [
     (["sensitivity", PAPER, "--of", "depth", "--groups", "start"], ["--groups = 'start': names nothing; give NAME=A,B"]),
     (["sensitivity", PAPER, "--of", "depth", "--levels", "4"], ["--levels = '4': is an option of morris; leave it out"]),
     (["rare", PAPER, "--limit", "depth above 3", "--cheaper", "h"], ["--cheaper = 'h': names no value; give A=X,B=Y"]),
@@ -228,9 +228,9 @@ ESTIMATE = ["estimate", PAPER, "--of", "depth", "--error", "1"]
         ("max(dpeth) above 3", "did you mean 'depth'?"), ("dpeth", "is neither a quantity nor an event"),
     ]],
 ])  # fmt: skip
-def test_odd_arguments_are_refused_all_at_once(given, words, tmp_path, capsys, monkeypatch):
+def test_odd_arguments_are_refused_all_at_once(inputs, words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert cli.main([*given, "-q"]) == 2
+    assert cli.main([*inputs, "-q"]) == 2
     out = capsys.readouterr()
     assert all(text in out.err for text in words), out.err
     assert out.out == ""

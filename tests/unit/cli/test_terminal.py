@@ -58,7 +58,7 @@ def test_alone_it_helps(capsys):
     assert out.err == ""
 
 
-@pytest.mark.parametrize(("given", "usage", "words"), [
+@pytest.mark.parametrize(("inputs", "usage", "words"), [
     (["rnu"], "lgvi-warp", "'rnu' is not known; did you mean 'run'?"),
     (["run", PAPER, "--sed", "1", "--stepp", "2"], "lgvi-warp run", "'--stepp' is not known; did you mean '--step'?"),
     (["run", PAPER, "--store", "zar"], "lgvi-warp run", "'zar' is not known; did you mean 'zarr'?"),
@@ -67,8 +67,8 @@ def test_alone_it_helps(capsys):
     (["check", "--color", "allways", PAPER], "lgvi-warp check", "did you mean 'always'?"),
     (["merge", "a"], "lgvi-warp merge", "--out"), (["--json"], "lgvi-warp", "VERB"),
 ])  # fmt: skip
-def test_a_fault_has_the_verbs_usage_and_the_nearest_name(given, usage, words, capsys):
-    assert ended(given) == 2
+def test_a_fault_has_the_verbs_usage_and_the_nearest_name(inputs, usage, words, capsys):
+    assert ended(inputs) == 2
     text = capsys.readouterr().err
     assert text.startswith(f"usage: {usage} [-h]")
     assert words in text.splitlines()[-1]
@@ -287,12 +287,12 @@ def test_completion_has_every_verb_and_option(shell, capsys, tmp_path):
 # One JSON document for each verb ------------------------------------------------------------------------------------------
 
 
-def document(given, capsys, code=0, name="", **parts):
+def document(inputs, capsys, code=0, name="", **parts):
     """The document that a verb prints, which is as the page states."""
-    assert main([*given, "--json", "--quiet"], **parts) == code
+    assert main([*inputs, "--json", "--quiet"], **parts) == code
     content = json.loads(capsys.readouterr().out)
-    assert differing(content, name or given[0]) == []
-    assert (content["verb"], content["version"]) == (given[0], lw.__version__)
+    assert differing(content, name or inputs[0]) == []
+    assert (content["verb"], content["version"]) == (inputs[0], lw.__version__)
     return content
 
 

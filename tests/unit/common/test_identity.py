@@ -108,9 +108,9 @@ PAIRS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("one, other", PAIRS.values(), ids=PAIRS)
-def test_functions_of_one_name_that_differ(one, other):
-    first, again, second = identity(law(one)), identity(law(one)), identity(law(other))
+@pytest.mark.parametrize("single, compared", PAIRS.values(), ids=PAIRS)
+def test_functions_of_one_name_that_differ(single, compared):
+    first, again, second = identity(law(single)), identity(law(single)), identity(law(compared))
     assert first == again != second
     assert UNKNOWN not in (first, second)
 
@@ -138,10 +138,10 @@ OBJECTS = {
 }
 
 
-@pytest.mark.parametrize("one, other", OBJECTS.values(), ids=OBJECTS)
-def test_objects_that_differ(one, other):
-    assert len({identity(one), identity(other), UNKNOWN}) == 3
-    assert identity(one) == identity(one)
+@pytest.mark.parametrize("single, compared", OBJECTS.values(), ids=OBJECTS)
+def test_objects_that_differ(single, compared):
+    assert len({identity(single), identity(compared), UNKNOWN}) == 3
+    assert identity(single) == identity(single)
 
 
 def test_circles_end():

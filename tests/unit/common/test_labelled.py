@@ -47,7 +47,7 @@ def drifting(scene):
 
 
 @pytest.fixture
-def seen(monkeypatch):
+def observed(monkeypatch):
     """Ensembles that a model would run, recorded in place of runs: their numbers by name."""
     found = {}
 
@@ -105,19 +105,19 @@ FORMS = {
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("vary", [VARY, list(NAMES)], ids=["laws", "names"])
-def test_a_model_reads_columns_by_their_names(drifting, seen, form, vary):
+def test_a_model_reads_columns_by_their_names(drifting, observed, form, vary):
     model = uq.model(drifting, vary, "position[2]", h=0.01, t1=0.02)
     assert model.names == NAMES
     model(FORMS[form]())
-    np.testing.assert_array_equal(seen[MASS], ROWS[:, 0])
-    np.testing.assert_array_equal(seen[BUOYANCY], ROWS[:, 1])
-    np.testing.assert_array_equal(seen["current.velocity"], ROWS[:, 2:])
+    np.testing.assert_array_equal(observed[MASS], ROWS[:, 0])
+    np.testing.assert_array_equal(observed[BUOYANCY], ROWS[:, 1])
+    np.testing.assert_array_equal(observed["current.velocity"], ROWS[:, 2:])
     given = FORMS[form]()
     model.scipy(np.asarray(ROWS).T if form in ("array", "lists") or form.startswith("mask") else given)
-    np.testing.assert_array_equal(seen["current.velocity"], ROWS[:, 2:])
+    np.testing.assert_array_equal(observed["current.velocity"], ROWS[:, 2:])
 
 
-def test_levels_are_read_in_the_order_of_the_laws(drifting, seen):
+def test_levels_are_read_in_the_order_of_the_laws(drifting, observed):
     u = np.array([[0.1, 0.2, 0.3, 0.4, 0.6], [0.9, 0.7, 0.8, 0.5, 0.45]])
     model = uq.model(drifting, VARY, "position[2]", levels=True, h=0.01, t1=0.02)
     assert model.names == NAMES
@@ -127,12 +127,12 @@ def test_levels_are_read_in_the_order_of_the_laws(drifting, seen):
         model(given)
         for j, name in enumerate(NAMES):
             base, _, index = name.partition("[")
-            values = seen[base][:, int(index[:-1])] if index else seen[base]
+            values = observed[base][:, int(index[:-1])] if index else observed[base]
             np.testing.assert_allclose(values, exact[j].ppf(u[:, j]), rtol=1e-15)
     assert "is not a level between 0 and 1" in refused(model, ROWS)
 
 
-def test_a_joint_law_keeps_its_place_among_levels(drifting, seen):
+def test_a_joint_law_keeps_its_place_among_levels(drifting, observed):
     gravity = {"environment.gravity": Normal(std=0.1)}
     vary = {"vehicle.mass": Normal(std=0.1), "start.attitude": UniformRotation(), **gravity}
     model = uq.model(drifting, vary, "position[2]", levels=True, h=0.01, t1=0.02)
@@ -140,11 +140,11 @@ def test_a_joint_law_keeps_its_place_among_levels(drifting, seen):
     assert model.names == ("vehicle.mass", *joint, "environment.gravity")
     assert model.problem["groups"] == ["vehicle.mass", *["start.attitude"] * 3, "environment.gravity"]
     model([[0.9, 0.1, 0.2, 0.3, 0.1]])
-    assert seen["vehicle.mass"][0] > 123.8
-    assert seen["environment.gravity"][0] < 9.8
+    assert observed["vehicle.mass"][0] > 123.8
+    assert observed["environment.gravity"][0] < 9.8
 
 
-def test_problem_and_distributions_have_the_order_of_the_names(drifting, seen):
+def test_problem_and_distributions_have_the_order_of_the_names(drifting, observed):
     vary = {MASS: Normal(std=0.1), BUOYANCY: Uniform(half_width=2.0)}
     for order in (list(vary), list(vary)[::-1]):
         model = uq.model(drifting, {name: vary[name] for name in order}, "depth", h=0.01, t1=0.02)
@@ -179,21 +179,21 @@ BAD = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_a_model_refuses_what_does_not_fit(drifting, seen, case):
+def test_a_model_refuses_what_does_not_fit(drifting, observed, case):
     make, words = BAD[case]
     message = refused(uq.model(drifting, VARY, "position[2]", h=0.01, t1=0.02), make())
     assert all(word in message for word in words), message
-    assert not seen
+    assert not observed
 
 
-def test_entries_that_do_not_vary_stay_the_scenes(drifting, seen):
+def test_entries_that_do_not_vary_stay_the_scenes(drifting, observed):
     vary = {"current.velocity[1]": Normal(std=0.1), "vehicle.inertia": Uniform(relative=0.01)}
     model = uq.model(drifting, vary, "position[2]", h=0.01, t1=0.02)
     assert model.names == ("current.velocity[1]", *(f"vehicle.inertia[{i},{i}]" for i in range(3)))
     velocity, inertia = np.array([[0.2, 0.1, 0.0]] * 2), np.array([np.diag([5.4, 5.3, 5.8])] * 2)
     model({"current.velocity": velocity, "vehicle.inertia": inertia})
-    np.testing.assert_array_equal(seen["current.velocity"], velocity)
-    np.testing.assert_array_equal(seen["vehicle.inertia"], inertia)
+    np.testing.assert_array_equal(observed["current.velocity"], velocity)
+    np.testing.assert_array_equal(observed["vehicle.inertia"], inertia)
     message = refused(model, {"current.velocity": velocity + 0.1, "vehicle.inertia": inertia})
     says(message, "changes entries that do not vary", "current.velocity[0]")
     skew = inertia + np.eye(3, k=1)
@@ -211,7 +211,7 @@ def test_names_that_are_no_list(drifting, vary, words):
     assert all(word in message for word in words), message
 
 
-def test_one_name_may_stand_alone(drifting, seen):
+def test_one_name_may_stand_alone(drifting, observed):
     assert uq.model(drifting, MASS, "depth", h=0.01, t1=0.02).names == (MASS,)
 
 

@@ -17,7 +17,7 @@ SCENE = lw.Scene.named("sphere")
 
 
 @pytest.mark.parametrize(
-    ("word", "names", "found"),
+    ("word", "names", "answer"),
     [
         ("RK4", ("psi_s", "rk4", "rk8"), "rk4"),
         ("current", ("Current", "CurrentField", "Drag"), "Current"),
@@ -28,8 +28,8 @@ SCENE = lw.Scene.named("sphere")
         ("", ("mass",), None),
     ],
 )
-def test_the_nearest_name_whatever_its_case(word, names, found):
-    assert nearest(word, names) == found
+def test_the_nearest_name_whatever_its_case(word, names, answer):
+    assert nearest(word, names) == answer
 
 
 def test_names_in_another_case():

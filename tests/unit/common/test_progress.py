@@ -219,8 +219,8 @@ def test_a_bar_begins_late_where_a_call_takes_long():
 class Shown:
     """Keeps what a bar is told."""
 
-    def __init__(self, told):
-        self.told = told
+    def __init__(self, reported):
+        self.told = reported
 
     def __call__(self, fraction):
         self.told.append(fraction)

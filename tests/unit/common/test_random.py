@@ -88,7 +88,7 @@ def test_the_four_are_independent(draws):
 
 
 @pytest.mark.parametrize(
-    "other",
+    "second",
     [
         {"member": np.arange(N) + 1},
         {"step": 1},
@@ -100,8 +100,8 @@ def test_the_four_are_independent(draws):
     ],
     ids=["member", "step", "channel", "seed0", "seed1", "steps", "channels"],
 )
-def test_streams_are_independent(draws, other):
-    stream = random.normals(**{"seed0": 3, "seed1": 4, "member": np.arange(N), "step": 0, "channel": 0} | other)
+def test_streams_are_independent(draws, second):
+    stream = random.normals(**{"seed0": 3, "seed1": 4, "member": np.arange(N), "step": 0, "channel": 0} | second)
     assert not (stream == draws)[1:].any()
     assert uncorrelated(stream, draws)
 

@@ -16,7 +16,7 @@ POINTS = [(0.0, 0.0, 1.0), (5.0, 0.0, 1.0)]
 THREE = (1.0, 1.0, 1.0)
 
 
-@pytest.mark.parametrize(("make", "said"), [
+@pytest.mark.parametrize(("make", "output"), [
     (lambda: lw.control.Waypoints(points=POINTS[:1], speed=1.0, look_ahead=1.0, radius=1.0),
      "waypoints.points.*less than two"),
     (lambda: lw.control.Waypoints(points=[*POINTS, (5.0, 0.0, 9.0)], speed=1.0, look_ahead=1.0, radius=1.0),
@@ -39,8 +39,8 @@ THREE = (1.0, 1.0, 1.0)
      "pose_pid.anti_windup = .*not known"),
     (lambda: lw.control.StateFeedback(K=np.ones((6, 11))), "state_feedback.K.*shape"),
 ])  # fmt: skip
-def test_what_is_wrong_is_said(make, said):
-    with pytest.raises(lw.SceneError, match=said):
+def test_what_is_wrong_is_said(make, output):
+    with pytest.raises(lw.SceneError, match=output):
         make()
 
 
@@ -66,7 +66,7 @@ def policy(tmp_path, arrays=ONE, **words):
     return lw.control.Policy(**dict(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"]) | words)
 
 
-@pytest.mark.parametrize(("arrays", "words", "said"), [
+@pytest.mark.parametrize(("arrays", "words", "output"), [
     (ONE, {"inputs": ["dept_error"]}, r"policy.inputs\[0\] = 'dept_error'.*depth_error"),
     (ONE, {"inputs": "depth"}, "policy.inputs.*no list of names"),
     (ONE, {"inputs": ["velocity"]}, "policy.inputs.*are 3 numbers.*name the 1 of"),
@@ -82,8 +82,8 @@ def policy(tmp_path, arrays=ONE, **words):
     (ONE | {"biases_0": np.array([np.nan])}, {}, "policy.file.*other than finite numbers"),
     (ONE | {"biases_0": np.array(["a"])}, {}, "policy.file.*other than finite numbers"),
 ])  # fmt: skip
-def test_a_policy_that_does_not_fit(arrays, words, said, tmp_path):
-    with pytest.raises(lw.SceneError, match=re.compile(said, re.S)):
+def test_a_policy_that_does_not_fit(arrays, words, output, tmp_path):
+    with pytest.raises(lw.SceneError, match=re.compile(output, re.S)):
         policy(tmp_path, arrays, **words)
 
 

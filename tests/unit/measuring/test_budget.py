@@ -44,6 +44,6 @@ def test_what_is_free_does_not_count():
     assert budget.over
 
 
-@pytest.mark.parametrize(("seconds", "said"), [(0.011, 0.02), (1.0, 1.0), (40.0, 50.0), (51.0, 100.0), (2.1, 3.0)])
-def test_a_length_that_is_easy_to_say(seconds, said):
-    assert rounded_up(seconds) == pytest.approx(said)
+@pytest.mark.parametrize(("seconds", "output"), [(0.011, 0.02), (1.0, 1.0), (40.0, 50.0), (51.0, 100.0), (2.1, 3.0)])
+def test_a_length_that_is_easy_to_say(seconds, output):
+    assert rounded_up(seconds) == pytest.approx(output)

@@ -957,10 +957,10 @@ def test_a_finished_run_is_checked_with_half_the_step(scene):
     plan = Sample(fleet, 4.0, 100, 5).plan(Candidate("psi_s", 0.1))
     checks = []
 
-    def run(one, threads):
-        checks.append(one)
-        path = exact(one.grid.times, 100)[:, one.ensemble.indices]
-        return made(path, one.grid.times)
+    def run(item, threads):
+        checks.append(item)
+        path = exact(item.grid.times, 100)[:, item.ensemble.indices]
+        return made(path, item.grid.times)
 
     error, members = suggest.verified(fleet, Runs({"psi_s": 1.0}).run(plan), found, run=run)
     (one,) = checks

@@ -62,13 +62,13 @@ def test_where_longer_steps_are_more_work_they_cost_no_less():
     assert disturbed == [4.0, 4.0, 2.0, 2.0]
 
 
-@pytest.mark.parametrize(("noise", "told"), [(1.02, False), (1.2, False), (2.0, True), (30.0, True)])
-def test_readings_that_disagree_are_told(noise, told):
+@pytest.mark.parametrize(("noise", "reported"), [(1.02, False), (1.2, False), (2.0, True), (30.0, True)])
+def test_readings_that_disagree_are_told(noise, reported):
     seconds = np.array([[1.0, noise, noise, noise, 1.0], [1.0, noise, 1.0, noise, noise]])
     (_, spread), _ = of_steps([Kind("a", 1.0), Kind("a", 0.5)], seconds)
     text = cost.disagreement([("psi_x float64", spread), ("rk4 float64", 1.0)])
     assert spread == noise
-    if told:
+    if reported:
         assert f"psi_x float64 ({noise:.2g} times)" in text
         assert "rk4" not in text
         assert "idle machine" in text

@@ -19,36 +19,36 @@ SLOPE = np.linspace(-0.6, -0.2, N)
 
 
 @pytest.fixture(scope="module")
-def found():
+def answer():
     """The second overshoots by 0.2 to 0.6 rad less and has an error by 2 rad s more."""
     return swept([record(), record(RISING + SLOPE, 3.0)], CASES[:2])
 
 
-def verdicts(found, **asked):
-    return {row.of: row.verdict for row in found.compare("soft", "stiff", **asked)}
+def verdicts(answer, **requested):
+    return {row.of: row.verdict for row in answer.compare("soft", "stiff", **requested)}
 
 
-def test_an_interval_and_what_matters_make_a_verdict(found):
+def test_an_interval_and_what_matters_make_a_verdict(answer):
     low, high = stats.ttest_1samp(SLOPE, 0.0).confidence_interval(0.95)
     assert -0.5 < low < -0.4 < high < -0.3
     for matters, expected in ((0.0, "better"), (0.3, "better"), (-high - 1e-9, "better"), (-high + 1e-9, "undecided"),
                               (0.4, "undecided"), (-low - 1e-9, "undecided"), (-low + 1e-9, "equivalent")):  # fmt: skip
-        assert verdicts(found, matters={OVERSHOOT: matters}) == {"success": "", OVERSHOOT: expected, IAE: ""}
+        assert verdicts(answer, matters={OVERSHOOT: matters}) == {"success": "", OVERSHOOT: expected, IAE: ""}
     # All members differ by 2 rad s: the interval has no width, and its edge is within.
     for matters, expected in ((1.9, "worse"), (2.0 + 1e-9, "equivalent")):
-        assert verdicts(found, matters={IAE: matters})[IAE] == expected
-    turned = {row.of: row.verdict for row in found.compare("stiff", "soft", matters={OVERSHOOT: 0.3, IAE: 1.0})}
+        assert verdicts(answer, matters={IAE: matters})[IAE] == expected
+    turned = {row.of: row.verdict for row in answer.compare("stiff", "soft", matters={OVERSHOOT: 0.3, IAE: 1.0})}
     assert turned == {"success": "", OVERSHOOT: "worse", IAE: "better"}
 
 
-def test_success_is_in_points_and_equal_cases_are_equivalent(found):
-    row = found.compare("soft", "stiff", matters=1.0)[0]
+def test_success_is_in_points_and_equal_cases_are_equivalent(answer):
+    row = answer.compare("soft", "stiff", matters=1.0)[0]
     d, only = row.difference, row.only
     assert (only[0], row.matters) == (0, 0.01)
     assert 0.0 < d.lower < d.upper < 0.5
     for points, expected in ((100.0 * d.lower - 1e-6, "better"), (100.0 * d.lower + 1e-6, "undecided"),
                              (100.0 * d.upper + 1e-6, "equivalent")):  # fmt: skip
-        assert verdicts(found, matters=points)["success"] == expected
+        assert verdicts(answer, matters=points)["success"] == expected
     same = swept([record(), record()], CASES[:2])
     # Metrics that are equal to the bit differ by nothing; of success forty members say no more than some points.
     assert verdicts(same, matters={"success": 1.0, OVERSHOOT: 0.0}) == {
@@ -75,8 +75,8 @@ def test_what_is_not_real_among_many_is_undecided():
     assert rows[OVERSHOOT].verdict == "undecided"
 
 
-def test_files_and_words_have_the_verdicts(found, tmp_path):
-    judged = replace(found, matters={"success": 1.0, OVERSHOOT: 0.3, IAE: 5.0})
+def test_files_and_words_have_the_verdicts(answer, tmp_path):
+    judged = replace(answer, matters={"success": 1.0, OVERSHOOT: 0.3, IAE: 5.0})
     judged.save(tmp_path)
     with (tmp_path / "comparison.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -87,7 +87,7 @@ def test_files_and_words_have_the_verdicts(found, tmp_path):
     assert "- stiff: better: success +" in text
     assert "where 1 matter, seen on the same members" in text
     assert f"- stiff: equivalent: {IAE} +2 rad s (+2 to +2), from " in text
-    found.save(tmp_path / "plain")
+    answer.save(tmp_path / "plain")
     assert "verdict" not in (tmp_path / "plain" / "comparison.csv").read_text()
     assert "matters" not in json.loads((tmp_path / "plain" / "sweep.json").read_text())
 
@@ -96,9 +96,9 @@ def test_files_and_words_have_the_verdicts(found, tmp_path):
     ({"overshot heading": 1.0}, "matters.\"overshot heading\" = 1.0: is no metric of this sweep; did you mean 'overshoot"),
     ({"success": -1.0}, 'matters."success" = -1.0'), ("much", 'matters."success" = \'much\''),
 ])  # fmt: skip
-def test_what_matters_is_a_number_of_what_there_is(matters, words, found):
+def test_what_matters_is_a_number_of_what_there_is(matters, words, answer):
     with pytest.raises(lw.SceneError) as caught:
-        found.compare("soft", "stiff", matters=matters)
+        answer.compare("soft", "stiff", matters=matters)
     assert words in str(caught.value)
 
 

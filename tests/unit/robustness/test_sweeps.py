@@ -86,7 +86,7 @@ def swept_by(run, names=CASES, *, success=None, baseline=None, confidence=0.95, 
 
 
 @pytest.fixture(scope="module")
-def found():
+def answer():
     return swept([record(), half_of_them()])
 
 
@@ -100,8 +100,8 @@ def gridded():
 # Tables
 
 
-def test_rows_count_and_summarize_members_that_did_not_fail(found):
-    soft, stiff, unknown = found.rows()
+def test_rows_count_and_summarize_members_that_did_not_fail(answer):
+    soft, stiff, unknown = answer.rows()
     assert (soft["members"], soft["failed"], soft["stopped"], soft["passed"]) == (N, 0, 0, 28)
     assert (stiff["failed"], stiff["stopped"], stiff["passed"]) == (1, 1, 31)
     ends = stats.binomtest(28, N).proportion_ci(0.95, "wilson")
@@ -130,20 +130,20 @@ def test_two_members_have_a_spread_and_one_has_none():
     assert second["overshoot heading mean"] == 1.0
 
 
-def test_the_table_has_the_rows_by_case_and_axis(gridded, found):
+def test_the_table_has_the_rows_by_case_and_axis(gridded, answer):
     table = gridded.table
     assert list(table["case"].values) == ["soft", "stiff"]
     assert list(table["controller.delay"].values) == [0.02, 0.04]
     assert table["success"].values.tolist() == [[0.7, 0.7], [0.7, 38 / 40]]
     assert table["iae heading mean"].values == pytest.approx(
         np.array([[1.0, 2.0], [1.0, 1.0]]) + MASS.mean(), rel=1e-12)  # fmt: skip
-    assert list(found.table["refused"].values)[:2] == ["", ""]
-    assert np.isnan(found.table["success"].values[2])
+    assert list(answer.table["refused"].values)[:2] == ["", ""]
+    assert np.isnan(answer.table["success"].values[2])
     assert coordinates([[{"type": "drag"}], 1.5, 2, "a"]) == ["[{'type': 'drag'}]", 1.5, 2, "a"]
 
 
-def test_rows_of_a_comparison(found):
-    rows = [row.row() for row in output.against_baseline(found)]
+def test_rows_of_a_comparison(answer):
+    rows = [row.row() for row in output.against_baseline(answer)]
     passed = [RISING < 1.5, half_of_them().numbers["overshoot heading"] < 1.5]
     passed[1][[3, 5]] = False
     only = int((passed[0] & ~passed[1]).sum()), int((passed[1] & ~passed[0]).sum())
@@ -166,8 +166,8 @@ def test_rows_of_a_comparison(found):
     assert rows[2]["difference"] == pytest.approx(2.0)
 
 
-def test_quantiles_are_compared_by_a_bootstrap_with_the_sweeps_seed(found):
-    rows = found.compare("soft", "stiff", quantile=0.9)
+def test_quantiles_are_compared_by_a_bootstrap_with_the_sweeps_seed(answer):
+    rows = answer.compare("soft", "stiff", quantile=0.9)
     good = [i for i in range(N) if i not in (3, 7)]
     x, y = RISING[good], half_of_them().numbers["overshoot heading"][good]
     d = paired.quantiles(x, y, 0.9, 0.95, seed=3)
@@ -180,7 +180,7 @@ def test_quantiles_are_compared_by_a_bootstrap_with_the_sweeps_seed(found):
     assert not rows[1].real
     assert rows[2].difference.lower > 0.0
     assert rows[2].real
-    back = found.compare("stiff", "soft", quantile=0.9)[2]
+    back = answer.compare("stiff", "soft", quantile=0.9)[2]
     assert back.difference.upper < 0.0
     assert back.real
 
@@ -195,18 +195,18 @@ def test_metrics_that_nobody_has_are_compared_as_nan():
     assert all(np.isnan(value) for value in quantile.values)
 
 
-def test_points_are_compared_with_the_same_point(gridded, found):
+def test_points_are_compared_with_the_same_point(gridded, answer):
     rows = gridded.compare("soft", "stiff")
     assert [row.point["controller.delay"] for row in rows if row.of == "success"] == [0.02, 0.04]
     assert len(rows) == 6
     assert [row.values for row in rows if row.of == "success"] == [(0.7, 0.7), (0.7, 0.95)]
     assert rows[0].row()["controller.delay"] == 0.02
     assert len(gridded.compare("soft", "stiff", {"controller.delay": 0.04})) == 3
-    assert found.compare("soft", "unknown") == []
+    assert answer.compare("soft", "unknown") == []
 
 
-def test_ranks_of_one_cell_are_by_mcnemar_and_of_a_grid_by_shares(found, gridded):
-    ranks = found.ranking()
+def test_ranks_of_one_cell_are_by_mcnemar_and_of_a_grid_by_shares(answer, gridded):
+    ranks = answer.ranking()
     assert [(row["rank"], row["case"], row["better_than"]) for row in ranks] == [(1, "stiff", ""), (2, "soft", "")]
     ends = stats.binomtest(31, N).proportion_ci(0.95, "wilson")
     assert [ranks[0][key] for key in ("value", "lower", "upper")] == pytest.approx([31 / N, *ends])
@@ -243,24 +243,24 @@ def test_all_pairs_of_three_cases_are_tested_together():
     assert [row["better_than"] for row in loose.ranking()] == ["a, c", "a", ""]
 
 
-def test_the_worst_failed_first_then_by_what_success_limits(found):
-    worst = found.worst(6)
+def test_the_worst_failed_first_then_by_what_success_limits(answer):
+    worst = answer.worst(6)
     assert [(row["case"], row["member"]) for row in worst] == [
         ("stiff", 3), ("stiff", 7), ("soft", 39), ("stiff", 39), ("soft", 38), ("soft", 37)]  # fmt: skip
-    drawn = found.inputs(found.cells[1])
+    drawn = answer.inputs(answer.cells[1])
     inputs = {name: values[3] for name, values in drawn.items()}
     assert list(inputs) == ["start.position[0]", "start.position[1]", "start.position[2]", "vehicle.mass"]
     assert inputs["vehicle.mass"] == MASS[3]
     assert worst[0] == {"case": "stiff", "member": 3, "status": 3, "passed": False, "overshoot heading": RISING[3],
                         "iae heading": 3.0 + MASS[3], "time_to_failure": 2.5, **inputs}  # fmt: skip
-    assert [row["passed"] for row in found.worst(40, case="soft")] == [False] * 12 + [True] * 28
-    heavy = found.worst(2, by="iae heading", case="soft")
+    assert [row["passed"] for row in answer.worst(40, case="soft")] == [False] * 12 + [True] * 28
+    heavy = answer.worst(2, by="iae heading", case="soft")
     assert [row["member"] for row in heavy] == np.argsort(-MASS)[:2].tolist()
-    assert len(found.worst()) == 20
+    assert len(answer.worst()) == 20
     # Without a limit from above it is the first metric.
-    plain = replace(found, conditions=success.Success(limits={"iae heading": (0.0, np.inf)}))
+    plain = replace(answer, conditions=success.Success(limits={"iae heading": (0.0, np.inf)}))
     assert plain.worst(3)[2]["member"] == 39
-    limited = replace(found, conditions=success.Success(limits={"iae heading": (0.0, 60.0)}))
+    limited = replace(answer, conditions=success.Success(limits={"iae heading": (0.0, 60.0)}))
     assert limited.worst(2, case="soft")[0]["member"] == int(np.argmax(MASS))
 
 
@@ -277,9 +277,9 @@ def test_inputs_are_in_the_users_order():
     assert list(turned.inputs(turned.cells[0])) == ["vehicle.mass", *(f"start.position[{i}]" for i in range(3))]
 
 
-def test_causes_are_those_of_the_members_that_did_not_fail(found):
-    inputs = found.inputs(found.cells[1])
-    rows = found.causes("stiff", of="iae heading")
+def test_causes_are_those_of_the_members_that_did_not_fail(answer):
+    inputs = answer.inputs(answer.cells[1])
+    rows = answer.causes("stiff", of="iae heading")
     y = np.where(np.arange(N) == 3, np.nan, 3.0 + MASS)
     expected = explained(inputs, y, 0.95)
     p = dict(zip(expected, paired.holm(np.array([one.p for one in expected.values()])), strict=True))
@@ -287,7 +287,7 @@ def test_causes_are_those_of_the_members_that_did_not_fail(found):
     assert rows[0]["input"] == "vehicle.mass"
     assert shares == sorted(shares, reverse=True)
     for row in rows:
-        one, passed = expected[row["input"]], found.passed(found.cells[1])
+        one, passed = expected[row["input"]], answer.passed(answer.cells[1])
         values = inputs[row["input"]]
         assert row == pytest.approx({"input": row["input"], **one._asdict(), "p": p[row["input"]],
                                      "median_passed": np.median(values[passed]),
@@ -298,32 +298,32 @@ def test_causes_are_those_of_the_members_that_did_not_fail(found):
     assert np.isfinite(row["median_passed"])
 
 
-def test_members_that_pass_and_that_do_not(found):
-    assert found.members("soft").tolist() == list(range(28, N))
-    assert found.members("soft", False).tolist() == [*range(28)]
-    assert found.values("stiff", "time_to_failure")[[3, 5]].tolist() == [2.5, 4.0]
-    ends = [found.survival("stiff", [time])[0].value for time in (2.0, 2.5, 3.0, 4.0)]
+def test_members_that_pass_and_that_do_not(answer):
+    assert answer.members("soft").tolist() == list(range(28, N))
+    assert answer.members("soft", False).tolist() == [*range(28)]
+    assert answer.values("stiff", "time_to_failure")[[3, 5]].tolist() == [2.5, 4.0]
+    ends = [answer.survival("stiff", [time])[0].value for time in (2.0, 2.5, 3.0, 4.0)]
     assert ends == [1.0, 39 / 40, 39 / 40, 38 / 40]
-    exact = replace(found, interval="clopper_pearson", confidence=0.9)
+    exact = replace(answer, interval="clopper_pearson", confidence=0.9)
     ends = stats.binomtest(28, N).proportion_ci(0.9, "exact")
     assert exact.success("soft") == pytest.approx((0.7, *ends))
-    assert repr(found) == "Sweep(3 cases, 1 points, 40 members)"
-    assert (found.unit("iae heading"), found.unit("time_to_failure")) == ("rad s", "s")
+    assert repr(answer) == "Sweep(3 cases, 1 points, 40 members)"
+    assert (answer.unit("iae heading"), answer.unit("time_to_failure")) == ("rad s", "s")
 
 
 @pytest.mark.parametrize(("ask", "words"), [
-    (lambda found: found.cells_of("sof"), "case = 'sof': is none of this sweep; did you mean 'soft'"),
-    (lambda found: found.cells_of("soft", {"controller.dela": 0.02}),
+    (lambda answer: answer.cells_of("sof"), "case = 'sof': is none of this sweep; did you mean 'soft'"),
+    (lambda answer: answer.cells_of("soft", {"controller.dela": 0.02}),
      "at = 'controller.dela': is no axis of the grid; did you mean 'controller.delay'"),
-    (lambda found: found.cells_of("soft", {"controller.delay": 0.03}),
+    (lambda answer: answer.cells_of("soft", {"controller.delay": 0.03}),
      'at["controller.delay"] = 0.03: is no value of this axis; give one of [0.02, 0.04]'),
-    (lambda found: found.cell("soft"),
+    (lambda answer: answer.cell("soft"),
      "at = None: leaves 2 cells of 'soft'; name one point of the grid: at={'controller.delay': 0.02}"),
-    (lambda found: found.values("soft", "iae", {"controller.delay": 0.02}),
+    (lambda answer: answer.values("soft", "iae", {"controller.delay": 0.02}),
      "metric = 'iae': is none of this sweep; did you mean 'iae heading'?"),
-    (lambda found: found.values("soft", "zzz", {"controller.delay": 0.02}),
+    (lambda answer: answer.values("soft", "zzz", {"controller.delay": 0.02}),
      "metric = 'zzz': is none of this sweep; known: overshoot heading, iae heading, time_to_failure"),
-    (lambda found: found.worst(by="iae"), "by = 'iae': is no metric of this sweep; did you mean 'iae heading'?"),
+    (lambda answer: answer.worst(by="iae"), "by = 'iae': is no metric of this sweep; did you mean 'iae heading'?"),
 ])  # fmt: skip
 def test_what_a_sweep_has_not_is_refused_with_what_it_has(gridded, ask, words):
     with pytest.raises(lw.SceneError) as caught:
@@ -331,13 +331,13 @@ def test_what_a_sweep_has_not_is_refused_with_what_it_has(gridded, ask, words):
     assert words in str(caught.value)
 
 
-def test_a_refused_case_is_named_where_it_is_asked_for(found):
+def test_a_refused_case_is_named_where_it_is_asked_for(answer):
     with pytest.raises(lw.SceneError, match=r"case = 'unknown': was refused: .*; mend it, or ask for another one"):
-        found.cell("unknown")
+        answer.cell("unknown")
     with pytest.raises(lw.SceneError, match="case = 'unknown': was refused; run a member of another one"):
-        setup.rerun_members_of(found.setup, found.cells[2], [0], None, None)
-    assert found.cells[2].fleet is None
-    assert [cell.index for cell in found.cells] == [0, 1, 2]
+        setup.rerun_members_of(answer.setup, answer.cells[2], [0], None, None)
+    assert answer.cells[2].fleet is None
+    assert [cell.index for cell in answer.cells] == [0, 1, 2]
 
 
 # Words and files
@@ -378,9 +378,9 @@ comparison.csv has the differences of all metrics.
 """
 
 
-def test_the_summary_in_words(found):
+def test_the_summary_in_words(answer):
     # The numbers are those of the tests above.
-    assert str(found) == SUMMARY
+    assert str(answer) == SUMMARY
 
 
 def test_the_summary_of_a_grid(gridded):
@@ -432,8 +432,8 @@ def test_a_summary_of_one_case_has_no_rank():
     assert "independent" not in text
 
 
-def test_files_hold_the_tables(found, tmp_path):
-    files = found.save(tmp_path / "new")
+def test_files_hold_the_tables(answer, tmp_path):
+    files = answer.save(tmp_path / "new")
     names = ["table.csv", "comparison.csv", "ranking.csv", "worst.csv", "causes.csv", "sweep.json", "summary.md"]
     assert [path.name for path in files] == names
     assert all(path.parent == tmp_path / "new" for path in files)
@@ -458,7 +458,7 @@ def test_files_hold_the_tables(found, tmp_path):
         (cell["case"], cell["at"], cell["fixed"], bool(cell["refused"]), cell["messages"]) for cell in content["cells"]
     ]
     assert cells == [("soft", {}, [], False, []), ("stiff", {}, [], False, ["slow"]), ("unknown", {}, [], True, [])]
-    assert [cell["key"] for cell in content["cells"]] == [cell.key for cell in found.cells]
+    assert [cell["key"] for cell in content["cells"]] == [cell.key for cell in answer.cells]
 
 
 def test_what_json_cannot_hold_is_written_as_text():
@@ -479,7 +479,7 @@ def test_cases_are_read_from_lists_and_tables():
         ("a", {"heading_pid.kp": 2.0}, {}), ("b", {}, {"events": []}), ("c", {}, {})]  # fmt: skip
 
 
-@pytest.mark.parametrize(("given", "faults"), [
+@pytest.mark.parametrize(("supplied", "faults"), [
     ("pid", ["cases = 'pid': is no list of cases"]), ([], ["cases = []: is no list of cases"]),
     (3, ["cases = 3: is no list of cases"]),
     ([{"set": {}}, "b"], ["cases[0] = {'set': {}}: has no name", "cases[1] = 'b': has no name"]),
@@ -491,9 +491,9 @@ def test_cases_are_read_from_lists_and_tables():
     ([{"name": "a", "scene": "x.toml"}], ["case 'a': scene = 'x.toml': is no Scene; give lw.Scene.load(path)"]),
     ([{"name": "a"}, {"name": "b"}, {"name": "a"}, {"name": "a"}], ["cases = 'a': is the name of 3 cases"]),
 ])  # fmt: skip
-def test_cases_that_are_none_are_refused_all_at_once(given, faults):
+def test_cases_that_are_none_are_refused_all_at_once(supplied, faults):
     with pytest.raises(lw.SceneError) as caught:
-        cases.cases_of(given)
+        cases.cases_of(supplied)
     assert all(fault in str(caught.value) for fault in faults)
 
 
@@ -549,15 +549,15 @@ def test_what_does_not_fit_a_scene_is_refused(scene, change, words):
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize(("given", "words"), [
+@pytest.mark.parametrize(("supplied", "words"), [
     ([1.0], "grid = [1.0]: is no table"),
     ({"a": "bc"}, "grid.\"a\" = 'bc': is no list of values; give [0.0, 0.1, 0.2]"),
     ({"a": []}, 'grid."a" = []: is no list of values'), ({"a": 3.0}, 'grid."a" = 3.0: is no list of values'),
     ({"a": [1.0, 2.0, 1.0]}, 'grid."a" = [1.0, 2.0, 1.0]: has a value twice; keep one of them'),
 ])  # fmt: skip
-def test_grids_that_are_none_are_refused(given, words):
+def test_grids_that_are_none_are_refused(supplied, words):
     with pytest.raises(lw.SceneError) as caught:
-        cases.grid_of(given)
+        cases.grid_of(supplied)
     assert words in str(caught.value)
 
 
@@ -680,15 +680,15 @@ def test_a_sweep_asks_solve_for_its_metrics_alone():
     assert replace(one, metrics=by_samples).kept(bare)["save"] == lw.SaveAt(fields=())
 
 
-def test_keys_are_of_all_that_decides_the_numbers(found):
-    one = found.setup
-    fleet = found.cells[0].fleet
+def test_keys_are_of_all_that_decides_the_numbers(answer):
+    one = answer.setup
+    fleet = answer.cells[0].fleet
     key = one.key(fleet)
     named = replace(SCENE, ensemble_settings=None)
     assert len(key) == 32
     assert one.key(lw.Ensemble(named, N, 3, VARY)) == key
     others = [one.key(lw.Ensemble(SCENE, N, 4, VARY)), one.key(lw.Ensemble(SCENE, N + 1, 3, VARY)),
-              one.key(found.cells[1].fleet), replace(one, settings={"h": 0.01}).key(fleet),
+              one.key(answer.cells[1].fleet), replace(one, settings={"h": 0.01}).key(fleet),
               replace(one, metrics=setup.metrics_of(["iae heading"])).key(fleet)]  # fmt: skip
     assert len({key, *others}) == 6
     twice, thrice = (lambda state, tick: 2.0 * tick["depth"]), (lambda state, tick: 3.0 * tick["depth"])

@@ -317,14 +317,14 @@ def of_terms(terms):
     return lw.Scene(lw.Vehicle(**BODY), terms=terms)
 
 
-def varied(given):
+def varied(inputs):
     """Members of the scene with a term of this table, of which one number has this distribution."""
-    table, name, law, members = given
+    table, name, law, members = inputs
     return lw.Ensemble(from_table(table), members, 0, {name: law})
 
 
-def planned(given):
-    return make_plan(lw.Ensemble(from_table(given[0])), **({"h": 0.01, "t1": 0.1} | given[1]))
+def planned(inputs):
+    return make_plan(lw.Ensemble(from_table(inputs[0])), **({"h": 0.01, "t1": 0.1} | inputs[1]))
 
 
 # What is given wrongly, and how: rows of what is given, and words of the one fault that is said.
@@ -349,10 +349,10 @@ ONE_FAULT = [
 
 
 @pytest.mark.parametrize(
-    ("make", "given", "words"), [(make, row[0], row[1:]) for make, rows in ONE_FAULT for row in rows]
+    ("make", "inputs", "words"), [(make, row[0], row[1:]) for make, rows in ONE_FAULT for row in rows]
 )
-def test_what_is_wrong_is_one_fault(make, given, words):
-    says(*faults(make, given), *words)
+def test_what_is_wrong_is_one_fault(make, inputs, words):
+    says(*faults(make, inputs), *words)
 
 
 # A user's law.
@@ -412,9 +412,9 @@ LAWS = [
 ]
 
 
-@pytest.mark.parametrize(("made", "words"), [(row[0], row[1:]) for row in LAWS])
-def test_a_users_law(made, words):
-    term = type("Bad", (Pull,), {"device": made, "__annotations__": {}})(k=1.0)
+@pytest.mark.parametrize(("built", "words"), [(row[0], row[1:]) for row in LAWS])
+def test_a_users_law(built, words):
+    term = type("Bad", (Pull,), {"device": built, "__annotations__": {}})(k=1.0)
     fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**BODY), terms=[term]))
     for check in (lambda: lw.laws.check_law(term), lambda: make_plan(fleet, h=0.01, t1=0.1)):
         (fault,) = faults(check)
@@ -440,9 +440,9 @@ def test_a_law_that_returns_nothing():
 
 
 @pytest.mark.kernel
-@pytest.mark.parametrize("given", [None, {"k": np.ones(1)}], ids=["nothing", "a dict"])
-def test_packed_that_returns_something_else(given):
-    report = lw.laws.check_law(type("Bad", (Packs,), {"what": given, "__annotations__": {}})(k=1.0))
+@pytest.mark.parametrize("inputs", [None, {"k": np.ones(1)}], ids=["nothing", "a dict"])
+def test_packed_that_returns_something_else(inputs):
+    report = lw.laws.check_law(type("Bad", (Packs,), {"what": inputs, "__annotations__": {}})(k=1.0))
     assert not report.ok
     says(str(report), "packed() returns", "lw.laws.Packed({name: numbers})")
 

@@ -34,10 +34,10 @@ def numbers(m):
     return m.parameters | m.starts | {name: getattr(m, name) for name in names}
 
 
-def assert_same(m, whole, indices):
+def assert_same(m, complete, indices):
     """The members of m are those of `whole` at the indices, bit by bit."""
     for name, value in numbers(m).items():
-        expected = numbers(whole)[name]
+        expected = numbers(complete)[name]
         expected = expected if len(expected) == 1 and len(value) == 1 else expected[indices]
         np.testing.assert_array_equal(value, expected, err_msg=name)
 

@@ -50,12 +50,12 @@ def told(law):
     return identities(functions_of(lw.Ensemble(lw.Scene.named("sphere"), 4, 1, {NAME: law})))
 
 
-@pytest.mark.parametrize(("one", "again", "other"), [
+@pytest.mark.parametrize(("single", "again", "compared"), [
     (Scaled(1.0), Scaled(1.0), Scaled(2.0)),
     (Generic(name="own")(1.0), Generic(name="own")(1.0), Twice(name="own")(1.0)),
 ], ids=["object", "of scipy"])  # fmt: skip
-def test_laws_of_one_text_differ(one, again, other):
-    first, same, second = told(one), told(again), told(other)
+def test_laws_of_one_text_differ(single, again, compared):
+    first, same, second = told(single), told(again), told(compared)
     assert first.keys() == {f"vary.{NAME}"}
     assert first == same != second
 

@@ -44,8 +44,8 @@ def scene(**term):
                                "start": {"position": [0.0, 0.0, 50.0]}, "terms": [term]})  # fmt: skip
 
 
-def said(one):
-    ensemble = one if isinstance(one, lw.Ensemble) else lw.Ensemble.from_scene(one)
+def said(first):
+    ensemble = first if isinstance(first, lw.Ensemble) else lw.Ensemble.from_scene(first)
     return plausibility.of_ensemble(ensemble).messages(ensemble.members)
 
 

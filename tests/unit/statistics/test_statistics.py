@@ -297,9 +297,9 @@ def paths(k=9, n=500, d=2):
     return np.concatenate([[0.0], rng.uniform(0.1, 2.0, k - 1).cumsum()]), np.round(rng.normal(size=(k, n, d)), 1)
 
 
-def finely(time, x, holds, pieces=20_000):
+def finely(time, x, holds, chunks=20_000):
     """Time for which it holds, by counting points of the lines between samples."""
-    share = ((np.arange(pieces) + 0.5) / pieces)[:, None, None]
+    share = ((np.arange(chunks) + 0.5) / chunks)[:, None, None]
     lines = zip(np.diff(time), x[:-1], x[1:], strict=True)
     return sum(dt * holds(a + share * (b - a)).mean(axis=0) for dt, a, b in lines)
 
@@ -444,8 +444,8 @@ def repeated():
     return np.stack([a, 0.6 * a + 0.8 * b], axis=2)
 
 
-def between(found):
-    assert np.all((np.asarray(found) >= 0.93) & (np.asarray(found) <= 0.97)), found
+def between(answer):
+    assert np.all((np.asarray(answer) >= 0.93) & (np.asarray(answer) <= 0.97)), answer
 
 
 def test_coverage_of_means_and_covariances(repeated):
@@ -802,10 +802,10 @@ def test_blocks_in_any_order_give_the_same_bits(kind, values):
             assert all(one[key].tobytes() == other[key].tobytes() for key in one.arrays)
 
 
-def check_as_files_hold_it(found):
+def check_as_files_hold_it(answer):
     """Estimates are the same again from arrays and text, and as a dataset each array has the dimensions of its shape."""
-    again = Estimates.from_arrays(*Estimates(found).to_arrays())
-    for one in found:
+    again = Estimates.from_arrays(*Estimates(answer).to_arrays())
+    for one in answer:
         other, dataset = again[one.name], one.dataset
         assert (other.settings, other.unit, other.dims, other.interval) == (
             one.settings,
@@ -876,14 +876,14 @@ def test_whole_numbers_of_numpy_are_whole_numbers():
     assert of(Histogram, x, bins=np.int64(4), limits=(0, 1)).value.shape == (1, 1, 4)
 
 
-@pytest.mark.parametrize(("given", "name"), [
+@pytest.mark.parametrize(("inputs", "name"), [
     ({"above": 10}, "above 10"), ({"above": 10.0}, "above 10"), ({"above": np.float32(0.5)}, "above 0.5"),
     ({"below": -0.0}, "below 0"), ({"above": 1e-7}, "above 1e-07"), ({"above": 1234567.5}, "above 1234567.5"),
     ({"above": [1.0, 2]}, "above (1, 2)"), ({"above": np.array([2.5])}, "above 2.5"),
     ({"above": 1, "below": 2.0}, "above 1 below 2"),
 ])  # fmt: skip
-def test_names_do_not_depend_on_how_a_number_was_written(given, name):
-    assert Exceedance(scalar(2), **given).key == f"exceedance x {name}"
+def test_names_do_not_depend_on_how_a_number_was_written(inputs, name):
+    assert Exceedance(scalar(2), **inputs).key == f"exceedance x {name}"
 
 
 def test_a_band_is_what_lies_between():

@@ -40,8 +40,8 @@ def said(rows):
     ]
 
 
-def entries(one, at):
-    return one.value[at], one.lower[at], one.upper[at]
+def entries(single, at):
+    return single.value[at], single.lower[at], single.upper[at]
 
 
 def estimate(kind, *arguments, d=2, **named):

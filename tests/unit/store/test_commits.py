@@ -67,7 +67,7 @@ def test_large_files_are_on_their_way_before_their_block_is_handed_over(root):
 
 
 @pytest.mark.parametrize(
-    ("fault", "said", "others"),
+    ("fault", "output", "others"),
     [
         (full(("synced", "chunks/2")), "No space left", ["0", "1", "3"]),
         (full(("synced", "blocks/2")), "No space left", ["0", "1", "3"]),
@@ -76,8 +76,8 @@ def test_large_files_are_on_their_way_before_their_block_is_handed_over(root):
     ],
     ids=["a file", "a marker", "no room for a marker", "a folder"],
 )
-def test_a_block_that_fails_is_not_marked_and_the_others_are(root, fault, said, others):
-    with pytest.raises(OSError, match=said), Disk(fault), grouped() as own:
+def test_a_block_that_fails_is_not_marked_and_the_others_are(root, fault, output, others):
+    with pytest.raises(OSError, match=output), Disk(fault), grouped() as own:
         for i in range(4):
             add(own, root, i)
     assert marked(root) == others

@@ -29,9 +29,9 @@ def arrays():
     return found
 
 
-def read(found, groups=("explicit",), members=MEMBERS):
+def read(answer, groups=("explicit",), members=MEMBERS):
     """The layout of these arrays as their metadata tell it."""
-    content = json.loads(Layout(found, groups, (), TIMES).root({}))
+    content = json.loads(Layout(answer, groups, (), TIMES).root({}))
     return layout_of(content, members)
 
 

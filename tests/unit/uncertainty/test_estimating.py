@@ -265,10 +265,10 @@ def test_numbers_reach_the_variance():
 
 
 @pytest.mark.parametrize(
-    ("asked", "power", "count"), [(1, 1.0, 64), (800, 1.0, 832), (1000, 1.5, 1024), (1025, 1.5, 2048)]
+    ("requested", "power", "count"), [(1, 1.0, 64), (800, 1.0, 832), (1000, 1.5, 1024), (1025, 1.5, 2048)]
 )
-def test_numbers_of_sobol_points(asked, power, count):
-    assert choice.rounded("sobol", asked, 2, power) == count
+def test_numbers_of_sobol_points(requested, power, count):
+    assert choice.rounded("sobol", requested, 2, power) == count
 
 
 def test_the_cost_of_a_member():

@@ -84,9 +84,9 @@ def test_records_of_every_index():
     assert len(rows) == 12
 
 
-@pytest.mark.parametrize("made", [sobol_indices, lambda: sobol_indices(second=False), effects])
-def test_an_analysis_comes_back_from_its_files(made, tmp_path):
-    found = made()
+@pytest.mark.parametrize("built", [sobol_indices, lambda: sobol_indices(second=False), effects])
+def test_an_analysis_comes_back_from_its_files(built, tmp_path):
+    found = built()
     paths = found.save(tmp_path / "new")
     assert [path.name for path in paths] == ["sensitivity.txt", "sensitivity.csv", "sensitivity.json"]
     assert paths[0].read_text() == f"{found}\n"

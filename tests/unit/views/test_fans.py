@@ -50,12 +50,12 @@ def test_a_direction_is_known_though_all_that_are_drawn_have_ended():
     np.testing.assert_allclose(np.diff(median[11:]), 2.0 * np.pi * 2.5 / 60.0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("said", "words"), [
+@pytest.mark.parametrize(("output", "words"), [
     ("position[1]", "east"), ("max(position[2])", "max(depth)"), ("mean euler[2] at floor", "mean yaw at floor"),
     ("own.position[1]", "own.position[1]"), ("velocity[0]", "velocity[0]"), ("start.position[1]", "start.position[1]"),
     ("quantiles position[0]", "quantiles north")])  # fmt: skip
-def test_components_have_names(said, words):
-    assert in_words(said) == words
+def test_components_have_names(output, words):
+    assert in_words(output) == words
 
 
 def test_an_attitude_is_of_a_member_that_goes_on():

@@ -114,16 +114,16 @@ def test_49_lines_differ_in_colour_or_style():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "said", "at"),
+    ("low", "high", "output", "at"),
     [(100.0, 101.0, "surface\n100 m\nabove", 1.0), (-7.0, -5.0, "surface\n5 m\nbelow", 0.0)],
 )
-def test_a_far_surface_is_told_with_its_side(low, high, said, at):
+def test_a_far_surface_is_told_with_its_side(low, high, output, at):
     """Three lines beside the axes, whose middle is half their height from the end of the axes."""
     axes = Figure().subplots()
     axes.set_ylim(low, high)
     canvas.point_down(axes)
     (text,) = axes.texts
-    assert text.get_text() == said
+    assert text.get_text() == output
     x, y = text.get_position()
     assert x > 1.0
     assert 0.02 < abs(at - y) < 0.2

@@ -495,14 +495,14 @@ class _Track:
         return remarks
 
 
-def _doubts(found: Assimilated) -> list[str]:
+def _doubts(finding: Assimilated) -> list[str]:
     """Tell what the gate left out, and innovations that are not what they should be."""
     doubts = []
-    for name, test in found.consistency().items():
-        out = found.left_out[name]
+    for name, test in finding.consistency().items():
+        out = finding.left_out[name]
         if out.any():
-            measured = int((out | np.isfinite(found.innovations[name]).any(axis=1)).sum())
-            when = summaries.listed(f"{time:g}" for time in found.time[out])
+            measured = int((out | np.isfinite(finding.innovations[name]).any(axis=1)).sum())
+            when = summaries.listed(f"{time:g}" for time in finding.time[out])
             text = f"the gate left out {int(out.sum())} of {measured} measurements of {name}, at {when} s"
             many = out.sum() > max(1.0, MANY_LEFT_OUT * measured)
             so_many = (

@@ -161,11 +161,11 @@ def _of(target: Target, rows: np.ndarray) -> np.ndarray:
     return np.asarray(rows[index])
 
 
-def _meet(one: Target, other: Target) -> bool:
+def _meet(first: Target, second: Target) -> bool:
     """Whether two targets have an entry in common."""
-    if one.name != other.name or one.index is None or other.index is None:
-        return one.name == other.name
-    return (sorted(one.index) == sorted(other.index)) if one.name in MATRICES else one.index == other.index
+    if first.name != second.name or first.index is None or second.index is None:
+        return first.name == second.name
+    return (sorted(first.index) == sorted(second.index)) if first.name in MATRICES else first.index == second.index
 
 
 def _as_values(variation: Variation) -> bool:

@@ -144,20 +144,20 @@ class MissingExtra(ImportError):  # noqa: N818
 MOST_KNOWN = 60
 
 
-def closest(word: Any, allowed: Iterable[str]) -> str:
+def closest(word: Any, known: Iterable[str]) -> str:
     """Suggest the known name nearest to a word."""
     from lgvi_warp.common.nearest import nearest  # loaded where something is wrong
 
-    names = tuple(map(str, allowed))
+    names = tuple(map(str, known))
     near = nearest(word[:LONGEST_VALUE] if isinstance(word, str) else brief(word), names)
     more = f" and {len(names) - MOST_KNOWN:,} more" if len(names) > MOST_KNOWN else ""
     return f"did you mean {near!r}?" if near else f"known: {', '.join(names[:MOST_KNOWN])}{more}"
 
 
-def among(value: Any, allowed: Iterable[Any]) -> bool:
+def among(value: Any, known: Iterable[Any]) -> bool:
     """Tell whether a value is one of those known, whatever the user gave: arrays and tables too."""
     kind = str if isinstance(value, np.str_) else type(value)
-    return any(kind is type(k) and value == k for k in allowed)
+    return any(kind is type(k) and value == k for k in known)
 
 
 class _Brief(reprlib.Repr):
@@ -256,23 +256,23 @@ class Faults:
         if self._found:
             raise SceneError(self._found, self._more)
 
-    def choice(self, key: str, value: Any, allowed: Iterable[Any]) -> bool:
+    def choice(self, key: str, value: Any, known: Iterable[Any]) -> bool:
         """Check that a value is one of those allowed; note a fault otherwise."""
         # Of tables that extensions add to no list is made where the value is in them.
-        looked_up = isinstance(allowed, Container) and not isinstance(allowed, Sequence)
-        good = looked_up and isinstance(value, str) and value in allowed
-        good = good or among(value, allowed := list(allowed))
+        looked_up = isinstance(known, Container) and not isinstance(known, Sequence)
+        good = looked_up and isinstance(value, str) and value in known
+        good = good or among(value, known := list(known))
         if not good:
-            self.add(key, value, "is not known", lambda: closest(value, allowed))
+            self.add(key, value, "is not known", lambda: closest(value, known))
         return good
 
-    def keys(self, key: str, keys: Iterable[str], allowed: Iterable[str]) -> None:
+    def keys(self, key: str, keys: Iterable[str], known: Iterable[str]) -> None:
         """Check that every key is one of those allowed; note a fault for each other one."""
-        allowed = list(allowed)
+        known = list(known)
         for name in keys:
-            if name not in allowed:
+            if name not in known:
                 value = keys[name] if isinstance(keys, Mapping) else "..."
-                remedy = functools.partial(closest, name, allowed)
+                remedy = functools.partial(closest, name, known)
                 self.add(f"{key}.{name}" if key else name, value, "is an unknown key", remedy)
 
     def real(self, key: str, value: Any, remedy: str = "give numbers") -> np.ndarray | None:

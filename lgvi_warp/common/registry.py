@@ -77,7 +77,7 @@ def _extensions() -> ModuleType:
     return import_module("lgvi_warp.common.extensions")
 
 
-def add(allowed: MutableMapping[str, Any], kind: type, attribute: str = "type") -> bool:
+def add(known: MutableMapping[str, Any], kind: type, attribute: str = "type") -> bool:
     """Make a class known by its word, unless another class has that word.
 
     A class of the same module and name replaces the former one: it is the same class, made again in a notebook.
@@ -85,10 +85,10 @@ def add(allowed: MutableMapping[str, Any], kind: type, attribute: str = "type") 
     word = vars(kind).get(attribute)
     if not word:
         return False
-    former = allowed.setdefault(word, kind)
+    former = known.setdefault(word, kind)
     if (former.__module__, former.__qualname__) == (kind.__module__, kind.__qualname__):
-        allowed[word] = kind
-    return allowed[word] is kind
+        known[word] = kind
+    return known[word] is kind
 
 
 def load_modules(package: ModuleType) -> None:

@@ -339,16 +339,16 @@ class ControlLaw(Part):
         return law
 
 
-def list_of_names(faults: Faults, key: str, names: Any, allowed: Collection[str]) -> list[str]:
+def list_of_names(faults: Faults, key: str, names: Any, known: Collection[str]) -> list[str]:
     """Names of a list that are known and occur once; what is wrong with others is noted."""
     listed = items_of(names)
     if not listed:
-        faults.add(key, names, "is no list of names", f"give some of {', '.join(allowed)}")
+        faults.add(key, names, "is no list of names", f"give some of {', '.join(known)}")
         return []
     for i, name in enumerate(listed):
-        if faults.choice(f"{key}[{i}]", name, allowed) and among(name, listed[:i]):
+        if faults.choice(f"{key}[{i}]", name, known) and among(name, listed[:i]):
             faults.add(f"{key}[{i}]", name, "is named twice", "leave one of them out")
-    return [name for name in listed if among(name, allowed)]
+    return [name for name in listed if among(name, known)]
 
 
 # How a law's integral is kept from growing while actuators are at their limits.

@@ -109,13 +109,13 @@ class Survey:
         facts = vars(self) | {"odd": None, "residual_coupling": self.residual_coupling > UNCOUPLED}
         return tuple(facts.values())
 
-    def covers(self, second: Survey) -> bool:
+    def covers(self, other: Survey) -> bool:
         """Whether a kernel chosen by this survey serves the members of the other, too."""
-        return self.joined(second).decisive == self.decisive
+        return self.joined(other).decisive == self.decisive
 
-    def joined(self, second: Survey) -> Survey:
+    def joined(self, other: Survey) -> Survey:
         """The survey of the members of both."""
-        pairs = zip(vars(self).values(), vars(second).values(), strict=True)
+        pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return Survey(*(a | b if isinstance(a, frozenset | Oddities) else max(a, b) for a, b in pairs))
 
 

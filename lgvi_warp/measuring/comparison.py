@@ -287,15 +287,15 @@ def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[st
     return running_maxima
 
 
-def quantities_of(result: Result, requested: Distance | None = None) -> dict[str, np.ndarray]:
+def quantities_of(result: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
     """Quantity -> (k, n, components) that means and spreads are taken of; attitude: the vertical in body axes."""
     values = {name: getattr(result, name).astype(np.float64) for name in ("position", "velocity", "angular_velocity")}
     values["attitude"] = result.attitude[..., 2, :].astype(np.float64)
     values["energy"] = result.energy[..., None]
     values["linear_momentum"] = invariants.linear_momentum(result)
     values["angular_momentum"] = invariants.angular_momentum(result)
-    if requested is not None and requested.name not in values and requested.unit != "rad":
-        values[requested.name] = requested.values(result)
+    if asked is not None and asked.name not in values and asked.unit != "rad":
+        values[asked.name] = asked.values(result)
     return values
 
 

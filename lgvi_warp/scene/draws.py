@@ -248,16 +248,14 @@ def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]
     return {name: value for name, value in start.items() if name not in ways} | {variations.ATTITUDE: R[0]}
 
 
-def _column(
-    tables: Faults, key: str, column: Any, allowed: Mapping[str, np.ndarray]
-) -> tuple[Target, np.ndarray] | None:
+def _column(tables: Faults, key: str, column: Any, known: Mapping[str, np.ndarray]) -> tuple[Target, np.ndarray] | None:
     """Target of a table's column, and its values; None after a fault in the name."""
     (target, *more), also = variations.targets(key), f'; or leave it out: ignore = ["{cut(key)}"]'
     if more:
         tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
-    if more or not variations.known_target(tables, key, "...", target, allowed, also):
+    if more or not variations.known_target(tables, key, "...", target, known, also):
         return None
-    shape = (len(column), *target.of(allowed[target.name]).shape)
+    shape = (len(column), *target.of(known[target.name]).shape)
     name = target.name if target.index is None else key
     values = explicit_parameter(tables, name, column, shape)
     attitudes = target.name == variations.ATTITUDE and values.shape == shape

@@ -94,13 +94,13 @@ def _fields(kind: Any) -> list[dataclasses.Field[Any]]:
     return [item for item in dataclasses.fields(kind) if item.init]
 
 
-def _table(kind: Any, allowed: Mapping[str, Schema] | None = None, required: Iterable[str] = ()) -> Schema:
+def _table(kind: Any, known: Mapping[str, Schema] | None = None, required: Iterable[str] = ()) -> Schema:
     """A table with the fields of a class, some of which are known."""
-    texts, allowed = _meanings(kind), allowed or {}
-    content: dict[str, Schema] = {name: dict(item) for name, item in allowed.items()}
+    texts, known = _meanings(kind), known or {}
+    content: dict[str, Schema] = {name: dict(item) for name, item in known.items()}
     for item in _fields(kind):
         name = word_of(item)
-        described = allowed.get(name) or _value(kind, item)
+        described = known.get(name) or _value(kind, item)
         content[name] = described | ({"description": texts[item.name]} if item.name in texts else {})
     missing = (dataclasses.MISSING, dataclasses.MISSING)
     needed = [word_of(item) for item in _fields(kind) if (item.default, item.default_factory) == missing]

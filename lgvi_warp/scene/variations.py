@@ -158,25 +158,25 @@ def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray, into: 
     values[target.name] = array
 
 
-def _hint(name: str, allowed: Mapping[str, np.ndarray], also: str) -> str:
+def _hint(name: str, known: Mapping[str, np.ndarray], also: str) -> str:
     """Return how to mend a name that the scene does not have."""
     section = name.split(".")[0]
-    others = [key for key in allowed if key.split(".")[0] == section]
+    others = [key for key in known if key.split(".")[0] == section]
     if name == "start.geodetic":
         return 'vary "start.position" [m] around the place, or give every member its own by lw.designs.Table'
     of_start = section == "start" and others
-    return (f"the scene gives {', '.join(others)}" if of_start else closest(name, allowed)) + also
+    return (f"the scene gives {', '.join(others)}" if of_start else closest(name, known)) + also
 
 
 def known_target(
-    faults: Faults, key: str, distribution: Any, target: Target, allowed: Mapping[str, np.ndarray], also: str = ""
+    faults: Faults, key: str, distribution: Any, target: Target, known: Mapping[str, np.ndarray], also: str = ""
 ) -> bool:
     """Check that the scene has a target, and note what is wrong."""
-    if target.name not in allowed:
-        remedy = functools.partial(_hint, target.name, allowed, also)
+    if target.name not in known:
+        remedy = functools.partial(_hint, target.name, known, also)
         faults.add(f'"{key}"', distribution, "does not name what the scene has", remedy)
         return False
-    shape = allowed[target.name].shape
+    shape = known[target.name].shape
     if target.index is not None:
         if target.name == ATTITUDE:
             faults.add(f'"{key}"', distribution, "varies an entry of a rotation", ROTATIONS)
@@ -195,7 +195,7 @@ ROTATIONS = (
 )
 
 
-def variation(faults: Faults, key: str, distribution: Any, allowed: Mapping[str, np.ndarray]) -> Variation | None:
+def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
     """Match a key of `vary` and its distribution with a scene; None after noting what is wrong."""
     if not isinstance(distribution, Distribution):
         remedy = (
@@ -206,9 +206,9 @@ def variation(faults: Faults, key: str, distribution: Any, allowed: Mapping[str,
     named = targets(key)
     with faults.including():
         distribution = distribution.ordered_as([target.label for target in named])
-    if not all([known_target(faults, key, distribution, target, allowed) for target in named]):
+    if not all([known_target(faults, key, distribution, target, known) for target in named]):
         return None
-    described = Variation(key, distribution, named, tuple(allowed[target.name] for target in named))
+    described = Variation(key, distribution, named, tuple(known[target.name] for target in named))
     wrong = _misfit(described)
     if wrong:
         faults.add(f'"{key}"', distribution, *wrong)

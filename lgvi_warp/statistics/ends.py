@@ -53,10 +53,10 @@ def outcomes(events: Iterable[str], statuses: Iterable[Status]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def check_outcomes(key: str, outcomes: Sequence[str], allowed: Sequence[str]) -> None:
+def check_outcomes(key: str, outcomes: Sequence[str], known: Sequence[str]) -> None:
     """Refuse outcomes that no member of a scene can have."""
     faults = Faults()
     for name in outcomes:
-        if name not in allowed:
-            faults.add(key, name, "is no outcome of this scene", closest(name, allowed))
+        if name not in known:
+            faults.add(key, name, "is no outcome of this scene", closest(name, known))
     faults.raise_if_any()

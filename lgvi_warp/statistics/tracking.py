@@ -187,12 +187,12 @@ def _of_channel(channel: Channel, function: Function, labels: tuple[str, ...]) -
     return Quantity(channel.name, function, channel.unit, fields, labels, needs_limit=True, entries=entries)
 
 
-def tracked_name(key: str, of: Any, allowed: tuple[str, ...]) -> str:
+def tracked_name(key: str, of: Any, known: tuple[str, ...]) -> str:
     """Return the name of what is tracked."""
-    if isinstance(of, str) and of in allowed:
+    if isinstance(of, str) and of in known:
         return of
     why = "is a distance, which has no goal beyond" if among(of, _DISTANCES) else "is nothing that is tracked"
-    raise refusal(key, of, why, closest(str(of), allowed))
+    raise refusal(key, of, why, closest(str(of), known))
 
 
 def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:

@@ -185,12 +185,12 @@ def _names_of_entries(statistic: Statistic) -> dict[str, dict[str, int]]:
     return entries
 
 
-def _target(name: str, allowed: Mapping[str, Named]) -> Named:
+def _target(name: str, known: Mapping[str, Named]) -> Named:
     """Quantity that a name asks to watch: a known one, or a mean that is added to them."""
-    alike = (allowed[spelling] for spelling in allowed if canonical(spelling) == canonical(name))
-    if (target := allowed.get(name) or next(alike, None)) is not None:
+    alike = (known[spelling] for spelling in known if canonical(spelling) == canonical(name))
+    if (target := known.get(name) or next(alike, None)) is not None:
         return target
-    hint, of = closest(name, allowed), name.removeprefix("mean ")
+    hint, of = closest(name, known), name.removeprefix("mean ")
     if of != name:
         try:
             quantity("until.statistic", of)
@@ -201,6 +201,6 @@ def _target(name: str, allowed: Mapping[str, Named]) -> Named:
             added = Mean(of)
             return added, added.key, {}
     if not hint.startswith("did you mean"):  # list the statistics alone, not their components
-        estimates = dict.fromkeys(estimate for _, estimate, _ in allowed.values())
-        hint = closest(name, estimates) if allowed else 'give a mean, such as "mean depth", or statistics'
+        estimates = dict.fromkeys(estimate for _, estimate, _ in known.values())
+        hint = closest(name, estimates) if known else 'give a mean, such as "mean depth", or statistics'
     raise refusal("until.statistic", name, "is none of the run's statistics", hint)

@@ -109,13 +109,13 @@ class LinearModel:
         return control.StateSpace(self.A, self.B, self.C, self.D, self.dt, **names)
 
 
-def chosen_places(faults: Faults, key: str, wanted: Sequence[str], allowed: tuple[str, ...]) -> list[int]:
+def chosen_places(faults: Faults, key: str, wanted: Sequence[str], known: tuple[str, ...]) -> list[int]:
     """Places of names, those of whole vectors too."""
     places: list[int] = []
     for name in wanted:
-        entries = [i for i, each in enumerate(allowed) if each == name or each.startswith(f"{name}[")]
+        entries = [i for i, each in enumerate(known) if each == name or each.startswith(f"{name}[")]
         if not entries:
-            faults.keys(key, [name], allowed)
+            faults.keys(key, [name], known)
         places += entries
     return places
 

@@ -43,17 +43,17 @@ class RareFailure:
     refused: str = ""
 
     @classmethod
-    def of(cls, result: RareEvent) -> RareFailure:
+    def of(cls, found: RareEvent) -> RareFailure:
         """Keep of an answer the failing members that are compared, so that it is small."""
-        members, count = members_of(result), result.normals.shape[1]
+        members, count = members_of(found), found.normals.shape[1]
         numbers, draws = members.u[:, :count], members.u[:, count:]
         failing = None
-        if result.failing is not None:
-            rows = _places(numbers, result.normals)
-            failing = Table(values={name: values[rows] for name, values in result.failing.own_values().items()})
+        if found.failing is not None:
+            rows = _places(numbers, found.normals)
+            failing = Table(values={name: values[rows] for name, values in found.failing.own_values().items()})
         return cls(
             replace(
-                result, failing=failing, normals=numbers, draws=draws, weights=members.weights, chains=members.chains
+                found, failing=failing, normals=numbers, draws=draws, weights=members.weights, chains=members.chains
             ),
             members,
         )

@@ -250,31 +250,31 @@ def one_run(runs: Runs, setting: Setting, grid: float | None) -> MeanEstimate:
 
 def told(
     pilot: Pilot, chosen: Chosen, levels: Sequence[Level], rounds: Sequence[Round],
-    answer: tuple[Sequence[Way], float] | None, part: MeanEstimate, own: Setting | None, content: Mapping[str, Any],
+    found: tuple[Sequence[Way], float] | None, part: MeanEstimate, own: Setting | None, content: Mapping[str, Any],
 ) -> Estimated:  # fmt: skip
     """The answer in full."""
     top, runs = chosen.setting, pilot.runs
     messages = list(pilot.messages)
-    ways, pilot_seconds = answer or ((), 0.0)
-    if answer is None:
+    ways, pilot_seconds = found or ((), 0.0)
+    if found is None:
         messages.append("nothing varies and no noise acts: one run is the answer, with its bias alone")
     if len(runs.strata) > 1:
         messages.append(f"rare values of a Choice are sampled apart, as strata: {len(runs.strata) - 1}")
-    variance_of_one = pilot.variance(top, pilot.first) if answer else 0.0
-    members = rounded("plain", variance_of_one / max(chosen.variance, 1e-300), 0) if answer else 1
+    variance_of_one = pilot.variance(top, pilot.first) if found else 0.0
+    members = rounded("plain", variance_of_one / max(chosen.variance, 1e-300), 0) if found else 1
     recipe = {
-        "of": runs.question.label, "estimator": ways[0].name if answer else "one run", "seed": runs.seed,
+        "of": runs.question.label, "estimator": ways[0].name if found else "one run", "seed": runs.seed,
         "t1": content["t1"], "error": chosen.error, "setting": top.to_dict(), "grid": pilot.grid(top),
         "levels": [level.to_dict() for level in levels], "rounds": [list(each) for each in rounds],
         "bias": [chosen.bias.value, chosen.bias.half], "reference": chosen.reference, "plain_members": members,
     }  # fmt: skip
     cost = runs.measured_cost(top, pilot.grid(top))
     own_seconds = None
-    if own is not None and answer:
+    if own is not None and found:
         # The pace of the setting that was run, at the scene's own step.
         own_seconds = rounded("plain", variance_of_one / max(chosen.error, 1e-300) ** 2, 0) * cost * top.h / own.h
     return answer_of(runs, pilot.target, recipe, levels, part, content, pilot_seconds=pilot_seconds,
-                     own_seconds=own_seconds, rivals=gains(ways) if answer else {}, messages=tuple(messages))  # fmt: skip
+                     own_seconds=own_seconds, rivals=gains(ways) if found else {}, messages=tuple(messages))  # fmt: skip
 
 
 def replayed(runs: Runs, target: Sought, recipe: Mapping[str, Any], content: Mapping[str, Any]) -> Estimated:

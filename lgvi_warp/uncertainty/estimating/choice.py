@@ -98,13 +98,13 @@ def candidates(seen: Observed, variance: float, only: str | None = None) -> list
     return [best, *(way for way in ways if way is not best)]
 
 
-def coupled(seen: Observed, count: int, requested: bool = False) -> list[tuple[int, ...]]:
+def coupled(seen: Observed, count: int, asked: bool = False) -> list[tuple[int, ...]]:
     """Chains of so many settings of which each is much cheaper than the one before, and follows it; asked: at any cost."""
     chains = []
     for rest in itertools.combinations(range(1, len(seen.z)), count - 1):
         chain = (0, *sorted(rest, key=lambda i: -seen.costs[i]))
         links = list(itertools.pairwise(chain))
-        cheap = requested or all(seen.costs[c] < CHEAPER * seen.costs[f] for f, c in links)
+        cheap = asked or all(seen.costs[c] < CHEAPER * seen.costs[f] for f, c in links)
         if cheap and all(slope(seen.z[f], seen.z[c])[1] <= APART for f, c in links):
             chains.append(chain)
     return chains

@@ -110,10 +110,10 @@ def chosen_chain(
     return (min(fitting, key=lambda pair: pair[0])[1] if fitting else None), notes
 
 
-def compared(own: np.ndarray, second: np.ndarray) -> tuple[float, float, float, float]:
+def compared(own: np.ndarray, other: np.ndarray) -> tuple[float, float, float, float]:
     """(offset, slope, standard deviation of what is missed, squared correlation) of limits as a line of others (n,)."""
-    ordinary = (np.abs(own) < 1e300) & (np.abs(second) < 1e300)
-    x, y = second[ordinary], own[ordinary]
+    ordinary = (np.abs(own) < 1e300) & (np.abs(other) < 1e300)
+    x, y = other[ordinary], own[ordinary]
     if len(x) < 16 or not (x.std() > 0.0 and y.std() > 0.0):
         return 0.0, 1.0, 0.0, 0.0
     correlation = float(np.corrcoef(x, y)[0, 1])

@@ -198,7 +198,7 @@ def doubts(
     probability: float | None,
     spread: float,
     failing: Sequence[np.ndarray],
-    requested: float,
+    asked: float,
     seen: np.ndarray | None = None,
 ) -> list[str]:
     """Why the weights are not the answer; empty where they are.
@@ -207,7 +207,7 @@ def doubts(
     relative error wanted. seen: (m,), which of the weighted members lie where the chains went; None for all.
     """
     reasons = []
-    if weighted.spread > requested:
+    if weighted.spread > asked:
         reasons.append(f"its own error is {weighted.spread:.1%}")
     if weighted.effective < (least := effective_wanted(weighted)):
         reasons.append(f"its weights are worth {weighted.effective:.0f} members, fewer than {least:.0f}")
@@ -228,12 +228,12 @@ def effective_wanted(weighted: WeightedMembers) -> float:
     return max(EFFECTIVE, EFFECTIVE_EACH * d * (d + 1) / 2)
 
 
-def wanting(weighted: WeightedMembers, requested: float) -> float:
+def wanting(weighted: WeightedMembers, asked: float) -> float:
     """Factor on the number of draws for this relative error, and for sufficiently even weights."""
     if not math.isfinite(weighted.spread):
         return math.inf
     return max(
-        (weighted.spread / requested) ** 2, effective_wanted(weighted) / weighted.effective, weighted.largest / LARGEST
+        (weighted.spread / asked) ** 2, effective_wanted(weighted) / weighted.effective, weighted.largest / LARGEST
     )
 
 

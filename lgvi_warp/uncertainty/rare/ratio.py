@@ -69,18 +69,18 @@ class FailingMembers(NamedTuple):
     related: float
 
 
-def members_of(answer: RareEvent) -> FailingMembers:
+def members_of(found: RareEvent) -> FailingMembers:
     """An event's failing members: whole chains of them, some 4,000 at most."""
     rng = generator(0, "rare pairs")
-    most = min(MOST_RUN, max(100, MOST_NUMBERS // max(1, answer.normals.shape[1] + answer.draws.shape[1])))
-    if answer.estimator != "subset":
-        u, weights = np.concatenate([answer.normals, answer.draws], axis=1), answer.weights
+    most = min(MOST_RUN, max(100, MOST_NUMBERS // max(1, found.normals.shape[1] + found.draws.shape[1])))
+    if found.estimator != "subset":
+        u, weights = np.concatenate([found.normals, found.draws], axis=1), found.weights
         if len(u) > most:
             u, weights = u[np.sort(rng.choice(len(u), most, p=weights))], np.full(most, 1.0 / most)
         return FailingMembers(u, weights, np.arange(len(u)), 1.0)
-    runs = answer.runs
+    runs = found.runs
     if len(runs[0].parts):  # members that several conditions count
-        u, weights, chains = np.concatenate([answer.normals, answer.draws], axis=1), answer.weights, answer.chains
+        u, weights, chains = np.concatenate([found.normals, found.draws], axis=1), found.weights, found.chains
         return _whole_chains(u, weights, np.unique(chains, return_inverse=True)[1], most, rng)
     first = np.cumsum([0, *(int(run.failing_chains.max()) + 1 for run in runs)])
     chains = np.concatenate([run.failing_chains + start for run, start in zip(runs, first, strict=False)])
@@ -99,30 +99,30 @@ def _whole_chains(
     return FailingMembers(u[kept], weights[kept] / weights[kept].sum(), chains, RELATED)
 
 
-def carried(u: np.ndarray, own: VehicleLimit, compared: VehicleLimit, seed: int) -> np.ndarray:
+def carried(u: np.ndarray, own: VehicleLimit, other: VehicleLimit, seed: int) -> np.ndarray:
     """The normals of members of one limit as those of another, by the names of numbers and draws.
 
     What the first does not have is drawn anew: it decides nothing there.
     """
-    v = generator(seed, "rare carried").standard_normal((len(u), compared.d))
+    v = generator(seed, "rare carried").standard_normal((len(u), other.d))
     columns = {name: i for i, name in enumerate(own.names)}
-    for i, name in enumerate(compared.names):
+    for i, name in enumerate(other.names):
         if name in columns:
             v[:, i] = u[:, columns[name]]
     sources = {(each.of, each.stream, each.first, each.spacing, each.numbers): each for each in own.sources}
-    for each in compared.sources:
+    for each in other.sources:
         same = sources.get((each.of, each.stream, each.first, each.spacing, each.numbers))
         if same is not None:
-            v[:, len(compared.names) :][:, each.columns] = u[:, len(own.names) :][:, same.columns]
+            v[:, len(other.names) :][:, each.columns] = u[:, len(own.names) :][:, same.columns]
     return v
 
 
-def shared(failing: FailingMembers, own: VehicleLimit, compared: VehicleLimit, seed: int = 0) -> Share:
+def shared(failing: FailingMembers, own: VehicleLimit, other: VehicleLimit, seed: int = 0) -> Share:
     """The part of an event's members for which that of another limit happens, with the same numbers and the same noise.
 
     docs/theory/rare_events.md, (B12).
     """
-    happens = compared(carried(failing.u, own, compared, seed)) > 0.0
+    happens = other(carried(failing.u, own, other, seed)) > 0.0
     return Share.of(happens.astype(float), failing.weights, failing.chains, failing.related)
 
 

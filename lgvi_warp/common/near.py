@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from lgvi_warp.common.nearest import nearest
@@ -41,7 +41,7 @@ def near_names(*takers: Callable[..., Any]) -> Callable[[F], F]:
         @functools.wraps(call)
         def wrapper(*args: Any, **settings: Any) -> Any:
             if not known.issuperset(settings):
-                refuse_argument(call.__qualname__, next(name for name in settings if name not in known), names)
+                refuse_unknown(call, settings, names)
             return call(*args, **settings)
 
         return wrapper  # type: ignore[return-value]
@@ -61,7 +61,7 @@ def near_keywords(kind: type) -> None:
     def wrapper(self: Any, *args: Any, **settings: Any) -> None:
         # A subclass has keywords of its own, which it hands on.
         if type(self) is kind and not known.issuperset(settings):
-            refuse_argument(kind.__qualname__, next(name for name in settings if name not in known), names)
+            refuse_unknown(kind, settings, names)
         init(self, *args, **settings)
 
     setattr(wrapper, MARK, kind)
@@ -80,10 +80,12 @@ def arguments_of(*functions: Any) -> tuple[str, ...] | None:
     return None if any_word else tuple(name for name in names if name not in {"self", "cls"})
 
 
-def refuse_argument(function: str, word: str, names: tuple[str, ...]) -> None:
-    """Raise the SceneError of an unknown keyword, which is a TypeError, too."""
+def refuse_unknown(call: Any, settings: Iterable[str], names: Iterable[str] | None) -> None:
+    """Raise the SceneError of the first unknown keyword, which is a TypeError, too."""
     from lgvi_warp.common.errors import UnknownArgument
 
+    names = tuple(names or ())
+    word = next(name for name in settings if name not in names)
     meant = next((name for name in names if word.casefold() in ELSEWHERE.get(name, ())), None) or nearest(word, names)
     remedy = f"did you mean {meant!r}?" if meant else f"known: {', '.join(names)}"
-    raise UnknownArgument([f"{function}() got an unexpected keyword argument {word!r}; {remedy}"])
+    raise UnknownArgument([f"{call.__qualname__}() got an unexpected keyword argument {word!r}; {remedy}"])

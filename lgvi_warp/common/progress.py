@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import Any, ParamSpec, TextIO, TypeVar
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.common.near import near_names
+from lgvi_warp.common.near import arguments_of, refuse_unknown
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -132,10 +132,13 @@ def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
     Returns: The same function, which takes True (a bar on a terminal or in a notebook, lines elsewhere) and False (nothing)
         too.
     """
-    call = near_names()(call)
+    names = arguments_of(call)
+    known = None if names is None else frozenset(names)
 
     @functools.wraps(call)
     def wrapper(*args: P.args, **settings: P.kwargs) -> R:
+        if known is not None and not known.issuperset(settings):
+            refuse_unknown(call, settings, names)
         progress = settings.get("progress")
         if progress is not None and not isinstance(progress, bool) and not callable(progress):
             raise refusal(

@@ -75,8 +75,9 @@ def meeting(h: float, end: float, times: Sequence[float]) -> tuple[Fraction, Fra
     Returns: The step, the one asked for and the times, with the end first, as they were read.
     """
     found, every = [], [float(end), *map(float, times)]
-    for reading in (_as_decimals, _as_float32, _in_steps, _as_parts):
-        read = reading(float(h), every)
+    decimals = [exact(t) for t in (float(h), *every)]
+    for reading in (None, _as_float32, _in_steps, _as_parts):
+        read = reading(float(h), every) if reading else decimals
         if read is not None:
             meant, *others = read
             spacing = shared_spacing(others)
@@ -92,11 +93,6 @@ def _of_float32(x: float) -> float:
     with np.errstate(over="ignore"):
         single = np.float32(x)
     return float(str(single)) if float(single) == x else float(x)
-
-
-def _as_decimals(h: float, times: Sequence[float]) -> list[Fraction]:
-    """Read the step and times as decimals."""
-    return [exact(t) for t in (h, *times)]
 
 
 def _as_float32(h: float, times: Sequence[float]) -> list[Fraction] | None:

@@ -19,13 +19,13 @@ from lgvi_warp.scene.plausibility import LIMITS, ends_at_the_surface, floats
 LOOKS, FEWEST = 8.0, 8
 
 
-def steps_between_looks(scene: SceneLike, h: float) -> int | None:
-    """Steps of h [s] between two looks at the depth in waves; None where no waves are, or the surface is known."""
+def time_between_looks(scene: SceneLike) -> float | None:
+    """Time [s] between two looks at the depth in waves; None where no waves are, or the surface is known."""
     seas = [term for term in scene.terms if term.type == "waves" and np.any(term.amplitudes)]
     if not seas or ends_at_the_surface(scene) or floats(scene):
         return None
     period = min(float(np.ravel(sea.periods)[np.argmax(np.ravel(sea.amplitudes))]) for sea in seas)
-    return max(FEWEST, int(period / LOOKS / h))
+    return period / LOOKS
 
 
 class Heights:

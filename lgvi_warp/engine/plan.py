@@ -19,7 +19,7 @@ from lgvi_warp.common.phases import Phases
 from lgvi_warp.control.signals import check_signals, ordered
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.going_on import begun
-from lgvi_warp.engine.heights import steps_between_looks
+from lgvi_warp.engine.heights import FEWEST, time_between_looks
 from lgvi_warp.engine.kernel import Kernel
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, resists
 from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of, with_tangents
@@ -187,13 +187,12 @@ def choose_plan(
     faults.raise_if_any()
     shared = _shared(ensemble, _adds_forces(method) and bool(damping_terms(scene.terms)))
     varied = ensemble.varied_names
-    shared.take(scene, varied, method)
-    facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
-    if ensemble.copies is not None:
-        # The kernel must have what a number changes that is nothing now.
-        facts = replace(survey(ensemble.copies.surveyed, method, shared), odd=facts.odd)
     # Before anything is packed, which depends on more than the scene and the method.
-    shared.note(scene, varied, method)
+    with shared.continued(scene, varied, method):
+        facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
+        if ensemble.copies is not None:
+            # The kernel must have what a number changes that is nothing now.
+            facts = replace(survey(ensemble.copies.surveyed, method, shared), odd=facts.odd)
     choice = choose_kernel(ensemble, method, facts, built_in, checks, shared.user_axes)
     check_backward_drag(ensemble, choice, method, grid.h)
     if on_failure == "substep":
@@ -222,14 +221,13 @@ def choose_plan(
         width_source=width_source,
         kernel=Kernel(spec, choice),
         layout=layout,
-        launches=_launches(grid, method, spec, layout, ticks, steps_between_looks(scene, grid.h)),
+        launches=_launches(grid, method, spec, layout, ticks, time_between_looks(scene)),
         facts=facts,
         shared=shared,
     )
     settings = method, grid.h, dtype, width, checks, on_failure, layout.fields, facts.decisive
-    shared.take(scene, varied, settings)
-    many_rows = ensemble.copies is None and rows_shared(plan)
-    shared.note(scene, varied, settings)
+    with shared.continued(scene, varied, settings):
+        many_rows = ensemble.copies is None and rows_shared(plan)
     if many_rows:
         spec = spec._replace(shared_rows=True)
         plan = replace(plan, spec=spec, kernel=Kernel(spec, choice))
@@ -249,7 +247,7 @@ def _adds_forces(method: Method) -> bool:
 
 
 def _launches(
-    grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, ticks: bool, looks: int | None
+    grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, ticks: bool, apart: float | None
 ) -> Launches:
     controller, size = layout.choice.controller, 8 if spec.real == wp.float64 else 4
     return Launches(
@@ -262,7 +260,7 @@ def _launches(
         every=None if controller is None else controller.every(grid.h),
         has_callback=layout.choice.has_callback,
         ticks=ticks,
-        looks=looks,
+        looks=None if apart is None else max(FEWEST, int(apart / grid.h)),
     )
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -129,18 +130,20 @@ class SharedResultsCache:
     # The last survey, and what it asked (see lgvi_warp.engine.survey).
     surveyed: Any = None
 
-    def take(self, scene: Any, names: Iterable[str], settings: Any) -> None:
-        """Take what `note` kept of an earlier run of the same scene with these settings, in which the same names varied."""
-        kept, varying = _known_of(scene).get((frozenset(names), settings), ({}, {}))
+    @contextlib.contextmanager
+    def continued(self, scene: Any, names: Iterable[str], settings: Any) -> Iterator[None]:
+        """Begin with results of an earlier run of the same scene, varied names and settings, and keep those after it.
+
+        settings: all that results follow from beside the scene's numbers.
+        """
+        known, place = _known_of(scene), (frozenset(names), settings)
+        kept, varying = known.get(place, ({}, {}))
         self._kept.update(kept)
         self._varying.update(varying)
-
-    def note(self, scene: Any, names: Iterable[str], settings: Any) -> None:
-        """Keep what is known now for later runs; settings: all that it follows from beside the scene's numbers."""
-        known = _known_of(scene)
+        yield
         if len(known) >= MOST_KNOWN:
             known.clear()
-        known[frozenset(names), settings] = dict(self._kept), dict(self._varying)
+        known[place] = dict(self._kept), dict(self._varying)
 
     def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
         """A result from memory, or computed."""

@@ -82,7 +82,7 @@ def test_looks_depend_on_no_launch_and_change_no_bit(monkeypatch):
     assert set(counted(first)) < set(counted(whole))
     for name in ("warnings", "warning_time", "warning_value"):
         np.testing.assert_array_equal(getattr(second, name), getattr(whole, name))
-    monkeypatch.setattr(plan, "steps_between_looks", lambda scene, h: None)
+    monkeypatch.setattr(plan, "time_between_looks", lambda scene: None)
     without = lw.solve(fleet, "rk4", h=STEP, t1=END, save=save)
     np.testing.assert_array_equal(without.position, whole.position)
     assert len(counted(without)) < len(counted(whole))

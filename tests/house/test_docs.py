@@ -26,7 +26,7 @@ def cases(language, *names):
     ]
 
 
-TOML = cases("toml", "sampling.md", "sensitivity.md")
+TOML = cases("toml", "sampling.md", "distributions.md", "sensitivity.md")
 
 
 @pytest.mark.parametrize("text", TOML)

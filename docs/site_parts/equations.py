@@ -17,7 +17,7 @@ from docutils.utils.math import latex2mathml
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "theory"
-FENCE = re.compile(r"^```math\n(.*?)^```\n+(Code: [^\n]*\n)?", re.DOTALL | re.MULTILINE)
+FENCE = re.compile(r"^```math\n(.*?)^```\n+(Code: (?:[^\n]+\n)+)?", re.DOTALL | re.MULTILINE)
 TAG = re.compile(r"\\tag\{(\w+)\}")
 LINK = re.compile(r"\[`([\w.]+)`\]\(([^)]+)\)")
 # In a docstring or comment: docs/theory/integrator.md, (13), (14)

@@ -35,7 +35,7 @@ class Until:
 
     The run stops at the end of a block. Intervals are looked at in the order of the blocks, so that neither the number
     of members nor any bit depends on threads; with replicates of a design, at powers of two of members.
-    docs/guide/statistics.md says how stopping affects coverage.
+    docs/guide/statistics_accuracy.md has the effect of stopping on coverage.
 
     Args:
         statistic: the name of one of the run's statistics as the command prints it: "mean position"; one component,

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Path of an argument from `lw.solve` to the kernel: `python -m tests.house.path h [scene.toml]` prints its walk.
 
+`python -m tests.house.path files` prints the files that a run enters, in the order of their first calls.
+
 A real run of a scene's first members is watched. A stay is a function that has the value in a name, in a container or in an
 attribute that it reads, or a class whose object holds it. A climb is a step of this walk, in the order of first visits, from a
 room to a higher one.
 """
 
+import importlib
+import inspect
 import os
 import sys
 import threading
@@ -51,6 +55,7 @@ class Walk:
 
     def __init__(self, value):
         self.value, self.begun, self.found, self.launched = value, {}, [], False
+        self.files: dict[str, None] = {}
 
     def is_it(self, value):
         return isinstance(value, float) and value == self.value
@@ -65,6 +70,9 @@ class Walk:
     def watch(self, frame, event, _):
         """Look at each function of the program when it is left: all that it had is in its names then."""
         code = frame.f_code
+        # What an import runs, modules and bodies of classes, is no call.
+        if event == "call" and code.co_flags & inspect.CO_OPTIMIZED and (place := place_of(code.co_filename)):
+            self.files.setdefault(place[1])
         if event == "call" and not self.launched:
             self.begun[frame] = len(self.begun)
         self.launched = self.launched or (event == "call" and code.co_qualname == LAUNCH)
@@ -86,9 +94,9 @@ class Walk:
         return list(dict.fromkeys(found[1:] for found in sorted(self.found)))
 
 
-def walked(argument, scene=ROOT / "examples" / "paper.toml"):
-    """The stays of an argument in a small run of a scene."""
-    fleet = lw.Ensemble(lw.Scene.load(scene), MEMBERS)
+def watched(argument, scene):
+    """The Walk of an argument in a run of a scene's first members."""
+    fleet = lw.Ensemble(scene, MEMBERS)
     walk = Walk(ARGUMENTS[argument])
     before = sys.getprofile()
     threading.setprofile(walk.watch)
@@ -98,7 +106,19 @@ def walked(argument, scene=ROOT / "examples" / "paper.toml"):
     finally:
         sys.setprofile(before)
         threading.setprofile(None)
-    return walk.stays()
+    return walk
+
+
+def walked(argument, scene=ROOT / "examples" / "paper.toml"):
+    """The stays of an argument in a small run of a scene file."""
+    return watched(argument, lw.Scene.load(scene)).stays()
+
+
+def entered():
+    """Files that a run of a scene without a method enters, in the order of their first calls; once in a process."""
+    for module in ("lgvi_warp.calls.solve", "lgvi_kernels.advance.kernel"):
+        importlib.import_module(module)
+    return list(watched("h", lw.Scene.named("sphere")).files)
 
 
 def climbs(stays):
@@ -115,6 +135,9 @@ def main(argument, *scene):
 
 
 if __name__ == "__main__":
+    if sys.argv[1:] == ["files"]:
+        print(*entered(), sep="\n")
+        sys.exit()
     if sys.argv[1:2] == [] or sys.argv[1] not in ARGUMENTS:
         sys.exit(f"give one of {', '.join(ARGUMENTS)}")
     main(*sys.argv[1:3])

@@ -26,7 +26,7 @@ def cases(language, *names):
     ]
 
 
-TOML = cases("toml", "sampling.md", "sensitivity.md")
+TOML = cases("toml", "sampling.md", "distributions.md", "sensitivity.md")
 
 
 @pytest.mark.parametrize("text", TOML)
@@ -139,3 +139,12 @@ def test_every_type_of_statistic_is_on_its_page(at_ticks):
         if bool(kind.ticks) is at_ticks:
             assert f"`{name}`" in page
             assert f"`lw.{door}.{kind.__name__}`" in page
+
+
+def test_each_word_of_the_glossary_is_defined_once_and_in_order():
+    text = (ROOT / "docs" / "reference" / "glossary.md").read_text()
+    sections = [re.findall(r"^\| ([a-z][\w ,-]*) \| ", part, re.MULTILINE)[1:] for part in text.split("\n## ")[1:]]
+    words = [word for section in sections for row in section for word in row.split(", ")]
+    assert len(words) > 60
+    assert len(set(words)) == len(words)
+    assert all(section == sorted(section) for section in sections)

@@ -23,7 +23,7 @@ OF_TESTS = {
     "house/test_readme.py": "README.md docs/guide/methods.md",
     "house/test_docs.py":
         "docs/controllers/README.md docs/controllers/actuators.md docs/controllers/allocation.md "
-        "docs/controllers/callback.md docs/controllers/metrics.md docs/controllers/signals.md "
+        "docs/controllers/callback.md docs/controllers/metrics.md docs/controllers/signals.md docs/guide/distributions.md "
         "docs/guide/events.md docs/guide/failed_members.md docs/guide/many_calls.md docs/guide/sampling.md "
         "docs/guide/sensitivity.md docs/guide/statistics.md docs/guide/vehicles.md",
     "control/test_bad_sensors.py": "docs/controllers/faults.md docs/controllers/sensors.md",

@@ -33,7 +33,7 @@ DOORS = {
     "terms": ("Terms: what acts", "[pages](../guide/terms/README.md)"),
     "events": ("Events: what stops a member", "[page](../guide/events.md)"),
     "control": ("Parts of a controller", "[pages](../controllers/README.md)"),
-    "distributions": ("Distributions: how a number varies", "[page](../guide/sampling.md)"),
+    "distributions": ("Distributions: how a number varies", "[page](../guide/distributions.md)"),
     "designs": ("Designs: how members are chosen", "[page](../guide/sampling.md)"),
     "statistics": ("Statistics over members", "[page](../guide/statistics.md)"),
     "metrics": ("Metrics of a control loop", "[page](../controllers/metrics.md)"),

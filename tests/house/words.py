@@ -63,9 +63,9 @@ def of_page(text):
 
 
 def places(folder):
-    """(path, line, fault) of all sources and pages below a folder; notebooks are made from pages."""
+    """(path, line, fault) of all sources and pages below a folder, but for notebooks and the pages that a build writes."""
     for path in sorted((ROOT / folder).rglob("*")):
-        if path.suffix in (".py", ".md") and "notebooks" not in path.parts:
+        if path.suffix in (".py", ".md") and not {"notebooks", "built"} & set(path.parts):
             reader = of_python if path.suffix == ".py" else of_page
             yield from ((path.relative_to(ROOT).as_posix(), *fault) for fault in reader(path.read_text()))
 

@@ -938,7 +938,7 @@ def test_coverage_of_runs_that_stop_by_themselves():
     from benchmarks.tables.coverage import stops
 
     for law, least, _, held, _ in stops(REPETITIONS):
-        # Stopping costs some coverage where ticks begin early and the distribution is skewed (docs/guide/statistics.md).
+        # Stopping costs coverage if ticks begin early and the distribution is skewed (docs/guide/statistics_accuracy.md).
         assert held >= (0.93 if least >= 1024 and law == "normal" else 0.9), (law, least, held)
         assert held <= 0.97
 

@@ -7,8 +7,6 @@ import functools
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
-from lgvi_warp.common.nearest import nearest
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Of the flags of a function's code: it takes any keyword.
@@ -83,6 +81,7 @@ def arguments_of(*functions: Any) -> tuple[str, ...] | None:
 def refuse_unknown(call: Any, settings: Iterable[str], names: Iterable[str] | None) -> None:
     """Raise the SceneError of the first unknown keyword, which is a TypeError, too."""
     from lgvi_warp.common.errors import UnknownArgument
+    from lgvi_warp.common.nearest import nearest
 
     names = tuple(names or ())
     word = next(name for name in settings if name not in names)

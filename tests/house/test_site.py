@@ -48,7 +48,7 @@ class Base:
             in two lines.
     """
 
-    def __init__(self, reported: int, silent: float = 1.0):
+    def __init__(self, told: int, silent: float = 1.0):
         pass
 
 
@@ -63,7 +63,7 @@ class Heir(Base):
         silent: no parameter.
     """
 
-    def __init__(self, reported: int, silent: float, a=(), *, b: "lw.Scene | None" = None):
+    def __init__(self, told: int, silent: float, a=(), *, b: "lw.Scene | None" = None):
         pass
 
     def method(self, x, *rest):

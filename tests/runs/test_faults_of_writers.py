@@ -88,7 +88,9 @@ def test_a_disk_that_is_full_at_any_place(name, parts, run, tmp_path):
     write()
     path = tmp_path / name
     content = path.read_bytes()
-    for size in sorted({0, 1, len(content) - 1, *(len(content) * k // parts for k in range(parts))}):
+    # A recording is a few bytes longer or shorter each time.
+    last = len(content) - (len(content) // 50 if name.endswith(".rrd") else 1)
+    for size in sorted({0, 1, last, *(len(content) * k // parts for k in range(parts))}):
         path.write_bytes(b"good")
         with warnings.catch_warnings():
             warnings.simplefilter("error", ResourceWarning)

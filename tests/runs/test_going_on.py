@@ -38,10 +38,10 @@ def one_run(fleet, method, pieces=PIECES, length=0.1, **settings):
     return lw.solve(fleet, method, **{"h": STEPS, "t1": pieces * length, "save": save} | settings)
 
 
-def in_pieces(fleet, method, chunks=PIECES, length=0.1, **settings):
+def in_pieces(fleet, method, pieces=PIECES, length=0.1, **settings):
     """One run after the other."""
     result, save = None, lw.SaveAt(**settings.pop("saved", {}))
-    for i in range(1, chunks + 1):
+    for i in range(1, pieces + 1):
         start = None if result is None else result.final
         how = {"h": STEPS, "t1": round(i * length, 9), "save": save} | settings
         result = lw.solve(fleet, method, **how, start=start)

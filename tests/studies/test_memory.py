@@ -103,7 +103,7 @@ def split(**more):
     noise = lw.terms.WrenchNoise(force=(30.0, 0.0, 0.0))
     scene = lw.Scene.named("sphere", terms=[lw.terms.Drag(linear=[20.0] * 3 + [1.0] * 3), noise])
     members = lw.Ensemble(scene, vary={"start.position[0]": lw.distributions.Normal(std=0.5)})
-    more = {"by": "splitting", "looks": 5, "relative_error": 0.5, "most": 10_000, "seed": 2} | more
+    more = {"by": "splitting", "intervals": 5, "relative_error": 0.5, "most": 10_000, "seed": 2} | more
     return lw.rare_event(members, "position[0] - 6.0", method="psi_x", h=0.1, t1=3.0, threads=1, **more)
 
 

@@ -7,9 +7,11 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
+from lgvi_warp.common.arguments import explained
 from lgvi_warp.common.errors import Faults, SceneError
 
 
+@explained
 class InFile:
     """A term or an event that is also made of a file. The extension's words are its type."""
 

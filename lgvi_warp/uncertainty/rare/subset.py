@@ -23,6 +23,8 @@ FIRST_SCALE = 0.6
 MOST_LEVELS = 17
 # A threshold that so large a part of a level's members reaches sorts nothing out.
 FLAT = 0.5
+# How often members that no event narrows may look narrower in any number.
+BY_CHANCE = 1e-3
 # Fewest members that may make the next level, where all others have one value that is farthest from the event.
 FEWEST_SEEDS = 10
 
@@ -139,13 +141,20 @@ class _Climber:
         inside = np.flatnonzero(level.limits >= bound)
         chosen = np.resize(self.rng.permutation(inside), self.seeds)
         self._u, self._limits = [level.u[chosen]], [level.limits[chosen]]
-        # Numbers that the event narrows get steps as narrow.
-        self._widths = np.clip(level.u[inside].std(axis=0), 1e-3, 1.0)
+        self.inside, self.of = level.u[inside], inside // (len(level.limits) // level.chains)
         share = len(inside) / len(level.limits)
         log_probability = level.log_probability + math.log(share)
         variance = level.variance + share_variance(level.limits >= bound, level.chains)
         self._next = ChainLevel(level.u[:0], level.limits[:0], len(chosen), bound, log_probability, variance)
         self._accepted, self._steps = 0.0, 0
+
+    def step_as(self, others: Sequence[_Climber]) -> None:
+        """Take the widths of steps from other runs, if there are any: widths by a run's own members would pull it there."""
+        runs = [run.inside for run in others if run is not self]
+        if runs:
+            self._widths = np.clip(np.concatenate(runs).std(axis=0), 1e-3, 1.0)
+        else:
+            self._widths = widths_of(self.inside, len(np.unique(self.of)))
 
     def proposals(self) -> np.ndarray:
         """The next places of all chains: each keeps the standard normal law (Papaioannou et al. 2015).
@@ -190,6 +199,18 @@ class _Climber:
         )
 
 
+def widths_of(u: np.ndarray, count: int) -> np.ndarray:
+    """Widths of steps (d,): numbers that the event narrows get steps as narrow; u: (n, d), of so many independent members.
+
+    docs/theory/rare_events.md, (B4).
+    """
+    from scipy.stats import chi2
+
+    spread = u.std(axis=0)
+    least = math.sqrt(chi2.ppf(BY_CHANCE / u.shape[1], count - 1) / count) if count > 1 else 0.0
+    return np.where(spread < least, np.maximum(spread, 1e-3), 1.0)
+
+
 def share_variance(happens: np.ndarray, chains: int) -> float:
     """Variance of the relative error of a share, of members (n,) chain by chain: from the spread of the chains' own shares.
 
@@ -224,6 +245,8 @@ def climb(
     while active := [run for run in runs if not run.arrived]:
         for run in active:
             run.begin()
+        for run in active:
+            run.step_as(active)
         for _ in range(1, round(1.0 / SHARE)):
             places = [run.proposals() for run in active]
             limits = limit(np.concatenate(places))

@@ -45,7 +45,9 @@ def raw(function, arguments):
     except DELIBERATE:
         return None
     except Exception as error:
-        inside = any(frame.filename.startswith(PACKAGE) for frame in traceback.extract_tb(error.__traceback__))
+        # A class hands its arguments on after a look at its keywords.
+        frames = [frame.filename for frame in traceback.extract_tb(error.__traceback__)]
+        inside = any(name.startswith(PACKAGE) and not name.endswith("common/near.py") for name in frames)
         return None if isinstance(error, TypeError) and not inside else error
     return None
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.special import ndtr, ndtri
-from scipy.stats import beta
+from scipy.stats import beta, chi2
 
 import lgvi_warp as lw
 from lgvi_warp.criteria.success import success_of
@@ -19,7 +19,7 @@ from lgvi_warp.uncertainty.rare.failing import failing_of
 from lgvi_warp.uncertainty.rare.mixture import fitted
 from lgvi_warp.uncertainty.rare.plain import sampled
 from lgvi_warp.uncertainty.rare.search import RareAnswer, unseen
-from lgvi_warp.uncertainty.rare.subset import NoProgress, climb
+from lgvi_warp.uncertainty.rare.subset import NoProgress, climb, widths_of
 from lgvi_warp.uncertainty.rare.witness import Surroundings, wide_of, witnessed
 from tests.support.levels import first_levels
 from tests.support.rare import searched
@@ -280,7 +280,28 @@ def test_a_two_sided_event_moves_the_number_that_decides_and_no_noise():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("d", [10, 60, 400])
+def test_chains_are_right_where_the_size_of_much_noise_decides():
+    # Steps as wide as a run's own members are apart made it 1.7 times as likely.
+    for d, bound in ((40, chi2.ppf(1e-5, 40)), (200, chi2.ppf(1e-5, 200))):
+        found = [
+            searched(lambda u, b=bound: b - (u**2).sum(axis=1), d, relative_error=0.2, seed=seed) for seed in range(6)
+        ]
+        assert np.mean([each.probability for each in found]) == pytest.approx(1e-5, rel=0.3)
+        assert sum(each.interval()[0] <= 1e-5 <= each.interval()[1] for each in found) >= 5
+
+
+def test_steps_are_narrow_only_where_numbers_are_beyond_chance():
+    rng = np.random.default_rng(0)
+    for count, d in ((10, 1200), (50, 1200), (500, 3)):
+        u = rng.standard_normal((count, d))
+        assert (widths_of(u, count) == 1.0).all()
+    u[:, 1] *= 0.05
+    assert widths_of(u, 500).tolist() == [1.0, u[:, 1].std(), 1.0]
+    assert widths_of(u[:1], 1).tolist() == [1.0] * 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("d", [10, 60, 400, 1200])
 def test_irrelevant_noise_is_not_significant_over_seeds(d):
     scores, others = [], []
     for seed in range(20):

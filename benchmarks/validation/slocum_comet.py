@@ -110,9 +110,9 @@ def measured() -> Content:
     return Content(rows, curves)
 
 
-def _mean(what: str, allowed: Any, computed: Any, chosen: Any) -> Row:
+def _mean(what: str, known: Any, computed: Any, chosen: Any) -> Row:
     """Means of chosen legs; known to within the standard deviation between them."""
-    return Row(what, "m/s", allowed[chosen].mean(), allowed[chosen].std(ddof=1), computed[chosen].mean())
+    return Row(what, "m/s", known[chosen].mean(), known[chosen].std(ddof=1), computed[chosen].mean())
 
 
 def _rms(differences: Any, chosen: Any) -> float:

@@ -17,7 +17,7 @@ THRUSTS = dict(zip(SIDES, (("#000000", "-"), ("#0072B2", "--"), ("#D55E00", "-."
 LABELS = ("off its place [cm]", "turned by [deg]", "thrust [N]")
 
 
-def scene(allowed):
+def scene(known):
     """The vehicle, the current and the controller; `known`: whether the allocation leaves out the thruster that died."""
     # N/m, N/(m s), N s/m; N m, N m s
     gains = {"kp": [80.0] * 3, "ki": [15.0] * 3, "kd": [80.0, 80.0, 100.0], "kr": [10.0] * 3, "kw": [4.0] * 3}
@@ -26,7 +26,7 @@ def scene(allowed):
         guidance=[lw.control.SetPoint(position=PLACE, heading=0.0)],
         laws=[lw.control.PosePID(**gains, feedforward="restoring")],
         allocation=[lw.control.PseudoInverse(to="thrusters")],
-        faults=[lw.control.Fault(of="thrusters", channel=DEAD, time=DIES, gain=0.0, known=allowed)],
+        faults=[lw.control.Fault(of="thrusters", channel=DEAD, time=DIES, gain=0.0, known=known)],
     )
     current = lw.terms.Current(velocity=[-0.3, 0.15, 0.0])
     start = lw.Start(position=PLACE)

@@ -109,7 +109,7 @@ def errors(law, members=1000):
     return result.position[:, :, 2] - WANTED, result.time
 
 
-def plot(histories, item, path):
+def plot(histories, each, path):
     """The mean rewards of episodes while learning, and how far off their depth the vehicles are under each law."""
     from matplotlib.figure import Figure
 
@@ -124,7 +124,7 @@ def plot(histories, item, path):
         title="Learning", xlabel="steps of environments [thousands]", ylabel="mean reward of an episode's steps"
     )
     learning.legend()
-    for i, (name, (error, t)) in enumerate(item.items()):
+    for i, (name, (error, t)) in enumerate(each.items()):
         depths.plot(t, np.sqrt(np.mean(error**2, axis=1)), color=f"C{i}" if name in histories else "0.5", label=name)
     depths.set(title="1000 new vehicles", xlabel="time [s]", ylabel="root mean square depth error [m]", yscale="log")
     depths.legend()

@@ -111,7 +111,7 @@ def errors(law, members=1000):
     return result.position[:, :, 2] - WANTED, result.time
 
 
-def plot(history, item, path):
+def plot(history, each, path):
     """The learning curve, and depths of the members: median and the middle 90 %."""
     from matplotlib.figure import Figure
 
@@ -119,7 +119,7 @@ def plot(history, item, path):
     learning, depths = figure.subplots(1, 2)
     learning.plot(np.arange(1, len(history) + 1), history)
     learning.set(title="Learning", xlabel="generation", ylabel="least cost [m]", yscale="log")
-    for i, (name, (error, t)) in enumerate(item.items()):
+    for i, (name, (error, t)) in enumerate(each.items()):
         low, middle, high = np.quantile(error, [0.05, 0.5, 0.95], axis=1)
         depths.plot(t, middle, color=f"C{i}", label=name)
         depths.fill_between(t, low, high, color=f"C{i}", alpha=0.25)

@@ -50,9 +50,9 @@ def opened(source: Any) -> Any:
         raise refusal("file", type(source).__name__, "is one variable", "give the Dataset that has it")
     with contextlib.ExitStack() as stack:
         path, file = stack.enter_context(regular_file(source, "file"))
-        begin = file.read(8)
-        file.seek(0)
         try:
+            begin = file.read(8)
+            file.seek(0)
             if begin == HDF5:
                 _check_closed(file, path)
                 whole = library.open_dataset(file, engine="h5netcdf", cache=False, phony_dims="access")

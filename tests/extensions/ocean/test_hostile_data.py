@@ -202,6 +202,12 @@ def test_a_canary_sings(tmp_path, pipes):
     assert pipes.opened == {path}
 
 
+@pytest.mark.skipif(not os.path.exists("/proc/self/mem"), reason="the system shows no memory as a file")
+def test_a_file_that_cannot_be_read_is_refused():
+    with pytest.raises(lw.SceneError, match="is damaged, or no NetCDF file"):
+        lw.terms.CurrentField.from_dataset("/proc/self/mem", ORIGIN)
+
+
 def test_soft_links_and_circles_within_a_file_are_read(tmp_path):
     good(tmp_path / "a.nc")
     known = lw.terms.CurrentField.from_dataset(tmp_path / "a.nc", ORIGIN)

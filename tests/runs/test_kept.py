@@ -16,7 +16,8 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.store import open as stored
 from lgvi_warp.store.folder import Folder
 from lgvi_warp.store.state import state
-from tests.runs.test_store import FIELDS, flip, remove, tear
+from tests.runs.test_store import FIELDS
+from tests.support.hostile import flipped, removed, torn
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, forked, tree
 
 # Some members turn too fast for the step: |J^-1 a| reaches 1.
@@ -115,16 +116,16 @@ def test_no_failures_leave_no_group(tmp_path):
     assert state(tmp_path)["complete"]
 
 
-DAMAGED = (("kept/position/c.0.1.0", flip, "has changed"), ("kept/attitude/c.0.0.0.0", tear, "is torn"),
-           ("kept/vehicle.mass/c.1", remove, "is missing"), ("kept/position/zarr.json", flip, "has changed"),
-           ("kept/member/c.0", flip, "has changed"), ("kept/blocks/000000256.json", remove, "is missing or damaged"),
-           ("kept/blocks/000000000.json", flip, "is missing or damaged"), ("kept/created.json", flip, "is damaged"),
-           ("kept/zarr.json", tear, "is damaged"), ("kept", shutil.rmtree, "is missing"))  # fmt: skip
+DAMAGED = (("kept/position/c.0.1.0", flipped, "has changed"), ("kept/attitude/c.0.0.0.0", torn(0.99), "is torn"),
+           ("kept/vehicle.mass/c.1", removed, "is missing"), ("kept/position/zarr.json", flipped, "has changed"),
+           ("kept/member/c.0", flipped, "has changed"), ("kept/blocks/000000256.json", removed, "is missing or damaged"),
+           ("kept/blocks/000000000.json", flipped, "is missing or damaged"), ("kept/created.json", flipped, "is damaged"),
+           ("kept/zarr.json", torn(0.99), "is damaged"), ("kept", shutil.rmtree, "is missing"))  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "harm", "word"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h, _ in DAMAGED])
 def test_damage_is_seen_and_mended(copy, complete, name, harm, word, capsys):
-    harm(copy / name)
+    harm(copy / name, None)
     assert cli.main(["info", str(copy)]) == 1
     said = capsys.readouterr().out
     assert f"damage      {name} {word}" in said

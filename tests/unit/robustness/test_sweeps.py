@@ -12,9 +12,10 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
+from lgvi_warp.criteria import success
 from lgvi_warp.criteria.memory import key_of
 from lgvi_warp.distributions import Normal, Uniform
-from lgvi_warp.robustness.sweeps import cases, output, setup, success, sweep
+from lgvi_warp.robustness.sweeps import cases, output, setup, sweep
 from lgvi_warp.robustness.sweeps.file import arguments_of_file
 from lgvi_warp.robustness.sweeps.record import Record, Records
 from lgvi_warp.robustness.sweeps.sweep_table import coordinates

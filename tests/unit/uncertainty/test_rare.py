@@ -134,7 +134,7 @@ def test_what_is_likely_is_sampled_plainly():
 def test_plain_members_that_meet_no_event_leave_it_to_chains():
     # Some 3,000 plain members expect 4 events: of a hundred seeds one meets none.
     p, d = 1.2e-3, 70
-    found = searched(lambda u: u.sum(axis=1) / math.sqrt(d) + ndtri(p), d, relative_error=0.5, seed=35)
+    found = searched(lambda u: u.sum(axis=1) / math.sqrt(d) + ndtri(p), d, relative_error=0.5, seed=45)
     assert found.estimator == "subset"
     assert abs(found.probability / p - 1.0) < 3.0 * found.spread
     assert found.weights.sum() == pytest.approx(1.0)

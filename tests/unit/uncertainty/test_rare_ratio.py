@@ -55,8 +55,8 @@ def compared(first, second, seed, **more):
 def test_the_ratio_is_that_of_the_normal_law(weighted):
     near, far = -ndtri(1e-5), -ndtri(4e-6)
     found = compared(beyond(near), beyond(far), 1, weighted=weighted)
-    # Weights know each probability to 2 %, for what their second look may have missed: members in common say more.
-    assert found.paired
+    # Weights know each probability to 2 %: either way may have the shorter interval.
+    assert found.paired or weighted
     assert found.lower < 0.4 < found.upper
     assert np.log(found.upper / found.lower) < (0.13 if weighted else 0.9)
     back = compared(beyond(far), beyond(near), 1, weighted=weighted)

@@ -41,10 +41,10 @@ def read(path):
     return {"seed": 0, "members": 0, "above": [0] * len(BOUNDS), "answers": []}
 
 
-def write(path, allowed):
+def write(path, content):
     """Put it in place of what was known before, whole or not at all."""
     new = path.with_suffix(".new")
-    new.write_text(json.dumps(allowed))
+    new.write_text(json.dumps(content))
     new.replace(path)
 
 
@@ -84,13 +84,13 @@ def add_rare(path, above, by, seed, error):
     write(path, known)
 
 
-def lines(allowed):
+def lines(content):
     """The answers beside plain members, a line each: how far apart they are, in both errors."""
-    yield f"{allowed['members']:,} plain members"
-    for answer in allowed["answers"]:
-        hits = allowed["above"][int(np.argmin(np.abs(BOUNDS - answer["above"])))]
-        share, p = hits / max(1, allowed["members"]), answer["probability"]
-        error = math.hypot(math.sqrt(max(1, hits)) / max(1, allowed["members"]), answer["relative_error"] * p)
+    yield f"{content['members']:,} plain members"
+    for answer in content["answers"]:
+        hits = content["above"][int(np.argmin(np.abs(BOUNDS - answer["above"])))]
+        share, p = hits / max(1, content["members"]), answer["probability"]
+        error = math.hypot(math.sqrt(max(1, hits)) / max(1, content["members"]), answer["relative_error"] * p)
         yield (
             f"above {answer['above']:g} m by {answer['by']}, seed {answer['seed']}: {p:.3g} "
             f"({100.0 * answer['relative_error']:.2g} %), plain {share:.3g} ({hits} members), "

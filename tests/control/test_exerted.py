@@ -92,11 +92,11 @@ FAULTS = {
 
 
 @pytest.mark.kernel
-@pytest.mark.parametrize("allowed", [False, True], ids=["unknown", "allowed"])
+@pytest.mark.parametrize("is_known", [False, True], ids=["unknown", "known"])
 @pytest.mark.parametrize("name", FAULTS)
-def test_energy_is_that_of_the_true_thrust(name, allowed):
+def test_energy_is_that_of_the_true_thrust(name, is_known):
     fields = ("velocity", "angular_velocity", "actuator")
-    scene, found = swinging(known=allowed, faults=FAULTS[name], save=lw.SaveAt(every=0.02, fields=fields))
+    scene, found = swinging(known=is_known, faults=FAULTS[name], save=lw.SaveAt(every=0.02, fields=fields))
     (thrusters,) = (term for term in scene.terms if term.type == "thrusters")
     lever = np.cross(thrusters.position, thrusters.direction)
     places = found.actuator[:, 0]

@@ -103,13 +103,13 @@ def test_without_waves_members_that_end_above_are_counted_by_any_way():
 
 
 @pytest.mark.kernel
-@pytest.mark.parametrize("allowed", ["event", "term", "box"])
-def test_a_scene_that_knows_its_surface_counts_none(allowed):
+@pytest.mark.parametrize("way", ["event", "term", "box"])
+def test_a_scene_that_knows_its_surface_counts_none(way):
     more = {
         "event": {"events": [lw.events.Surface()]},
         "box": {"events": [lw.events.Box(lower=[-99.0, -99.0, 0.0], upper=[99.0] * 3)]},
         "term": {"terms": [lw.terms.SurfaceBuoyancy(heights=0.3)]},
-    }[allowed]
+    }[way]
     fleet = fleet_in(*more.get("terms", ()), events=more.get("events", ()), members=8)
     result = lw.solve(fleet, "psi_s", h=STEP, t1=2.0)
     assert not counted(result).size

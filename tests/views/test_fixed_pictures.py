@@ -15,9 +15,9 @@ pytestmark = [
 ]
 
 
-def check(allowed, shown):
+def check(recorded, shown):
     """Difference of a picture from the recorded one, and the remedy."""
-    faults = differing(allowed, json.loads(json.dumps(shown)))
+    faults = differing(recorded, json.loads(json.dumps(shown)))
     remedy = "look at it (make gallery), then python -m tests.support.fixed_pictures --write"
     assert not faults, "\n".join([*faults[:20], remedy])
 

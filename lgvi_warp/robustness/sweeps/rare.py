@@ -53,7 +53,12 @@ class RareFailure:
             failing = Table(values={name: values[rows] for name, values in found.failing.own_values().items()})
         return cls(
             replace(
-                found, failing=failing, normals=numbers, draws=draws, weights=members.weights, chains=members.chains
+                found,
+                failing=failing,
+                normals=numbers,
+                draws=draws,
+                weights=members.weights,
+                ancestors=members.ancestors,
             ),
             members,
         )
@@ -139,7 +144,8 @@ class RareFailures:
             assert cell.fleet is not None
             try:
                 condition: Any = failing_of(self.success, self.setup.metrics, cell.fleet.scene)
-                found = rare_event(cell.fleet, condition, seed=self.setup.members.seed, progress=progress or False, **asked,
+                # Cells are compared as independent answers: each has its own seed.
+                found = rare_event(cell.fleet, condition, seed=int(key[:12], 16), progress=progress or False, **asked,
                                    **self.setup.settings, **execution)  # fmt: skip
                 answer = RareFailure.of(found)
                 if lasting:
@@ -198,12 +204,12 @@ class RareFailures:
         # No file holds times: they differ from run to run, where all else is the same to the byte.
         nothing = np.zeros((0, 0))
         small = replace(
-            answer.found, normals=nothing, draws=nothing, chains=np.zeros(0, int), seconds=0.0, plain_seconds=0.0
+            answer.found, normals=nothing, draws=nothing, ancestors=np.zeros(0, int), seconds=0.0, plain_seconds=0.0
         )
         words = np.frombuffer(json.dumps({"key": key, "found": small.to_dict()}).encode(), np.uint8)
         place_of(self._path(key), self.folder).parent.mkdir(parents=True, exist_ok=True)
         write_npz(self._path(key), {"words": words, "u": answer.members.u, "weights": answer.members.weights,
-                                    "chains": answer.members.chains, "related": np.array(answer.members.related)},
+                                    "ancestors": answer.members.ancestors},
                   self.folder)  # fmt: skip
 
     def _read(self, key: str) -> RareFailure | None:
@@ -213,12 +219,12 @@ class RareFailures:
         try:
             arrays = of_npz(self._path(key))
             words, u = parsed(arrays["words"].tobytes()), arrays["u"]
-            members = FailingMembers(u, arrays["weights"], arrays["chains"], float(arrays["related"]))
-            if words["key"] != key or not len(u) == len(members.weights) == len(members.chains):
+            members = FailingMembers(u, arrays["weights"], arrays["ancestors"])
+            if words["key"] != key or not len(u) == len(members.weights) == len(members.ancestors):
                 return None
             count = len(words["found"]["moved"])
             found = RareEvent.from_dict(
-                words["found"] | {"normals": u[:, :count], "draws": u[:, count:]} | {"chains": members.chains}
+                words["found"] | {"normals": u[:, :count], "draws": u[:, count:]} | {"ancestors": members.ancestors}
             )
             found = replace(found, seconds=np.nan, plain_seconds=np.nan)
             return RareFailure(found, members)

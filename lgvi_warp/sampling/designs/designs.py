@@ -47,12 +47,10 @@ class Saltelli(Sampling):
         faults = Faults("ensemble.sampling.saltelli.")
         faults.choice("second_order", self.second_order, (True, False))
         check_replicates(faults, self.replicates)
-        groups = () if self.groups is None else self.groups
+        groups = {} if self.groups is None else self.groups
         example = 'give {"start": ["start.position", "start.velocity"]}'
-        if isinstance(groups, Mapping):
-            pairs = list(groups.items())
-        else:
-            pairs = items_of(groups) or ([] if groups == () else [groups])
+        pairs = list(groups.items()) if isinstance(groups, Mapping) else items_of(groups)
+        pairs = [groups] if pairs is None else pairs
         if not all(isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
             faults.add("groups", groups, "is no mapping of names to lists of factors", example)
             pairs = []

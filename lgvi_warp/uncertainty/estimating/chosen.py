@@ -64,7 +64,10 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
         if ladder.settings:
             climbed.append(choice_of(pilot, ladder, asked))
         elif i == len(ladders) - 1 and not climbed:
-            causes = "; ".join(f"{name}: {why}" for name, why in list(ladder.refused.items())[-2:])
+            refused = list(ladder.refused.items())[-2:]
+            if len({why for _, why in refused}) == 1:  # no step would help
+                raise SceneError([refused[0][1]])
+            causes = "; ".join(f"{name}: {why}" for name, why in refused)
             raise SceneError([f"setting: no step was taken: {causes}; mend what fails, or fix method= and h="])
         if climbed and climbed[-1].ladder.end == "apart":
             break

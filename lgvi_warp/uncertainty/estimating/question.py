@@ -150,13 +150,13 @@ def _of_statistic(statistic: Statistic) -> Question:
         statistics.Mean | statistics.Exceedance | statistics.Quantiles | statistics.FirstPassage | MemberStatistic,
     ):
         raise refusal("of", statistic.key, "is no mean, probability or quantile of all members", REMEDY)
-    if statistic.quantity.size != 1:
-        problem = f"is of {statistic.quantity.size} numbers of each member"
-        raise refusal("of", statistic.key, problem, f"name one, such as {statistic.quantity.labels[0]!r}")
     if isinstance(statistic, MemberStatistic):
         _, gathering = metric_of("of", statistic)
         question = Question(f"mean {statistic.key}", statistic.unit or "1", Sought(), None, gathering)
         return _asked_of(question, _only(statistic))
+    if statistic.quantity.size != 1:
+        problem = f"is of {statistic.quantity.size} numbers of each member"
+        raise refusal("of", statistic.key, problem, f"name one, such as {statistic.quantity.labels[0]!r}")
     if isinstance(statistic, statistics.FirstPassage):
         return _of_passage(statistic)
     return _asked_of(_of_quantity(statistic.of), statistic)

@@ -63,7 +63,8 @@ class RareEvent(Saved):
         moved_z: by name, the z-score farthest from 0 of these three against all members; from 4.5 on it is no chance.
         by_condition: where the event is any of several conditions, (probability, lower, upper) of each alone by its words, and
             of "any" and "all" of them, over the whole run; empty otherwise, and where a status is among them.
-        chains: (m,), the chain of each of the failing members, where those of one are related; different numbers elsewhere.
+        ancestors: (m,), of each failing member the one of a first level from which it descends, or the run of splitting.
+            Members of one ancestor are related.
     """
 
     study: ClassVar[str] = "rare"
@@ -96,7 +97,7 @@ class RareEvent(Saved):
     moved_spread: Mapping[str, float] = field(default_factory=dict, repr=False)
     moved_z: Mapping[str, float] = field(default_factory=dict, repr=False)
     by_condition: Mapping[str, Chance] = field(default_factory=dict)
-    chains: np.ndarray = field(default_factory=lambda: np.zeros(0, int), repr=False)
+    ancestors: np.ndarray = field(default_factory=lambda: np.zeros(0, int), repr=False)
 
     def __str__(self) -> str:
         low, high = self.interval
@@ -148,7 +149,7 @@ class RareEvent(Saved):
         }
         chances = content.get("by_condition", {})
         more["by_condition"] = {name: Chance(*map(float, each)) for name, each in chances.items()}
-        more["chains"] = np.array(content.get("chains", ()), int)
+        more["ancestors"] = np.array(content.get("ancestors", ()), int)
         return cls(**content | arrays | more | {"failing": table, "runs": runs})
 
     def rows(self) -> Iterator[dict[str, Any]]:

@@ -93,27 +93,26 @@ def _words(name: str, mean: float, size: float, spread: float) -> str:
 
 
 def chances_of(
-    names: Iterable[str], rows: np.ndarray, weights: np.ndarray, chains: np.ndarray, of_any: Chance, spread: float
+    names: Iterable[str], rows: np.ndarray, weights: np.ndarray, ancestors: np.ndarray, of_any: Chance, spread: float
 ) -> dict[str, Chance]:
     """Probability of each condition alone, of any and of all, from the failing members' limits (k, m).
 
-    spread: of the relative error of the probability of any.
+    ancestors: (m,), those of one are related. spread: of the relative error of the probability of any.
     """
-    from scipy.special import ndtri
-    from scipy.stats import chi2
+    from scipy.stats import chi2, t
 
     happens = rows > 0.0
-    place = np.unique(chains, return_inverse=True)[1]
+    place = np.unique(ancestors, return_inverse=True)[1]
     events = {**dict(zip(names, happens, strict=True)), "any": None, "all": happens.all(axis=0)}
     found = {}
     for name, event in events.items():
         if event is None:
             found[name] = of_any
             continue
-        share, error = (float(each[0]) for each in mean_and_error(event[:, None].astype(float), weights, chains))
-        total = mean_and_error(np.ones((len(weights), 1)), weights, chains)[0][0]
+        share, error = (float(each[0]) for each in mean_and_error(event[:, None].astype(float), weights, ancestors))
+        total = mean_and_error(np.ones((len(weights), 1)), weights, ancestors)[0][0]
         clusters = np.bincount(place, weights)
-        count = float(total**2 / (clusters**2).sum()) / RELATED**2
+        count = float(total**2 / (clusters**2).sum())
         # None or all of so many may be chance: three of them bound what is hidden.
         hidden = min(1.0, 3.0 / count)
         if not event.any():
@@ -121,10 +120,10 @@ def chances_of(
         elif event.all():
             found[name] = Chance(of_any.probability, (1.0 - hidden) * of_any.lower, of_any.upper)
         else:
-            away = float(ndtri(0.975)) * math.hypot(spread, RELATED * error / share)
+            away = float(t.ppf(0.975, max(1.0, count - 1.0))) * math.hypot(spread, error / share)
             p, own = of_any.probability * share, np.bincount(place, weights * event)
-            # Few chains have it: no interval is narrower than that of their number (Garwood 1936).
-            few = float(own.sum() ** 2 / (own**2).sum()) / RELATED**2
+            # Few ancestors have it: no interval is narrower than that of their number (Garwood 1936).
+            few = float(own.sum() ** 2 / (own**2).sum())
             low = min(math.exp(-away), float(chi2.ppf(0.025, 2.0 * few)) / (2.0 * few))
             high = max(math.exp(away), float(chi2.ppf(0.975, 2.0 * few + 2.0)) / (2.0 * few))
             found[name] = Chance(p, p * low, min(of_any.upper, p * high))

@@ -40,13 +40,12 @@ class Mixture:
 
     def log_parts(self, u: np.ndarray) -> np.ndarray:
         """Logarithm of each part's share of the density at points (n, d): (n, k)."""
-        from scipy.linalg import solve_triangular
-
         logs = []
         for share, mean, root in zip(self.shares, self.means, self.roots, strict=True):
-            z = solve_triangular(root, (u - mean).T, lower=True)
+            # A triangular solve, however small, wakes all threads of LAPACK: 20 ms on a busy machine.
+            z = (u - mean) @ np.linalg.inv(root).T
             scale = np.log(np.diag(root)).sum() + 0.5 * u.shape[1] * math.log(2.0 * math.pi)
-            logs.append(math.log(share) - 0.5 * (z**2).sum(axis=0) - scale)
+            logs.append(math.log(share) - 0.5 * (z**2).sum(axis=1) - scale)
         return np.stack(logs, axis=1)
 
     def log_density(self, u: np.ndarray) -> np.ndarray:

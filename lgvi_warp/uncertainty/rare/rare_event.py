@@ -275,7 +275,7 @@ def _told(
     if condition.statuses:
         messages.append(WITH_STATUS)
     # Runs of splitting are independent; members of one are related, wherever they began.
-    related = result.of_run if isinstance(result, SplitAnswer) else chains
+    related = result.of_run if isinstance(result, SplitAnswer) else result.ancestors
     plain = (1.0 - result.probability) / (result.probability * max(result.spread, 1e-12) ** 2)
     return RareEvent(
         event=condition.label,
@@ -302,7 +302,7 @@ def _told(
         by_condition=chances_of(condition.names, result.rows, result.weights, related, of_any, result.spread)
         if several
         else {},
-        chains=chains,
+        ancestors=related,
         runs=result.runs,
         plain_members=plain,
         plain_seconds=plain * own.seconds / max(1, own.members),

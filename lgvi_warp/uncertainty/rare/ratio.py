@@ -11,12 +11,11 @@ import numpy as np
 
 from lgvi_warp.common.random import generator
 from lgvi_warp.uncertainty.rare.answer import RareEvent
-from lgvi_warp.uncertainty.rare.causes import RELATED
 from lgvi_warp.uncertainty.rare.limit import VehicleLimit
 
 # Most failing members of one event that are run in the other, and most of their normals; the fewest independent ones, in
 # effect, that happen in both.
-MOST_RUN, MOST_NUMBERS, FEWEST_SHARED = 4000, 4_000_000, 20.0
+MOST_RUN, MOST_NUMBERS, FEWEST_SHARED = 4000, 4_000_000, 8.0
 
 
 @dataclass(frozen=True)
@@ -28,15 +27,15 @@ class Share:
     count: float
 
     @classmethod
-    def of(cls, happens: np.ndarray, weights: np.ndarray, chains: np.ndarray, related: float = 1.0) -> Share:
-        """From members (n,) with weights, of which those of one chain are related; related: times the spread of chains."""
-        total = np.bincount(chains, weights)
+    def of(cls, happens: np.ndarray, weights: np.ndarray, ancestors: np.ndarray) -> Share:
+        """From members (n,) with weights, of which those of one ancestor (n,), counted from 0, are related."""
+        total = np.bincount(ancestors, weights)
         alike = bool((happens == happens[0]).all())
         share = float(happens[0]) if alike else float(weights @ happens) / total.sum()
-        # Of a ratio of two sums over independent chains.
-        away = np.bincount(chains, weights * (happens - share))
-        variance = related**2 * float((away**2).sum()) / total.sum() ** 2
-        count = float(total.sum() ** 2 / (total**2).sum()) / related**2
+        # Of a ratio of two sums over independent ancestors.
+        away = np.bincount(ancestors, weights * (happens - share))
+        variance = float((away**2).sum()) / total.sum() ** 2
+        count = float(total.sum() ** 2 / (total**2).sum())
         # Where all or none are seen, chance may have hidden one: no less than half a member is unsure.
         smooth = (share * count + 0.5) / (count + 1.0)
         variance = smooth * (1.0 - smooth) / (count + 2.0) if alike else variance
@@ -58,45 +57,22 @@ class RareRatio:
 
 
 class FailingMembers(NamedTuple):
-    """Members for which an event happens: normals u (m, d) of numbers and noise, weights (m,) and chains (m,) of them.
-
-    related: times the spread that chains tell, where they begin at members that are related.
-    """
+    """Members for which an event happens: normals u (m, d) of numbers and noise, their weights and their ancestors (m,)."""
 
     u: np.ndarray
     weights: np.ndarray
-    chains: np.ndarray
-    related: float
+    ancestors: np.ndarray
 
 
 def members_of(found: RareEvent) -> FailingMembers:
-    """An event's failing members: whole chains of them, some 4,000 at most."""
-    rng = generator(0, "rare pairs")
-    most = min(MOST_RUN, max(100, MOST_NUMBERS // max(1, found.normals.shape[1] + found.draws.shape[1])))
-    if found.estimator != "subset":
-        u, weights = np.concatenate([found.normals, found.draws], axis=1), found.weights
-        if len(u) > most:
-            u, weights = u[np.sort(rng.choice(len(u), most, p=weights))], np.full(most, 1.0 / most)
-        return FailingMembers(u, weights, np.arange(len(u)), 1.0)
-    runs = found.runs
-    if len(runs[0].parts):  # members that several conditions count
-        u, weights, chains = np.concatenate([found.normals, found.draws], axis=1), found.weights, found.chains
-        return _whole_chains(u, weights, np.unique(chains, return_inverse=True)[1], most, rng)
-    first = np.cumsum([0, *(int(run.failing_chains.max()) + 1 for run in runs)])
-    chains = np.concatenate([run.failing_chains + start for run, start in zip(runs, first, strict=False)])
-    u = np.concatenate([run.failing for run in runs])
-    weights = np.concatenate([np.full(len(run.failing), run.size * run.probability / len(run.failing)) for run in runs])
-    return _whole_chains(u, weights, chains, most, rng)
-
-
-def _whole_chains(
-    u: np.ndarray, weights: np.ndarray, chains: np.ndarray, most: int, rng: np.random.Generator
-) -> FailingMembers:
-    """Some of the members (m, d), about so many at most: whole chains."""
-    order = rng.permutation(np.unique(chains))
-    kept = np.isin(chains, order[: max(2, int(np.searchsorted(np.cumsum(np.bincount(chains)[order]), most)))])
-    chains = np.unique(chains[kept], return_inverse=True)[1]
-    return FailingMembers(u[kept], weights[kept] / weights[kept].sum(), chains, RELATED)
+    """An event's failing members, 4,000 at most: of more, drawn by their weights."""
+    u, weights = np.concatenate([found.normals, found.draws], axis=1), found.weights
+    ancestors = np.unique(found.ancestors, return_inverse=True)[1]
+    most = min(MOST_RUN, max(100, MOST_NUMBERS // max(1, u.shape[1])))
+    if len(u) > most:
+        kept = np.sort(generator(0, "rare pairs").choice(len(u), most, p=weights))
+        u, weights, ancestors = u[kept], np.full(most, 1.0 / most), ancestors[kept]
+    return FailingMembers(u, weights, ancestors)
 
 
 def carried(u: np.ndarray, own: VehicleLimit, other: VehicleLimit, seed: int) -> np.ndarray:
@@ -123,7 +99,7 @@ def shared(failing: FailingMembers, own: VehicleLimit, other: VehicleLimit, seed
     docs/theory/rare_events.md, (B12).
     """
     happens = other(carried(failing.u, own, other, seed)) > 0.0
-    return Share.of(happens.astype(float), failing.weights, failing.chains, failing.related)
+    return Share.of(happens.astype(float), failing.weights, failing.ancestors)
 
 
 def ratio_of(

@@ -73,6 +73,7 @@ class RareAnswer:
         notes: what else is worth knowing.
         rows: (k, m), their limits by each of k conditions.
         chains: (m,), of each the chain, members of which are related; different numbers where none are.
+        ancestors: (m,), of each the member of a first level from which it descends.
         parts: (m,), which of four parts each is in that are independent of each other.
         bounds: the interval of 95 % where it is that of a count; None otherwise.
     """
@@ -89,6 +90,7 @@ class RareAnswer:
     notes: tuple[str, ...] = ()
     rows: np.ndarray = field(default_factory=lambda: np.zeros((1, 0)))
     chains: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    ancestors: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     parts: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     bounds: tuple[float, float] | None = None
 
@@ -179,25 +181,28 @@ def _of_runs(groups: Groups) -> FailingGroup:
             parts = run.parts if len(run.parts) else np.ones(len(run.failing))
             rows = run.rows if len(run.rows) else run.failing_limits[None]
             weights = run.size / sizes * run.probability / len(parts) * parts
-            columns.append((run.failing, rows.T, weights, run.failing_chains + first, np.full(len(parts), i % RUNS)))
-            first += int(run.failing_chains.max(initial=-1)) + 1
-    u, rows, weights, chains, parts = (np.concatenate(column) for column in zip(*columns, strict=True))
-    return FailingGroup(u, rows.T, weights / weights.sum(), chains, parts)
+            chains, ancestors = run.failing_chains + first, run.failing_ancestors + first
+            columns.append((run.failing, rows.T, weights, chains, ancestors, np.full(len(parts), i % RUNS)))
+            first += run.size
+    u, rows, weights, chains, ancestors, parts = (np.concatenate(column) for column in zip(*columns, strict=True))
+    return FailingGroup(u, rows.T, weights / weights.sum(), chains, ancestors, parts)
 
 
 class FailingGroup(NamedTuple):
-    """Failing members: u (m, d), limits by condition (k, m), weights (m,), chains (m,), independent parts (m,)."""
+    """Failing members: u (m, d), limits by condition (k, m), and (m,) each weights, chains, ancestors, independent parts."""
 
     u: np.ndarray
     rows: np.ndarray
     weights: np.ndarray
     chains: np.ndarray
+    ancestors: np.ndarray
     parts: np.ndarray
 
     @classmethod
     def alone(cls, u: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> FailingGroup:
         """Members of which none is related to another."""
-        return cls(u, rows, weights, np.arange(len(u)), np.arange(len(u)) % RUNS)
+        own = np.arange(len(u))
+        return cls(u, rows, weights, own, own, own % RUNS)
 
 
 @dataclass(eq=False)
@@ -353,8 +358,9 @@ class RareSearch:
         """The answer; members that chains repeat are one, with the weights of all."""
         distinct, first, place = np.unique(members.u, axis=0, return_index=True, return_inverse=True)
         weights, rows = np.bincount(place.reshape(-1), members.weights, len(distinct)), members.rows[:, first]
+        related = (each[first] for each in (members.chains, members.ancestors, members.parts))
         return RareAnswer(*reported, estimator, self.members, distinct, rows.max(axis=0), weights, tuple(runs),
-                          tuple(self.notes), rows, members.chains[first], members.parts[first], bounds)  # fmt: skip
+                          tuple(self.notes), rows, *related, bounds)  # fmt: skip
 
     def importance(self, groups: Groups, chains: tuple[float, float] | None, seen: Witness) -> RareAnswer | None:
         """Weights of members drawn about the failing ones of all runs; None where they are not the answer.

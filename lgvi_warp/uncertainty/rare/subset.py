@@ -73,6 +73,7 @@ class SubsetRun:
         size: number of members of a level.
         members: number of members that were run.
         failing_chains: (m,), the chain of each of the failing members.
+        failing_ancestors: (m,), the member of the first level from which each descends.
         parts: (m,), where several conditions make the event, one over the number of these that each failing member fulfils.
         rows: (k, m), limits of the failing members by each condition; none where there is one.
     """
@@ -87,6 +88,7 @@ class SubsetRun:
     size: int
     members: int
     failing_chains: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    failing_ancestors: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     parts: np.ndarray = field(default_factory=lambda: np.zeros(0))
     rows: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
@@ -106,6 +108,9 @@ class _Climber:
     members: int = 0
     scale: float = FIRST_SCALE
     below: list[ChainLevel] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.ancestors = np.arange(len(self.level.limits))
 
     @property
     def arrived(self) -> bool:
@@ -140,7 +145,7 @@ class _Climber:
         level, bound = self.level, self.threshold()
         inside = np.flatnonzero(level.limits >= bound)
         chosen = np.resize(self.rng.permutation(inside), self.seeds)
-        self._u, self._limits = [level.u[chosen]], [level.limits[chosen]]
+        self._u, self._limits, self._ancestors = [level.u[chosen]], [level.limits[chosen]], self.ancestors[chosen]
         self.inside, self.of = level.u[inside], inside // (len(level.limits) // level.chains)
         share = len(inside) / len(level.limits)
         log_probability = level.log_probability + math.log(share)
@@ -178,7 +183,7 @@ class _Climber:
         """Go to the level that the chains have filled."""
         self.below.append(replace(self.level, u=self.level.u[:0]))
         u, limits = np.stack(self._u, axis=1), np.stack(self._limits, axis=1)
-        acceptance = self._accepted / max(1, self._steps)
+        acceptance, self.ancestors = self._accepted / max(1, self._steps), np.repeat(self._ancestors, u.shape[1])
         self.level = replace(self._next, u=u.reshape(-1, u.shape[2]), limits=limits.ravel(), acceptance=acceptance)
 
     def result(self) -> SubsetRun:
@@ -196,6 +201,7 @@ class _Climber:
             size=self.size,
             members=self.members,
             failing_chains=np.flatnonzero(happens) // (len(happens) // level.chains),
+            failing_ancestors=self.ancestors[happens],
         )
 
 

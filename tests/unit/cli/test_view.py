@@ -62,7 +62,7 @@ def test_a_disk_that_is_full_while_recording_is_one_line_and_leaves_no_file(tmp_
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))  # noqa: E731
     done = subprocess.run(arguments, capture_output=True, text=True, preexec_fn=limit)
     assert done.returncode == 1
-    assert "is the disk full, or the folder read-only?" in done.stderr
+    assert f"{tmp_path / 'a.rrd'}: File too large" in done.stderr
     assert done.stderr.count("\n") == 1
     assert [path.name for path in tmp_path.iterdir()] == ["result.npz"]
 

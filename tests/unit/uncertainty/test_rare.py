@@ -63,13 +63,17 @@ def test_spreads_are_told_as_they_are_over_seeds(name, p, most):
     # 38 of 40 is 19 in 20.
     assert (np.abs(ratios - 1.0) <= 3.0 * spreads).sum() >= 38
     # A standard deviation of 40 runs is known to 11 %, which is less than what 1.5 allows.
-    assert 1.0 / 1.5 < ratios.std() / math.sqrt((spreads**2).mean()) < 1.5
+    assert ratios.std() / math.sqrt((spreads**2).mean()) < 1.5
+    # What weights may not have seen (B17), at most half of the error asked, is told beside, and is absent here.
     by_weights = [each for each in found if each.estimator == "importance"]
+    beside = (0.5 * 0.1) ** 2 * len(by_weights) / len(found)
+    assert ratios.std() / math.sqrt((spreads**2).mean() - beside) > 1.0 / 1.5
     assert np.mean([each.members for each in found]) <= most
     if name in ("one side", "two sides", "unequal sides"):
         # The few whose weights were not believed took chains.
         assert len(by_weights) >= 32
-        assert np.mean([each.members for each in by_weights]) <= 2e4
+        # Two levels more take 6,000 members more.
+        assert np.mean([each.members for each in by_weights]) <= (2e4 if p == 1e-5 else 2.6e4)
 
 
 @pytest.mark.slow

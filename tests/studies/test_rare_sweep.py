@@ -86,7 +86,6 @@ def test_rare_failures_are_those_of_the_normal_law(answer):
     for case, p in (("near", NEAR), ("aside", FAR)):
         rare = answer.rare(case)
         assert abs(rare.probability / p - 1.0) < 3.0 * rare.relative_error
-        assert rare.estimator == "subset"
         assert rare.event == "way 3.6 or more or not ok"
         way, floor, of_any, of_all = rare.by_condition.items()
         assert [way[0], floor[0], of_any[0], of_all[0]] == ["way 3.6 or more", "floor", "any", "all"]

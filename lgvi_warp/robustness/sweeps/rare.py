@@ -145,7 +145,7 @@ class RareFailures:
             try:
                 condition: Any = failing_of(self.success, self.setup.metrics, cell.fleet.scene)
                 # Cells are compared as independent answers: each has its own seed.
-                found = rare_event(cell.fleet, condition, seed=int(key[:12], 16), progress=progress or False, **asked,
+                found = rare_event(cell.fleet, condition, seed=int(key[:7], 16), progress=progress or False, **asked,
                                    **self.setup.settings, **execution)  # fmt: skip
                 answer = RareFailure.of(found)
                 if lasting:

@@ -102,6 +102,22 @@ class Result(Summarized):
         compile_seconds: Time to load the kernel [s].
         compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
         run_seconds: Time of the run without that [s].
+        members: Number of members, n.
+        end_time: Time up to which each member ran [s], shape (n,).
+        final: Final states, from which a run can go on.
+        depth: Depth [m], shape (k, n).
+        altitude: Height above the floor [m], shape (k, n).
+        speed: Length of the velocity [m/s], shape (k, n).
+        euler: Roll, pitch and yaw [rad], shape (k, n, 3).
+        quaternion_wxyz: Unit quaternions of the attitudes, shape (k, n, 4).
+        energy: Kinetic and potential energy [J], shape (k, n).
+        dataset: The samples as an xarray Dataset.
+
+    Methods:
+        frame: Table of the members: inputs, outcome, end.
+        part: Select members.
+        save: Write the result to a file.
+        load: Read such a file.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -58,6 +58,14 @@ class Scene(Summarized):
         ensemble_settings: What varies, the section [ensemble] of a scene file; None if nothing does.
         events: What stops a member, such as lw.events.Surface(), or tables as in a scene file.
 
+    Methods:
+        load: Read a scene file, or a shipped scene ("example:paper").
+        named: Scene of a vehicle that comes with the package.
+        from_dict: Scene of tables in the form of a scene file.
+        to_dict: Tables in the form of a scene file.
+        parameters: Every number that may vary from member to member.
+        with_numbers: The scene with other numbers.
+
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
 

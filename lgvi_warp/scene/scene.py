@@ -244,7 +244,7 @@ class Scene(Summarized):
         """Read a scene from a scene file (TOML).
 
         Args:
-            path: Path of the file.
+            path: Path of the file; "example:NAME" for one that comes with the package (`lgvi-warp example` lists them).
             overrides: Values by dotted key ("vehicle.mass") that replace those of the file; by default none.
 
         Returns:
@@ -253,6 +253,9 @@ class Scene(Summarized):
         Raises:
             SceneError: If the file cannot be read or its content is wrong; the message lists every fault.
         """
+        from lgvi_warp.common.examples import located
+
+        path = located(path)
         content, text = tables_and_text(path, overrides)
         scene = from_dict(content)
         changes = {key: value if isinstance(value, str) else repr(value) for key, value in (overrides or {}).items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed beside the package: libraries of its extras, kernels in Warp's cache, the viewer."""
+"""Installed parts beside the package: libraries of its extras, kernels in Warp's cache, the viewer."""
 
 from __future__ import annotations
 

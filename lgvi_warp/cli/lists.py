@@ -14,8 +14,8 @@ from typing import Any
 from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.common.examples import PREFIX, example_files, example_title, located
 from lgvi_warp.common.files import place_of, write_text
+from lgvi_warp.scene.examples import PREFIX, example_files, example_title, located
 
 # A scene to begin with; {} are filled by `new`.
 NEW_SCENE = """# {title}

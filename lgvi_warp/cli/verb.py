@@ -17,7 +17,7 @@ OF = 'position, attitude, velocity, angular_velocity, energy, depth, speed, eule
 
 def scene_path(text: str) -> str:
     """Path of a scene or sweep file that an argument names; the files are named after it."""
-    from lgvi_warp.common.examples import located
+    from lgvi_warp.scene.examples import located
 
     try:
         return os.fspath(located(text))

@@ -253,7 +253,7 @@ class Scene(Summarized):
         Raises:
             SceneError: If the file cannot be read or its content is wrong; the message lists every fault.
         """
-        from lgvi_warp.common.examples import located
+        from lgvi_warp.scene.examples import located
 
         path = located(path)
         content, text = tables_and_text(path, overrides)

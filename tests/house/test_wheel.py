@@ -6,7 +6,6 @@ import re
 import shlex
 import subprocess
 import sys
-import sysconfig
 import tarfile
 import zipfile
 from pathlib import Path
@@ -27,7 +26,7 @@ OF_MACHINE = re.compile(r"^(?:speed|kernel) .*\n|\(\d+\.\d MB\)", re.MULTILINE)
 
 # What the wheel holds of the folder `examples`, and commands of pages that follow "In a clone:".
 EXAMPLES = re.compile(r"examples/(paper\.toml|(scenes|sweeps|validation)/.*)$")
-IN_A_CLONE = re.compile(r"[Ii]n a clone[:,] (`+).*?\1")
+IN_A_CLONE = re.compile(r"[Ii]n a clone[:,].*?(?=\)|\n\n)", re.DOTALL)
 
 
 def commands_of(page):
@@ -73,7 +72,8 @@ def installed(built, tmp_path_factory):
     run("python", "-m", "pip", "install", "--no-index", "--no-deps", wheel)
     packages = Path(run("python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
     # A path in a .pth file is searched, but the .pth files in that folder are not read: no editable install is seen.
-    (packages / "others.pth").write_text(sysconfig.get_path("purelib"))
+    others = [place for place in sys.path if Path(place).name in ("site-packages", "dist-packages")]
+    (packages / "others.pth").write_text("\n".join(others))
     return run
 
 

@@ -280,7 +280,7 @@ class Term(Documented):
         Returns:
             The dataclass fields declared by `number`, in the order of the class.
         """
-        return _number_fields(cls)  # type: ignore[arg-type]  # a class is hashable
+        return _number_fields(cls)
 
     def shape_of(self, item: dataclasses.Field[Any]) -> tuple[Any, ...]:
         """The shape of a numeric field of this object.

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.common.errors import Faults, SceneError, refusal
-from lgvi_warp.common.examples import located
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.toml_text import parsed
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_of
+from lgvi_warp.scene.examples import located
 from lgvi_warp.scene.file import tables_of_file
 from lgvi_warp.scene.scene import Scene
 

@@ -4,8 +4,8 @@
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.common.examples import example_files, example_title, located
 from lgvi_warp.robustness.sweeps.file import arguments_of_file
+from lgvi_warp.scene.examples import example_files, example_title, located
 from tests.conftest import ROOT
 from tests.support.verbs import main
 
@@ -51,7 +51,7 @@ def test_what_is_no_name_is_refused(name, capsys):
 
 
 def test_a_near_name_is_suggested():
-    with pytest.raises(lw.SceneError, match="^example:papr: is not a known example; did you mean 'paper'"):
+    with pytest.raises(lw.SceneError, match=r"^example:papr: is not a known example; did you mean 'paper'"):
         lw.Scene.load("example:papr")
 
 

@@ -16,10 +16,8 @@ from lgvi_warp.statistics.values.quantity import KNOWN
 if TYPE_CHECKING:
     import pandas
 
-    from lgvi_warp.results.result import Result
 
-
-def frame_of(result: Result) -> pandas.DataFrame:
+def frame_of(result: Any) -> pandas.DataFrame:
     """Build the table of a result (see `Result.frame`)."""
     try:
         import pandas
@@ -38,7 +36,7 @@ def frame_of(result: Result) -> pandas.DataFrame:
     return frame
 
 
-def _ends(result: Result) -> dict[str, np.ndarray]:
+def _ends(result: Any) -> dict[str, np.ndarray]:
     """States (n, 3) at the end by field: those that were kept."""
     if result.end is not None:
         states = dict(result.final.states)

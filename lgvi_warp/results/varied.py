@@ -4,18 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from lgvi_warp.results.result import Result
 
 # Fields of the start that the first sample shows.
 STARTS = ("position", "velocity", "angular_velocity")
 
 
-def varied(result: Result) -> dict[str, np.ndarray]:
+def varied(result: Any) -> dict[str, np.ndarray]:
     """Collect the numbers (n,) that differ between members, by name and component: parameters, then those of the start."""
     inputs = {}
     starts: Mapping[str, np.ndarray] = result.starts

@@ -11,9 +11,9 @@ from tests.house.graph import ROOMS, Import, arrows_up, circle, circles_of_folde
 
 # What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
 OPTIONAL = {
-    "pandas", "SALib", "matplotlib", "rerun", "rerun_cli", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow",
+    "SALib", "matplotlib", "rerun", "rerun_cli", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow",
     "PIL", "gymnasium", "tqdm", "control", "tomlkit", "h5netcdf", "h5py", "dask", "pyproj", "rasterio", "mcap", "mcap_ros2",
-    "stable_baselines3", "shtab",
+    "stable_baselines3", "shtab", "pandas",
 }  # fmt: skip
 DEVICE_OF_EXTENSIONS, TWIN_OF_EXTENSIONS = (
     re.compile(rf"lgvi_warp\.extensions\.\w+\.{folder}\b") for folder in ("device", "twin")

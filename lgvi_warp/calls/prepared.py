@@ -57,6 +57,11 @@ class Prepared:
         names: names of the columns of X (d,).
         common_noise: whether noise acts on every member alike.
         noise: what is drawn, and from where.
+        draws: draws of noise and sensors in a call.
+
+    Methods:
+        states: run members from given states.
+        numbers: numbers of members as an array.
     """
 
     def __init__(

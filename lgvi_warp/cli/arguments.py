@@ -11,7 +11,7 @@ from typing import NoReturn
 from lgvi_warp import __version__
 from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
-from lgvi_warp.cli.lists import list_names, new, schema, show_help
+from lgvi_warp.cli.lists import example, list_names, new, schema, show_help
 from lgvi_warp.cli.machine import bench, info
 from lgvi_warp.cli.plot import plot
 from lgvi_warp.cli.runs import predict, resume, run
@@ -36,7 +36,7 @@ from lgvi_warp.common.errors import closest
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
-          derivatives, margins, worst_case, tune_gains, trim, view, info, bench, warm, new, list_names, schema,
+          derivatives, margins, worst_case, tune_gains, trim, view, info, bench, warm, new, example, list_names, schema,
           plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
@@ -47,25 +47,25 @@ READING = tuple(name for verb in _VERBS if verb.reads for name in (verb.name, *v
 EPILOG = """examples:
   lgvi-warp new dive.toml --vehicle remus_100
   lgvi-warp check dive.toml
-  lgvi-warp run examples/paper.toml --out runs/paper
-  lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
-  lgvi-warp run examples/paper.toml --error 1e-3
-  lgvi-warp run examples/paper.toml --members 1000000 --store zarr --out runs/large
+  lgvi-warp run example:paper --out runs/paper
+  lgvi-warp run example:paper --members 20000 --dtype float32 --set vehicle.mass=120
+  lgvi-warp run example:paper --error 1e-3
+  lgvi-warp run example:paper --members 1000000 --store zarr --out runs/large
   lgvi-warp resume runs/large
   lgvi-warp view runs/paper
-  lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
-  lgvi-warp estimate examples/paper.toml --of "mean position[0]" --error 1e-3
-  lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
-  lgvi-warp stability examples/paper.toml --out runs/stability
-  lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
-  lgvi-warp rare examples/paper.toml --limit "position[2] above 690"
-  lgvi-warp derivatives examples/paper.toml --of "position[0]" --by vehicle.mass --by "start.angular_velocity[0]"
+  lgvi-warp tradeoff example:paper --out runs/tradeoff
+  lgvi-warp estimate example:paper --of "mean position[0]" --error 1e-3
+  lgvi-warp sensitivity example:paper --of "position[2]" --out runs/sensitivity
+  lgvi-warp stability example:paper --out runs/stability
+  lgvi-warp sweep example:heading_laws --out runs/heading_laws
+  lgvi-warp rare example:paper --limit "position[2] above 690"
+  lgvi-warp derivatives example:paper --of "position[0]" --by vehicle.mass --by "start.angular_velocity[0]"
   lgvi-warp margins dive.toml --loop heading_pid --of gain --of disk
   lgvi-warp worst-case dive.toml --of "max(depth)" --within vehicle.buoyancy=297:302
   lgvi-warp tune-gains dive.toml --over heading_pid.kp=0.1:10:log --minimise "iae heading"
   lgvi-warp trim dive.toml --speed 1.5
   lgvi-warp info runs/large
-  lgvi-warp run examples/paper.toml --json -q
+  lgvi-warp run example:paper --json -q
 
 exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
 an argument, or what lies in a folder, or a library is missing that the verb needs; 130 interrupted, 143 by SIGTERM, 129 by

@@ -15,6 +15,7 @@ from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.files import place_of, write_text
+from lgvi_warp.scene.examples import PREFIX, example_files, example_title, located
 
 # A scene to begin with; {} are filled by `new`.
 NEW_SCENE = """# {title}
@@ -158,6 +159,30 @@ def _laws() -> dict[str, str]:
 def _summary(kind: Any) -> str:
     """First line of a class's docstring."""
     return (inspect.getdoc(kind) or "").partition("\n")[0]
+
+
+def example_arguments(verb: Any) -> None:
+    """Add the arguments of the verb example."""
+    verb.add_argument("name", metavar="NAME", nargs="?", help="the example to print; without one, all are listed")
+
+
+@as_verb(
+    "example", "list the scene and sweep files that come with the package, or print one", example_arguments, reads=True
+)
+def example(chosen: argparse.Namespace) -> int:
+    """Run the verb example: list the files that come with the package, or print one as it is."""
+    if chosen.name is not None:
+        text = Path(located(f"{PREFIX}{chosen.name.removeprefix(PREFIX)}")).read_text(encoding="utf-8")
+        if chosen.json:
+            tell(chosen, lambda: {"name": chosen.name, "text": text}, str)
+        else:
+            print(text, end="")
+        return 0
+    titles = {name: example_title(path) for name, path in example_files().items()}
+    width = max(map(len, titles))
+    tell(chosen, lambda: {"names": [{"name": name, "text": title} for name, title in titles.items()]},
+         lambda: "\n".join(f"{name:<{width}}  {title}" for name, title in titles.items()))  # fmt: skip
+    return 0
 
 
 @as_verb("schema", "print the JSON schema of scene files, for editors", reads=True)

@@ -13,6 +13,7 @@ from lgvi_warp.cli.output import Part, say, tell
 from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.common.summaries import listed
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.peak import fma_peak
 
@@ -33,6 +34,7 @@ def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_pe
     """Run the verb info: describe a stored run, or this machine."""
     if chosen.dir is not None:
         return info_of_folder(chosen, describe)
+    from lgvi_warp.cli import installed
     from lgvi_warp.common import container, machine
 
     with progress_bar(chosen.quiet, "measuring"):
@@ -44,6 +46,9 @@ def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_pe
         "versions": machine.versions(),
         "peak": peaks,
         "packets": {kernel: {"vehicles": width.lanes, "source": width.source} for kernel, width in packets.items()},
+        "extras": installed.missing_by_extra(),
+        "cache": installed.kernel_cache(),
+        "viewer": installed.viewer(),
     }
     limits = container.cpu_quota(), machine.affinity(), machine.physical_memory()
     tell(chosen, lambda: document, lambda: "\n".join(machine_lines(document, *limits)))
@@ -70,6 +75,11 @@ def machine_lines(document: dict[str, Any], quota: float | None, cores: int, phy
         by_source.setdefault(width["source"], []).append(f"{kernel} {width['vehicles']}")
     for source, texts in by_source.items():
         yield f"packets     vehicles, {source}: {', '.join(texts)}"
+    for extra, missing in document["extras"].items():
+        yield f"extra       {extra}: {f'without {listed(missing)}' if missing else 'installed'}"
+    cache = document["cache"]
+    yield f"cache       {cache['path']}, {cache['bytes'] / 2**20:.1f} MiB of kernels"
+    yield f"viewer      {document['viewer'] or 'not found; it comes with the extra viz'}"
 
 
 def bench_arguments(verb: Any) -> None:

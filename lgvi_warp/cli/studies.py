@@ -14,7 +14,7 @@ from lgvi_warp.cli.output import Part, tell
 from lgvi_warp.cli.progress import part_of, progress_bar
 from lgvi_warp.cli.settings import folder
 from lgvi_warp.cli.signals import Ended
-from lgvi_warp.cli.verb import FOLDER, add_shared, as_verb
+from lgvi_warp.cli.verb import FOLDER, add_shared, as_verb, scene_path
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.common.reading import file_json
@@ -178,7 +178,7 @@ SWEEP = FunctionOptions(
 
 def sweep_arguments(verb: Any) -> None:
     """Add the arguments of the verb sweep."""
-    verb.add_argument("scene", metavar="SWEEP", help="sweep file (TOML)")
+    verb.add_argument("scene", metavar="SWEEP", type=scene_path, help="sweep file (TOML), or example:NAME")
     add_shared(
         verb, "--out", out="folder for the files; what is finished there is not run again (default: runs/NAME_sweep)"
     )

@@ -4,17 +4,30 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from lgvi_warp.common.errors import SceneError
+
 OF = 'position, attitude, velocity, angular_velocity, energy, depth, speed, euler, "position[2]", "norm(velocity)" ...'
+
+
+def scene_path(text: str) -> str:
+    """Path of a scene or sweep file that an argument names; the files are named after it."""
+    from lgvi_warp.scene.examples import located
+
+    try:
+        return os.fspath(located(text))
+    except SceneError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 # Arguments that several verbs have.
 SHARED: dict[str, dict[str, Any]] = {
-    "scene": {"metavar": "SCENE", "help": "scene file (TOML)"},
+    "scene": {"metavar": "SCENE", "type": scene_path, "help": "scene file (TOML), or example:NAME (see `example`)"},
     "dir": {"metavar": "DIR", "type": Path, "help": "a store, or a folder with one"},
     "--out": {"metavar": "DIR", "type": Path},
     "--duration": {"metavar": "S", "help": "end of the run [s]"},

@@ -33,10 +33,7 @@ class Summarized:
         return ""
 
     def __repr__(self) -> str:
-        title, rows = self.summary_rows()
-        rows = _fewer(rows)
-        width = max((len(label) for label, _ in rows), default=0)
-        return "\n".join([_cut(title), *(_cut(f"  {label:<{width}}  {text}") for label, text in rows)])
+        return as_table(*self.summary_rows())
 
     def _repr_html_(self) -> str:
         title, rows = self.summary_rows()
@@ -46,6 +43,13 @@ class Summarized:
             for label, text in _fewer(rows)
         )
         return f"<div><b>{html.escape(_cut(title))}</b><table>{cells}</table>{self.summary_picture()}</div>"
+
+
+def as_table(title: str, rows: Rows) -> str:
+    """Write a title and rows of (label, text), one a line."""
+    rows = _fewer(rows)
+    width = max((len(label) for label, _ in rows), default=0)
+    return "\n".join([_cut(title), *(_cut(f"  {label:<{width}}  {text}") for label, text in rows)])
 
 
 def _fewer(rows: Rows) -> Rows:

@@ -124,11 +124,15 @@ class Bus(NamedTuple):
 class Part(Term):
     """A part of a controller: a term in all but the list that it stands in.
 
-    Class attributes: `type`, `device`: as of `Term`; the module is one of lgvi_kernels.laws.control. `section` is the list;
-    `needs`, what it reads of the wanted motion, among `WISHES`.
-
     Args:
         name: Name of the part in parameters ("name.field"); by default its type.
+
+    Attributes:
+        section: List of the controller in which it stands.
+        device: As of `Term`; the module is one of lgvi_kernels.laws.control.
+        needs: What it reads of the wanted motion, among `WISHES`.
+        gives: What it wants of the motion, among `WISHES`.
+        bus: Where it finds the numbers of other parts.
     """
 
     acts: ClassVar[bool] = False
@@ -243,7 +247,12 @@ def _built_in(section: str, *words: str) -> registry.Kinds:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuringPart(Part):
-    """A sensor or an estimator: changes what the controller takes for the motion."""
+    """A sensor or an estimator: changes what the controller takes for the motion.
+
+    Attributes:
+        uses: Keys of the sensors that hand their readings to this estimator alone, by what they are to it.
+        linear: Whether linear models of a loop may have it.
+    """
 
     section: ClassVar[str] = "sensors"
     kinds: ClassVar[registry.Kinds] = _built_in(
@@ -285,7 +294,11 @@ class MeasuringPart(Part):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guidance(Part):
-    """A part that says which motion is wanted."""
+    """A part that says which motion is wanted.
+
+    Attributes:
+        wanted: The quantities of `gives` for which the user asked.
+    """
 
     section: ClassVar[str] = "guidance"
     kinds: ClassVar[registry.Kinds] = _built_in(
@@ -302,7 +315,8 @@ class Guidance(Part):
 class ControlLaw(Part):
     """A law: the demand X, Y, Z [N] and K, M, N [N m] in the body's axes, from what is wanted and what is measured.
 
-    Class attributes: `demands` names the components that it asks for, among `COMPONENTS`; none named: all of them.
+    Attributes:
+        demands: Components that it asks for, among `COMPONENTS`; none named: all of them.
     """
 
     section: ClassVar[str] = "laws"
@@ -434,6 +448,12 @@ class Allocation(Part):
 
     Args:
         to: Key of the term that takes the commands.
+
+    Attributes:
+        actuator: The term that takes the commands.
+
+    Methods:
+        reach: The wrench of a unit of each command.
     """
 
     section: ClassVar[str] = "allocation"

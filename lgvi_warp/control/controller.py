@@ -13,6 +13,7 @@ import numpy as np
 
 from lgvi_warp.common import declared
 from lgvi_warp.common.declared import positive, read, real
+from lgvi_warp.common.documented import Documented
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.times import ROUND_OFF, whole_steps
 from lgvi_warp.control.altimeter import Altimeter
@@ -37,7 +38,7 @@ ACTUATOR = 'give the vehicle a term that does, [[terms]] type = "thrusters", "co
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Controller:
+class Controller(Documented):
     """A controller that acts at control ticks, once a period; its commands are held until the next one.
 
     Each list holds parts such as lw.control.HeadingPID(...), or tables as in a scene file.
@@ -51,6 +52,10 @@ class Controller:
         allocation: What turns the demand into commands, in this order: each takes what those before it did not deliver. By
             default the pseudo-inverse, where there is one term that takes commands.
         faults: What happens to commands and to sensors.
+
+    Methods:
+        parameters: The numbers that may vary by member.
+        to_dict: The section [controller] of a scene file.
 
     Raises:
         SceneError: Where anything is wrong; the message lists every fault.

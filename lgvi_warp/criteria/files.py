@@ -75,6 +75,15 @@ class Saved(ABC):
     Attributes:
         study: name of the study, and of its files.
         endings: of its files, in the order in which they are written; "txt" is what `str` tells.
+
+    Methods:
+        save: Write the files into a folder.
+        load: Read the JSON file.
+        rows: Records of the CSV file.
+        to_csv: Write the CSV file alone.
+        to_json: The JSON text.
+        to_dict: The content of the JSON file.
+        from_dict: Build the answer from this content.
     """
 
     def __init_subclass__(cls) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 from lgvi_warp.common import summaries
 from lgvi_warp.common.declared import checked, read, word
+from lgvi_warp.common.documented import Documented
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.methods.tableaux import CASH_KARP, CG3, DOP853, DOPRI5, RK4, RKW3, Tableau
@@ -147,7 +148,7 @@ _BETWEEN = "is not between 0 and 1"
 
 
 @dataclass(frozen=True)
-class Method(Summarized):
+class Method(Summarized, Documented):
     """An integration method by name, and how it solves its implicit equations.
 
     Args:
@@ -178,6 +179,13 @@ class Method(Summarized):
             events and statuses.
         atol: Absolute tolerance of the step control; give both or none.
         reason: Why it was chosen where no one named it; for the summary and the provenance. Default "".
+
+    Attributes:
+        order: Order of convergence in the step.
+        stages: Stage coefficients of a composition.
+        adaptive: Whether each packet chooses its own steps.
+        tableau: Coefficients of a Runge-Kutta method; None for other methods.
+        program: Sub-maps of one stage and their coefficients.
 
     Raises:
         SceneError: A setting is wrong; the message names every fault.

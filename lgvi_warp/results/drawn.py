@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lgvi_warp.common.summaries import as_table, few_digits
+
 if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
     from lgvi_warp.scene.ensemble import Ensemble
@@ -49,9 +51,27 @@ class DrawnParameters(Mapping[str, np.ndarray]):
         return len(self._drawn)
 
     def __repr__(self) -> str:
-        """The names and the number of members, for which nothing is drawn."""
-        few = type(self)(self.ensemble, self._first + 1, self._first) if self._stop > self._first + 1 else self
-        return f"{type(self).__name__} of {self._stop - self._first:,} members: {', '.join(few) or 'none'}"
+        """A table of the first member's numbers, so that no others are drawn; first what varies."""
+        first = type(self)(self.ensemble, self._first + 1, self._first)
+        varied = {*self.ensemble.varied(), *self.ensemble.varied_starts()}
+        names = sorted(first, key=lambda name: name not in varied)
+        texts = [("varies; the first: " if name in varied else "") + few_digits(first[name][0]) for name in names]
+        return as_table(f"Numbers of {self._stop - self._first:,} members", list(zip(names, texts, strict=True)))
+
+
+class GivenParameters(dict[str, np.ndarray]):
+    """Numbers of members that are in memory, each (1, ...) or (n, ...), which print as a table."""
+
+    def __repr__(self) -> str:
+        def text(values: np.ndarray) -> str:
+            if len(values) == 1:
+                return few_digits(values[0])
+            spread = f", {values.min():.6g} to {values.max():.6g}" if values.ndim == 1 else ""
+            return f"varies: {' x '.join(map(str, values.shape))} numbers{spread}"
+
+        rows = sorted(((name, text(np.asarray(values))) for name, values in self.items()),
+                      key=lambda row: not row[1].startswith("varies"))  # fmt: skip
+        return as_table(f"Numbers of {max(map(len, self.values()), default=0):,} members", rows)
 
 
 class DrawnStarts(DrawnParameters):

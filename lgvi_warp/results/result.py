@@ -31,11 +31,13 @@ from lgvi_warp.physics.terms.events import from_list
 from lgvi_warp.physics.terms.floor import altitude_over
 from lgvi_warp.results import final as final_files
 from lgvi_warp.results import member_fields, result_file
+from lgvi_warp.results.drawn import GivenParameters
 from lgvi_warp.sampling.final import Final
 from lgvi_warp.statistics.estimates.estimate import Estimates
 from lgvi_warp.statistics.values.quantity import KNOWN
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 
@@ -102,6 +104,22 @@ class Result(Summarized):
         compile_seconds: Time to load the kernel [s].
         compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
         run_seconds: Time of the run without that [s].
+        members: Number of members, n.
+        end_time: Time up to which each member ran [s], shape (n,).
+        final: Final states, from which a run can go on.
+        depth: Depth [m], shape (k, n).
+        altitude: Height above the floor [m], shape (k, n).
+        speed: Length of the velocity [m/s], shape (k, n).
+        euler: Roll, pitch and yaw [rad], shape (k, n, 3).
+        quaternion_wxyz: Unit quaternions of the attitudes, shape (k, n, 4).
+        energy: Kinetic and potential energy [J], shape (k, n).
+        dataset: The samples as an xarray Dataset.
+
+    Methods:
+        frame: Table of the members: inputs, outcome, end.
+        part: Select members.
+        save: Write the result to a file.
+        load: Read such a file.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -141,6 +159,10 @@ class Result(Summarized):
     compile_seconds: float = field(default=0.0, compare=False)
     compile_phases: Phases = field(default=Phases(), compare=False)
     run_seconds: float = field(default=0.0, compare=False)
+
+    def __post_init__(self) -> None:
+        if type(self.parameters) is dict:
+            object.__setattr__(self, "parameters", GivenParameters(self.parameters))
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """Outcomes, settings, fields with their units, statistics and messages."""
@@ -360,6 +382,36 @@ class Result(Summarized):
         coordinates = {"time": ("time", self.time, TIME)}
         attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
         return xr.Dataset(data, coordinates, attributes)
+
+    def frame(self) -> pandas.DataFrame:
+        """Build a table of the members, one a row (needs pandas, which the extra `store` brings).
+
+        Columns:
+
+        * inputs that differ between members, by name and component: "vehicle.buoyancy", "start.position[2]";
+        * `outcome`, the status by name, and `end_time` [s];
+        * the end, as far as it was kept: `position[0]` to `position[2]` [m, inertial axes], `euler[0]` ... [rad],
+          `velocity[0]` ... [m/s] and `angular_velocity[0]` ... [rad/s], body axes.
+
+        `frame.attrs["units"]` has the units. Of samples in a store the last time alone is read.
+
+        Returns:
+            The table. Its index is the member in this result, counted from 0.
+
+        Raises:
+            ImportError: If pandas is not installed.
+
+        Examples:
+            >>> import lgvi_warp as lw
+            >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+            >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+            >>> frame = lw.solve(fleet, h=0.1, t1=2.0).frame()
+            >>> frame[["vehicle.buoyancy", "outcome", "position[2]"]].shape
+            (8, 3)
+        """
+        from lgvi_warp.results.frame import frame_of
+
+        return frame_of(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the result to an .npz file, durable, and either whole or not at all.

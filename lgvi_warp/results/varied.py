@@ -4,23 +4,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from lgvi_warp.results.result import Result
 
 # Fields of the start that the first sample shows.
 STARTS = ("position", "velocity", "angular_velocity")
 
 
-def varied(result: Result) -> dict[str, np.ndarray]:
+def varied(result: Any) -> dict[str, np.ndarray]:
     """Collect the numbers (n,) that differ between members, by name and component: parameters, then those of the start."""
     inputs = {}
     starts: Mapping[str, np.ndarray] = result.starts
-    if not starts:
-        # A file of an earlier version shows the start by the first samples alone.
+    if not starts and result.store is None:
+        # A file of an earlier version shows the start by the first samples alone; a store would read all of them.
         starts = {f"start.{name}": result.samples[name][0] for name in result.samples if name in STARTS}
     for name, values in (*result.parameters.items(), *starts.items()):
         if len(values) != result.members:

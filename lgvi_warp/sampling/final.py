@@ -44,6 +44,10 @@ class Final(Summarized):
         lanes: Rows (n, rows) by name as the kernel has them: its state, what is remembered, and outcomes.
         settings: What `lanes` depends on: method, step, number type and laws.
 
+    Methods:
+        part: Select members.
+        changed: Give members other states.
+
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})

@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import members_of, of_kind
+from lgvi_warp.common.documented import Documented
 from lgvi_warp.common.errors import Faults, NoSuchMembers, brief, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.summaries import Summarized
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from lgvi_warp.sampling.final import Final
 
 
-class Ensemble(Summarized):
+class Ensemble(Summarized, Documented):
     """A scene and what varies in it from member to member.
 
     A member's numbers depend on the seed, its index and the varied names alone, not on the block, subset or order in
@@ -56,6 +57,27 @@ class Ensemble(Summarized):
         vary: Distributions by name, of lgvi_warp or frozen ones of scipy.stats; None if nothing varies (default).
         sampling: "random" (default), "sobol", "halton", "saltelli", lw.designs.LatinHypercube(...), lw.designs.Grid(...),
             lw.designs.Table(...) and others, or a table as in a scene file.
+
+    Attributes:
+        indices: Indices of these members in the whole ensemble, (members,).
+        final: Where they ended in the run that they go on from; None where they start.
+        replicates: Number of independent replicates of the sampling.
+
+    Methods:
+        parameters: Parameters of some members by name.
+        numbers: All numbers of some members, those of the start too.
+        starts: Numbers of the start that vary, of some members.
+        levels: Levels in (0, 1) from which distributions draw.
+        weights: What some members count for in statistics.
+        select: Parameters and initial states of some members.
+        varied: Names of the parameters that vary.
+        member: One member as an ensemble of its own.
+        subset: Some members as an ensemble of their own.
+        with_seed: Members drawn from the same distributions by another seed.
+        going_on: These members as they go on from the end of a run.
+        from_scene: The ensemble that a scene file describes.
+        from_states: An ensemble of given states and parameters.
+        to_dict: The section [ensemble] of a scene file.
 
     Raises:
         SceneError: If anything is wrong; the message lists every fault. Unphysical members are counted, and the first

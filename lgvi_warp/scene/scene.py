@@ -58,6 +58,14 @@ class Scene(Summarized):
         ensemble_settings: What varies, the section [ensemble] of a scene file; None if nothing does.
         events: What stops a member, such as lw.events.Surface(), or tables as in a scene file.
 
+    Methods:
+        load: Read a scene file, or a shipped scene ("example:paper").
+        named: Scene of a vehicle that comes with the package.
+        from_dict: Scene of tables in the form of a scene file.
+        to_dict: Tables in the form of a scene file.
+        parameters: Every number that may vary from member to member.
+        with_numbers: The scene with other numbers.
+
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
 
@@ -236,7 +244,7 @@ class Scene(Summarized):
         """Read a scene from a scene file (TOML).
 
         Args:
-            path: Path of the file.
+            path: Path of the file; "example:NAME" for one that comes with the package (`lgvi-warp example` lists them).
             overrides: Values by dotted key ("vehicle.mass") that replace those of the file; by default none.
 
         Returns:
@@ -245,6 +253,9 @@ class Scene(Summarized):
         Raises:
             SceneError: If the file cannot be read or its content is wrong; the message lists every fault.
         """
+        from lgvi_warp.scene.examples import located
+
+        path = located(path)
         content, text = tables_and_text(path, overrides)
         scene = from_dict(content)
         changes = {key: value if isinstance(value, str) else repr(value) for key, value in (overrides or {}).items()}

@@ -39,6 +39,14 @@ class Environment:
             east and down; by default None, not known. Longitudes may be -180 to 180 or 0 to 360.
         start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; without a zone it is UTC. By default None, not known.
 
+    Attributes:
+        start_time: Date and time at t = 0 in UTC; None where it is not known.
+
+    Methods:
+        positions: Convert places on the Earth to positions.
+        geodetic: Convert positions to places on the Earth.
+        to_dict: The section [environment] of a scene file.
+
     Raises:
         SceneError: If a number is negative or not finite, a latitude beyond 90 degrees; the message lists every fault.
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.arguments import explained, items_of
+from lgvi_warp.common.documented import Documented
 from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
 from lgvi_warp.common.real_numbers import settle, settles_first
 from lgvi_warp.statistics.ends import Ends
@@ -92,7 +93,7 @@ class RowGatherer(Gatherer):
 
 @explained
 @dataclass(frozen=True, eq=False)
-class Statistic:
+class Statistic(Documented):
     """A statistic over members at every sample time. Abstract.
 
     Members that failed are left out from their failure on.

@@ -15,6 +15,7 @@ import numpy as np
 from lgvi_warp.common.arguments import members_of, path_of
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status
+from lgvi_warp.common.summaries import as_table, few_digits
 from lgvi_warp.common.write_lock import writer_of
 from lgvi_warp.control.controller import terms_of
 from lgvi_warp.control.signals import IN_FILES
@@ -60,6 +61,14 @@ class Arrays(Mapping[str, np.ndarray]):
         at = (*(slice(None),) * self.axis, self.members)
         array = self.group[name]
         return np.asarray(array[at] if isinstance(self.members, slice) else array.oindex[at])
+
+    def __repr__(self) -> str:
+        """A table of names and shapes, for which nothing is read."""
+        rows = [(name, f"{' x '.join(map(str, self.group[name].shape))} numbers in the store") for name in self.names]
+        return as_table(
+            f"{len(self)} arrays",
+            [*rows, *((name, few_digits(values)) for name, values in (self.in_memory or {}).items())],
+        )
 
     def rows(self, name: str, when: slice | np.ndarray, places: slice) -> np.ndarray:
         """Read samples at some of the times, of some of these members: only the chunks that hold them are read."""

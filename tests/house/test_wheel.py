@@ -3,9 +3,9 @@
 
 import os
 import re
+import shlex
 import subprocess
 import sys
-import sysconfig
 import tarfile
 import zipfile
 from pathlib import Path
@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import ROOT
+from tests.support.pages import snippets
 
 sys.path.append(str(ROOT / "docs"))
 
@@ -21,6 +22,18 @@ from site_parts import tutorial
 pytestmark = pytest.mark.slow
 # What differs from machine to machine, and from run to run.
 OF_MACHINE = re.compile(r"^(?:speed|kernel) .*\n|\(\d+\.\d MB\)", re.MULTILINE)
+
+
+# What the wheel holds of the folder `examples`, and commands of pages that follow "In a clone:".
+EXAMPLES = re.compile(r"examples/(paper\.toml|(scenes|sweeps|validation)/.*)$")
+IN_A_CLONE = re.compile(r"[Ii]n a clone[:,].*?(?=\)|\n\n)", re.DOTALL)
+
+
+def commands_of(page):
+    """Commands of the package in the text of a page, but for those that need a clone."""
+    text = IN_A_CLONE.sub("", (ROOT / page).read_text())
+    commands = re.findall(r"`((?:lgvi-warp|python|make) [^`\n]+)`", text)
+    return list(dict.fromkeys([*commands, *re.findall(r"^    (lgvi-warp .*?)(?: +#.*)?$", text, re.MULTILINE)]))
 
 
 def as_shown(printed, shown):
@@ -59,7 +72,8 @@ def installed(built, tmp_path_factory):
     run("python", "-m", "pip", "install", "--no-index", "--no-deps", wheel)
     packages = Path(run("python", "-c", "import sysconfig; print(sysconfig.get_path('purelib'))").strip())
     # A path in a .pth file is searched, but the .pth files in that folder are not read: no editable install is seen.
-    (packages / "others.pth").write_text(sysconfig.get_path("purelib"))
+    others = [place for place in sys.path if Path(place).name in ("site-packages", "dist-packages")]
+    (packages / "others.pth").write_text("\n".join(others))
     return run
 
 
@@ -70,6 +84,7 @@ def test_the_wheel_holds_the_packages_and_their_data(built):
     packages = {"lgvi_warp", "lgvi_kernels"}
     expected = {name.removeprefix("kernels/") for name in tracked}
     expected = {name for name in expected if name.partition("/")[0] in packages}
+    expected |= {f"lgvi_warp/{name}" for name in tracked if EXAMPLES.match(name)}
     assert {name for name in names if ".dist-info/" not in name} == expected
     assert {"lgvi_warp/py.typed", "lgvi_warp/__init__.pyi", "lgvi_warp/vehicles/remus_100.toml"} <= names
 
@@ -94,11 +109,36 @@ def test_the_command_helps(installed):
 
 
 def test_an_example_runs(installed):
-    installed(
-        "lgvi-warp", "run", ROOT / "examples" / "paper.toml", "--members", "8", "--duration", "2", "--out", "paper"
-    )
+    installed("lgvi-warp", "run", "example:paper", "--members", "8", "--duration", "2", "--out", "paper")
     listed = installed("python", "-c", "import os; print(*sorted(os.listdir('paper')))").split()
     assert {"result.npz", "fleet.png"} <= set(listed)
+
+
+def test_examples_are_those_of_the_clone(installed):
+    listed = installed("lgvi-warp", "example").splitlines()
+    files = {
+        path.stem: path for path in ROOT.glob("examples/**/*.toml") if EXAMPLES.match(path.relative_to(ROOT).as_posix())
+    }
+    assert {line.partition(" ")[0] for line in listed} == set(files)
+    assert installed("lgvi-warp", "example", "three_laws") == files["three_laws"].read_text()
+    code = "import lgvi_warp as lw; print(lw.Scene.load('example:slocum_comet').source['file'])"
+    assert installed("python", "-c", code) == "slocum_comet.toml\n"
+    assert "can run" in installed("lgvi-warp", "check", "example:slocum_comet")
+
+
+def test_readme_and_the_first_page_need_no_clone(installed):
+    """Every command and snippet ends with exit code 0 in an empty folder."""
+    commands = list(dict.fromkeys([*commands_of("README.md"), *commands_of("docs/index.rst")]))
+    assert len(commands) >= 4
+    assert {command.partition(" ")[0] for command in commands} == {"lgvi-warp"}
+    for command in commands:
+        installed(*shlex.split(command))
+    codes = [snippet.code for snippet in snippets("README.md", "python")]
+    assert len(codes) == 1
+    assert "literalinclude:: ../examples/where_to_search.py" in (ROOT / "docs" / "index.rst").read_text()
+    assert (ROOT / "examples" / "where_to_search.py").read_text().endswith(codes[0])
+    for code in codes:
+        installed("python", "-c", code)
 
 
 def test_the_tutorial_prints_what_it_shows(installed):

@@ -70,6 +70,10 @@ class Vehicles:
         dtype: Numbers of the kernel and of the observations, "float64" or "float32"; default that of the scene.
         width: Vehicles per packet; default from the CPU.
 
+    Attributes:
+        members: Indices of the members that the environments have now, (num_envs,).
+        time: Time since all began [s].
+
     Raises:
         SceneError: Where anything is wrong; the message lists every fault.
         MissingExtra: Where Gymnasium is not installed.

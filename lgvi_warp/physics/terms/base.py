@@ -16,6 +16,7 @@ import numpy as np
 from lgvi_warp.common import names, registry
 from lgvi_warp.common.arguments import explained, items_of
 from lgvi_warp.common.declared import read
+from lgvi_warp.common.documented import Documented
 from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
 from lgvi_warp.common.real_numbers import settle, settles_first
 from lgvi_warp.physics.inertia import Frame
@@ -162,21 +163,42 @@ def _number_fields(kind: Any) -> tuple[dataclasses.Field[Any], ...]:
 
 @explained
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Term:
+class Term(Documented):
     """A force, a moment or a motion of the water that a scene names.
 
     Fields declared by `number` are arrays after construction.
 
-    Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the
-    module of lgvi_kernels.laws by name (by default the type), that of an extension by its path, or any object with the same
-    functions; `timed` says whether the law depends on time; `dissipative`, whether its damping never creates energy;
-    `brakes`, whether it takes energy on the whole even if some motions gain by it; `strengths` names the numbers without
-    which it does nothing; `carries` says whether it is a current that is the same everywhere and at all times, which exerts
-    no force; `anchored`, whether it holds the vehicle to a place, so that a current does work. docs/develop/add_a_force.md
-    shows how to write one.
+    docs/develop/add_a_force.md shows how to write one. Attributes and methods are for authors.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
+
+    Attributes:
+        type: Name in a scene file, which knows the class as soon as it is made.
+        device: Module of lgvi_kernels.laws by name (by default the type), that of an extension by its path, or any object with
+            the same functions.
+        timed: Whether the law depends on time.
+        dissipative: Whether its damping never creates energy.
+        brakes: Whether it takes energy on the whole even if some motions gain by it.
+        strengths: Names of the numbers without which it does nothing.
+        carries: Whether it is a current that is the same everywhere and at all times, which exerts no force.
+        carried: Whether it changes the vehicle's inertia in time.
+        anchored: Whether it holds the vehicle to a place, so that a current does work.
+        accounted: Whether its scene accounts the energy used.
+        memory_rows: Rows of memory, at first 0, of a term that does not define `packed`.
+        key: Name in parameters: `name`, or the type.
+        conserves: Quantities that a motion under it conserves.
+
+    Methods:
+        parameters: The numbers that may vary by member.
+        number_fields: The fields declared by `lw.laws.number`.
+        check: Note what is wrong with the numbers.
+        beside: The same term, knowing the other terms of its scene.
+        packed: The numbers for the device code.
+        potential: Potential energy of a law that follows from one.
+        water: Velocity of the water, of a flow.
+        inner: Momenta and energy of masses that move in the vehicle.
+        to_dict: The term as a table of a scene file.
 
     Raises:
         SceneError: Where a number has the wrong shape, is not finite or is out of bounds. The message lists every fault.
@@ -258,7 +280,7 @@ class Term:
         Returns:
             The dataclass fields declared by `number`, in the order of the class.
         """
-        return _number_fields(cls)  # type: ignore[arg-type]  # a class is hashable
+        return _number_fields(cls)
 
     def shape_of(self, item: dataclasses.Field[Any]) -> tuple[Any, ...]:
         """The shape of a numeric field of this object.

@@ -38,6 +38,9 @@ class CurrentField(InFile, Term):
         outside: What happens outside the grid: "hold", the default, the nearest node's velocity; or "stop": a member that
             leaves it stops with the status OUTSIDE, and a run that ends after the last time is refused.
 
+    Methods:
+        from_dataset: Currents of an ocean model.
+
     Raises:
         SceneError: Where the shape of `velocities` does not fit, and as `Term`.
 

@@ -20,11 +20,14 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 class Event(Term):
     """A condition that stops a member as soon as its distance, positive while the member goes on, is 0 or below.
 
-    Class attributes: `device` is the name of a module of lgvi_kernels.stops, or any object with `distance(view, p)`;
-    `status` is the status of a member that it stopped. Distances look at the position of the body's origin, in inertial axes.
+    Distances look at the position of the body's origin, in inertial axes.
 
     Args:
         name: Name of the event in parameters ("name.field"); by default its type.
+
+    Attributes:
+        device: Name of a module of lgvi_kernels.stops, or any object with `distance(view, p)`.
+        status: Status of a member that it stopped.
     """
 
     status: ClassVar[Status] = Status.CONDITION

@@ -33,6 +33,11 @@ class Floor(InFile, Event):
         spacing: Distance of the nodes along north and east, (2,) [m]; needed with a grid.
         clearance: How far above the floor members stop [m]; 0 where it is left out. Give it where it is to vary.
 
+    Methods:
+        from_file: Floor of a chart, in a raster or a data set.
+        depth_at: Depth of the floor at a place.
+        edges: The event that stops members which leave the grid.
+
     Raises:
         SceneError: Where a grid has no spacing, or a flat floor has one; and as `Term`.
 

@@ -56,6 +56,9 @@ class NoisyTerm(Term):
         noise_step: Time from one draw to the next [s]: runs whose steps are whole multiples of it see the same path, and no
             other step is allowed. None, the default, draws once a step: runs with different steps see different paths.
 
+    Methods:
+        draws: Number of draws in one step of a run.
+
     Raises:
         SceneError: Where `noise_step` is not above 0, and as `Term`.
     """

@@ -88,6 +88,10 @@ class QuadraticForm(Term):
         values: The coefficients, (k,) [kg/m, kg, kg m]: of two velocities, of a velocity and a rate, of two rates; of torques
             [kg, kg m, kg m2].
 
+    Methods:
+        of: Form of coefficients by name.
+        gertler_hagen: Form of the coefficients of a submarine's standard equations.
+
     Raises:
         SceneError: Where a name is not known or given twice, and as `Term`.
 

@@ -71,6 +71,10 @@ class Thrusters(Commanded):
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Commands at these times, (k, n) [unit], linear between them; instead of `command`.
 
+    Methods:
+        thrust: Steady thrust at given commands.
+        command_for: The smallest commands that give these thrusts.
+
     Raises:
         SceneError: Where a direction has no length, times do not rise, the command is given twice, or neither a coefficient
             nor a polynomial nor a table is given; where a table does not rise, or stands beside a polynomial. Also as `Term`.

@@ -66,6 +66,14 @@ class Margins(Saved):
             nothing" where its commands have no effect, "failed"; "" where it has.
         step: step of the runs [s], to which delays are known.
         messages: what the user should know, such as that the step was shortened to fit the period.
+        members: number of members, n.
+        steady: whether the loop settles as it is, (n,).
+        reasons: number of members without margins, by reason.
+
+    Methods:
+        percentiles: Percentiles of each margin over the members that settle.
+        curve: Distribution of a margin.
+        worst: The members that bear least.
     """
 
     study: ClassVar[str] = "margins"

@@ -12,6 +12,7 @@ from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.toml_text import parsed
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_of
+from lgvi_warp.scene.examples import located
 from lgvi_warp.scene.file import tables_of_file
 from lgvi_warp.scene.scene import Scene
 
@@ -24,6 +25,7 @@ RUN = {"method": "method", "step": "h", "duration": "t1", "dtype": "dtype"}
 
 def arguments_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read the arguments of `sweep` from a sweep file (TOML); paths in it are relative to its folder."""
+    path = located(path)
     content = parsed(file_text(path, "sweep file"), os.fspath(path))
     folder, faults = Path(path).parent, Faults()
     faults.keys("", content, KEYS)
@@ -42,8 +44,9 @@ def arguments_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
     }
     arguments |= {RUN[name]: value for name, value in content.get("run", {}).items() if name in RUN}
     arguments |= {name: value for name, value in content.get("compare", {}).items() if name in COMPARE}
-    scene_path = folder / content["scene"]
+    scene_path: Any = None
     with faults.including():
+        scene_path = located(content["scene"], folder)
         arguments["scene"] = Scene.load(scene_path)
     vary = {}
     for key, value in content.get("vary", {}).items():
@@ -68,7 +71,7 @@ def _case(entry: Any, folder: Path, scene_path: Path) -> Any:
     scene = case.get("scene")
     if scene is not None and not isinstance(scene, str):
         raise refusal("cases.scene", scene, "is no path of a scene file", 'write scene = "other.toml"')
-    path = scene_path if scene is None else folder / scene
+    path = scene_path if scene is None else located(scene, folder)
     vehicle = case.get("vehicle")
     try:
         if isinstance(vehicle, Mapping) and "name" in vehicle:

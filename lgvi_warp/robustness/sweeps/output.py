@@ -48,6 +48,24 @@ class Sweep(SweepTable):
         interval: how intervals of probabilities are formed.
         rares: rare failures of the cells that ask for them; None where none does.
         matters: the least difference that matters, by "success" [points] and metric [its unit]; those that were given.
+        cases: names of the cases.
+        metrics: names of the metrics.
+        table: the rows as an xarray Dataset.
+
+    Methods:
+        success: Probability that a member of a case passes.
+        compare: Compare two cases on the same members.
+        ranking: Rank the cases by success.
+        worst: The worst members of all cells.
+        causes: Inputs that explain success or a metric.
+        values: A metric of all members.
+        survival: Probability that a member neither failed nor was stopped by each time.
+        members: Members that do not pass, or those that do.
+        again: Run members of a case again, with samples.
+        rare: Rare failure of a case.
+        compare_rare: Compare the rare failures of two cases.
+        rows: Success and metrics of each cell, as records.
+        save: Write tables and summary into a folder.
     """
 
     def compare(

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.arguments import explained
+from lgvi_warp.common.documented import Documented
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.real_numbers import is_whole, settles_first
 from lgvi_warp.sampling.designs.space import Space
@@ -23,7 +24,7 @@ Drawn = dict[str, np.ndarray]
 
 @explained
 @dataclass(frozen=True)
-class Sampling:
+class Sampling(Documented):
     """Arrangement of the members' points in the unit cube.
 
     Class attributes: `kind` is the name in a scene file; `fewer` says whether a run may take only the first of the members

@@ -14,6 +14,7 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.arguments import explained
+from lgvi_warp.common.documented import Documented
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.random import FAR
 from lgvi_warp.common.real_numbers import settle, settles_first
@@ -23,7 +24,7 @@ Spread = float | tuple[float, ...] | list[float] | np.ndarray
 
 @explained
 @dataclass(frozen=True)
-class Distribution:
+class Distribution(Documented):
     """The distribution of a quantity, around the scene's value of it unless the distribution says otherwise.
 
     Numbers may be one for all components, or one per component, in the unit of the quantity.

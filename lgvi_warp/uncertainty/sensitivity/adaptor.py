@@ -35,6 +35,11 @@ class ScalarModel:
     Attributes:
         names: of the columns of X (d,), in the order of `vary`.
         scene, vary, of, levels, failed: as given.
+        problem: description of the columns for SALib.
+
+    Methods:
+        distributions: distribution of each column, for scipy.
+        scipy: run members in scipy's shape.
 
     Raises:
         SceneError: for faulty arguments, all in one message.

@@ -8,15 +8,18 @@ import inspect
 import io
 import json
 import os
+import re
 import subprocess
 import sys
+import tomllib
+from importlib import metadata
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import command, completion, lists, output, writing
+from lgvi_warp.cli import command, completion, installed, lists, output, writing
 from lgvi_warp.cli.machine import machine_lines
 from lgvi_warp.cli.signals import Lasting, Signals
 from lgvi_warp.common import container, machine
@@ -44,6 +47,25 @@ def test_info_of_the_machine(capsys):
     assert said.split("\n")[:-1] == list(machine_lines(content, *limits))
 
 
+def test_what_is_installed(tmp_path, monkeypatch):
+    extras = installed.missing_by_extra()
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(extras) == set(stated) - {"all", "test", "docs", "arm", "dev"}
+    there = {item.metadata["Name"].lower() for item in metadata.distributions()}
+    for extra, missing in extras.items():
+        plain = [re.match(r"[\w-]+", line)[0] for line in stated[extra] if "[" not in line]
+        assert [name for name in missing if name in plain] == [name for name in plain if name.lower() not in there]
+    monkeypatch.setattr(installed, "is_there", lambda library: library != "zarr")
+    assert installed.missing_by_extra()["export"] == ["zarr"]
+    (tmp_path / "wp_a").mkdir()
+    (tmp_path / "wp_a" / "a.o").write_bytes(b"x" * 1000)
+    (tmp_path / "b").write_bytes(b"x" * 24)
+    monkeypatch.setattr("warp.config.kernel_cache_dir", str(tmp_path))
+    assert installed.kernel_cache() == {"path": tmp_path, "bytes": 1024}
+    monkeypatch.setitem(sys.modules, "rerun_cli", None)
+    assert installed.viewer() is None
+
+
 def test_a_machine_in_words():
     sources = {"plain": "table: avx2", "dense": "another"}
     content = {
@@ -51,6 +73,7 @@ def test_a_machine_in_words():
         "versions": {"numpy": "2", "warp": "1"}, "peak": {"float64": 1.25e10, "float32": 2.5e10},
         "packets": {kernel: {"vehicles": 8, "source": sources[kernel.split()[0]]}
                     for kernel in ("plain float64", "plain float32", "dense float64")},
+        "extras": {"viz": [], "uq": ["SALib"]}, "cache": {"path": "a/cache", "bytes": 3 * 2**19}, "viewer": None,
     }  # fmt: skip
     assert list(machine_lines(content, 1.5, 4, 8 * 2**30)) == [
         "cpu         a cpu, avx2, 4 threads (a quota of 1.5 CPUs; 4 cores)",
@@ -60,7 +83,12 @@ def test_a_machine_in_words():
         "float32     one core's peak 25.0 GFMA/s",
         "packets     vehicles, table: avx2: plain float64 8, plain float32 8",
         "packets     vehicles, another: dense float64 8",
+        "extra       viz: installed",
+        "extra       uq: without SALib",
+        "cache       a/cache, 1.5 MiB of kernels",
+        "viewer      not found; it comes with the extra viz",
     ]
+    assert [*machine_lines(content | {"viewer": "a/rerun"}, 1.5, 4, None)][-1] == "viewer      a/rerun"
     for memory, physical in ((0, 1), (2**30, 2**30), (2**30, None)):
         said = list(machine_lines(content | {"memory": memory}, None, 4, physical))
         assert said[0] == "cpu         a cpu, avx2, 4 threads"
@@ -345,3 +373,9 @@ def test_an_interrupt_names_the_files_that_are_finished(tmp_path):
         writing.side_by_side({names[1]: Study(OSError("full"))}, wait=wait)
     assert not isinstance(caught.value, writing.Ended)
     assert waited == [0.2, 0.2]
+
+
+def test_documents_of_examples(capsys):
+    names = [entry["name"] for entry in document(["example"], capsys)["names"]]
+    assert "paper" in names
+    assert document(["example", "paper"], capsys)["text"] == (ROOT / "examples" / "paper.toml").read_text()

@@ -138,6 +138,8 @@ def test_a_float_that_is_whole_is_refused_with_the_number_to_write():
 def test_drawn_numbers_are_shown_by_their_names():
     fleet = lw.Ensemble(SCENE, 5, 1, {"vehicle.buoyancy": lw.distributions.Normal(std=0.1)})
     drawn = DrawnParameters(fleet, 5)
-    assert repr(drawn) == f"DrawnParameters of 5 members: {', '.join(drawn)}"
-    assert "vehicle.buoyancy" in repr(drawn)
-    assert repr(DrawnStarts(fleet, 5)) == "DrawnStarts of 5 members: none"
+    title, first, *others = repr(drawn).splitlines()
+    assert title == "Numbers of 5 members"
+    assert first.split() == ["vehicle.buoyancy", "varies;", "the", "first:", f"{drawn['vehicle.buoyancy'][0]:.6g}"]
+    assert [line.split()[0] for line in others] == [name for name in drawn if name != "vehicle.buoyancy"]
+    assert repr(DrawnStarts(fleet, 5)) == "Numbers of 5 members"

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scene and sweep files that come with the package, called "example:NAME" where a path of such a file is taken."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from lgvi_warp.common.errors import SceneError, closest
+
+PREFIX = "example:"
+# Folders of such files.
+_FOLDERS = ("", "scenes", "sweeps", "validation")
+
+
+def example_files() -> dict[str, Path]:
+    """Path of each file by name; a wheel has them within the package, a clone beside it."""
+    package = Path(__file__).parents[1]
+    home = next(place for place in (package / "examples", package.parent / "examples") if place.is_dir())
+    return {path.stem: path for part in _FOLDERS for path in sorted((home / part).glob("*.toml"))}
+
+
+def example_title(path: Path) -> str:
+    """The first comment of a file, without the page that it names."""
+    comment = re.search(r"# *(.*?)(?:: docs/.*|\.)?$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    return comment[1] if comment else ""
+
+
+def located(path: str | os.PathLike[str], folder: Path | None = None) -> str | os.PathLike[str]:
+    """The path itself, below a folder if one is given; of "example:NAME" that of the file that comes with the package."""
+    name = os.fspath(path) if isinstance(path, str | os.PathLike) else ""
+    if not isinstance(name, str) or not name.startswith(PREFIX):
+        return path if folder is None else folder / path
+    files, name = example_files(), name.removeprefix(PREFIX)
+    if name not in files:
+        raise SceneError([f"{PREFIX}{name}: is not a known example; {closest(name, files)}"])
+    return files[name]

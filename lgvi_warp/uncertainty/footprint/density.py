@@ -18,14 +18,18 @@ from scipy import fft
 
 from lgvi_warp.common.errors import MissingExtra
 
-# Nodes of the grid along each axis. The second is for clusters that are far apart, where the finest bandwidth is best.
-SIZES = (384, 1536)
+# Nodes of the grid along each axis, at the first look and where there are clusters, or where the finest bandwidth is best.
+SIZES = (384, 512, 1536)
 # Coarsest bandwidth, in those of Scott's rule; each of the next is half as wide, down to one cell.
 COARSEST, RUNGS = 4.0, 9
 # Finer ones are not looked at where the areas of all shares are so many times the least.
 HOPELESS = 2.0
 # The grid reaches so many of the coarsest bandwidths beyond these quantiles of the places; members outside count as outside.
 REACH, TAIL = 3.0, 0.001
+# A part of a region with so large a share of the members is a cluster.
+SOME = 0.01
+# Clusters whose spread is below this part of the whole are as points.
+POINT = 1e-6
 # A finer bandwidth must lessen the area so far, else it only follows the sample.
 GAIN = 0.97
 # A level below this part of the largest density is round-off.
@@ -46,12 +50,56 @@ class Level(NamedTuple):
     polygons: tuple[Polygon, ...]
 
 
-class Grid:
-    """Members binned on a square grid; coordinates are counted in cells."""
+class Frame:
+    """Coordinates in which a covariance is one and wide gaps between clusters, which have no density, are cut short.
 
-    def __init__(self, places: np.ndarray, weights: np.ndarray, low: np.ndarray, cell: float, size: int):
-        self.low, self.cell, self.size, self.weights = low, cell, size, weights
-        places = (places - low) / cell
+    So a kernel is as long and as oblique as a cluster, and clusters far apart fit on one grid.
+    """
+
+    def __init__(self, places: np.ndarray, covariance: np.ndarray, widest: float):
+        self.middle, self.root, self.widest = places.mean(axis=0), np.linalg.cholesky(covariance), widest
+        self.cuts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        least = 4.0 * REACH * widest
+        for axis in np.sort(self._white(places), axis=0).T:
+            at = np.flatnonzero(np.diff(axis) > least)
+            # Lengths cut out before each gap, and after it.
+            lost = np.concatenate([[0.0], np.cumsum(axis[at + 1] - axis[at] - least)])
+            middles = 0.5 * (axis[at] + axis[at + 1])
+            self.cuts.append((middles, middles - 0.5 * (lost[1:] + lost[:-1]), lost))
+
+    def _white(self, places: np.ndarray) -> np.ndarray:
+        return np.linalg.solve(self.root, (places - self.middle).T).T
+
+    def of(self, places: np.ndarray) -> np.ndarray:
+        """Convert north and east (n, 2) [m] to these coordinates."""
+        axes = zip(self._white(places).T, self.cuts, strict=True)
+        return np.stack([axis - lost[np.searchsorted(at, axis)] for axis, (at, _, lost) in axes], axis=1)
+
+    def back(self, places: np.ndarray) -> np.ndarray:
+        """Convert coordinates (n, 2) to north and east [m]."""
+        axes = zip(places.T, self.cuts, strict=True)
+        white = np.stack([axis + lost[np.searchsorted(at, axis)] for axis, (_, at, lost) in axes], axis=1)
+        return self.middle + white @ self.root.T
+
+
+class Grid:
+    """Members (n, 2) [m] binned on a square grid in a frame; coordinates are counted in cells.
+
+    like: A grid of the same frame and cells; default None, one that holds all but the outermost members.
+    """
+
+    def __init__(self, places: np.ndarray, weights: np.ndarray, frame: Frame, size: int, like: Grid | None = None):
+        self.frame, self.size, self.weights = frame, size, weights
+        places = frame.of(places)
+        if like is None:
+            margin = REACH * frame.widest
+            low, high = np.quantile(places, [TAIL, 1.0 - TAIL], axis=0) + [[-margin], [margin]]
+            self.low, self.cell = low, float((high - low).max()) / (size - 1)
+        else:
+            self.low, self.cell = like.low, like.cell
+        # Of a cell [m2].
+        self.area = self.cell**2 * float(np.prod(np.diag(frame.root)))
+        places = (places - self.low) / self.cell
         self.inside = ((places >= 0.0) & (places < size - 1)).all(axis=1)
         self.at = places[self.inside]
         node = np.floor(self.at).astype(np.int64)
@@ -100,25 +148,38 @@ class Smoothed(NamedTuple):
         level = self.level(1.0 - share)
         return float(np.count_nonzero(self.density >= level)) if level else np.inf
 
-    def region(self, share: float, middle: np.ndarray, root: np.ndarray) -> Level:
-        """Trace a share's region, with the interval that order statistics of the densities give its level.
+    def within(self, share: float, places: np.ndarray) -> np.ndarray | None:
+        """Pool the covariance (2, 2) [m2] of members (n, 2) [m] within the parts of a share's region; None of one part."""
+        from scipy.ndimage import label
 
-        middle, root: Place (2,) and Cholesky factor (2, 2) [m] of the grid's coordinates.
-        """
+        grid = self.grid
+        parts, count = label(self.density >= self.level(1.0 - share))
+        part = parts[tuple(np.round(grid.at).astype(np.int64).T)]
+        places, weights = places[grid.inside], grid.weights[grid.inside]
+        total = np.bincount(part, weights, count + 1)
+        large = 1 + np.flatnonzero(total[1:] > SOME * grid.weights.sum())
+        if len(large) < 2:
+            return None
+        means = np.stack([np.bincount(part, weights * axis, count + 1) for axis in places.T], axis=1)
+        away = places - (means / np.maximum(total, 1e-300)[:, None])[part]
+        some = np.isin(part, large)
+        return np.asarray((away[some].T * weights[some]) @ away[some] / weights[some].sum())
+
+    def region(self, share: float) -> Level:
+        """Trace a share's region, with the interval that order statistics of the densities give its level."""
         from scipy.stats import binom
 
         count = round(self.grid.count)
         first, last = binom.ppf([0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], count, 1.0 - share)
         outside = (1.0 - share, (last + 1.0) / (count + 1.0), first / (count + 1.0))
         parts, fewer, more = map(self._polygons, map(self.level, outside))
-        scale = self.grid.cell**2 * float(np.prod(np.diag(root)))
+        grid = self.grid
         # A ten-thousandth of a cell.
-        digits = 4 - math.floor(math.log10(self.grid.cell * np.diag(root).min()))
+        digits = 4 - math.floor(math.log10(grid.cell * np.diag(grid.frame.root).min()))
         polygons = [
-            tuple((middle + (self.grid.low + self.grid.cell * ring) @ root.T).round(digits) for ring in rings)
-            for rings in parts or ()
+            tuple(grid.frame.back(grid.low + grid.cell * ring).round(digits) for ring in rings) for rings in parts or ()
         ]
-        area, low, high = (math.inf if each is None else scale * _area(each) for each in (parts, fewer, more))
+        area, low, high = (math.inf if each is None else grid.area * _area(each) for each in (parts, fewer, more))
         return Level(area, low, high, tuple(polygons))
 
     def _polygons(self, level: float) -> list[list[np.ndarray]] | None:
@@ -152,38 +213,44 @@ def regions(
     places: North and east (n, 2) [m], not all on a line. weights: (n,). growing: One of the shares.
     Returns: The regions; by number of members the region of the share `growing`; whether the grid resolves all clusters.
     """
-    middle, root = places.mean(axis=0), np.linalg.cholesky(covariance)
-    # In these coordinates the covariance is one, so that a kernel is as long and as oblique as the cloud.
-    white = np.linalg.solve(root, (places - middle).T).T
-    quarters = np.quantile(white, [0.25, 0.75], axis=0)
+    scott = COARSEST * effective(weights) ** (-1.0 / 6.0)
+    quarters = np.quantile(Frame(places, covariance, math.inf).of(places), [0.25, 0.75], axis=0)
     # Of heavy tails the quartiles tell the width of the middle, as in Silverman's rule.
-    spread = float(np.clip(np.diff(quarters, axis=0).min() / 1.349, 2.0**-5, 1.0))
-    widest = COARSEST * spread * effective(weights) ** (-1.0 / 6.0)
+    frame = Frame(places, covariance, scott * float(np.clip(np.diff(quarters, axis=0).min() / 1.349, 2.0**-5, 1.0)))
     best: dict[float, tuple[float, Smoothed]] = {}
+    former = best
+    pooled = resolved = False
     for size in SIZES:
-        low, high = np.quantile(white, [TAIL, 1.0 - TAIL], axis=0) + REACH * widest * np.array([[-1.0], [1.0]])
-        cell = float((high - low).max()) / (size - 1)
-        grid = Grid(white, weights, low, cell, size)
-        for h in [h for h in widest / cell * 0.5 ** np.arange(RUNGS) if h >= 1.0] or [1.0]:
-            smoothed, finest = grid.smoothed(h), h
-            areas = {share: smoothed.cells(share) * cell**2 for share in shares}
-            better = {share: (areas[share], smoothed) for share in shares
-                      if share not in best or areas[share] < GAIN * best[share][0]}  # fmt: skip
-            best |= better
+        grid = Grid(places, weights, frame, size)
+        for h in [h for h in frame.widest / grid.cell * 0.5 ** np.arange(RUNGS) if h >= 1.0] or [1.0]:
+            smoothed = grid.smoothed(h)
+            areas = {share: smoothed.cells(share) * grid.area for share in shares}
+            best |= {share: (areas[share], smoothed) for share in shares
+                     if share not in best or areas[share] < GAIN * best[share][0]}  # fmt: skip
             if all(areas[share] > HOPELESS * best[share][0] for share in shares):
                 break
-        resolved = all(smoothed.h > finest for _, smoothed in better.values())
-        if resolved:
+        resolved = all(each is not smoothed for _, each in best.values())
+        within = None if pooled else best[growing][1].within(growing, places)
+        if within is None and resolved:
             break
-        widest = COARSEST * finest * cell
-    levels = [best[share][1].region(share, middle, root) for share in shares]
+        if within is None:
+            covariance, widest = frame.root @ frame.root.T, COARSEST * smoothed.h * grid.cell
+        else:
+            covariance, widest, pooled, former, best = within, scott, True, best, {}
+        if np.linalg.eigvalsh(covariance)[0] <= POINT**2 * np.var(places, axis=0).sum():
+            resolved = False
+            break
+        frame = Frame(places, covariance, widest)
+    best = {share: best.get(share, each) if each[0] >= GAIN * best.get(share, each)[0] else each
+            for share, each in former.items()}  # fmt: skip
+    levels = [best[share][1].region(share) for share in shares]
     chosen, order = best[growing][1], np.random.default_rng(0).permutation(len(places))
     grown = {}
     for part in (8, 4, 2):
         some = order[: len(places) // part]
         if len(some) >= least_members(growing):
-            grid = Grid(white[some], weights[some], chosen.grid.low, chosen.grid.cell, chosen.grid.size)
-            grown[len(some)] = grid.smoothed(chosen.h * part ** (1.0 / 6.0)).region(growing, middle, root)
+            grid = Grid(places[some], weights[some], chosen.grid.frame, chosen.grid.size, chosen.grid)
+            grown[len(some)] = grid.smoothed(chosen.h * part ** (1.0 / 6.0)).region(growing)
     return levels, grown | {len(places): levels[shares.index(growing)]}, resolved
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.uncertainty.footprint.answer import Footprint
+from lgvi_warp.uncertainty.footprint.answer import Footprint, length_text
 from lgvi_warp.uncertainty.footprint.footprint import footprint as footprint_of
 from lgvi_warp.views.plots.canvas import COLORS, STYLES, TINTS, legend_below, panel, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
@@ -55,7 +55,7 @@ def footprint(
 
 
 def _draw(axes: Any, found: Footprint) -> None:
-    from matplotlib.patches import Ellipse, PathPatch
+    from matplotlib.patches import Circle, Ellipse, PathPatch
     from matplotlib.path import Path
 
     tints = dict(zip((0.99, 0.95, 0.9, 0.5), (*TINTS, COLORS[0]), strict=True))
@@ -74,6 +74,9 @@ def _draw(axes: Any, found: Footprint) -> None:
     middle = found.centre[::-1]
     axes.add_patch(Ellipse(middle, sides[1], sides[0], angle=angle, fill=False, edgecolor=COLORS[1], linestyle=STYLES[1],
                            label=f"{region.percent} ellipse: {region.ellipse_area:.3g} m$^2$"))  # fmt: skip
+    axes.add_patch(Circle(middle, region.radius, fill=False, edgecolor=COLORS[2], linestyle=STYLES[3],
+                          label=f"{region.percent} circle: {length_text(region.radius, region.radius)} m"))  # fmt: skip
+    axes.update_datalim([middle - region.radius, middle + region.radius])
     some = len(found.places) < found.members
     who = f"{len(found.places):,} of {found.members:,} members" if some else f"{found.members:,} members"
     axes.scatter(*found.places.T[::-1], s=4, color="black", alpha=0.5, linewidths=0, label=who)
@@ -82,5 +85,5 @@ def _draw(axes: Any, found: Footprint) -> None:
     axes.grid(True, alpha=0.3)
     axes.locator_params(nbins=6)
     show_at_least(axes)
-    draw_floor(axes, found.provenance["scene"])
+    draw_floor(axes, found.provenance.get("scene", {}), "depth of the floor")
     legend_below(axes, ncols=3)

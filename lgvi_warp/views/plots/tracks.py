@@ -101,7 +101,7 @@ def show_at_least(axes: Any) -> None:
     axes.set_aspect("equal", adjustable="datalim")
 
 
-def draw_floor(axes: Any, scene: Mapping[str, Any]) -> None:
+def draw_floor(axes: Any, scene: Mapping[str, Any], label: str | None = None) -> None:
     """Draw the depths of floors on grids, in what is in view and as far beyond it as an equal scale may show."""
     across, up = np.array(axes.get_xlim()), np.array(axes.get_ylim())
     shown = axes.dataLim.frozen()
@@ -112,6 +112,8 @@ def draw_floor(axes: Any, scene: Mapping[str, Any]) -> None:
             lines = axes.contour(relief.east, relief.north, relief.depth, levels=LEVELS, colors=FLOOR, linewidths=0.6,
                                  linestyles="solid", alpha=0.6, zorder=0.5)  # fmt: skip
             axes.clabel(lines, fmt="%g m", fontsize="x-small")
+            if label is not None:
+                axes.plot([], [], color=FLOOR, linewidth=0.6, label=label)
             if relief.depth.min() < 0.0 < relief.depth.max():
                 axes.contour(relief.east, relief.north, relief.depth, levels=[0.0], colors=FLOOR, linewidths=1.6)
     # What is in view is that of the paths.

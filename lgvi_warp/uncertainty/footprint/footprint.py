@@ -60,7 +60,8 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
         >>> found.answer
         '95 % end within 2.31 m of a point 15.01 m north and 2.97 m east of the origin'
     """
-    word = at.strip() if isinstance(at, str) else f"{at:.12g}" if isinstance(at, Real) else ""
+    word = at.strip() if isinstance(at, str) else str(at) if isinstance(at, Real) else ""
+    word = word if (when := time_of(word)) is None else f"{when:.12g}"
     positions, there = _positions(result_of(result), word, at)
     lacking = result.status[~there].counts()
     weights = np.ones(result.members) if result.weights is None else np.asarray(result.weights, np.float64)
@@ -142,9 +143,5 @@ def _row(result: Result, row: int) -> np.ndarray:
             return np.asarray(result.samples["position"][row])
         stored: Any = result.samples
         return np.asarray(stored.rows("position", slice(row, row + 1), slice(0, result.members))[0])
-    if row == len(result.time) - 1 and result.end is not None and "position" in result.final.states:
-        return np.asarray(result.final.position)
-    raise SceneError(
-        ['positions of all members were not kept; run it with keep="all" or save=lw.SaveAt(final=True); '
-         "the members that were kept are result.kept"]
-    )  # fmt: skip
+    remedy = "run it with keep='all'; without save=... start and end alone take little memory. Kept members are result.kept"
+    raise SceneError([f"positions of all members were not kept; {remedy}"])

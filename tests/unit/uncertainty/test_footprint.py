@@ -246,7 +246,7 @@ def test_what_cannot_be_is_refused():
     says(refused(lw.studies.footprint, result, None), "at = None")
     says(refused(lw.studies.footprint, result.position), "result", "lw.solve")
     bare = dataclasses.replace(result, samples={})
-    says(refused(lw.studies.footprint, bare), "were not kept", 'keep="all"', "SaveAt(final=True)")
+    says(refused(lw.studies.footprint, bare), "were not kept", "keep='all'")
     none = run_to(places, status=np.full(30, FAILED), end=np.full(30, 0.5))
     says(refused(lw.studies.footprint, none), "no member has a place", "non_finite 30")
 

@@ -215,9 +215,11 @@ def _some_members(result: Result, ending: str, members: Any, given: Environment 
 
 def _regions(found: Any, ending: str, given: dict[str, Any]) -> Write:
     """Writer of the regions of a footprint into a file with this ending."""
-    exporter = None if ending in WRITERS else extensions.load("exporters", ending)
+    exporter: Any = None if ending in WRITERS else extensions.load("exporters", ending)
     if not hasattr(exporter, "write_regions"):
-        raise refusal("to", ending, "holds no regions", "give a file .geojson or .kml; its save(folder) writes JSON and CSV")
+        raise refusal(
+            "to", ending, "holds no regions", "give a file .geojson or .kml; its save(folder) writes JSON and CSV"
+        )
     for name in ("members", "start"):
         if given[name] is not None:
             raise refusal(name, given[name], "is given for a footprint, which is of all members", "leave it out")

@@ -40,6 +40,11 @@ class Region:
         """The share in percent, as "95 %"."""
         return f"{100.0 * self.share:g} %"
 
+    @property
+    def area_text(self) -> str:
+        """The area with its interval in words, as "112 m2 (107 to 118)"."""
+        return _area_text(self.area, self.low, self.high)
+
 
 @dataclass(frozen=True, eq=False)
 class Footprint(Saved):
@@ -91,7 +96,7 @@ class Footprint(Saved):
             who = f"{self.members:,} members that {'did not fail' if failed else are}"
             share, are = f"{share} of the {who}", are if failed else "do so"
         place = place_text(self.centre, region.radius or 1.0)
-        within = f"within {length_text(region.radius, region.radius)} m of" if region.radius > 0.0 else "at"
+        within = f"within {number_text(region.radius, region.radius)} m of" if region.radius > 0.0 else "at"
         return f"{before}{share} {are} {within} {place}"
 
     def __str__(self) -> str:
@@ -100,14 +105,16 @@ class Footprint(Saved):
             counts = ", ".join(f"{name} {count:,}" for name, count in self.lacking.items())
             lines.append(f"left out    {sum(self.lacking.values()):,} members without such a place: {counts}")
         for each in self.regions:
-            size = length_text(each.radius, each.radius)
+            size = number_text(each.radius, each.radius)
             lines.append(
-                f"{each.percent:<11} {_area_text(each.area, each.low, each.high)}"
+                f"{each.percent:<11} {each.area_text}"
                 f"{f' in {len(each.polygons)} parts' * (len(each.polygons) > 1)}; within {size} m of the centre; "
-                f"ellipse {each.ellipse_area:.4g} m2"
+                f"ellipse {number_text(each.ellipse_area, each.ellipse_area)} m2"
             )
         if len(self.growth) > 1:
-            lines += [f"growth      {self.main.percent} of {n:,} members: {_area_text(*areas)}" for n, *areas in self.growth]
+            lines += [
+                f"growth      {self.main.percent} of {n:,} members: {_area_text(*areas)}" for n, *areas in self.growth
+            ]
         return "\n".join([*lines, *(f"note        {text}" for text in self.messages), f"answer      {self.answer}"])
 
     def to_dict(self) -> dict[str, Any]:
@@ -159,13 +166,13 @@ def _area_text(area: float, low: float, high: float) -> str:
     """An area with its interval in words."""
     if math.isnan(area):
         return "no area"
-    upper = f"to {high:.4g}" if math.isfinite(high) else "or more"
-    return f"{area:.4g} m2 ({low:.4g} {upper})"
+    upper = f"to {number_text(high, high)}" if math.isfinite(high) else "or more"
+    return f"{number_text(area, area)} m2 ({number_text(low, low)} {upper})"
 
 
-def length_text(value: float, scale: float) -> str:
-    """A length [m] to three digits of a scale."""
-    digits = 2 - math.floor(math.log10(scale)) if scale > 0.0 else 2
+def number_text(value: float, scale: float) -> str:
+    """A number to three digits of a scale, or more, without an exponent."""
+    digits = 2 - math.floor(math.log10(scale)) if 0.0 < scale < math.inf else 2
     return f"{value:,.{max(0, digits)}f}"
 
 
@@ -173,6 +180,6 @@ def place_text(place: Sequence[float] | np.ndarray, scale: float) -> str:
     """A place, north and east [m], in words, to three digits of a scale."""
     words = []
     for value, names in zip(place, (("north", "south"), ("east", "west")), strict=True):
-        text = length_text(abs(float(value)), scale)
+        text = number_text(abs(float(value)), scale)
         words += [f"{text} m {names[int(value < 0.0)]}"] if float(text.replace(",", "")) else []
     return f"a point {' and '.join(words)} of the origin" if words else "the origin"

@@ -75,7 +75,9 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
     along, across = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[::-1], 0.0))
     round_off = ROUND_OFF * float(np.finfo(positions.dtype).eps * np.abs(places).max())
     shares = [share for share in SHARES if count >= least_members(share) - 1e-9]
-    messages = [f"a region of {share:.0%} needs {least_members(share)} members" for share in SHARES if share not in shares]
+    messages = [
+        f"a region of {share:.0%} needs {least_members(share)} members" for share in SHARES if share not in shares
+    ]
     levels, growth = [Level(np.nan, np.nan, np.nan, ())] * len(shares), dict[int, Level]()
     if along <= round_off:
         away, messages = 0.0 * away, [*messages, "all members are at one point: a region has no area"]
@@ -119,7 +121,9 @@ def _positions(result: Result, word: str, at: Any) -> tuple[np.ndarray, np.ndarr
     if when is not None:
         if not len(rows := rows_at(result.time, when)):
             near = result.time[np.argsort(np.abs(result.time - when))[:2]]
-            remedy = f"give {' or '.join(f'{time:g}' for time in np.sort(near))}, or keep it: save=lw.SaveAt(at=[{word}])"
+            remedy = (
+                f"give {' or '.join(f'{time:g}' for time in np.sort(near))}, or keep it: save=lw.SaveAt(at=[{word}])"
+            )
             raise refusal("at", at, "is no time of a sample", remedy)
         row, there = int(rows[0]), there | (stop_time(result) >= when)
     elif word != "end":
@@ -143,5 +147,7 @@ def _row(result: Result, row: int) -> np.ndarray:
             return np.asarray(result.samples["position"][row])
         stored: Any = result.samples
         return np.asarray(stored.rows("position", slice(row, row + 1), slice(0, result.members))[0])
-    remedy = "run it with keep='all'; without save=... start and end alone take little memory. Kept members are result.kept"
+    remedy = (
+        "run it with keep='all'; without save=... start and end alone take little memory. Kept members are result.kept"
+    )
     raise SceneError([f"positions of all members were not kept; {remedy}"])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.uncertainty.footprint.answer import Footprint, length_text
+from lgvi_warp.uncertainty.footprint.answer import Footprint, number_text
 from lgvi_warp.uncertainty.footprint.footprint import footprint as footprint_of
 from lgvi_warp.views.plots.canvas import COLORS, STYLES, TINTS, legend_below, panel, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
@@ -50,7 +50,7 @@ def footprint(
     with panel(ax, path, (8.0, 7.5)) as axes:
         _draw(axes, found)
         if ax is None:
-            axes.set_title(wrapped(found.answer, axes.figure))
+            axes.set_title(wrapped(found.answer, axes.figure, 0.9))
     return axes
 
 
@@ -64,19 +64,20 @@ def _draw(axes: Any, found: Footprint) -> None:
         if rings:
             outline = Path.make_compound_path(*(Path(ring, closed=True) for ring in rings))
             axes.add_patch(PathPatch(outline, facecolor=tints[region.share], edgecolor=COLORS[0], linewidth=0.6, alpha=0.8,
-                                     label=f"{region.percent}: {region.area:.3g} m$^2$"))  # fmt: skip
+                                     label=f"{region.percent}: {number_text(region.area, region.area)} m$^2$"))  # fmt: skip
             axes.update_datalim(np.concatenate(rings))
     lengths, turns = np.linalg.eigh(found.covariance)
     region = found.main
     sides = 2.0 * np.sqrt(-2.0 * np.log1p(-region.share) * np.maximum(lengths, 0.0))
     # Of the longer axis, counted from east.
     angle = float(np.degrees(np.arctan2(turns[0, 1], turns[1, 1])))
-    middle = found.centre[::-1]
+    north, east = map(float, found.centre)
+    middle = east, north
     axes.add_patch(Ellipse(middle, sides[1], sides[0], angle=angle, fill=False, edgecolor=COLORS[1], linestyle=STYLES[1],
-                           label=f"{region.percent} ellipse: {region.ellipse_area:.3g} m$^2$"))  # fmt: skip
+                           label=f"{region.percent} ellipse: {number_text(region.ellipse_area, region.ellipse_area)} m$^2$"))  # fmt: skip
     axes.add_patch(Circle(middle, region.radius, fill=False, edgecolor=COLORS[2], linestyle=STYLES[3],
-                          label=f"{region.percent} circle: {length_text(region.radius, region.radius)} m"))  # fmt: skip
-    axes.update_datalim([middle - region.radius, middle + region.radius])
+                          label=f"{region.percent} circle: {number_text(region.radius, region.radius)} m"))  # fmt: skip
+    axes.update_datalim([(east - region.radius, north - region.radius), (east + region.radius, north + region.radius)])
     some = len(found.places) < found.members
     who = f"{len(found.places):,} of {found.members:,} members" if some else f"{found.members:,} members"
     axes.scatter(*found.places.T[::-1], s=4, color="black", alpha=0.5, linewidths=0, label=who)

@@ -13,7 +13,7 @@ from scipy.stats import binom, gaussian_kde
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
-from lgvi_warp.uncertainty.footprint.answer import place_text
+from lgvi_warp.uncertainty.footprint.answer import number_text, place_text
 from lgvi_warp.uncertainty.footprint.density import GAIN, Frame, Grid
 from tests.support.made import made
 from tests.support.refusals import refused, says
@@ -266,6 +266,13 @@ def test_a_footprint_is_saved_and_read(tmp_path):
     assert len(files[1].read_text().splitlines()) == 1 + len(found.regions)
 
 
+@pytest.mark.parametrize(
+    "value, text", [(7035.2, "7,035"), (143.4, "143"), (26.44, "26.4"), (0.01234, "0.0123"), (0.0, "0.00")]
+)
+def test_numbers_in_words(value, text):
+    assert number_text(value, value) == text
+
+
 @pytest.mark.parametrize("place, scale, text", [
     ((-1.9, 24.94), 11.7, "a point 1.9 m south and 24.9 m east of the origin"),
     ((0.04, -3.0), 11.7, "a point 3.0 m west of the origin"), ((0.0, 0.0), 1.0, "the origin"),
@@ -276,13 +283,21 @@ def test_places_in_words(place, scale, text):
 
 
 def test_the_picture_shows_the_numbers():
-    floor = lw.events.Floor(depth=np.linspace(-22.5, 22.5, 21)[:, None] * np.ones(21), origin=[-50.0, -50.0], spacing=[5.0, 5.0])
+    floor = lw.events.Floor(
+        depth=np.linspace(-22.5, 22.5, 21)[:, None] * np.ones(21), origin=[-50.0, -50.0], spacing=[5.0, 5.0]
+    )
     result = run_to(drawn(math.inf, 1_500, 3), scene=lw.Scene.named("sphere", events=[floor]))
     found = lw.studies.footprint(result)
     axes = lw.plots.footprint(result)
     assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_aspect()) == ("east [m]", "north [m]", 1.0)
     assert axes.get_title().replace("\n", " ") == found.answer
-    shown = dict(zip([f"{region.percent}: {region.area:.3g} m$^2$" for region in found.regions], found.regions, strict=True))
+    shown = dict(
+        zip(
+            [f"{region.percent}: {number_text(region.area, region.area)} m$^2$" for region in found.regions],
+            found.regions,
+            strict=True,
+        )
+    )
     for patch in axes.patches[:4]:
         low, high = patch.get_path().get_extents().get_points()
         ring = np.concatenate([rings[0] for rings in shown[patch.get_label()].polygons])

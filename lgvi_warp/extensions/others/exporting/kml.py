@@ -92,7 +92,7 @@ def write_regions(found: Footprint, plane: LocalPlane, target: Path, report: Rep
         for region, polygons in areas(found, plane):
             placemark = ET.Element("Placemark")
             _text(placemark, "name", region.percent)
-            _text(placemark, "description", f"{region.area:.4g} m2 ({region.low:.4g} to {region.high:.4g})")
+            _text(placemark, "description", region.area_text)
             style = ET.SubElement(placemark, "Style")
             for name, color in STYLE.items():
                 _text(ET.SubElement(style, name), "color", color)

@@ -15,9 +15,9 @@ from lgvi_warp.cli.output import print_faults, tell
 from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.report import file_line, pictures, shown_members
 from lgvi_warp.cli.settings import writable
-from lgvi_warp.common.errors import SceneError
 from lgvi_warp.cli.verb import add_shared, as_verb
 from lgvi_warp.cli.writing import Written
+from lgvi_warp.common.errors import SceneError
 
 
 def plot_arguments(verb: Any) -> None:

@@ -52,8 +52,8 @@ def export(
 
     ".csv" and ".parquet": a table with a row for each member and time of the samples, else for each member. ".nc": NetCDF-4
     with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and transforms in the
-    axes of ROS. docs/guide/exports.md has their columns, names, units and axes. A footprint is written as ".geojson" or ".kml":
-    a polygon or several for each region.
+    axes of ROS. docs/guide/exports.md has their columns, names, units and axes. Of a footprint the regions are
+    written, as ".geojson" or ".kml".
 
     Args:
         run: A result, a result.npz, a store, or a folder with one of the two; or what `lw.studies.footprint` returns.
@@ -213,7 +213,7 @@ def _some_members(result: Result, ending: str, members: Any, given: Environment 
     return functools.partial(exporter.write, tracks)
 
 
-def _regions(found: Any, ending: str, given: dict[str, Any]) -> Write:
+def _regions(footprint: Any, ending: str, arguments: dict[str, Any]) -> Write:
     """Writer of the regions of a footprint into a file with this ending."""
     exporter: Any = None if ending in WRITERS else extensions.load("exporters", ending)
     if not hasattr(exporter, "write_regions"):
@@ -221,10 +221,10 @@ def _regions(found: Any, ending: str, given: dict[str, Any]) -> Write:
             "to", ending, "holds no regions", "give a file .geojson or .kml; its save(folder) writes JSON and CSV"
         )
     for name in ("members", "start"):
-        if given[name] is not None:
-            raise refusal(name, given[name], "is given for a footprint, which is of all members", "leave it out")
-    environment = _where(given["origin"] or found.origin, None) or Environment()
-    return functools.partial(exporter.write_regions, found, plane_of(environment, "a map"))
+        if arguments[name] is not None:
+            raise refusal(name, arguments[name], "is given for a footprint, which is of all members", "leave it out")
+    environment = _where(arguments["origin"] or footprint.origin, None) or Environment()
+    return functools.partial(exporter.write_regions, footprint, plane_of(environment, "a map"))
 
 
 def _nothing(fraction: float) -> None:

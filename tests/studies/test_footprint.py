@@ -60,7 +60,10 @@ def test_the_command_says_and_writes_it(result, tmp_path, capsys):
     found = lw.studies.footprint(result, "floor")
     says(capsys.readouterr().out, f"answer      {found.answer}")
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"result.npz", *(f"footprint.{ending}" for ending in "json csv txt png geojson kml".split())}
+    assert names == {
+        "result.npz",
+        *(f"footprint.{ending}" for ending in ["json", "csv", "txt", "png", "geojson", "kml"]),
+    }
     assert cli.main(["--json", "-q", "footprint", str(tmp_path), "--at", "1.0", "--out", str(tmp_path / "other")]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["content"]["footprint"]["answer"] == lw.studies.footprint(result, 1.0).answer

@@ -93,7 +93,7 @@ class Grid:
         places = frame.of(places)
         if like is None:
             margin = REACH * frame.widest
-            low, high = np.quantile(places, [TAIL, 1.0 - TAIL], axis=0) + [[-margin], [margin]]
+            low, high = np.quantile(places, [TAIL, 1.0 - TAIL], axis=0) + np.array([[-margin], [margin]])
             self.low, self.cell = low, float((high - low).max()) / (size - 1)
         else:
             self.low, self.cell = like.low, like.cell

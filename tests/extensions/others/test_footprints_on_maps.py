@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Regions of footprints on maps, opened by readers that are not ours: places, areas on the Earth, rings, and what is refused."""
+"""Regions of footprints on maps, opened by readers that are not ours: places, areas on the Earth, rings, refusals."""
 
 import json
 import math

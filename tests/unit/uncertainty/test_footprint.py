@@ -33,7 +33,7 @@ def drawn(df, n, seed):
 
 
 def area(df, share):
-    """Closed form: the region is an ellipse, whose squared radius is F distributed with 2 and df degrees of freedom, times 2."""
+    """Closed form: the region is an ellipse; half its squared radius is F distributed with 2 and df degrees of freedom."""
     outside = 1.0 - share
     squared = -2.0 * math.log(outside) if df == math.inf else df * (outside ** (-2.0 / df) - 1.0)
     return math.pi * squared * ROOT_DET
@@ -178,8 +178,8 @@ def test_weights_count():
     assert contains_xy(shape, *places[at].T).mean() == pytest.approx(0.9, abs=4.0 * math.sqrt(0.09 / 1_500))
 
 
-@pytest.mark.parametrize("n, shares", [(1, [0.5]), (2, [0.5]), (8, [0.5]), (9, [0.5, 0.9]), (18, [0.5, 0.9]),
-                                       (19, [0.5, 0.9, 0.95]), (98, [0.5, 0.9, 0.95]), (99, [0.5, 0.9, 0.95, 0.99])])  # fmt: skip
+@pytest.mark.parametrize("n, shares", [(1, [0.5]), (2, [0.5]), (8, [0.5]), (9, [0.5, 0.9]),
+                                       (18, [0.5, 0.9]), (19, [0.5, 0.9, 0.95]), (98, [0.5, 0.9, 0.95]), (99, [0.5, 0.9, 0.95, 0.99])])  # fmt: skip
 def test_few_members_have_few_regions(n, shares):
     """A region of a share leaves one of 1 / (1 - share) members outside: of fewer members there is none."""
     found = footprint(drawn(math.inf, n, 1))
@@ -276,7 +276,8 @@ def test_numbers_in_words(value, text):
 @pytest.mark.parametrize("place, scale, text", [
     ((-1.9, 24.94), 11.7, "a point 1.9 m south and 24.9 m east of the origin"),
     ((0.04, -3.0), 11.7, "a point 3.0 m west of the origin"), ((0.0, 0.0), 1.0, "the origin"),
-    ((12345.6, 0.0), 2345.0, "a point 12,346 m north of the origin"), ((0.0, 0.00123), 0.01, "a point 0.0012 m east of the origin"),
+    ((12345.6, 0.0), 2345.0, "a point 12,346 m north of the origin"),
+    ((0.0, 0.00123), 0.01, "a point 0.0012 m east of the origin"),
 ])  # fmt: skip
 def test_places_in_words(place, scale, text):
     assert place_text(place, scale) == text

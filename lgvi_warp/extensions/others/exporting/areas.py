@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 Rings = list[np.ndarray]
 
 
-def areas(found: Footprint, plane: LocalPlane) -> Iterator[tuple[Region, list[Rings]]]:
+def areas(footprint: Footprint, plane: LocalPlane) -> Iterator[tuple[Region, list[Rings]]]:
     """Give the regions with their polygons, the largest first, so that no region hides a smaller one."""
-    for region in sorted(found.regions, key=lambda region: -region.share):
+    for region in sorted(footprint.regions, key=lambda region: -region.share):
         polygons = [_on_map(polygon, plane) for polygon in region.polygons]
         yield region, [part for rings in polygons for part in _cut(rings)]
 

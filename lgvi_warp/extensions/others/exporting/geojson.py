@@ -58,16 +58,16 @@ def _geometry(line: MapLine) -> tuple[dict[str, Any] | None, Any]:
     return {"type": "MultiLineString", "coordinates": list(places)}, list(times)
 
 
-def write_regions(found: Footprint, plane: LocalPlane, target: Path, report: Report) -> None:
+def write_regions(footprint: Footprint, plane: LocalPlane, target: Path, report: Report) -> None:
     """Write a feature for each region, the largest first, and a point for the centre."""
     features: list[dict[str, Any]] = []
-    for region, polygons in areas(found, plane):
+    for region, polygons in areas(footprint, plane):
         numbers = {name: getattr(region, name) for name in ("share", "area", "low", "high", "radius")}
         places = [[ring.tolist() for ring in rings] for rings in polygons]
         geometry = {"type": "MultiPolygon", "coordinates": places} if places else None
         features.append({"type": "Feature", "geometry": geometry, "properties": finite_or_none(numbers)})
-    latitude, longitude = map(float, plane.geodetic(*found.centre))
+    latitude, longitude = map(float, plane.geodetic(*footprint.centre))
     centre = {"type": "Point", "coordinates": [longitude, latitude]}
-    features.append({"type": "Feature", "geometry": centre, "properties": {"answer": found.answer}})
+    features.append({"type": "Feature", "geometry": centre, "properties": {"answer": footprint.answer}})
     with new_text_file(target) as file:
         file.write(json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False) + "\n")

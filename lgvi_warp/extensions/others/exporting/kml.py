@@ -85,11 +85,11 @@ def _text(parent: ET.Element, name: str, text: str) -> None:
     ET.SubElement(parent, name).text = text
 
 
-def write_regions(found: Footprint, plane: LocalPlane, target: Path, report: Report) -> None:
+def write_regions(footprint: Footprint, plane: LocalPlane, target: Path, report: Report) -> None:
     """Write a placemark for each region, the largest first, and one for the centre."""
     with new_text_file(target) as file:
         file.write(HEAD)
-        for region, polygons in areas(found, plane):
+        for region, polygons in areas(footprint, plane):
             placemark = ET.Element("Placemark")
             _text(placemark, "name", region.percent)
             _text(placemark, "description", region.area_text)
@@ -105,7 +105,7 @@ def write_regions(found: Footprint, plane: LocalPlane, target: Path, report: Rep
             file.write(ET.tostring(placemark, encoding="unicode") + "\n")
         placemark = ET.Element("Placemark")
         _text(placemark, "name", "centre")
-        _text(placemark, "description", found.answer)
-        latitude, longitude = plane.geodetic(*found.centre)
+        _text(placemark, "description", footprint.answer)
+        latitude, longitude = plane.geodetic(*footprint.centre)
         _places(ET.SubElement(placemark, "Point"), np.array([[longitude, latitude]]))
         file.write(ET.tostring(placemark, encoding="unicode") + "\n" + TAIL)

@@ -36,7 +36,7 @@ DOORS = {
     "state spaces": (lambda: MODEL.state_space(), "control", "control"),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (canvas.figure_class, "matplotlib.figure", "viz"),
-    "footprints": (lambda: Smoothed(None, 0.0, np.eye(3), np.ones(1), np.ones(1))._polygons(0.5), "contourpy", "viz"),
+    "footprints": (lambda: Smoothed(None, 0.0, np.eye(3), np.ones(1), np.ones(1)).parts(0.5), "contourpy", "viz"),
     "reports": (lambda: run_again.toml_of({}), "tomlkit", "viz"),
     "completion": (lambda: cli.arguments.VERBS["completion"](Namespace(shell="bash")), "shtab", "shell"),
     "recordings": (lambda: rerun.record(None, "x"), "rerun", "viz"),

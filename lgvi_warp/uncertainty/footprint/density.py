@@ -41,7 +41,7 @@ CONFIDENCE = 0.95
 Polygon = tuple[np.ndarray, ...]
 
 
-class Level(NamedTuple):
+class Outline(NamedTuple):
     """Region of a share: its area with an interval [m2], and its polygons."""
 
     area: float
@@ -50,7 +50,7 @@ class Level(NamedTuple):
     polygons: tuple[Polygon, ...]
 
 
-class Frame:
+class Whitening:
     """Coordinates in which a covariance is one and wide gaps between clusters, which have no density, are cut short.
 
     So a kernel is as long and as oblique as a cluster, and clusters far apart fit on one grid.
@@ -82,13 +82,15 @@ class Frame:
         return self.middle + white @ self.root.T
 
 
-class Grid:
+class DensityGrid:
     """Members (n, 2) [m] binned on a square grid in a frame; coordinates are counted in cells.
 
     like: A grid of the same frame and cells; default None, one that holds all but the outermost members.
     """
 
-    def __init__(self, places: np.ndarray, weights: np.ndarray, frame: Frame, size: int, like: Grid | None = None):
+    def __init__(
+        self, places: np.ndarray, weights: np.ndarray, frame: Whitening, size: int, like: DensityGrid | None = None
+    ):
         self.frame, self.size, self.weights = frame, size, weights
         places = frame.of(places)
         if like is None:
@@ -132,7 +134,7 @@ class Grid:
 class Smoothed(NamedTuple):
     """Density on a grid; densities at the members without their own kernels, rising, and the shares of members up to them."""
 
-    grid: Grid
+    grid: DensityGrid
     h: float
     density: np.ndarray
     shares: np.ndarray
@@ -165,14 +167,14 @@ class Smoothed(NamedTuple):
         some = np.isin(part, large)
         return np.asarray((away[some].T * weights[some]) @ away[some] / weights[some].sum())
 
-    def region(self, share: float) -> Level:
+    def region(self, share: float) -> Outline:
         """Trace a share's region, with the interval that order statistics of the densities give its level."""
         from scipy.stats import binom
 
         count = round(self.grid.count)
         first, last = binom.ppf([0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE], count, 1.0 - share)
         outside = (1.0 - share, (last + 1.0) / (count + 1.0), first / (count + 1.0))
-        parts, fewer, more = map(self._polygons, map(self.level, outside))
+        parts, fewer, more = map(self.parts, map(self.level, outside))
         grid = self.grid
         # A ten-thousandth of a cell.
         digits = 4 - math.floor(math.log10(grid.cell * np.diag(grid.frame.root).min()))
@@ -180,9 +182,9 @@ class Smoothed(NamedTuple):
             tuple(grid.frame.back(grid.low + grid.cell * ring).round(digits) for ring in rings) for rings in parts or ()
         ]
         area, low, high = (math.inf if each is None else grid.area * _area(each) for each in (parts, fewer, more))
-        return Level(area, low, high, tuple(polygons))
+        return Outline(area, low, high, tuple(polygons))
 
-    def _polygons(self, level: float) -> list[list[np.ndarray]] | None:
+    def parts(self, level: float) -> list[list[np.ndarray]] | None:
         """Trace where the density is above a level: the rings of each part, in cells; None where it cannot be told."""
         try:
             from contourpy import FillType, contour_generator
@@ -207,21 +209,21 @@ def _area(polygons: list[list[np.ndarray]]) -> float:
 
 def regions(
     places: np.ndarray, weights: np.ndarray, covariance: np.ndarray, shares: Sequence[float], growing: float
-) -> tuple[list[Level], dict[int, Level], bool]:
+) -> tuple[list[Outline], dict[int, Outline], bool]:
     """Find the regions of shares that the members suffice for.
 
     places: North and east (n, 2) [m], not all on a line. weights: (n,). growing: One of the shares.
     Returns: The regions; by number of members the region of the share `growing`; whether the grid resolves all clusters.
     """
     scott = COARSEST * effective(weights) ** (-1.0 / 6.0)
-    quarters = np.quantile(Frame(places, covariance, math.inf).of(places), [0.25, 0.75], axis=0)
+    quarters = np.quantile(Whitening(places, covariance, math.inf).of(places), [0.25, 0.75], axis=0)
     # Of heavy tails the quartiles tell the width of the middle, as in Silverman's rule.
-    frame = Frame(places, covariance, scott * float(np.clip(np.diff(quarters, axis=0).min() / 1.349, 2.0**-5, 1.0)))
+    frame = Whitening(places, covariance, scott * float(np.clip(np.diff(quarters, axis=0).min() / 1.349, 2.0**-5, 1.0)))
     best: dict[float, tuple[float, Smoothed]] = {}
     former = best
     pooled = resolved = False
     for size in SIZES:
-        grid = Grid(places, weights, frame, size)
+        grid = DensityGrid(places, weights, frame, size)
         for h in [h for h in frame.widest / grid.cell * 0.5 ** np.arange(RUNGS) if h >= 1.0] or [1.0]:
             smoothed = grid.smoothed(h)
             areas = {share: smoothed.cells(share) * grid.area for share in shares}
@@ -240,7 +242,7 @@ def regions(
         if np.linalg.eigvalsh(covariance)[0] <= POINT**2 * np.var(places, axis=0).sum():
             resolved = False
             break
-        frame = Frame(places, covariance, widest)
+        frame = Whitening(places, covariance, widest)
     best = {share: best.get(share, each) if each[0] >= GAIN * best.get(share, each)[0] else each
             for share, each in former.items()}  # fmt: skip
     levels = [best[share][1].region(share) for share in shares]
@@ -249,7 +251,7 @@ def regions(
     for part in (8, 4, 2):
         some = order[: len(places) // part]
         if len(some) >= least_members(growing):
-            grid = Grid(places[some], weights[some], chosen.grid.frame, chosen.grid.size, chosen.grid)
+            grid = DensityGrid(places[some], weights[some], chosen.grid.frame, chosen.grid.size, chosen.grid)
             grown[len(some)] = grid.smoothed(chosen.h * part ** (1.0 / 6.0)).region(growing)
     return levels, grown | {len(places): levels[shares.index(growing)]}, resolved
 

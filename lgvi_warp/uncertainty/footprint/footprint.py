@@ -18,7 +18,7 @@ from lgvi_warp.physics.terms.events import from_list
 from lgvi_warp.results.quantities import quantities
 from lgvi_warp.statistics.ends import outcomes
 from lgvi_warp.uncertainty.footprint.answer import MAIN, Footprint, Region, time_of
-from lgvi_warp.uncertainty.footprint.density import Level, effective, least_members, regions
+from lgvi_warp.uncertainty.footprint.density import Outline, effective, least_members, regions
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
@@ -33,10 +33,10 @@ ROUND_OFF = 16.0
 
 
 def footprint(result: Result, at: str | float = "end") -> Footprint:
-    """Find the smallest regions that hold 50, 90, 95 and 99 % of the members' places, and their areas.
+    """Find the smallest regions that hold given shares of the members' places, and their areas.
 
-    The regions are level sets of a kernel density, at the levels above which these shares of new members would lie. So they
-    may have several parts and holes. Members that failed have no end; those that never get there have no place. Both are
+    The shares are 50, 90, 95 and 99 %. The regions are level sets of a kernel density, at the levels above which these shares of
+    new members would lie. So they may have several parts and holes. Members that failed have no end; those that never get there have no place. Both are
     counted in `lacking`.
 
     Args:
@@ -78,7 +78,7 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
     messages = [
         f"a region of {share:.0%} needs {least_members(share)} members" for share in SHARES if share not in shares
     ]
-    levels, growth = [Level(np.nan, np.nan, np.nan, ())] * len(shares), dict[int, Level]()
+    levels, growth = [Outline(np.nan, np.nan, np.nan, ())] * len(shares), dict[int, Outline]()
     if along <= round_off:
         away, messages = 0.0 * away, [*messages, "all members are at one point: a region has no area"]
     elif len(places) < 3 or across <= max(round_off, THIN * along):

@@ -14,7 +14,7 @@ from scipy.stats import binom, gaussian_kde
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.uncertainty.footprint.answer import number_text, place_text
-from lgvi_warp.uncertainty.footprint.density import GAIN, Frame, Grid
+from lgvi_warp.uncertainty.footprint.density import GAIN, DensityGrid, Whitening
 from tests.support.made import made
 from tests.support.refusals import refused, says
 
@@ -127,7 +127,7 @@ def test_the_density_is_that_of_scipy():
     n, count = 0.5, 200
     places = np.random.default_rng(3).standard_normal((count, 2)) @ np.linalg.cholesky(COVARIANCE).T
     covariance = np.cov(places.T)
-    grid = Grid(places, np.ones(count), Frame(places, covariance, 1.0), 160)
+    grid = DensityGrid(places, np.ones(count), Whitening(places, covariance, 1.0), 160)
     found = grid.smoothed(n / grid.cell)
     at = np.array([[0.0, 0.0], [1.0, 1.5], [-2.0, -0.5]])
     exact = gaussian_kde(places.T, bw_method=n)(at.T)
@@ -179,7 +179,8 @@ def test_weights_count():
 
 
 @pytest.mark.parametrize("n, shares", [(1, [0.5]), (2, [0.5]), (8, [0.5]), (9, [0.5, 0.9]),
-                                       (18, [0.5, 0.9]), (19, [0.5, 0.9, 0.95]), (98, [0.5, 0.9, 0.95]), (99, [0.5, 0.9, 0.95, 0.99])])  # fmt: skip
+                                       (18, [0.5, 0.9]), (19, [0.5, 0.9, 0.95]), (98, [0.5, 0.9, 0.95]),
+                                       (99, [0.5, 0.9, 0.95, 0.99])])  # fmt: skip
 def test_few_members_have_few_regions(n, shares):
     """A region of a share leaves one of 1 / (1 - share) members outside: of fewer members there is none."""
     found = footprint(drawn(math.inf, n, 1))

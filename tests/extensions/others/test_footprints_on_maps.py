@@ -35,25 +35,25 @@ def ring(n=1_000, radius=500.0, seed=1):
 
 
 @pytest.fixture(scope="module")
-def found():
+def answer():
     return footprint(ring())
 
 
-def geometries(found, path, **options):
+def geometries(answer, path, **options):
     """{share: geometry} as shapely reads GeoJSON."""
-    features = json.loads(lw.export(found, path, **options).read_text())["features"]
+    features = json.loads(lw.export(answer, path, **options).read_text())["features"]
     return {
         each["properties"].get("share"): each["geometry"] and shapely.from_geojson(json.dumps(each["geometry"]))
         for each in features
     }
 
 
-def test_a_map_has_the_regions_with_their_holes(found, tmp_path):
-    shapes = geometries(found, tmp_path / "found.geojson")
+def test_a_map_has_the_regions_with_their_holes(answer, tmp_path):
+    shapes = geometries(answer, tmp_path / "found.geojson")
     centre = shapes.pop(None)
-    np.testing.assert_allclose((centre.y, centre.x), by_geodesic(found.centre), rtol=0, atol=DEGREES)
+    np.testing.assert_allclose((centre.y, centre.x), by_geodesic(answer.centre), rtol=0, atol=DEGREES)
     assert list(shapes) == [0.99, 0.95, 0.9, 0.5]
-    for region in found.regions:
+    for region in answer.regions:
         shape = shapes[region.share]
         assert shape.is_valid
         assert len(shape.geoms) == len(region.polygons)
@@ -66,18 +66,18 @@ def test_a_map_has_the_regions_with_their_holes(found, tmp_path):
         # On the Earth an area is that of the plane: 3 km away lengths across are too long by 4e-8. Edges are geodesics.
         on_earth = abs(GEOD.geometry_area_perimeter(shape)[0])
         assert on_earth == pytest.approx(region.area, rel=1e-5)
-    assert max(len(rings) for rings in found.main.polygons) == 2
+    assert max(len(rings) for rings in answer.main.polygons) == 2
     # Of new members the share is there: to four standard errors of the level, of 1,000 members.
     latitude, longitude = by_geodesic(ring(20_000, seed=2))
     assert shapely.contains_xy(shapes[0.9], longitude, latitude).mean() == pytest.approx(0.9, abs=0.04)
 
 
-def test_a_file_for_globes_has_the_same(found, tmp_path):
-    shapes = geometries(found, tmp_path / "found.geojson")
-    root = ElementTree.parse(lw.export(found, tmp_path / "found.kml")).getroot()
+def test_a_file_for_globes_has_the_same(answer, tmp_path):
+    shapes = geometries(answer, tmp_path / "found.geojson")
+    root = ElementTree.parse(lw.export(answer, tmp_path / "found.kml")).getroot()
     *marks, centre = root.findall(".//k:Placemark", SPACE)
     assert [mark.find("k:name", SPACE).text for mark in marks] == ["99 %", "95 %", "90 %", "50 %"]
-    assert centre.find("k:description", SPACE).text == found.answer
+    assert centre.find("k:description", SPACE).text == answer.answer
     for mark, share in zip(marks, (0.99, 0.95, 0.9, 0.5), strict=True):
         polygons = mark.findall("k:MultiGeometry/k:Polygon", SPACE)
         rings = [[[tuple(map(float, place.split(","))) for place in node.text.split()]
@@ -89,9 +89,9 @@ def test_a_file_for_globes_has_the_same(found, tmp_path):
 
 def test_a_region_across_the_antimeridian_is_cut(tmp_path):
     origin = [-45.0, 179.999]
-    found = footprint(100.0 * np.random.default_rng(2).standard_normal((2_000, 2)), origin)
-    for region in found.regions:
-        shape = geometries(found, tmp_path / "cut.geojson", overwrite=True)[region.share]
+    answer = footprint(100.0 * np.random.default_rng(2).standard_normal((2_000, 2)), origin)
+    for region in answer.regions:
+        shape = geometries(answer, tmp_path / "cut.geojson", overwrite=True)[region.share]
         assert shape.is_valid
         west, _, east, _ = shape.bounds
         assert (west, east) == (-180.0, 180.0)
@@ -101,24 +101,24 @@ def test_a_region_across_the_antimeridian_is_cut(tmp_path):
         assert area == pytest.approx(region.area, rel=1e-5)
 
 
-def test_what_no_map_can_hold_is_refused(found, tmp_path):
+def test_what_no_map_can_hold_is_refused(answer, tmp_path):
     nowhere = footprint(ring(), None)
     says(refused(lw.export, nowhere, tmp_path / "a.kml"), "origin", "is not known", "--origin=LAT,LON")
     path = lw.export(nowhere, tmp_path / "a.kml", origin=ORIGIN)
-    assert path.read_text() == lw.export(found, tmp_path / "b.kml").read_text()
-    says(refused(lw.export, found, tmp_path / "a.csv"), "holds no regions", ".geojson or .kml")
-    says(refused(lw.export, found, tmp_path / "c.kml", members=[0]), "members", "leave it out")
-    says(refused(lw.export, found, tmp_path / "b.kml"), "is there already")
+    assert path.read_text() == lw.export(answer, tmp_path / "b.kml").read_text()
+    says(refused(lw.export, answer, tmp_path / "a.csv"), "holds no regions", ".geojson or .kml")
+    says(refused(lw.export, answer, tmp_path / "c.kml", members=[0]), "members", "leave it out")
+    says(refused(lw.export, answer, tmp_path / "b.kml"), "is there already")
     at_the_pole = footprint(100.0 * np.random.default_rng(2).standard_normal((200, 2)), [90.0, 0.0])
     says(refused(lw.export, at_the_pole, tmp_path / "pole.kml"), "holds a pole")
     assert not (tmp_path / "pole.kml").exists()
 
 
 def test_a_point_is_a_place_without_regions(tmp_path):
-    found = footprint(np.zeros((30, 2)))
-    shapes = geometries(found, tmp_path / "point.geojson")
+    answer = footprint(np.zeros((30, 2)))
+    shapes = geometries(answer, tmp_path / "point.geojson")
     assert (shapes[None].y, shapes[None].x) == pytest.approx(ORIGIN)
     assert all(shapes[share] is None for share in shapes if share)
-    marks = ElementTree.parse(lw.export(found, tmp_path / "point.kml")).getroot().findall(".//k:Placemark", SPACE)
+    marks = ElementTree.parse(lw.export(answer, tmp_path / "point.kml")).getroot().findall(".//k:Placemark", SPACE)
     assert len(marks) == 4
-    assert math.isnan(found.main.area)
+    assert math.isnan(answer.main.area)

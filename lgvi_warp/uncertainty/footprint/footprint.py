@@ -58,7 +58,7 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
         >>> fleet = lw.Ensemble(scene, members=200, vary={"start.position": start})
         >>> found = lw.studies.footprint(lw.solve(fleet, h=0.1, t1=10.0))
         >>> found.answer
-        '95 % end within 2.31 m of a point 15.01 m north and 2.97 m east of the origin'
+        '95 % end within 6.10 m of a point 9.74 m north and 2.40 m west of the origin'
     """
     word = at.strip() if isinstance(at, str) else str(at) if isinstance(at, Real) else ""
     word = word if (when := time_of(word)) is None else f"{when:.12g}"

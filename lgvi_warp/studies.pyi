@@ -21,4 +21,7 @@ from lgvi_warp.robustness.sweeps.cases import Case as Case
 from lgvi_warp.sampling.final import Final as Final
 from lgvi_warp.uncertainty.derivatives.answer import Derivatives as Derivatives
 from lgvi_warp.uncertainty.estimating.answer import Estimated as Estimated
+from lgvi_warp.uncertainty.footprint.answer import Footprint as Footprint
+from lgvi_warp.uncertainty.footprint.answer import Region as Region
+from lgvi_warp.uncertainty.footprint.footprint import footprint as footprint
 from lgvi_warp.uncertainty.rare.answer import RareEvent as RareEvent

@@ -62,6 +62,15 @@ def of_example(script: str, file: str) -> Made:
     return Made(sources_of(ROOT / script), (sys.executable, "-c", inside, str(ROOT / script), "{}"), file)
 
 
+def of_page(page: str, file: str) -> Made:
+    """A picture that the code of a page draws."""
+    inside = (
+        "import os, sys; sys.path.append('docs'); from site_parts.pictures import code_of; "
+        "code = code_of(open(sys.argv[1]).read()); os.chdir(sys.argv[2]); exec(code)"
+    )
+    return Made((page, *room("plots")), (sys.executable, "-c", inside, page, "{}"), file)
+
+
 def of_comparison(name: str) -> Made:
     """The picture of a comparison with a published experiment or code, drawn from its rows."""
     drawn_by = (
@@ -108,6 +117,7 @@ MADE = {
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),
     "guide/beside_others.png": Made(("benchmarks/rows/bars.json", "benchmarks/bars_picture.py"), BARS),
     "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
+    "guide/footprint.png": of_page("docs/guide/footprint.md", "footprint.png"),
     "guide/glider_by_its_battery.png": of_script("examples/laws/glider_by_its_battery.py"),
     "guide/glider_in_an_eddy.png": of_script("examples/studies/glider_in_an_eddy.py"),
     **{f"guide/named_{name}.png": of_vehicle(name) for name in ("lauv", "eca_a9", "girona_500", "rexrov", "dsrv")},

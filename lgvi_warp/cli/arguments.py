@@ -13,7 +13,7 @@ from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
 from lgvi_warp.cli.lists import example, list_names, new, schema, show_help
 from lgvi_warp.cli.machine import bench, info
-from lgvi_warp.cli.plot import plot
+from lgvi_warp.cli.plot import footprint, plot
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.stores import export, merge, report
 from lgvi_warp.cli.studies import (
@@ -36,8 +36,8 @@ from lgvi_warp.common.errors import closest
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
-          derivatives, margins, worst_case, tune_gains, trim, view, info, bench, warm, new, example, list_names, schema,
-          plot, completion, show_help)  # fmt: skip
+          derivatives, margins, worst_case, tune_gains, trim, footprint, view, info, bench, warm, new, example, list_names,
+          schema, plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
 }
@@ -64,6 +64,7 @@ EPILOG = """examples:
   lgvi-warp worst-case dive.toml --of "max(depth)" --within vehicle.buoyancy=297:302
   lgvi-warp tune-gains dive.toml --over heading_pid.kp=0.1:10:log --minimise "iae heading"
   lgvi-warp trim dive.toml --speed 1.5
+  lgvi-warp footprint runs/large --at floor
   lgvi-warp info runs/large
   lgvi-warp run example:paper --json -q
 

@@ -52,7 +52,8 @@ class Content:
 
 # Study -> name of the public class of what it found.
 CLASSES = {"tradeoff": "Tradeoff", "stability": "StabilityMap", "rare": "RareEvent", "derivatives": "Derivatives",
-           "worst_case": "WorstCase", "estimate": "Estimated", "tune_gains": "Tuned"}  # fmt: skip
+           "worst_case": "WorstCase", "estimate": "Estimated", "tune_gains": "Tuned",
+           "footprint": "Footprint"}  # fmt: skip
 
 
 def _study(kind: str) -> Any:

@@ -32,6 +32,7 @@ _STUDY_FILES = {
     "margins": "margins.json",
     "worst_case": "worst_case.json",
     "estimate": "estimate.json",
+    "footprint": "footprint.json",
     "tune_gains": "tune_gains.json",
     "trim": "trim.json",
 }

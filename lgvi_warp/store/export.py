@@ -21,7 +21,7 @@ from lgvi_warp.common.safe_files import inside
 from lgvi_warp.results.result import Result
 from lgvi_warp.scene.start import Environment
 from lgvi_warp.store.exporting import tables, trajectories, whole_store
-from lgvi_warp.store.exporting.tracks import Report, recorded, tracks_of
+from lgvi_warp.store.exporting.tracks import Report, plane_of, recorded, tracks_of
 from lgvi_warp.store.folder import Folder
 from lgvi_warp.store.open import folder_of, open_run
 from lgvi_warp.store.state import state
@@ -38,7 +38,7 @@ WRITERS: dict[str, Callable[..., None]] = {
 
 @shows_progress
 def export(
-    run: Result | str | os.PathLike[str],
+    run: Any,
     to: str | os.PathLike[str],
     out: str | os.PathLike[str] | None = None,
     *,
@@ -52,10 +52,11 @@ def export(
 
     ".csv" and ".parquet": a table with a row for each member and time of the samples, else for each member. ".nc": NetCDF-4
     with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and transforms in the
-    axes of ROS. docs/guide/exports.md has their columns, names, units and axes.
+    axes of ROS. docs/guide/exports.md has their columns, names, units and axes. Of a footprint the regions are
+    written, as ".geojson" or ".kml".
 
     Args:
-        run: A result, a result.npz, a store, or a folder with one of the two.
+        run: A result, a result.npz, a store, or a folder with one of the two; or what `lw.studies.footprint` returns.
         to: The file. Or "netcdf", all that a store holds with its arrays as they are, or "parquet": for these `out` is the
             file.
         out: The file for these two words; by default beside the run.
@@ -92,7 +93,8 @@ def export(
     if word == "netcdf" and (extra := [name for name, value in chosen.items() if value is not None]):
         raise refusal(extra[0], chosen[extra[0]], "is given for all that a store holds", "give a file: to='run.nc'")
     replaces = flag("overwrite", overwrite)
-    source = _source(run)
+    of_regions = _regions(run, ending, chosen) if getattr(run, "study", "") == "footprint" else None
+    source = _source(run) if of_regions is None else Source(lambda: run)
     beside = source.path if word and out is None else None
     target = _beside(source, ending) if word and out is None else file_path("to", to if out is None else out)
     root = None if beside is None else beside.parent
@@ -101,7 +103,9 @@ def export(
         raise SceneError([f"{target}: is there already; give overwrite=True (--overwrite), or another name"])
     if source.folder is not None:
         check_whole(source.folder)
-    if word == "netcdf":
+    if of_regions is not None:
+        write = of_regions
+    elif word == "netcdf":
         write = _whole_store(source)
     else:
         write = _some_members(source.result(), ending, members, _where(origin, start))
@@ -207,6 +211,20 @@ def _some_members(result: Result, ending: str, members: Any, given: Environment 
         problem = f"are {tracks.count:,}, more than the {most:,} that a {ending} file of all members may have"
         raise refusal("members", None, problem, "choose some: members=range(100) (--members 0:100)")
     return functools.partial(exporter.write, tracks)
+
+
+def _regions(footprint: Any, ending: str, arguments: dict[str, Any]) -> Write:
+    """Writer of the regions of a footprint into a file with this ending."""
+    exporter: Any = None if ending in WRITERS else extensions.load("exporters", ending)
+    if not hasattr(exporter, "write_regions"):
+        raise refusal(
+            "to", ending, "holds no regions", "give a file .geojson or .kml; its save(folder) writes JSON and CSV"
+        )
+    for name in ("members", "start"):
+        if arguments[name] is not None:
+            raise refusal(name, arguments[name], "is given for a footprint, which is of all members", "leave it out")
+    environment = _where(arguments["origin"] or footprint.origin, None) or Environment()
+    return functools.partial(exporter.write_regions, footprint, plane_of(environment, "a map"))
 
 
 def _nothing(fraction: float) -> None:

@@ -13,7 +13,7 @@ from tests.house.graph import ROOMS, Import, arrows_up, circle, circles_of_folde
 OPTIONAL = {
     "SALib", "matplotlib", "rerun", "rerun_cli", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow",
     "PIL", "gymnasium", "tqdm", "control", "tomlkit", "h5netcdf", "h5py", "dask", "pyproj", "rasterio", "mcap", "mcap_ros2",
-    "stable_baselines3", "shtab", "pandas",
+    "stable_baselines3", "shtab", "pandas", "contourpy",
 }  # fmt: skip
 DEVICE_OF_EXTENSIONS, TWIN_OF_EXTENSIONS = (
     re.compile(rf"lgvi_warp\.extensions\.\w+\.{folder}\b") for folder in ("device", "twin")

@@ -14,6 +14,7 @@ from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.store.settings import needed
+from lgvi_warp.uncertainty.footprint.density import Smoothed
 from lgvi_warp.uncertainty.sensitivity import analyses
 from lgvi_warp.views.pages import run_again
 from lgvi_warp.views.plots import canvas
@@ -35,6 +36,7 @@ DOORS = {
     "state spaces": (lambda: MODEL.state_space(), "control", "control"),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (canvas.figure_class, "matplotlib.figure", "viz"),
+    "footprints": (lambda: Smoothed(None, 0.0, np.eye(3), np.ones(1), np.ones(1)).parts(0.5), "contourpy", "viz"),
     "reports": (lambda: run_again.toml_of({}), "tomlkit", "viz"),
     "completion": (lambda: cli.arguments.VERBS["completion"](Namespace(shell="bash")), "shtab", "shell"),
     "recordings": (lambda: rerun.record(None, "x"), "rerun", "viz"),

@@ -46,8 +46,8 @@ ELSEWHERE = {page: test for test, pages in OF_TESTS.items() for page in pages.sp
 TERMS = [f"docs/guide/terms/{path.name}" for path in sorted((DOCS / "guide" / "terms").glob("[a-z]*.md"))]
 PARTS = ["docs/controllers/guidance.md", "docs/controllers/laws.md"]
 SCRIPT_NAMES = (
-    "assimilation choose_method_and_step compare_with_your_simulator current energy_used exports geodetic_places going_on "
-    "named_vehicles notebooks resume tangents your_vehicle"
+    "assimilation choose_method_and_step compare_with_your_simulator current energy_used exports footprint geodetic_places "
+    "going_on named_vehicles notebooks resume tangents your_vehicle"
 )
 SCRIPTS = [f"docs/guide/{name}.md" for name in SCRIPT_NAMES.split()]
 PYTHON = sorted(

@@ -85,11 +85,7 @@ class Tracks:
 
     def needing_origin(self, purpose: str) -> LocalPlane:
         """The plane of the axes on the Earth; refuse a run whose origin is not known."""
-        plane = self.plane
-        if plane is None:
-            remedy = "give origin=[latitude, longitude] (--origin=LAT,LON), or the scene [environment] origin"
-            raise refusal("origin", None, f"is not known: {purpose} has places on the Earth", remedy)
-        return plane
+        return plane_of(self.environment, purpose)
 
     def sample(self, name: str, rows: slice = slice(None), when: slice = slice(None)) -> np.ndarray:
         """Samples (k, m, ...) of some of the members at some of the times."""
@@ -155,6 +151,15 @@ class Tracks:
         if len(index) < len(time) and (not len(times) or times[-1] < end):
             index, times = np.append(index, len(index)), np.append(times, end)
         return index, times
+
+
+def plane_of(environment: Environment, purpose: str) -> LocalPlane:
+    """Find the plane of axes on the Earth; refuse axes whose origin is not known."""
+    plane = environment.plane
+    if plane is None:
+        remedy = "give origin=[latitude, longitude] (--origin=LAT,LON), or the scene [environment] origin"
+        raise refusal("origin", None, f"is not known: {purpose} has places on the Earth", remedy)
+    return plane
 
 
 def tracks_of(result: Result, members: Any, environment: Environment) -> Tracks:

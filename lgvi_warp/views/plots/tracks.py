@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ MOST_PATHS = 12
 MOST_AXES = 1
 # A view from above shows at least this much [m].
 LEAST_VIEW = 0.01
-# Contours of a floor, about so many; their colour.
+# Contours of a floor, about so many, and the coast, where its depth is zero; their colour.
 LEVELS, FLOOR = 8, "#7A4A00"
 
 
@@ -88,25 +88,34 @@ def draw_plan(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
     _lines(axes, some, some.position[..., 1], some.position[..., 0], start=True)
     title = f"{some_of(result, len(choice.members))} from above"
     axes.set(title=title[:1].upper() + title[1:], xlabel="east [m]", ylabel="north [m]")
+    show_at_least(axes)
+    axes.locator_params(nbins=6)
+    draw_floor(axes, result.provenance["scene"])
+
+
+def show_at_least(axes: Any) -> None:
+    """Show all data of a view from above in the same scale both ways, and at least a square of a centimetre."""
     middle = 0.5 * (axes.dataLim.min + axes.dataLim.max)
     axes.update_datalim([middle - 0.5 * LEAST_VIEW, middle + 0.5 * LEAST_VIEW])
     axes.autoscale_view()
-    axes.locator_params(nbins=6)
     axes.set_aspect("equal", adjustable="datalim")
-    _contours(axes, result)
 
 
-def _contours(axes: Any, result: Result) -> None:
+def draw_floor(axes: Any, scene: Mapping[str, Any], label: str | None = None) -> None:
     """Draw the depths of floors on grids, in what is in view and as far beyond it as an equal scale may show."""
     across, up = np.array(axes.get_xlim()), np.array(axes.get_ylim())
     shown = axes.dataLim.frozen()
     reach = 0.75 * max(np.ptp(across), np.ptp(up))
     middle = np.array([up.mean(), across.mean()])
-    for relief in reliefs(result.provenance["scene"], middle - reach, middle + reach):
+    for relief in reliefs(scene, middle - reach, middle + reach):
         if np.ptp(relief.depth) > 0.0:
             lines = axes.contour(relief.east, relief.north, relief.depth, levels=LEVELS, colors=FLOOR, linewidths=0.6,
                                  linestyles="solid", alpha=0.6, zorder=0.5)  # fmt: skip
             axes.clabel(lines, fmt="%g m", fontsize="x-small")
+            if label is not None:
+                axes.plot([], [], color=FLOOR, linewidth=0.6, label=label)
+            if relief.depth.min() < 0.0 < relief.depth.max():
+                axes.contour(relief.east, relief.north, relief.depth, levels=[0.0], colors=FLOOR, linewidths=1.6)
     # What is in view is that of the paths.
     axes.dataLim.set(shown)
     axes.autoscale_view()

@@ -57,7 +57,7 @@ ELSEWHERE = {
     "notation.repeated": {"arrays"}, "designs.Table": {"ignore"}, "metrics.CustomMetric": {"last"},
     "studies.InnovationTest": {"mean", "mean_band", "ratio_band"},
 }  # fmt: skip
-RECORDS = {"uq.Indices", "uq.MorrisEffects", "uq.SobolIndices"}
+RECORDS = {"uq.Indices", "uq.MorrisEffects", "uq.SobolIndices", "studies.Footprint", "studies.Region"}
 RUN = {"solve": {"statistics", "keep", "tangents"}, "prepare": {"vary", "of", "statistics"}, "gather": {"statistics"},
        "uq.model": {"vary", "of"}, "uq.evaluate": {"of"}, "uq.given_data": {"of"}}  # fmt: skip
 

@@ -64,7 +64,8 @@ def test_contents_of_a_folder(tmp_path):
              "sensitivity": ["sensitivity.json"], "stability": ["stability.json", "stability_mass.json"],
              "sweep": ["sweep.json"], "rare": ["rare.json"], "derivatives": ["derivatives.json"],
              "margins": ["margins.json"], "worst_case": ["worst_case.json"],
-             "estimate": ["estimate.json"], "tune_gains": ["tune_gains.json"], "trim": ["trim.json"],
+             "estimate": ["estimate.json"], "footprint": ["footprint.json"],
+             "tune_gains": ["tune_gains.json"], "trim": ["trim.json"],
              "assimilate": ["assimilate.json"]}  # fmt: skip
     expected = [Content(kind, tmp_path / name) for kind, found in names.items() for name in found]
     for content in expected:

@@ -150,7 +150,7 @@ APART = {"Indices", "Saved", "Policy"}
 OF_RUNS = {"Result", "Final", "Prepared", "Sweep", "Outputs", "ScalarModel"}
 OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned", "StabilityMap", "SobolIndices",
               "MorrisEffects", "GivenDataIndices", "Suggestion", "Tradeoff", "RareEvent", "Assimilated", "InnovationTest",
-              "Estimated", "Derivatives"}  # fmt: skip
+              "Estimated", "Derivatives", "Footprint", "Region"}  # fmt: skip
 
 
 def classes():
@@ -302,6 +302,9 @@ def test_what_studies_give():
         "RareEvent": lw.rare_event(lw.Ensemble(SPHERE, 1, 0, vary), "depth - 3.0", **short),
         "Tradeoff": lw.tradeoff(lw.Ensemble(SPHERE, 16, 0, vary), t1=1.0, methods=["psi_s"], members=16, seconds=2.0),
     }  # fmt: skip
+    where = lw.Ensemble(SPHERE, 8, 0, {"start.position": lw.distributions.Normal(std=[1.0, 2.0, 0.0])})
+    found["Footprint"] = lw.studies.footprint(lw.solve(where, **short))
+    found["Region"] = found["Footprint"].main
     found["InnovationTest"] = found["Assimilated"].consistency()["depth"]
     assert found.keys() >= OF_STUDIES
     for name, value in found.items():

@@ -1,17 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tracks of members as a GeoJSON file (RFC 7946): a feature for each, with its outcome and the times of its points."""
+"""Tracks of members, or regions of a footprint, as a GeoJSON file (RFC 7946): a feature for each.
+
+A track has the outcome of its member and the times of its points, a region its share and its area.
+"""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common.files import new_text_file
+from lgvi_warp.common.places import LocalPlane
+from lgvi_warp.criteria.files import finite_or_none
+from lgvi_warp.extensions.others.exporting.areas import areas
 from lgvi_warp.extensions.others.exporting.lines import MapLine, lines
 from lgvi_warp.store.exporting.tracks import Report, Tracks
+
+if TYPE_CHECKING:
+    from lgvi_warp.uncertainty.footprint.answer import Footprint
 
 # Programs read such a file whole.
 MOST_MEMBERS = 1000
@@ -47,3 +56,18 @@ def _geometry(line: MapLine) -> tuple[dict[str, Any] | None, Any]:
     if len(places) == 1:
         return {"type": "LineString", "coordinates": places[0]}, times[0]
     return {"type": "MultiLineString", "coordinates": list(places)}, list(times)
+
+
+def write_regions(footprint: Footprint, plane: LocalPlane, target: Path, report: Report) -> None:
+    """Write a feature for each region, the largest first, and a point for the centre."""
+    features: list[dict[str, Any]] = []
+    for region, polygons in areas(footprint, plane):
+        numbers = {name: getattr(region, name) for name in ("share", "area", "low", "high", "radius")}
+        places = [[ring.tolist() for ring in rings] for rings in polygons]
+        geometry = {"type": "MultiPolygon", "coordinates": places} if places else None
+        features.append({"type": "Feature", "geometry": geometry, "properties": finite_or_none(numbers)})
+    latitude, longitude = map(float, plane.geodetic(*footprint.centre))
+    centre = {"type": "Point", "coordinates": [longitude, latitude]}
+    features.append({"type": "Feature", "geometry": centre, "properties": {"answer": footprint.answer}})
+    with new_text_file(target) as file:
+        file.write(json.dumps({"type": "FeatureCollection", "features": features}, allow_nan=False) + "\n")

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The answer to where members are: regions, centre and spread of their places on the map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
+from lgvi_warp.uncertainty.footprint.density import Polygon
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """The smallest region that holds a share of the members, with the circle and the ellipse of the same share.
+
+    Attributes:
+        share: Share of the members.
+        area: Area [m2]; NaN of places at one point or on a line.
+        low, high: Its 95 % interval [m2]; high is infinite where the members are too few to bound it.
+        radius: Radius of the circle about the centre that holds the share [m].
+        ellipse_area: Area of the ellipse that would hold it, if the places were normally distributed [m2].
+        polygons: Its parts. Each is a tuple of rings (k, 2), north and east [m]: the outer one, then those of its holes.
+    """
+
+    share: float
+    area: float
+    low: float
+    high: float
+    radius: float
+    ellipse_area: float
+    polygons: tuple[Polygon, ...] = field(default=(), repr=False)
+
+    @property
+    def percent(self) -> str:
+        """The share in percent, as "95 %"."""
+        return f"{100.0 * self.share:g} %"
+
+    @property
+    def area_text(self) -> str:
+        """The area with its interval in words, as "112 m2 (107 to 118)"."""
+        return _area_text(self.area, self.low, self.high)
+
+
+@dataclass(frozen=True, eq=False)
+class Footprint(Saved):
+    """Places of the members on the map, made by `lw.studies.footprint`.
+
+    Attributes:
+        at: "end", the name of an event or outcome, as "floor", or a time [s] as text.
+        members: Number of members that have such a place.
+        lacking: Number of members that have none, by outcome, as {"ok": 700, "non_finite": 3}.
+        centre: Mean of the places (2,), north and east of the origin [m].
+        covariance: Their covariance (2, 2) [m2].
+        regions: The regions of 50, 90, 95 and 99 %, as far as the members suffice for them.
+        growth: For an eighth, a quarter, half and all of the members: number, area of the 95 % region and its interval [m2].
+        origin: Latitude and longitude of the axes' origin [deg]; None where the scene has none.
+        places: North and east of members (m, 2) [m], for pictures: of more than 1,000 a part.
+        messages: Notes for the user.
+        provenance: Scene, ensemble, settings, versions and machine of the run.
+    """
+
+    study: ClassVar[str] = "footprint"
+    endings: ClassVar[tuple[str, ...]] = ("json", "csv", "txt")
+
+    at: str
+    members: int
+    lacking: Mapping[str, int]
+    centre: np.ndarray
+    covariance: np.ndarray
+    regions: tuple[Region, ...]
+    growth: tuple[tuple[int, float, float, float], ...]
+    origin: tuple[float, float] | None
+    places: np.ndarray = field(repr=False)
+    messages: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def main(self) -> Region:
+        """The region that the answer is about: that of 95 %, or the largest that the members suffice for."""
+        return max((region for region in self.regions if region.share <= MAIN), key=lambda region: region.share)
+
+    @property
+    def answer(self) -> str:
+        """The answer in one sentence."""
+        region, time = self.main, time_of(self.at)
+        before = "" if time is None else f"At {self.at} s "
+        are = "are" if before else {"end": "end", "floor": "reach the floor"}.get(self.at, f"end by {self.at}")
+        share = region.percent if region.radius > 0.0 else "all" if before else "All"
+        if self.lacking:
+            failed = before or self.at == "end"
+            who = f"{self.members:,} members that {'did not fail' if failed else are}"
+            share, are = f"{share} of the {who}", are if failed else "do so"
+        place = place_text(self.centre, region.radius or 1.0)
+        within = f"within {number_text(region.radius, region.radius)} m of" if region.radius > 0.0 else "at"
+        return f"{before}{share} {are} {within} {place}"
+
+    def __str__(self) -> str:
+        lines = [f"footprint   {self.members:,} members, at {self.at}{' s' * (time_of(self.at) is not None)}"]
+        if self.lacking:
+            counts = ", ".join(f"{name} {count:,}" for name, count in self.lacking.items())
+            lines.append(f"left out    {sum(self.lacking.values()):,} members without such a place: {counts}")
+        for each in self.regions:
+            size = number_text(each.radius, each.radius)
+            lines.append(
+                f"{each.percent:<11} {each.area_text}"
+                f"{f' in {len(each.polygons)} parts' * (len(each.polygons) > 1)}; within {size} m of the centre; "
+                f"ellipse {number_text(each.ellipse_area, each.ellipse_area)} m2"
+            )
+        if len(self.growth) > 1:
+            lines += [
+                f"growth      {self.main.percent} of {n:,} members: {_area_text(*areas)}" for n, *areas in self.growth
+            ]
+        return "\n".join([*lines, *(f"note        {text}" for text in self.messages), f"answer      {self.answer}"])
+
+    def to_dict(self) -> dict[str, Any]:
+        content = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "provenance"}
+        content |= {"regions": [asdict(region) for region in self.regions], "answer": self.answer}
+        return dict(finite_or_none(content)) | {"provenance": self.provenance}
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        told = {name: value for name, value in content.items() if name != "answer"}
+        arrays = {name: np.array(content[name], np.float64) for name in ("centre", "covariance")}
+        places = np.array(content["places"], np.float64).reshape(-1, 2)
+        return cls(**told | arrays | {
+            "places": places,
+            "regions": tuple(_region(entry) for entry in content["regions"]),
+            "growth": tuple((n, *with_missing_as(areas, math.inf)) for n, *areas in content["growth"]),
+            "origin": content["origin"] and tuple(content["origin"]),
+            "messages": tuple(content["messages"]),
+        })  # fmt: skip
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        for region in self.regions:
+            yield {"share": region.share, "area": region.area, "low": region.low, "high": region.high,
+                   "parts": len(region.polygons), "radius": region.radius, "ellipse_area": region.ellipse_area,
+                   "north": float(self.centre[0]), "east": float(self.centre[1])}  # fmt: skip
+
+
+# Share of the region that the answer is about.
+MAIN = 0.95
+
+
+def _region(entry: Mapping[str, Any]) -> Region:
+    """A region of a JSON file: without an area one of a point or a line."""
+    polygons = tuple(tuple(np.array(ring, np.float64) for ring in rings) for rings in entry["polygons"])
+    missing = math.nan if entry["low"] is None else math.inf
+    numbers = {name: with_missing_as(entry[name], missing) for name in ("area", "low", "high")}
+    return Region(**{**entry, **numbers, "polygons": polygons})
+
+
+def time_of(at: str) -> float | None:
+    """Read a time [s]; None for the name of an end."""
+    try:
+        return float(at)
+    except ValueError:
+        return None
+
+
+def _area_text(area: float, low: float, high: float) -> str:
+    """An area with its interval in words."""
+    if math.isnan(area):
+        return "no area"
+    upper = f"to {number_text(high, high)}" if math.isfinite(high) else "or more"
+    return f"{number_text(area, area)} m2 ({number_text(low, low)} {upper})"
+
+
+def number_text(value: float, scale: float) -> str:
+    """A number to three digits of a scale, or more, without an exponent."""
+    digits = 2 - math.floor(math.log10(scale)) if 0.0 < scale < math.inf else 2
+    return f"{value:,.{max(0, digits)}f}"
+
+
+def place_text(place: Sequence[float] | np.ndarray, scale: float) -> str:
+    """A place, north and east [m], in words, to three digits of a scale."""
+    words = []
+    for value, names in zip(place, (("north", "south"), ("east", "west")), strict=True):
+        text = number_text(abs(float(value)), scale)
+        words += [f"{text} m {names[int(value < 0.0)]}"] if float(text.replace(",", "")) else []
+    return f"a point {' and '.join(words)} of the origin" if words else "the origin"

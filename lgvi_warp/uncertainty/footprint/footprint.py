@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Footprint of a run: where its members are at the end, at an event, or at a time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from numbers import Real
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common import summaries
+from lgvi_warp.common.arguments import result_of
+from lgvi_warp.common.errors import SceneError, closest, refusal
+from lgvi_warp.common.status import failed, stop_time
+from lgvi_warp.common.times import rows_at
+from lgvi_warp.physics.terms.events import from_list
+from lgvi_warp.results.quantities import quantities
+from lgvi_warp.statistics.ends import outcomes
+from lgvi_warp.uncertainty.footprint.answer import MAIN, Footprint, Region, time_of
+from lgvi_warp.uncertainty.footprint.density import Outline, effective, least_members, regions
+
+if TYPE_CHECKING:
+    from lgvi_warp.results.result import Result
+
+SHARES = (0.5, 0.9, MAIN, 0.99)
+# Most places that the answer holds, for pictures.
+MOST_PLACES = 1000
+# Places whose spread across is below this part of that along lie on a line.
+THIN = 1e-6
+# Spread below so many units in the last place of the coordinates is round-off.
+ROUND_OFF = 16.0
+
+
+def footprint(result: Result, at: str | float = "end") -> Footprint:
+    """Find the smallest regions that hold given shares of the members' places, and their areas.
+
+    The shares are 50, 90, 95 and 99 %. The regions are level sets of a kernel density, at the levels above which these shares
+    of new members would lie. So they may have several parts and holes. Members that failed have no end; those that never get
+    there have no place. Both are counted in `lacking`.
+
+    Args:
+        result: A result with positions, in memory or in a store.
+        at: "end"; the name of an event or outcome, as "floor", for the place where it stopped members; or the time of a
+            sample [s].
+
+    Returns:
+        Regions, centre, covariance, and the answer in one sentence.
+
+    Raises:
+        SceneError: Positions were not kept, no sample has this time, or no member has such a place.
+        MissingExtra: contourpy is not installed (extra: viz).
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> start = lw.distributions.Normal(std=[3.0, 2.0, 0.0])
+        >>> fleet = lw.Ensemble(scene, members=200, vary={"start.position": start})
+        >>> found = lw.studies.footprint(lw.solve(fleet, h=0.1, t1=10.0))
+        >>> found.answer
+        '95 % end within 6.10 m of a point 9.74 m north and 2.40 m west of the origin'
+    """
+    word = at.strip() if isinstance(at, str) else str(at) if isinstance(at, Real) else ""
+    word = word if (when := time_of(word)) is None else f"{when:.12g}"
+    positions, there = _positions(result_of(result), word, at)
+    lacking = result.status[~there].counts()
+    weights = np.ones(result.members) if result.weights is None else np.asarray(result.weights, np.float64)
+    counted = there & (weights > 0.0)
+    if not counted.any():
+        raise refusal("at", word, f"no member has a place then ({summaries.counted(lacking)})", "see result.status")
+    places, weights = positions[counted, :2].astype(np.float64), weights[counted]
+    centre, count = np.average(places, axis=0, weights=weights), effective(weights)
+    away = places - centre
+    covariance = (away.T * weights) @ away / weights.sum() * (count / max(count - 1.0, 1.0))
+    along, across = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[::-1], 0.0))
+    round_off = ROUND_OFF * float(np.finfo(positions.dtype).eps * np.abs(places).max())
+    shares = [share for share in SHARES if count >= least_members(share) - 1e-9]
+    messages = [
+        f"a region of {share:.0%} needs {least_members(share)} members" for share in SHARES if share not in shares
+    ]
+    levels, growth = [Outline(np.nan, np.nan, np.nan, ())] * len(shares), dict[int, Outline]()
+    if along <= round_off:
+        away, messages = 0.0 * away, [*messages, "all members are at one point: a region has no area"]
+    elif len(places) < 3 or across <= max(round_off, THIN * along):
+        messages.append("the members are on a line: a region has no area")
+    else:
+        main = max(share for share in shares if share <= MAIN)
+        levels, growth, resolved = regions(places, weights, covariance, shares, main)
+        if not resolved:
+            messages.append("clusters are finer than the grid resolves: their regions are smaller than these")
+    # The circle holds its share of new members, as the region does.
+    distance = np.hypot(*away.T)
+    order = np.argsort(distance)
+    held = np.cumsum(weights[order]) / weights.sum() * count / (count + 1.0)
+    circles = np.interp(shares, held, distance[order])
+    ellipses = -2.0 * np.pi * np.log1p(-np.array(shares)) * along * across
+    environment = result.provenance.get("scene", {}).get("environment", {})
+    drawn = np.random.default_rng(0).permutation(len(places))[:MOST_PLACES]
+    return Footprint(
+        at=word,
+        members=len(places),
+        lacking=lacking,
+        centre=centre,
+        covariance=covariance,
+        regions=tuple(
+            Region(share, level.area, level.low, level.high, float(circle), float(ellipse), level.polygons)
+            for share, level, circle, ellipse in zip(shares, levels, circles, ellipses, strict=True)
+        ),
+        growth=tuple((members, level.area, level.low, level.high) for members, level in growth.items()),
+        origin=tuple(environment["origin"]) if environment.get("origin") else None,
+        places=places[np.sort(drawn)],
+        messages=tuple(messages),
+        provenance=result.provenance,
+    )
+
+
+def _positions(result: Result, word: str, at: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n, 3) [m] of all members at an end or a time, and a mask (n,) of those that have one."""
+    when, row, status = time_of(word), len(result.time) - 1, np.asarray(result.status)
+    there = ~failed(status)
+    if when is not None:
+        if not len(rows := rows_at(result.time, when)):
+            near = result.time[np.argsort(np.abs(result.time - when))[:2]]
+            remedy = (
+                f"give {' or '.join(f'{time:g}' for time in np.sort(near))}, or keep it: save=lw.SaveAt(at=[{word}])"
+            )
+            raise refusal("at", at, "is no time of a sample", remedy)
+        row, there = int(rows[0]), there | (stop_time(result) >= when)
+    elif word != "end":
+        events = from_list(result.provenance["scene"].get("events", ()))
+        known = outcomes([event.key for event in events], [event.status for event in events])
+        if word not in known:
+            raise refusal("at", at, 'is neither "end", a time nor an outcome of this scene', closest(word, known))
+    positions = _row(result, row)
+    if when is None and word != "end":
+        # Only that row: a run in a store may be larger than the memory.
+        last = replace(result, time=result.time[row:], samples={"position": positions[None]}, store=None, kept=None)
+        positions = quantities(f"position at {word}")[0].values(last).astype(positions.dtype)
+        there = np.ones(len(status), bool)
+    return positions, there & np.isfinite(positions[:, :2]).all(axis=1)
+
+
+def _row(result: Result, row: int) -> np.ndarray:
+    """Positions of all members (n, 3) at one sample; of a store only the chunks that hold it are read, one after another."""
+    if "position" in result.samples:
+        if result.store is None:
+            return np.asarray(result.samples["position"][row])
+        stored: Any = result.samples
+        return np.asarray(stored.rows("position", slice(row, row + 1), slice(0, result.members))[0])
+    remedy = (
+        "run it with keep='all'; without save=... start and end alone take little memory. Kept members are result.kept"
+    )
+    raise SceneError([f"positions of all members were not kept; {remedy}"])

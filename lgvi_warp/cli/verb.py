@@ -20,7 +20,12 @@ SHARED: dict[str, dict[str, Any]] = {
     "--duration": {"metavar": "S", "help": "end of the run [s]"},
     "--members": {"metavar": "N", "help": "number of vehicles"},
     "--seed": {"metavar": "N", "help": "seed of what varies"},
-    "--set": {"metavar": "KEY=VALUE", "action": "append", "default": [], "help": "replace a key of the scene file"},
+    "--set": {
+        "metavar": "NAME=VALUE",
+        "action": "append",
+        "default": [],
+        "help": "replace a key of the scene file, or a number of the scene: run.step, heading_pid.kp, current.velocity[0]",
+    },
     "--method": {"help": "as for run"},
     "--methods": {"metavar": "A,B", "type": lambda text: [name.strip() for name in text.split(",")]},
     "--step": {"metavar": "S", "help": "time step [s]"},

@@ -15,8 +15,10 @@ from typing import Any, cast
 import numpy as np
 
 from lgvi_warp.common import summaries
+from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.names import alike, folded
+from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.fields import TABLE
@@ -25,12 +27,12 @@ from lgvi_warp.physics.vehicle import UNITS, Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.file import (
-    tables_and_text,
     tables_of_text,
     with_named_vehicle,
     with_origin_of_floors,
     with_times_of_data,
 )
+from lgvi_warp.scene.names import file_keys
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 from lgvi_warp.scene.variations import check_names
@@ -237,7 +239,8 @@ class Scene(Summarized):
 
         Args:
             path: Path of the file.
-            overrides: Values by dotted key ("vehicle.mass") that replace those of the file; by default none.
+            overrides: Values that replace those of the file, by key ("run.step") or by name as of `with_numbers`
+                ("heading_pid.kp", "current.velocity[0]"); by default none.
 
         Returns:
             The scene.
@@ -245,8 +248,8 @@ class Scene(Summarized):
         Raises:
             SceneError: If the file cannot be read or its content is wrong; the message lists every fault.
         """
-        content, text = tables_and_text(path, overrides)
-        scene = from_dict(content)
+        text = file_text(path, "scene file")
+        scene = loads(text, overrides, os.fspath(path), path_of("path", path).parent)
         changes = {key: value if isinstance(value, str) else repr(value) for key, value in (overrides or {}).items()}
         object.__setattr__(scene, "source", {"file": Path(path).name, "text": text, "changes": changes})
         return scene
@@ -326,9 +329,25 @@ def _copied(content: Any) -> Any:
 SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller", "source")
 
 
-def loads(text: str, overrides: Mapping[str, Any] | None = None) -> Scene:
-    """Build a scene from the text of a scene file (TOML)."""
-    return from_dict(tables_of_text(text, overrides))
+def loads(
+    text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
+) -> Scene:
+    """Build a scene from the text of a scene file (TOML), with some values replaced."""
+    content, numbers = tables_of_text(text, overrides, name, folder)
+    if not numbers:
+        return from_dict(content)
+    from lgvi_warp.scene.numbers import with_numbers
+
+    faults, scene = Faults(), None
+    with faults.including():
+        scene = from_dict(content)
+    with faults.including():
+        # Where other values are wrong, names are looked up in the scene as the file has it.
+        scene = with_numbers(scene or from_dict(tables_of_text(text, None, name, folder)[0]), numbers, file_keys())
+        _check_ensemble(scene.ensemble_settings or EnsembleSettings(), scene, ())
+    faults.raise_if_any()
+    assert scene is not None
+    return scene
 
 
 def from_dict(content: Mapping[str, Any]) -> Scene:

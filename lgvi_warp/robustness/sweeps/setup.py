@@ -27,6 +27,7 @@ from lgvi_warp.robustness.sweeps.record import Record
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.functions import Own, ToldApart, functions_of
+from lgvi_warp.scene.names import all_by_key
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.member_metrics import metric_of, numbers_of_members
@@ -223,7 +224,7 @@ def _base(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
     if vary is not None and not isinstance(vary, Mapping):
         remedy = 'give {"vehicle.mass": lw.distributions.Normal(...)}'
         raise refusal("vary", vary, "does not map names to distributions", remedy)
-    return scene, {**scene.vary, **(vary or {})}
+    return scene, {**scene.vary, **all_by_key("vary.", scene.scene, vary or {})}
 
 
 def electrical(entries: Any, scene: Any) -> Any:

@@ -34,7 +34,7 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
         Name, as "run.step" or "heading_pid.kp" -> its value as TOML text.
 
     Raises:
-        SceneError: A --set has no value, or sets a key again.
+        SceneError: A --set has no name or no value, or sets what is set already.
     """
     changes: dict[str, Any] = {}
     faults = Faults()
@@ -44,8 +44,8 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
             changes[key] = PLAIN.get(name, str)(value)
     for text in chosen.set:
         key, equals, value = (word.strip() for word in text.partition("="))
-        if not equals:
-            faults.add("--set", text, "has no value", "write --set vehicle.buoyancy=300")
+        if not (equals and key):
+            faults.add("--set", text, "is no NAME=VALUE", "write --set vehicle.buoyancy=300")
         elif key in changes:
             faults.add(f"--set {key}", value, f"is set to {changes[key]} as well", "keep one of them")
         else:

@@ -18,7 +18,7 @@ from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.toml_text import parsed
 from lgvi_warp.scene.names import is_key
-from lgvi_warp.scene.variations import clashes, targets
+from lgvi_warp.scene.variations import Target, clashes, targets
 
 
 def tables_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -44,8 +44,9 @@ def _replace(content: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, 
     faults, others, taken = Faults(), dict[str, Any](), []
     for name, value in settings.items():
         with faults.including():
-            taken.append((name, targets(name)))
+            named = targets(name)
             read = _value_of(name, value) if isinstance(value, str) else value
+            taken.append((name, (Target(name),) if is_key(name) else named))
             if is_key(name):
                 override(content, name, read)
             else:

@@ -336,22 +336,20 @@ def loads(
     content, numbers = tables_of_text(text, overrides, name, folder)
     if not numbers:
         return from_dict(content)
-    from lgvi_warp.scene.numbers import with_numbers
-
-    faults, scene = Faults(), None
-    with faults.including():
-        scene = from_dict(content)
-    with faults.including():
-        # Where other values are wrong, names are looked up in the scene as the file has it.
-        scene = with_numbers(scene or from_dict(tables_of_text(text, None, name, folder)[0]), numbers, file_keys())
-        _check_ensemble(scene.ensemble_settings or EnsembleSettings(), scene, ())
-    faults.raise_if_any()
-    assert scene is not None
-    return scene
+    try:
+        return from_dict(content, numbers)
+    except SceneError as error:
+        faults = dict.fromkeys(error.faults)
+        try:
+            # Where other values are wrong, names are looked up in the scene as the file has it.
+            from_dict(tables_of_text(text, None, name, folder)[0], numbers)
+        except SceneError as more:
+            faults |= dict.fromkeys(more.faults)
+        raise SceneError(faults, error.more) from None
 
 
-def from_dict(content: Mapping[str, Any]) -> Scene:
-    """Build a scene from the tables of a scene file."""
+def from_dict(content: Mapping[str, Any], numbers: Mapping[str, Any] | None = None) -> Scene:
+    """Build a scene from the tables of a scene file, with other numbers by name."""
     content = with_origin_of_floors(with_times_of_data(with_named_vehicle(content)))
     faults = Faults()
     faults.keys("", content, SECTIONS)
@@ -377,6 +375,10 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
         settings_given = settings if tables["ensemble"] else None
         scene = Scene(**{"vehicle": Vehicle(**_STAND_INS)} | sound | lists, controller=content.get("controller"),
                       ensemble_settings=settings_given)  # fmt: skip
+        if numbers and not faults:
+            from lgvi_warp.scene.numbers import with_numbers
+
+            scene = with_numbers(scene, numbers, file_keys())
     with faults.including():
         if scene is None:
             # Names of a faulty term's parameters are unknown: only names of the other sections can be checked.

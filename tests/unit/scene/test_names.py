@@ -115,21 +115,23 @@ def test_parts_by_their_places():
     assert set(lw.Ensemble(scene, 2, vary=vary).vary) == {"depth_cell.bias"}
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize(
     ("file", "name", "value"),
-    [("scenes/remus_100_autopilot.toml", "heading_pid.kp", 1.25), ("scenes/remus_100_autopilot.toml", "vehicle.buoyancy", 301.0),
+    [("scenes/remus_100_autopilot.toml", "heading_pid.kp", 1.25),
+     ("scenes/remus_100_autopilot.toml", "vehicle.buoyancy", 301.0),
      ("scenes/bluerov2_dead_thruster.toml", "current.velocity[1]", 0.15), ("paper.toml", "start.position[2]", 350.0)],
 )  # fmt: skip
 def test_runs_have_the_same_bits(file, name, value):
     """A run of the scene that --set gives, of that of with_numbers, and of a row of lw.prepare."""
     path, settings = SCENES[file], {"h": 0.01, "t1": 2.0}
     scene = load(path)
-    runs = [lw.solve(lw.Ensemble(each, 1, 3), **settings)
+    runs = [lw.solve(lw.Ensemble(each, 1), **settings)
             for each in (scene.with_numbers({name: value}), on_the_command(path, f"{name}={value}"))]  # fmt: skip
-    prepared = lw.prepare(lw.Ensemble(scene, 1, 3), [name], "position", **settings)
+    prepared = lw.prepare(lw.Ensemble(scene, 1), [name], "position", **settings)
     for run in (runs[1].position[-1], prepared([[value]])):
         np.testing.assert_array_equal(run, runs[0].position[-1])
-    assert not np.array_equal(lw.solve(lw.Ensemble(scene, 1, 3), **settings).position[-1], runs[0].position[-1])
+    assert not np.array_equal(lw.solve(lw.Ensemble(scene, 1), **settings).position[-1], runs[0].position[-1])
 
 
 def test_what_follows_from_a_key_follows_from_its_new_value():
@@ -141,7 +143,8 @@ def test_what_follows_from_a_key_follows_from_its_new_value():
 
 
 REFUSED = {
-    "two names of one number": ({"depth_cell.noise": 0.1, "controller.sensors[0].noise": 0.2}, ["is set by", "keep one of them"]),
+    "two names of one number": (
+        {"depth_cell.noise": 0.1, "controller.sensors[0].noise": 0.2}, ["is set by", "keep one of them"]),
     "a whole and its entry": ({"start.velocity": [1, 0, 0], "start.velocity[0]": 2.0}, ["is set by"]),
     "two entries of a symmetric matrix": (
         {"vehicle.added_mass_matrix[0,1]": 1.0, "vehicle.added_mass_matrix[1,0]": 2.0}, ["is set by"]),

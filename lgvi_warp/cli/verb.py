@@ -79,7 +79,7 @@ class Verb:
     def add(self, verbs: Any) -> None:
         """Add its parser to those of all verbs; its own help says what it does, too."""
         text = self.help[0].upper() + self.help[1:] + "."
-        parser = verbs.add_parser(self.name, help=self.help, description=text, aliases=self.aliases)
+        parser = verbs.add_parser(self.name, help=self.help, description=text, aliases=self.aliases, allow_abbrev=False)
         parser.verbs = verbs.choices
         self.arguments(parser)
 

@@ -139,7 +139,7 @@ def setup_of(
     for name, read, value in (("cases", cases_of, cases), ("axes", grid_of, grid), ("metrics", metrics_of, metrics)):
         with faults.including():
             parts[name] = read(value)
-    for name in ("save", "statistics", "keep", "until", "store", "only"):
+    for name in ("save", "statistics", "keep", "until", "store", "blocks"):
         if name in settings:
             faults.add(name, "...", "is what a sweep decides", "leave it out")
     check_rare(faults, rare)

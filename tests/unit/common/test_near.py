@@ -47,7 +47,9 @@ def test_names_in_another_case():
 
 @pytest.mark.parametrize(
     ("door", "word", "name"),
-    [("terms", "current", "Current"), ("control", "PID", "DepthPID' or 'HeadingPID' or 'HeavePID' or 'PosePID' or 'SpeedPID"), ("events", "floor", "Floor"),
+    [("terms", "current", "Current"),
+     ("control", "PID", "DepthPID' or 'HeadingPID' or 'HeavePID' or 'PosePID' or 'SpeedPID"),
+     ("events", "floor", "Floor"),
      ("distributions", "normal", "Normal"), ("statistics", "mean", "Mean"), ("designs", "sobol", "Sobol"),
      ("metrics", "overshoot", "Overshoot"), ("", "sovle", "solve"), ("", "ensemble", "Ensemble")],
 )  # fmt: skip
@@ -61,7 +63,8 @@ def test_public_names_that_are_nearly_right(door, word, name):
 
 @pytest.mark.parametrize(
     ("place", "word", "name"),
-    [("", "Drag", "lw.terms.Drag"), ("", "HeadingPID", "lw.control.HeadingPID"), ("control", "Thrusters", "lw.terms.Thrusters"),
+    [("", "Drag", "lw.terms.Drag"), ("", "HeadingPID", "lw.control.HeadingPID"),
+     ("control", "Thrusters", "lw.terms.Thrusters"),
      ("terms", "Controller", "lw.Controller")],
 )  # fmt: skip
 def test_public_names_behind_another_door(place, word, name):
@@ -71,7 +74,7 @@ def test_public_names_behind_another_door(place, word, name):
 
 def test_a_word_that_several_names_end_with_names_all_of_them():
     scene = lw.Scene.load(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml", {"ensemble.members": 2})
-    with pytest.raises(lw.SceneError, match="did you mean 'depth_pid.kp' or 'heading_pid.kp'"):
+    with pytest.raises(lw.SceneError, match=r"did you mean 'depth_pid\.kp' or 'heading_pid\.kp'"):
         scene.with_numbers({"kp": 1.0})
 
 

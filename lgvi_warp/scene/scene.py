@@ -219,9 +219,9 @@ class Scene(Summarized):
 
         Args:
             numbers: Values by name: those of `parameters()`, single entries ("drag.quadratic[0]"), parts by their place
-                ("controller.sensors[0].noise"), "start.position" and what else a start has, "controller.period", "run.step" and
-                "run.duration". A held command takes the place of another, a schedule that of a held one, an attitude that of
-                another form.
+                ("controller.sensors[0].noise"), "start.position" and what else a start has, "controller.period", "run.step"
+                and "run.duration". A held command takes the place of another, a schedule that of a held one, an attitude that
+                of another form.
 
         Returns:
             A new scene.

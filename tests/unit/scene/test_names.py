@@ -43,7 +43,7 @@ def written(scene, name, value):
     return lw.Scene.from_dict(tables)
 
 
-def other(scene, name):
+def another_value(scene, name):
     """Another value of a number that the scene can have, as a file writes it, and the scene that has it."""
     value = scene.parameters()[name]
     for candidate in (2.0 * value, 0.5 * value, value + 0.25, value + 1.0, np.full(value.shape, 50.0)):
@@ -69,7 +69,7 @@ def on_the_command(path, *options):
 def test_every_entry_takes_every_number(file, name):
     """File, --set, load, with_numbers and a sweep's set: the same scene, of which that of the written file is the witness."""
     path, scene = SCENES[file], load(SCENES[file])
-    value, changed = other(scene, name)
+    value, changed = another_value(scene, name)
     witness = text(written(scene, name, value))
     entries = {
         "with_numbers": changed,
@@ -103,7 +103,7 @@ def test_parts_by_their_places():
                 place, key = f"{section}[{i}].{name}", f"{part.key}.{name}"
                 assert by_key(scene, place) == key
                 found.add(key)
-            value, changed = other(scene, key)
+            value, changed = another_value(scene, key)
             assert (
                 text(lw.Scene.load(AUTOPILOT, FEW | {place: value}))
                 == text(changed)

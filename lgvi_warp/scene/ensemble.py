@@ -23,7 +23,6 @@ from lgvi_warp.scene import variations
 from lgvi_warp.scene.draws import SceneNumbers, counted, draws_of
 from lgvi_warp.scene.given_members import given_members
 from lgvi_warp.scene.like import SceneLike
-from lgvi_warp.scene.names import all_by_key
 from lgvi_warp.scene.physical_checks import PhysicalChecks
 from lgvi_warp.scene.settings import EnsembleSettings, section
 from lgvi_warp.scene.variations import Target, Variation
@@ -187,6 +186,8 @@ class Ensemble(Summarized):
         self, scene: SceneLike, settings: EnsembleSettings, explicit: dict[str, np.ndarray], checked: bool = False
     ) -> None:
         if any("]." in name for name in settings.vary):
+            from lgvi_warp.scene.names import all_by_key
+
             settings = replace(settings, vary=all_by_key("ensemble.vary.", scene, settings.vary))
         self.scene, self.seed = scene, int(settings.seed)
         self.vary: dict[str, Any] = dict(settings.vary)

@@ -17,8 +17,10 @@ from lgvi_warp.common.errors import Faults, SceneError, among, refusal
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.toml_text import parsed
-from lgvi_warp.scene.names import is_key
 from lgvi_warp.scene.variations import Target, clashes, targets
+
+# Sections that are one table each.
+TABLES = ("vehicle", "environment", "start", "ensemble", "run", "controller", "source")
 
 
 def tables_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -103,6 +105,12 @@ def _mesh_in(folder: Path, name: str) -> str:
     if path is None or not path.is_file():
         raise refusal(key, name, "is not there", "put the mesh beside the scene file, or give length and diameter [m]")
     return os.fspath(path)
+
+
+def is_key(name: str) -> bool:
+    """Whether a name is a key of a table of the scene file."""
+    section, _, rest = name.partition(".")
+    return section in TABLES and bool(rest) and (section == "ensemble" or "[" not in rest)
 
 
 def override(content: dict[str, Any], key: str, value: Any) -> None:

@@ -25,8 +25,6 @@ Value = TypeVar("Value")
 LISTS = ("terms", "events", "controller.sensors", "controller.guidance", "controller.laws", "controller.allocation",
          "controller.faults")  # fmt: skip
 PLACE = re.compile(rf"({'|'.join(map(re.escape, LISTS))})\[(\d+)\](?=\.)")
-# Sections that are one table each.
-TABLES = ("vehicle", "environment", "start", "ensemble", "run", "controller", "source")
 
 
 def file_keys() -> list[str]:
@@ -71,9 +69,3 @@ def single_number(scene: Any, name: str, argument: str = "vary") -> tuple[Target
         faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{entry}"')
     faults.raise_if_any()
     return target, float(target.of(known[target.name]))
-
-
-def is_key(name: str) -> bool:
-    """Whether a name is a key of a table of the scene file."""
-    section, _, rest = name.partition(".")
-    return section in TABLES and bool(rest) and (section == "ensemble" or "[" not in rest)

@@ -32,7 +32,6 @@ from lgvi_warp.scene.file import (
     with_origin_of_floors,
     with_times_of_data,
 )
-from lgvi_warp.scene.names import file_keys
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 from lgvi_warp.scene.variations import check_names
@@ -377,6 +376,7 @@ def from_dict(content: Mapping[str, Any], numbers: Mapping[str, Any] | None = No
         scene = Scene(**{"vehicle": Vehicle(**_STAND_INS)} | sound | lists, controller=content.get("controller"),
                       ensemble_settings=settings_given)  # fmt: skip
         if numbers and not faults:
+            from lgvi_warp.scene.names import file_keys
             from lgvi_warp.scene.numbers import with_numbers
 
             scene = with_numbers(scene, numbers, file_keys())

@@ -47,7 +47,7 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
         >>> fleet = lw.Ensemble(scene, members=512, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> for name, blocks in {"first.zarr": range(0, 1), "second.zarr": range(1, 2)}.items():
-        ...     part = lw.solve(fleet, h=0.1, t1=2.0, store=name, only=blocks)
+        ...     part = lw.solve(fleet, h=0.1, t1=2.0, store=name, blocks=blocks)
         >>> whole = lw.merge(["first.zarr", "second.zarr"], "all.zarr")
         >>> lw.open_run("all.zarr").members
         512

@@ -30,6 +30,7 @@ from lgvi_warp.scene import variations
 from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, whole_columns
 from lgvi_warp.scene.draw_layout import draw_layout
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.names import numbers_of, single_number
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import EnsembleSettings
 
@@ -248,7 +249,7 @@ class Prepared:
         faults, names = Faults(), self.names
         shape = f"give an array of shape (n, {len(names)}), columns {', '.join(names)}"
         if is_labelled(X):
-            known = scene_numbers(self._fleet.scene)
+            known = numbers_of(self._fleet.scene)
             columns = whole_columns(faults, names, known, columns_by_name(faults, "X", X))
             array = stacked(faults, "X", names, columns) if columns else None
         else:
@@ -310,22 +311,6 @@ def members_at(scene: Any, final: Final, parameters: Any = None) -> Ensemble:
     # Where they go on from has their states, and attitudes that a method let drift from rotations.
     rest, upright = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3))
     return Ensemble.from_states(scene, rest, upright, rest, rest, numbers or None).going_on(final)
-
-
-def scene_numbers(scene: Any) -> dict[str, np.ndarray]:
-    """Every number of a scene that may vary."""
-    return scene.parameters() | {f"start.{key}": value for key, value in scene.start.given().items()}
-
-
-def scene_value(scene: Any, name: str, argument: str = "vary") -> np.ndarray:
-    """A single number of a scene; argument: what names it, for faults."""
-    (target,) = variations.targets(name)
-    known, faults = scene_numbers(scene), Faults(f"{argument}.")
-    if variations.known_target(faults, name, "...", target, known) and (ndim := target.of(known[target.name]).ndim):
-        entry = f"{name}[{','.join('0' * ndim)}]"
-        faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{entry}"')
-    faults.raise_if_any()
-    return target.of(known[target.name])
 
 
 @near_names()
@@ -488,5 +473,12 @@ def _columns(
             return names, full, cube_columns
     if not names:
         return (), "has no columns, since nothing varies; name what varies: prepare(scene, vary=[...])", None
-    values = {name: np.array([float(scene_value(scene, name))]) for name in names}
-    return names, Ensemble(scene, None, full.seed, None, Table(values=values)), None
+    faults, values, taken = Faults(), {}, []
+    for name in names:
+        with faults.including():
+            target, number = single_number(scene, name)
+            values[target.label] = np.array([number])
+            taken.append((name, (target,)))
+    variations.clashes(faults, taken)
+    faults.raise_if_any()
+    return tuple(values), Ensemble(scene, None, full.seed, None, Table(values=values)), None

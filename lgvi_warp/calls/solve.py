@@ -46,7 +46,7 @@ def solve(
     store: Store | str | os.PathLike[str] | None = None,
     executor: Executor | str = "threads",
     scheduler: str | None = None,
-    only: range | None = None,
+    blocks: range | None = None,
     on_block: Callable[[Result], None] | None = None,
     start: Final | None = None,
     tangents: str | Sequence[str] | None = None,
@@ -87,7 +87,7 @@ def solve(
             not held in memory; lw.resume continues such a run after it was stopped.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
-        only: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may ask for more
+        blocks: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may ask for more
             blocks than there are. The result is of the members of these blocks.
         on_block: Called with the Result of each block of members as soon as it is finished, a copy, in order, in the thread
             that called: to look at a run while it goes on. Default: nothing is called.
@@ -98,7 +98,7 @@ def solve(
             each costs one to two runs without them. Default: none.
 
     Returns:
-        A Result, of every member unless `until` or `only` says otherwise.
+        A Result, of every member unless `until` or `blocks` says otherwise.
 
     Raises:
         SceneError: If arguments are at fault; the message names every fault.
@@ -127,15 +127,15 @@ def solve(
     )  # fmt: skip
     with faults.including():
         function_of("on_block", on_block)
-    if only is not None and store is None:
-        faults.add("only", only, "is for a run into a store", "give store=..., or leave it out")
-    if only is not None and request.observed.until is not None:
-        faults.add("only", only, "runs in parts, where until looks at the whole", "leave out one of them")
+    if blocks is not None and store is None:
+        faults.add("blocks", blocks, "is for a run into a store", "give store=..., or leave it out")
+    if blocks is not None and request.observed.until is not None:
+        faults.add("blocks", blocks, "runs in parts, where until looks at the whole", "leave out one of them")
     faults.raise_if_any()
     names = () if tangents is None else check(request, tangents, store, start, on_block)
     plan = request.plan(survey_all=store is not None)
     # Parts of a run, and other processes and machines, must agree on a width.
-    if only is None and isinstance(request.executor, Threads) and tangents is None:
+    if blocks is None and isinstance(request.executor, Threads) and tangents is None:
         plan = with_best_width(plan, request.count(plan))
     try:
         if names:
@@ -143,7 +143,7 @@ def solve(
         if store is None:
             report, final = callback(progress), request.keeps_final
             return request.run(plan, progress=report, partial=True, on_block=on_block, final=final)
-        return run_stored(request, plan, store, callback(progress), only, on_block)
+        return run_stored(request, plan, store, callback(progress), blocks, on_block)
     finally:
         # Packets and their plan refer to each other: their arrays would stay until Python looks for such circles.
         plan.free_packets.clear()

@@ -11,6 +11,7 @@ from typing import NoReturn
 from lgvi_warp import __version__
 from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
+from lgvi_warp.cli.from_function import RUN
 from lgvi_warp.cli.lists import example, list_names, new, schema, show_help
 from lgvi_warp.cli.machine import bench, info
 from lgvi_warp.cli.plot import footprint, plot
@@ -33,6 +34,7 @@ from lgvi_warp.cli.verb import COMMON
 from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import closest
+from lgvi_warp.common.near import ELSEWHERE
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
@@ -98,11 +100,19 @@ def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         verb = top.verbs[chosen.verb]
         options = re.findall(r"--[\w-]+", verb.format_help())
         wrong = [word for word in unknown if word.startswith("-")] or unknown
-        texts = [f"{word!r} is not known" + (f"; {closest(word.partition('=')[0], options)}" if word[:1] == "-" else "")
+        texts = [f"{word!r} is not known" + (f"; {_suggestion(word.partition('=')[0], options)}" if word[:1] == "-" else "")
                  for word in wrong]  # fmt: skip
         verb.error("; ".join(texts))
     chosen.parser = top
     return chosen
+
+
+def _suggestion(word: str, options: Sequence[str]) -> str:
+    """Suggest an option for a word: that of an argument, of its name here or in other packages, or the nearest one."""
+    asked = word.strip("-").replace("-", "_").casefold()
+    name = next((name for name, words in ELSEWHERE.items() if asked in (name, *words)), asked)
+    option = f"--{RUN.get(name, name).replace('_', '-')}"
+    return f"did you mean {option!r}?" if option in options else closest(word, options)
 
 
 def parser() -> Parser:

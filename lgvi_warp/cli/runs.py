@@ -99,7 +99,7 @@ def run(
     """Run the verb run: simulate a scene's ensemble, write its files and print its summary."""
     begun = time.perf_counter()
     scene = load_scene(chosen)
-    store, only = store_settings(chosen), block_range(chosen)
+    store, blocks = store_settings(chosen), block_range(chosen)
     address, out = live_address(scene, chosen, viewer), folder(chosen)
     if store is None:
         place_of(out / RESULT, out)
@@ -116,7 +116,7 @@ def run(
         try:
             result = (simulate or solve)(
                 scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store,
-                executor=chosen.executor, scheduler=chosen.scheduler, only=only,
+                executor=chosen.executor, scheduler=chosen.scheduler, blocks=blocks,
                 on_block=live_view(scene, address, live), start=start, **settings,
             )  # fmt: skip
         except MembersFailed as error:

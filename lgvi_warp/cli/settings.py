@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.errors import Faults, SceneError
 
 if TYPE_CHECKING:
     from lgvi_warp.scene.scene import Scene
@@ -25,27 +25,32 @@ OPTIONS = {
 
 
 def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
-    """Collect the keys of the scene file that the command line replaces.
+    """Collect the values of the scene that the command line replaces.
 
     Args:
         chosen: The command's parsed arguments.
 
     Returns:
-        Key, as "run.step" -> its value as TOML text.
+        Name, as "run.step" or "heading_pid.kp" -> its value as TOML text.
 
     Raises:
-        SceneError: A --set has no value.
+        SceneError: A --set has no name or no value, or sets what is set already.
     """
     changes: dict[str, Any] = {}
+    faults = Faults()
     for name, key in OPTIONS.items():
         value = getattr(chosen, name, None)
         if value is not None:
             changes[key] = PLAIN.get(name, str)(value)
     for text in chosen.set:
-        key, equals, value = text.partition("=")
-        if not equals:
-            raise SceneError([f"--set {text}: has no value; write --set vehicle.buoyancy=300"])
-        changes[key.strip()] = value.strip()
+        key, equals, value = (word.strip() for word in text.partition("="))
+        if not (equals and key):
+            faults.add("--set", text, "is no NAME=VALUE", "write --set vehicle.buoyancy=300")
+        elif key in changes:
+            faults.add(f"--set {key}", value, f"is set to {changes[key]} as well", "keep one of them")
+        else:
+            changes[key] = value
+    faults.raise_if_any()
     return changes
 
 

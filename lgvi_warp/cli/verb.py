@@ -33,7 +33,12 @@ SHARED: dict[str, dict[str, Any]] = {
     "--duration": {"metavar": "S", "help": "end of the run [s]"},
     "--members": {"metavar": "N", "help": "number of vehicles"},
     "--seed": {"metavar": "N", "help": "seed of what varies"},
-    "--set": {"metavar": "KEY=VALUE", "action": "append", "default": [], "help": "replace a key of the scene file"},
+    "--set": {
+        "metavar": "NAME=VALUE",
+        "action": "append",
+        "default": [],
+        "help": "replace a key of the scene file, or a number of the scene: run.step, heading_pid.kp, current.velocity[0]",
+    },
     "--method": {"help": "as for run"},
     "--methods": {"metavar": "A,B", "type": lambda text: [name.strip() for name in text.split(",")]},
     "--step": {"metavar": "S", "help": "time step [s]"},
@@ -87,7 +92,7 @@ class Verb:
     def add(self, verbs: Any) -> None:
         """Add its parser to those of all verbs; its own help says what it does, too."""
         text = self.help[0].upper() + self.help[1:] + "."
-        parser = verbs.add_parser(self.name, help=self.help, description=text, aliases=self.aliases)
+        parser = verbs.add_parser(self.name, help=self.help, description=text, aliases=self.aliases, allow_abbrev=False)
         parser.verbs = verbs.choices
         self.arguments(parser)
 

@@ -5,6 +5,7 @@ import ast
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 
@@ -30,15 +31,14 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
     def find(name: str) -> Any:
         if name not in places:
             from lgvi_warp.common.extensions import load
-            from lgvi_warp.common.nearest import nearest
+            from lgvi_warp.common.nearest import meant
 
             # A class: what else is asked for is a module of a room, mostly.
             if name[:1].isupper() and (kind := load(table, name)) is not None:
                 return kind
             # What asks for private names asks whether a module has them.
-            near = None if name.startswith("_") else nearest(name, tuple(listed()))
-            remedy = f"; did you mean {near!r}?" if near else ""
-            raise AttributeError(f"module {door!r} has no attribute {name!r}{remedy}")
+            near = "" if name.startswith("_") else behind_another(name, door) or meant(name, tuple(listed()))
+            raise AttributeError(f"module {door!r} has no attribute {name!r}{'; ' * bool(near)}{near}")
         home, name_there = places[name]
         # What a door holds of itself is a module.
         value = import_module(f"{door}.{name}") if home == door else getattr(import_module(home), name_there)
@@ -55,3 +55,17 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
         return sorted({*places, *words(table)})
 
     return sorted(places), find, listed
+
+
+def behind_another(name: str, door: str) -> str:
+    """Suggest the class that another door has by this name; "" where there is none, or this door has one."""
+    package = door.partition(".")[0]
+    top = import_module(package).__all__
+    # Doors begin with a small letter, as functions do, and are modules of the package.
+    doors = [f"{package}.{each}" for each in top if find_spec(f"{package}.{each}")] if name[:1].isupper() else []
+    for other in (door, package, *doors):
+        for known in import_module(other).__all__:
+            if known.casefold() == name.casefold():
+                place = other.replace(package, "lw", 1)
+                return "" if other == door else f"did you mean '{place}.{known}'?"
+    return ""

@@ -146,12 +146,12 @@ MOST_KNOWN = 60
 
 def closest(word: Any, known: Iterable[str]) -> str:
     """Suggest the known name nearest to a word."""
-    from lgvi_warp.common.nearest import nearest  # loaded where something is wrong
+    from lgvi_warp.common.nearest import meant  # loaded where something is wrong
 
     names = tuple(map(str, known))
-    near = nearest(word[:LONGEST_VALUE] if isinstance(word, str) else brief(word), names)
+    near = meant(word[:LONGEST_VALUE] if isinstance(word, str) else brief(word), names)
     more = f" and {len(names) - MOST_KNOWN:,} more" if len(names) > MOST_KNOWN else ""
-    return f"did you mean {near!r}?" if near else f"known: {', '.join(names[:MOST_KNOWN])}{more}"
+    return near or f"known: {', '.join(names[:MOST_KNOWN])}{more}"
 
 
 def among(value: Any, known: Iterable[Any]) -> bool:

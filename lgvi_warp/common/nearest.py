@@ -5,8 +5,18 @@ from __future__ import annotations
 
 import functools
 
-# Fewest letters of a word that names are searched for.
-SHORTEST = 3
+# Fewest letters of a word that names are searched for; most names that a message suggests.
+SHORTEST, MOST = 3, 6
+
+
+def meant(word: str, names: tuple[str, ...]) -> str:
+    """Suggest all names that a word ends, where these are few, or the one that is nearest; "" for none."""
+    text = word.casefold()
+    ends = [name for name in names if name.casefold().endswith(f".{text}")]
+    if len(text) >= SHORTEST and not any(name.casefold() == text for name in names):
+        ends = ends or [name for name in names if name.casefold().endswith(text)]
+    near = ends if 1 < len(ends) <= MOST else [name for name in [nearest(word, names)] if name]
+    return f"did you mean {' or '.join(map(repr, near))}?" if near else ""
 
 
 # A file may have the same fault in thousands of tables, of which few are told.

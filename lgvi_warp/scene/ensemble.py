@@ -207,6 +207,10 @@ class Ensemble(Summarized, Documented):
     def _setup(
         self, scene: SceneLike, settings: EnsembleSettings, explicit: dict[str, np.ndarray], checked: bool = False
     ) -> None:
+        if any("]." in name for name in settings.vary):
+            from lgvi_warp.scene.names import all_by_key
+
+            settings = replace(settings, vary=all_by_key("ensemble.vary.", scene, settings.vary))
         self.scene, self.seed = scene, int(settings.seed)
         self.vary: dict[str, Any] = dict(settings.vary)
         self._draws = draws_of(scene, settings, explicit)

@@ -13,34 +13,49 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.arguments import mapping_of, path_of
-from lgvi_warp.common.errors import SceneError, among, cut, refusal
+from lgvi_warp.common.errors import Faults, SceneError, among, refusal
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.toml_text import parsed
+from lgvi_warp.scene.variations import Target, clashes, targets
+
+# Sections that are one table each.
+TABLES = ("vehicle", "environment", "start", "ensemble", "run", "controller", "source")
 
 
 def tables_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read the tables of a scene file (TOML)."""
-    return tables_and_text(path)[0]
-
-
-def tables_and_text(
-    path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None
-) -> tuple[dict[str, Any], str]:
-    """Read a scene file (TOML) as tables and as it was written."""
-    text = file_text(path, "scene file")
-    return tables_of_text(text, overrides, os.fspath(path), path_of("path", path).parent), text
+    return tables_of_text(file_text(path, "scene file"), None, os.fspath(path), path_of("path", path).parent)[0]
 
 
 def tables_of_text(
-    text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
-) -> dict[str, Any]:
-    """Read the tables of the text of a scene file (TOML), whose relative paths refer to a folder."""
+    text: str, settings: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Read the tables of the text of a scene file (TOML), whose relative paths refer to a folder, with some values replaced.
+
+    Returns: The tables; and the values, by name, of numbers whose names are no keys.
+    """
     content = parsed(text, name)
-    replaced = {} if overrides is None else mapping_of("overrides", overrides, "dotted keys to values")
-    for key, value in replaced.items():
-        override(content, key, value)
-    return _files_in(folder, content) if folder else content
+    given = {} if settings is None else mapping_of("overrides", settings, "names to values")
+    others = _replace(content, given) if given else {}
+    return _files_in(folder, content) if folder else content, others
+
+
+def _replace(content: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace values of keys in the tables of a scene file, in place; return the values of names that are no keys."""
+    faults, others, taken = Faults(), dict[str, Any](), []
+    for name, value in settings.items():
+        with faults.including():
+            named = targets(name)
+            read = _value_of(name, value) if isinstance(value, str) else value
+            taken.append((name, (Target(name),) if is_key(name) else named))
+            if is_key(name):
+                override(content, name, read)
+            else:
+                others[name] = read
+    clashes(faults, taken, "set")
+    faults.raise_if_any()
+    return others
 
 
 def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
@@ -92,19 +107,22 @@ def _mesh_in(folder: Path, name: str) -> str:
     return os.fspath(path)
 
 
+def is_key(name: str) -> bool:
+    """Whether a name is a key of a table of the scene file."""
+    section, _, rest = name.partition(".")
+    return section in TABLES and bool(rest) and (section == "ensemble" or "[" not in rest)
+
+
 def override(content: dict[str, Any], key: str, value: Any) -> None:
     """Set the value of a dotted key in the tables of a scene file, in place."""
-    section, _, rest = key.partition(".") if isinstance(key, str) else ("", "", "")
-    if isinstance(value, str) and rest:
-        value = _value_of(key, value)
-    if not rest:
-        raise SceneError([f"{cut(key)}: is not a dotted key; write section.key=value, such as vehicle.buoyancy=300"])
-    table = content.setdefault(section, {})
-    if section == "ensemble" and rest.startswith("vary.") and isinstance(table, dict):
-        table, rest = table.setdefault("vary", {}), rest.removeprefix("vary.").strip("\"'")
-    if not isinstance(table, dict):
-        raise SceneError([f"{key}: {section} is not a table; write section.key=value"])
-    table[rest] = value
+    *path, last = key.split(".")
+    if key.startswith("ensemble.vary."):
+        path, last = path[:2], key.removeprefix("ensemble.vary.").strip("\"'")
+    for i, word in enumerate(path):
+        content = content.setdefault(word, {})
+        if not isinstance(content, dict):
+            raise refusal(key, value, f"{'.'.join(path[: i + 1])} is not a table", "write section.key=value")
+    content[last] = value
 
 
 def _value_of(key: str, text: str) -> Any:
@@ -114,6 +132,8 @@ def _value_of(key: str, text: str) -> Any:
     except SceneError as error:
         if not isinstance(error.__cause__, tomllib.TOMLDecodeError):
             raise SceneError((key + fault.removeprefix("value") for fault in error.faults), error.more) from None
+        with contextlib.suppress(ValueError):  # such as .5, which TOML does not take
+            return float(text)
         if "\n" not in text.strip():
             return text
         content = {}

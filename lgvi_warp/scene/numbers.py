@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import keyword
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -14,6 +14,7 @@ from lgvi_warp.common.arguments import mapping_of
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.control.base import SECTIONS
 from lgvi_warp.scene import variations
+from lgvi_warp.scene.names import by_key
 from lgvi_warp.scene.start import NAMES
 
 SceneT = TypeVar("SceneT", bound=Any)
@@ -21,17 +22,22 @@ SceneT = TypeVar("SceneT", bound=Any)
 SETTINGS = ("controller.period", "run.step", "run.duration")
 
 
-def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
-    """Return a scene with other numbers, by names as `Scene.with_numbers` has them."""
-    base, faults = scene.parameters(), Faults()
+def with_numbers(scene: SceneT, numbers: Mapping[str, Any], keys: Sequence[str] = ()) -> SceneT:
+    """Return a scene with other numbers, by names as `Scene.with_numbers` has them.
+
+    keys: Names that messages suggest beside those of numbers.
+    """
+    base, faults, taken = scene.parameters(), Faults(), []
     changes: dict[str, dict[str, Any]] = {}
+    known = (*base, *SETTINGS, *(f"start.{entry}" for entry in NAMES))
     for name, value in mapping_of("numbers", numbers, "names to numbers").items():
-        target, *others = variations.targets(name)
+        target, *others = variations.targets(by_key(scene, name))
         key, _, attribute = target.name.rpartition(".")
-        known = (*base, *SETTINGS, *(f"start.{entry}" for entry in NAMES))
         if others or target.name not in known:
-            faults.add(f'"{name}"', value, "is no number of this scene", closest(name, known))
+            problem = "is no number of this scene" + " and no key of its file" * bool(keys)
+            faults.add(f'"{name}"', value, problem, closest(target.name, dict.fromkeys((*known, *keys))))
             continue
+        taken.append((name, (target,)))
         attribute += "_" * keyword.iskeyword(attribute)
         place = changes.setdefault(key, {})
         if target.index is None:
@@ -41,12 +47,15 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
         array = np.array(place.get(attribute, start), dtype=np.float64)
         try:
             array[target.index] = value
+            if target.name in variations.MATRICES:
+                array[target.index[::-1]] = value
         except (IndexError, ValueError, TypeError):
             faults.add(
                 f'"{name}"', value, f"is no number of {target.name}, of shape {array.shape}", "give one that there is"
             )
             continue
         place[attribute] = array
+    variations.clashes(faults, taken, "set")
     faults.raise_if_any()
     return _changed(scene, changes)
 

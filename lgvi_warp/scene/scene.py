@@ -15,8 +15,10 @@ from typing import Any, cast
 import numpy as np
 
 from lgvi_warp.common import summaries
+from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.names import alike, folded
+from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.fields import TABLE
@@ -25,7 +27,6 @@ from lgvi_warp.physics.vehicle import UNITS, Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.file import (
-    tables_and_text,
     tables_of_text,
     with_named_vehicle,
     with_origin_of_floors,
@@ -224,9 +225,10 @@ class Scene(Summarized):
         """Return the scene with other numbers.
 
         Args:
-            numbers: Values by name: those of `parameters()`, single entries ("drag.quadratic[0]"), "start.position" and what
-                else a start has, "controller.period", "run.step" and "run.duration". A held command takes the place of
-                another, a schedule that of a held one, an attitude that of another form.
+            numbers: Values by name: those of `parameters()`, single entries ("drag.quadratic[0]"), parts by their place
+                ("controller.sensors[0].noise"), "start.position" and what else a start has, "controller.period", "run.step"
+                and "run.duration". A held command takes the place of another, a schedule that of a held one, an attitude that
+                of another form.
 
         Returns:
             A new scene.
@@ -245,7 +247,8 @@ class Scene(Summarized):
 
         Args:
             path: Path of the file; "example:NAME" for one that comes with the package (`lgvi-warp example` lists them).
-            overrides: Values by dotted key ("vehicle.mass") that replace those of the file; by default none.
+            overrides: Values that replace those of the file, by key ("run.step") or by name as of `with_numbers`
+                ("heading_pid.kp", "current.velocity[0]"); by default none.
 
         Returns:
             The scene.
@@ -256,8 +259,8 @@ class Scene(Summarized):
         from lgvi_warp.scene.examples import located
 
         path = located(path)
-        content, text = tables_and_text(path, overrides)
-        scene = from_dict(content)
+        text = file_text(path, "scene file")
+        scene = loads(text, overrides, os.fspath(path), path_of("path", path).parent)
         changes = {key: value if isinstance(value, str) else repr(value) for key, value in (overrides or {}).items()}
         object.__setattr__(scene, "source", {"file": Path(path).name, "text": text, "changes": changes})
         return scene
@@ -337,13 +340,27 @@ def _copied(content: Any) -> Any:
 SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller", "source")
 
 
-def loads(text: str, overrides: Mapping[str, Any] | None = None) -> Scene:
-    """Build a scene from the text of a scene file (TOML)."""
-    return from_dict(tables_of_text(text, overrides))
+def loads(
+    text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
+) -> Scene:
+    """Build a scene from the text of a scene file (TOML), with some values replaced."""
+    content, numbers = tables_of_text(text, overrides, name, folder)
+    if not numbers:
+        return from_dict(content)
+    try:
+        return from_dict(content, numbers)
+    except SceneError as error:
+        faults = dict.fromkeys(error.faults)
+        try:
+            # Where other values are wrong, names are looked up in the scene as the file has it.
+            from_dict(tables_of_text(text, None, name, folder)[0], numbers)
+        except SceneError as more:
+            faults |= dict.fromkeys(more.faults)
+        raise SceneError(faults, error.more) from None
 
 
-def from_dict(content: Mapping[str, Any]) -> Scene:
-    """Build a scene from the tables of a scene file."""
+def from_dict(content: Mapping[str, Any], numbers: Mapping[str, Any] | None = None) -> Scene:
+    """Build a scene from the tables of a scene file, with other numbers by name."""
     content = with_origin_of_floors(with_times_of_data(with_named_vehicle(content)))
     faults = Faults()
     faults.keys("", content, SECTIONS)
@@ -369,6 +386,11 @@ def from_dict(content: Mapping[str, Any]) -> Scene:
         settings_given = settings if tables["ensemble"] else None
         scene = Scene(**{"vehicle": Vehicle(**_STAND_INS)} | sound | lists, controller=content.get("controller"),
                       ensemble_settings=settings_given)  # fmt: skip
+        if numbers and not faults:
+            from lgvi_warp.scene.names import file_keys
+            from lgvi_warp.scene.numbers import with_numbers
+
+            scene = with_numbers(scene, numbers, file_keys())
     with faults.including():
         if scene is None:
             # Names of a faulty term's parameters are unknown: only names of the other sections can be checked.

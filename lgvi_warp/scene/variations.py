@@ -257,8 +257,8 @@ def _no_such_matrices(target: Target, values: np.ndarray) -> tuple[str, str] | N
     return ("holds a matrix that is not symmetric", "give symmetric matrices") if skew else None
 
 
-def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]]) -> None:
-    """Note every number that is varied twice, by two keys or by one."""
+def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]], done: str = "varied") -> None:
+    """Note every number that is varied twice, by two keys or by one; done: what is done to it."""
     taken: dict[str, list[tuple[tuple[int, ...] | None, str]]] = {}
     for key, wanted in named:
         for target in wanted:
@@ -267,7 +267,7 @@ def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]]) -> 
                 index = tuple(sorted(index))
             for earlier, by_key in taken.setdefault(target.name, []):
                 if index is None or earlier is None or index == earlier:
-                    faults.add(f'"{key}"', target.label, f'is varied by "{by_key}" as well', "keep one of them")
+                    faults.add(f'"{key}"', target.label, f'is {done} by "{by_key}" as well', "keep one of them")
                     break
             taken[target.name].append((index, key))
 

@@ -141,7 +141,7 @@ def test_a_run_goes_on_with_its_function_alone(tmp_path, version):
     """A function of the same name, gain and all but one number in a closure is another one, unless its version is given."""
     path, settings = tmp_path / "run.zarr", dict(method="psi_s", h=H, t1=0.2, threads=1)
     first, same, other = (scene([lw.control.Callback(turning(k), version=version)], 300) for k in (1.0, 1.0, 2.0))
-    lw.solve(first, **settings, store=lw.Store(path), only=range(1))
+    lw.solve(first, **settings, store=lw.Store(path), blocks=range(1))
     if version is None:
         for existing in (
             lambda: lw.resume(path, other),
@@ -162,7 +162,7 @@ def test_a_function_that_cannot_be_compared_is_noted(tmp_path):
             return heading(t, y, r, members)
 
     fleet = scene([lw.control.Callback(locked)], 300)
-    lw.solve(fleet, **settings, store=lw.Store(path), only=range(1))
+    lw.solve(fleet, **settings, store=lw.Store(path), blocks=range(1))
     assert any("laws.callback" in text and "version" in text for text in lw.resume(path, fleet).messages)
 
 

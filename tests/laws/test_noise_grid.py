@@ -102,7 +102,7 @@ def test_members_keep_their_path_in_a_subset_and_in_a_store(tmp_path):
     subset = lw.solve(fleet(members=300).subset([5, 299, 6]), "psi_x", h=h, t1=END)
     np.testing.assert_array_equal(subset.position, whole.position[:, [5, 299, 6]])
     path = tmp_path / "run.zarr"
-    lw.solve(fleet(members=300), "psi_x", h=h, t1=END, store=lw.Store(path), only=range(1))
+    lw.solve(fleet(members=300), "psi_x", h=h, t1=END, store=lw.Store(path), blocks=range(1))
     np.testing.assert_array_equal(lw.resume(path).position, whole.position)
     assert lw.open_run(path).provenance["scene"]["terms"][1]["noise_step"] == GRID
 

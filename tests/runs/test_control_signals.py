@@ -294,7 +294,7 @@ def test_a_store_holds_them_and_goes_on(complete, tmp_path):
     path, part = tmp_path / "whole.zarr", tmp_path / "part.zarr"
     stored = lw.solve(fleet(), "psi_s", **SETTINGS, store=path)
     assert same(complete, stored)
-    lw.solve(fleet(), "psi_s", **SETTINGS, store=part, only=range(1))
+    lw.solve(fleet(), "psi_s", **SETTINGS, store=part, blocks=range(1))
     assert not Folder(part).complete
     lw.resume(part)
     assert differing(path, part) == []

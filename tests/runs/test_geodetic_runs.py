@@ -45,7 +45,7 @@ def test_members_at_places_of_their_own_are_stored_and_resumed(tmp_path):
     settings = SETTINGS | {"t1": 0.5, "save": lw.SaveAt(every=0.25)}
     whole = lw.solve(fleet, **settings)
     np.testing.assert_array_equal(whole.position[0], fleet.scene.environment.positions(places))
-    part = lw.solve(fleet, **settings, store=tmp_path / "run.zarr", only=range(1))
+    part = lw.solve(fleet, **settings, store=tmp_path / "run.zarr", blocks=range(1))
     assert part.members < 600
     lw.resume(tmp_path / "run.zarr")
     stored = lw.open_run(tmp_path / "run.zarr")

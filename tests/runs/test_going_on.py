@@ -242,7 +242,7 @@ def test_a_stored_run_that_was_stopped(tmp_path):
     fleet, how = autopilot(600), dict(method="psi_x", h=0.01)
     first = lw.solve(fleet, **how, t1=0.2)
     store = tmp_path / "second.zarr"
-    lw.solve(fleet, **how, t1=0.4, start=first.final, store=store, only=range(0, 1))
+    lw.solve(fleet, **how, t1=0.4, start=first.final, store=store, blocks=range(0, 1))
     last = lw.resume(store)
     whole = lw.solve(fleet, **how, t1=0.4)
     assert differences(whole, last) == []

@@ -244,7 +244,7 @@ def test_members_that_share_their_steps_lie_beside_those_that_are_kept(tmp_path)
 
 def test_parts_are_merged_with_their_kept_members(complete, tmp_path):
     for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
-        lw.solve(failing(), **SETTINGS, keep="failed", store=tmp_path / name / "run.zarr", only=only)
+        lw.solve(failing(), **SETTINGS, keep="failed", store=tmp_path / name / "run.zarr", blocks=only)
         assert not (tmp_path / name / "run.zarr" / "kept").exists()
     folder = lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all")
     assert folder.complete
@@ -257,7 +257,7 @@ def test_parts_are_merged_with_their_kept_members(complete, tmp_path):
 def test_the_last_part_into_one_folder_runs_them(complete, tmp_path):
     path = tmp_path / "run.zarr"
     for only in (range(2, 4), range(0, 2)):
-        lw.solve(failing(), **SETTINGS, keep="failed", store=lw.Store(path, existing="resume"), only=only)
+        lw.solve(failing(), **SETTINGS, keep="failed", store=lw.Store(path, existing="resume"), blocks=only)
     assert differing(complete, path) == []
 
 

@@ -36,7 +36,7 @@ def project(tmp_path):
     path = tmp_path / "a" / "project"
     table = written(path / "data" / "members.csv")
     lw.solve(fleet(table), **SETTINGS, store=tmp_path / "whole.zarr")
-    lw.solve(fleet(table), **SETTINGS, store=path / "runs" / "run.zarr", only=range(0, 1))
+    lw.solve(fleet(table), **SETTINGS, store=path / "runs" / "run.zarr", blocks=range(0, 1))
     return path
 
 
@@ -47,7 +47,7 @@ def older(monkeypatch, project):
         then.setattr(Table, "arrays", lambda table: {} if table.file is not None else table.own_values())
         shutil.rmtree(project / "runs")
         lw.solve(
-            fleet(project / "data" / "members.csv"), **SETTINGS, store=project / "runs" / "run.zarr", only=range(1)
+            fleet(project / "data" / "members.csv"), **SETTINGS, store=project / "runs" / "run.zarr", blocks=range(1)
         )
     return project
 
@@ -100,7 +100,7 @@ def test_the_same_run_is_told_by_the_tables_checksum(project, tmp_path):
 def test_parts_with_a_table_each_are_of_one_run(tmp_path):
     for name, only in (("a", range(0, 2)), ("b", range(2, 3))):
         table = written(tmp_path / name / "members.csv")
-        lw.solve(fleet(table), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
+        lw.solve(fleet(table), **SETTINGS, store=tmp_path / name / "run.zarr", blocks=only)
     assert lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all").complete
 
 

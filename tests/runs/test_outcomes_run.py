@@ -71,7 +71,7 @@ def test_counts_agree_of_100_000():
 def test_in_a_store_and_after_a_resume(tmp_path, monkeypatch):
     monkeypatch.setitem(events.TYPES, FarAway.type, FarAway)
     members, whole = fleet(1000), lw.solve(fleet(1000), **SETTINGS)
-    stored = lw.solve(members, **SETTINGS, store=tmp_path / "run.zarr", only=range(0, 2))
+    stored = lw.solve(members, **SETTINGS, store=tmp_path / "run.zarr", blocks=range(0, 2))
     assert len(stored.status) == 512
     lw.resume(tmp_path / "run.zarr")
     back = lw.open_run(tmp_path / "run.zarr")

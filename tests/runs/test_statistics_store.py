@@ -236,12 +236,12 @@ def test_replicates_of_a_store_are_those_of_memory(tmp_path):
 
 def test_a_run_in_parts_has_no_until(tmp_path):
     with pytest.raises(lw.SceneError, match="runs in parts"):
-        lw.solve(fleet(), **SETTINGS, until=UNTIL, store=tmp_path / "run.zarr", only=range(1))
+        lw.solve(fleet(), **SETTINGS, until=UNTIL, store=tmp_path / "run.zarr", blocks=range(1))
 
 
 def test_parts_of_a_run_are_merged_with_their_statistics(complete, memory, tmp_path):
     for i, only in enumerate((range(0, 2), range(2, 4))):
-        lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none", store=tmp_path / f"{i}.zarr", only=only)
+        lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none", store=tmp_path / f"{i}.zarr", blocks=only)
     lw.merge([tmp_path / "0.zarr", tmp_path / "1.zarr"], tmp_path / "run.zarr")
     assert differing(complete, tmp_path / "run.zarr") == []
     assert bits(lw.open_run(tmp_path / "run.zarr")) == bits(memory)

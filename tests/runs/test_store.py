@@ -392,7 +392,7 @@ def test_damaged_settings_are_refused(copy):
 
 
 def test_a_run_that_is_not_complete_is_not_opened_by_mistake(tmp_path):
-    part = lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(1, 3))
+    part = lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", blocks=range(1, 3))
     assert part.members == 512
     assert np.isfinite(part.position).all()
     with pytest.raises(lw.SceneError, match=r"2 blocks are missing.*lgvi-warp resume"):
@@ -406,7 +406,7 @@ def test_a_run_that_is_not_complete_is_not_opened_by_mistake(tmp_path):
 
 def test_parts_of_a_run_are_merged(tmp_path, complete):
     for name, only in (("a", range(0, 1)), ("b", range(2, 4)), ("c", range(0, 2))):
-        lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
+        lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", blocks=only)
     assert not lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "some").complete
     folder = lw.merge([tmp_path / name for name in "abc"], tmp_path / "all")
     assert folder.complete
@@ -443,7 +443,7 @@ def test_parts_that_may_only_be_read_are_merged(copy, complete, tmp_path):
 
 def test_a_part_that_is_damaged_lends_no_times(tmp_path, complete):
     for name, only in (("a", range(0, 2)), ("b", range(2, 4))):
-        lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
+        lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", blocks=only)
     (tmp_path / "a" / "run.zarr" / "time" / "c.0").unlink()
     assert differing(complete, lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all").path) == []
     with pytest.raises(lw.SceneError, match=r"time/c.0 is missing"):
@@ -451,7 +451,7 @@ def test_a_part_that_is_damaged_lends_no_times(tmp_path, complete):
 
 
 def test_only_parts_of_one_run_are_merged(tmp_path, complete):
-    lw.solve(fleet(), **{**SETTINGS, "t1": 2.0}, store=tmp_path / "run.zarr", only=range(0, 1))
+    lw.solve(fleet(), **{**SETTINGS, "t1": 2.0}, store=tmp_path / "run.zarr", blocks=range(0, 1))
     with pytest.raises(lw.SceneError, match=r"steps is 200 in .*run.zarr and 300 in .*: these are parts of different"):
         lw.merge([complete, tmp_path], tmp_path / "all")
     flipped = shutil.copytree(complete, tmp_path / "flipped.zarr")
@@ -463,18 +463,18 @@ def test_only_parts_of_one_run_are_merged(tmp_path, complete):
 def test_blocks_beyond_the_run_are_refused(tmp_path):
     for only in (range(4, 9), range(2, 2), range(-1, 2), range(0, 4, 2)):
         with pytest.raises(lw.SceneError, match=f"blocks {only.start}:{only.stop}: are not within the 4"):
-            lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=only)
+            lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", blocks=only)
     assert list(tmp_path.iterdir()) == []
     # The last of equal parts may be shorter.
-    assert lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(3, 6)).members == 1003 - 768
+    assert lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", blocks=range(3, 6)).members == 1003 - 768
     with pytest.raises(lw.SceneError, match="is for a run into a store"):
-        lw.solve(fleet(), **SETTINGS, only=range(0, 1))
+        lw.solve(fleet(), **SETTINGS, blocks=range(0, 1))
 
 
 def test_explicit_states_and_subsets_go_on_from_the_store_alone(tmp_path):
     chosen = fleet(600).subset(np.arange(599, 99, -1))
     lw.solve(chosen, **SETTINGS, store=tmp_path / "a.zarr")
-    lw.solve(chosen, **SETTINGS, store=tmp_path / "b.zarr", only=range(0, 1))
+    lw.solve(chosen, **SETTINGS, store=tmp_path / "b.zarr", blocks=range(0, 1))
     lw.resume(tmp_path / "b.zarr")
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
     assert list(lw.open_run(tmp_path / "a.zarr").dataset.realization.values[:2]) == [599, 598]
@@ -495,7 +495,7 @@ def test_values_given_as_arrays_lie_in_the_store_as_arrays(kind, tmp_path):
     whole = lw.solve(members(RANDOM), **SETTINGS)
     for ensemble, name in ((members(RANDOM), "a"), (members(RANDOM).subset(np.arange(599, 99, -1)), "c")):
         stored = lw.solve(ensemble, **SETTINGS, store=tmp_path / f"{name}.zarr")
-        lw.solve(ensemble, **SETTINGS, store=tmp_path / f"{name}b.zarr", only=range(0, 1))
+        lw.solve(ensemble, **SETTINGS, store=tmp_path / f"{name}b.zarr", blocks=range(0, 1))
         lw.resume(tmp_path / f"{name}b.zarr")
         assert differing(tmp_path / f"{name}.zarr", tmp_path / f"{name}b.zarr") == []
         assert state(tmp_path / f"{name}b.zarr")["complete"]
@@ -518,7 +518,7 @@ def test_values_given_as_arrays_lie_in_the_store_as_arrays(kind, tmp_path):
 def test_other_states_are_another_run(tmp_path):
     scene, n = fleet().scene, 300
     states = np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.full((n, 3), 0.1)
-    lw.solve(lw.Ensemble.from_states(scene, *states), **SETTINGS, store=tmp_path / "a.zarr", only=range(0, 1))
+    lw.solve(lw.Ensemble.from_states(scene, *states), **SETTINGS, store=tmp_path / "a.zarr", blocks=range(0, 1))
     other = lw.Ensemble.from_states(scene, states[0] + 1.0, *states[1:])
     with pytest.raises(lw.SceneError, match=r"ensemble\.arrays_sha256 .* is another run"):
         lw.solve(other, **SETTINGS, store=lw.Store(tmp_path / "a.zarr", existing="resume"))
@@ -538,7 +538,7 @@ def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path, monkeypatch):
     scene = lw.Scene(fleet().scene.vehicle, terms=[Mine(force=[0.1, 0.0, 0.0], torque=[0.0, 0.0, 0.0])])
     own = lw.Ensemble(scene, 300, 1, {"mine.force": lw.distributions.Normal(std=0.1)})
     whole = lw.solve(own, **SETTINGS, store=tmp_path / "a.zarr")
-    lw.solve(own, **SETTINGS, store=tmp_path / "b.zarr", only=range(0, 1))
+    lw.solve(own, **SETTINGS, store=tmp_path / "b.zarr", blocks=range(0, 1))
     with pytest.raises(lw.SceneError, match=r"'mine': is not known"):
         lw.resume(tmp_path / "b.zarr")
     assert lw.resume(tmp_path / "b.zarr", own).energy.tobytes() == whole.energy.tobytes()

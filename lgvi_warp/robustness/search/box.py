@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.calls.prepared import scene_value
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.scene.names import single_number
 
 # Candidates of a generation for each number, at least so many.
 POPULATION, LEAST = 8, 16
@@ -53,7 +53,7 @@ class SearchBox:
                 faults.add(key, name, "is no name of a number", f"give {example}")
                 continue
             with faults.including():
-                scene_value(scene, name, key)
+                name = single_number(scene, name, key)[0].label
             values = tuple(items_of(pair) or ())
             log = len(values) == 3 and values[2] == "log"
             ends = faults.finite(f'{key}."{name}"', values[:2] if log else values or pair, (2,))

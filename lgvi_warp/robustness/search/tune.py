@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.calls.prepared import Prepared, prepare, scene_value
+from lgvi_warp.calls.prepared import Prepared, prepare
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
@@ -23,6 +23,7 @@ from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, search
 from lgvi_warp.robustness.search.numbers import Numbers
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.names import single_number
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
 
@@ -166,7 +167,7 @@ def tune_gains(
         lambda inside: np.asarray(measure(costs(box.values(inside)))), len(box.names), budget // n, seed, restarts,
         report=lambda count: report(min(1.0, n * count / budget)))  # fmt: skip
     best = box.values(optimum.at[None])
-    before = np.array([[float(scene_value(scene, name)) for name in box.names]])
+    before = np.array([[single_number(scene, name)[1] for name in box.names]])
     drawn = ensemble.sampling.kind == "random" and bool(ensemble.vary) and not ensemble.explicit()
     count = (4 * n if fresh is None else fresh) if drawn else 0
     fresh_costs = np.full(2, np.nan)

@@ -15,6 +15,7 @@ from lgvi_warp.physics import terms
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.names import by_key
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import NAMES
 
@@ -187,7 +188,7 @@ def ensemble_of(
 ) -> tuple[Ensemble, list[str]]:
     """The members of a case, those of all as far as it has what varies and does not set it; and names of what does not."""
     known = known_names(scene)
-    fixed = {target.name for name in numbers for target in variations.targets(name)}
+    fixed = {target.name for name in numbers for target in variations.targets(by_key(scene, name))}
     dropped = [name for name in vary if any(t.name in fixed or t.name not in known for t in variations.targets(name))]
     if dropped and like.sampling.kind != "random":
         why = f"does not vary here, and with sampling {like.sampling.kind!r} the other numbers would be others too"

@@ -27,6 +27,7 @@ from lgvi_warp.robustness.sweeps.record import Record
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.functions import Own, ToldApart, functions_of
+from lgvi_warp.scene.names import all_by_key
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.member_metrics import metric_of, numbers_of_members
@@ -138,7 +139,7 @@ def setup_of(
     for name, read, value in (("cases", cases_of, cases), ("axes", grid_of, grid), ("metrics", metrics_of, metrics)):
         with faults.including():
             parts[name] = read(value)
-    for name in ("save", "statistics", "keep", "until", "store", "only"):
+    for name in ("save", "statistics", "keep", "until", "store", "blocks"):
         if name in settings:
             faults.add(name, "...", "is what a sweep decides", "leave it out")
     check_rare(faults, rare)
@@ -223,7 +224,7 @@ def _base(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
     if vary is not None and not isinstance(vary, Mapping):
         remedy = 'give {"vehicle.mass": lw.distributions.Normal(...)}'
         raise refusal("vary", vary, "does not map names to distributions", remedy)
-    return scene, {**scene.vary, **(vary or {})}
+    return scene, {**scene.vary, **all_by_key("vary.", scene.scene, vary or {})}
 
 
 def electrical(entries: Any, scene: Any) -> Any:

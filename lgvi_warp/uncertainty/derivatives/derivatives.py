@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from lgvi_warp.calls.prepared import scene_value
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
@@ -16,6 +15,7 @@ from lgvi_warp.results.quantities import OfInterest, OfResult, quantities
 from lgvi_warp.runs.request import scene_of
 from lgvi_warp.scene.columns import names_of
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.names import single_number
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.variations import Target, targets
 from lgvi_warp.uncertainty.derivatives import undefined
@@ -100,12 +100,11 @@ def _checked(fleet: Any, of: Any, by: Any, smooth: Any, seed: Any) -> SlopesQues
         faults.add("of", label, "is named twice", "name each quantity once, and give functions names of their own")
     names, numbers = names_of(faults, by, "by"), list[Target]()
     for name in names:
-        if len(several := targets(name)) > 1:
+        if len(targets(name)) > 1:
             faults.add("by", name, "names several numbers", "name each by itself")
             continue
         with faults.including():
-            scene_value(scene, name, "by")
-            numbers += several
+            numbers.append(single_number(scene, name, "by")[0])
     with faults.including():
         flag("smooth", smooth)
     alone = not isinstance(fleet, Ensemble)

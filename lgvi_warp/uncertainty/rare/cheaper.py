@@ -16,6 +16,7 @@ from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.random import generator
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.names import by_key
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.uncertainty.rare.limit import VehicleLimit
 
@@ -76,7 +77,7 @@ def cheaper_of(entries: Any, fleet: Ensemble, settings: Mapping[str, Any]) -> li
 def _cheaper(key: str, entry: Mapping[str, Any], fleet: Ensemble, settings: Mapping[str, Any]) -> Cheaper:
     numbers = {name: value for name, value in entry.items() if name not in SETTINGS}
     for name in numbers:
-        if any(target.name in fleet.varied_names for target in variations.targets(name)):
+        if any(target.name in fleet.varied_names for target in variations.targets(by_key(fleet.scene, name))):
             raise refusal(f"{key}.{name}", entry[name], "is of a number that varies", "leave it out")
     scene = fleet.scene
     assert isinstance(scene, Scene)

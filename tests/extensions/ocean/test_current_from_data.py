@@ -199,13 +199,13 @@ def test_a_stored_run_goes_on_with_the_file_or_the_numbers(tmp_path, kept):
     fleet = lw.Ensemble(drifting(field), 600, 1, {"start.position": lw.distributions.Normal(std=1.0)})
     run = dict(method="rk4", h=0.5, t1=2.0, threads=1)
     store = tmp_path / "run.zarr"
-    lw.solve(fleet, **run, store=store, only=range(0, 1))
+    lw.solve(fleet, **run, store=store, blocks=range(0, 1))
     again = lw.resume(store)
     np.testing.assert_array_equal(again.position[-1], lw.solve(fleet, **run).position[-1])
     table = again.provenance["scene"]["terms"][0]
     assert ("file" in table, "velocities" in table) == ((True, False) if kept == "file" else (False, True))
     if kept == "file":
-        lw.solve(fleet, **run, store=tmp_path / "c.zarr", only=range(0, 1))
+        lw.solve(fleet, **run, store=tmp_path / "c.zarr", blocks=range(0, 1))
         data.cmems(data.still, data.still).to_netcdf(tmp_path / "a.nc")
         with pytest.raises(lw.SceneError, match=r"checksum = .*is not that of what is read"):
             lw.resume(tmp_path / "c.zarr")

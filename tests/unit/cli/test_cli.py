@@ -95,7 +95,7 @@ def test_options_reach_the_run(tmp_path, capsys):
 @pytest.mark.parametrize(("arguments", "words"), [
     (["--set", "vehicle.mas=1"], ["vehicle.mas", "did you mean 'mass'"]),
     (["--step", "-1", "--members", "0", "--set", "vehicle.mass=-2"], ["3 faults", "step", "members", "mass"]),
-    (["--method", "psy"], ["psy", "did you mean"]), (["--set", "nonsense"], ["--set nonsense", "vehicle.buoyancy=300"]),
+    (["--method", "psy"], ["psy", "did you mean"]), (["--set", "nonsense"], ["nonsense", "vehicle.buoyancy=300"]),
     (["--dtype", "float16"], ["float16"]), (["--width", "5"], ["width = 5"]), (["--threads", "0"], ["threads = 0"]),
     (["--device", "cuda"], ["run.device = 'cuda'", "runs are on CPU cores", 'give "cpu"']),
     (["--resume"], ["--resume", "--store zarr"]),

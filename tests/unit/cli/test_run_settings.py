@@ -26,7 +26,9 @@ def test_every_option_of_a_run_replaces_its_key():
     plainly = ("--members", "1e6", "--seed", "-3", "--keep", "3,17", "--set", " vehicle.mass = a=b ")
     assert settings.overrides(chosen(*plainly)) == {
         "run.keep": "[3,17]", "ensemble.members": "1000000", "ensemble.seed": "-3", "vehicle.mass": "a=b"}  # fmt: skip
-    with pytest.raises(lw.SceneError, match=r"^--set vehicle\.mass: has no value; write --set vehicle\.buoyancy=300$"):
+    with pytest.raises(
+        lw.SceneError, match=r"^--set = 'vehicle\.mass': is no NAME=VALUE; write --set vehicle\.buoyancy=300$"
+    ):
         settings.overrides(chosen("--set", "vehicle.mass"))
 
 

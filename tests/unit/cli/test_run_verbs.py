@@ -51,10 +51,10 @@ def test_arguments_of_a_run(tmp_path):
     assert scene.run.step == 0.01
     assert other.ensemble_settings.members == 9
     assert plain == {"threads": None, "width": None, "progress": None, "store": None, "executor": "threads",
-                     "scheduler": None, "only": None, "on_block": None, "start": None}  # fmt: skip
+                     "scheduler": None, "blocks": None, "on_block": None, "start": None}  # fmt: skip
     assert named.pop("progress") is not None
     assert named.pop("store").path == tmp_path / "run.zarr"
-    assert named == {"threads": 3, "width": 4, "executor": "dask", "scheduler": "tcp://x", "only": range(1, 2),
+    assert named == {"threads": 3, "width": 4, "executor": "dask", "scheduler": "tcp://x", "blocks": range(1, 2),
                      "on_block": None, "start": None}  # fmt: skip
     assert report.calls == [(result, tmp_path, [], None)] * 2
 

@@ -65,6 +65,32 @@ def test_options_are_the_arguments_of_the_function(verb):
             assert text in action.help.replace("%%", "%"), name
 
 
+# Verbs beside studies -> what they call in Python, and their options that are no arguments of it.
+CALLS = {
+    "run": ([lw.solve, lw.suggest, lw.Method, lw.Store], {"--live", "--viewer"}),
+    **dict.fromkeys(("predict", "plan"), ([lw.predict, lw.solve, lw.Store], set())), "resume": ([lw.resume], set()),
+    "merge": ([lw.merge], set()), "export": ([lw.export], set()), "report": ([lw.report], {"--open"}),
+    "check": ([lw.solve], set()), "sweep": ([lw.sweep], {"--plan", "--record"}), "view": ([lw.record], {"--movie"}),
+    "warm": ([lw.solve], {"--methods", "--dtypes"}), "new": ([], {"--vehicle"}), "bench": ([], {"--members", "--steps"}),
+    **dict.fromkeys(("info", "list", "schema", "plot", "completion", "help"), ([], set())),
+}  # fmt: skip
+# Options that are keys of a scene file; a word of `existing` of a Store, and its dtype beside that of the run.
+OF_FILES = {"--step", "--duration", "--members", "--seed"}
+OF_STORES = {"--overwrite": "existing", "--resume": "existing", "--store-dtype": "dtype"}
+
+
+def test_options_of_other_verbs_are_called_as_arguments():
+    verbs, common = cli.parser().verbs, {"-h", "-q", "-v", "--json", "--color", "--out", "--set"}
+    assert CALLS.keys() | VERBS.keys() == verbs.keys()
+    for verb, (functions, own) in CALLS.items():
+        options = {action.option_strings[0] for action in verbs[verb]._actions if action.option_strings}
+        arguments = {name for function in functions for name in inspect.signature(function).parameters}
+        called = OF_STORES if lw.Store in functions else {}
+        others = {each for each in options - common - (set() if verb == "bench" else OF_FILES)
+                  if called.get(each, each.strip("-").replace("-", "_")) not in arguments}  # fmt: skip
+        assert others == own, verb
+
+
 def draw(finding, *, path):
     """Stands for what draws a picture."""
     path.write_text("a picture")

@@ -8,8 +8,10 @@ import pickle
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp import cli
 from lgvi_warp.common.nearest import nearest
 from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
+from tests.conftest import ROOT
 from tests.support.public import PATHS
 from tests.support.refusals import says
 
@@ -45,16 +47,42 @@ def test_names_in_another_case():
 
 @pytest.mark.parametrize(
     ("door", "word", "name"),
-    [("terms", "current", "Current"), ("control", "PID", "PosePID"), ("events", "floor", "Floor"),
+    [("terms", "current", "Current"),
+     ("control", "PID", "DepthPID' or 'HeadingPID' or 'HeavePID' or 'PosePID' or 'SpeedPID"),
+     ("events", "floor", "Floor"),
      ("distributions", "normal", "Normal"), ("statistics", "mean", "Mean"), ("designs", "sobol", "Sobol"),
      ("metrics", "overshoot", "Overshoot"), ("", "sovle", "solve"), ("", "ensemble", "Ensemble")],
 )  # fmt: skip
 def test_public_names_that_are_nearly_right(door, word, name):
     module = getattr(lw, door) if door else lw
-    assert name in dir(module)
+    assert set(name.split("' or '")) <= set(dir(module))
     with pytest.raises(AttributeError, match=f"has no attribute '{word}'; did you mean '{name}'"):
         getattr(module, word)
     assert not hasattr(module, "__path_of_nothing__")
+
+
+@pytest.mark.parametrize(
+    ("place", "word", "name"),
+    [("", "Drag", "lw.terms.Drag"), ("", "HeadingPID", "lw.control.HeadingPID"),
+     ("control", "Thrusters", "lw.terms.Thrusters"),
+     ("terms", "Controller", "lw.Controller")],
+)  # fmt: skip
+def test_public_names_behind_another_door(place, word, name):
+    with pytest.raises(AttributeError, match=f"has no attribute '{word}'; did you mean '{name}'"):
+        getattr(getattr(lw, place) if place else lw, word)
+
+
+def test_a_word_that_several_names_end_with_names_all_of_them():
+    scene = lw.Scene.load(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml", {"ensemble.members": 2})
+    with pytest.raises(lw.SceneError, match=r"did you mean 'depth_pid\.kp' or 'heading_pid\.kp'"):
+        scene.with_numbers({"kp": 1.0})
+
+
+def test_options_by_the_names_of_arguments(capsys):
+    for word, option in (("--dt", "--step"), ("--t1=3", "--duration"), ("--n", "--members"), ("--stpe", "--step")):
+        with pytest.raises(SystemExit):
+            cli.main(["run", "scene.toml", word, "3"])
+        assert f"is not known; did you mean '{option}'?" in capsys.readouterr().err
 
 
 def keywords(kind):

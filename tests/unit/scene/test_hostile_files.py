@@ -257,7 +257,7 @@ SET = {
     "run.method=psi_s\npsi": "is not one value",
     "vehicle.mass=" + "9" * 5000: "vehicle.mass",
     "vehicle.mass=" + "[" * 5000 + "]" * 5000: "nested",
-    "=3": "is not a dotted key",
+    "=3": "is no NAME=VALUE",
 }
 ARGUMENTS = (
     [([*option.split(), value, PAPER], f"{key} = {told}") for option, key, values in OPTIONS for value, told in values.items()]

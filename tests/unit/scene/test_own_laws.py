@@ -75,7 +75,7 @@ def test_laws_of_libraries_say_what_they_are():
 def test_a_store_and_a_sweep_take_no_law_for_another(tmp_path):
     scene = lw.Scene.named("sphere")
     one, other = (lw.Ensemble(scene, 300, 1, {NAME: Scaled(width)}) for width in (1.0, 2.0))
-    lw.solve(one, **SETTINGS, store=tmp_path / "run.zarr", only=range(1))
+    lw.solve(one, **SETTINGS, store=tmp_path / "run.zarr", blocks=range(1))
     with pytest.raises(lw.SceneError, match=r"functions\.vary\.start\.position\[0\] is "):
         lw.resume(tmp_path / "run.zarr", other)
     assert lw.resume(tmp_path / "run.zarr", one).members == 300

@@ -217,7 +217,8 @@ class Controller:
         answers = 0 if callback is None else channels[callback.to] if callback.to else 6
         shared = max(law.shared_rows for law in self.laws)
         altimeters = [part.key for part in self.sensors if isinstance(part, Altimeter)]
-        rows = self.handed_rows, self.belief_rows, any(part.iterates for part in wired.parts)
+        ending = [part.key for part in self.guidance if part.ends and part.key in {event.follows for event in events}]
+        rows = self.handed_rows, self.belief_rows, any(part.iterates for part in wired.parts), ending
         controller = wired.on(Bus.of(channels, self.period, max(answers, shared), altimeters, *rows))
         for part in controller.allocation:
             part.check_actuator(faults)

@@ -266,6 +266,11 @@ class MeasuringPart(Part):
     belief_rows: ClassVar[int] = 0
 
     @property
+    def estimates_position(self) -> bool:
+        """Whether it changes the measured position, whose difference from the true one is then the navigation error."""
+        return False
+
+    @property
     def uses(self) -> Mapping[str, str]:
         """Keys of the sensors that hand their readings to this estimator alone, by what they are to it; by default none."""
         return {}

@@ -95,8 +95,8 @@ class Bus(NamedTuple):
         """The bus of some actuators, with a time between two ticks [s].
 
         channels: Commands of each. answers: Rows for answers of the host. altimeters: Their keys. handed: Rows that sensors
-            hand to an estimator, by their keys; belief: rows of what it believes. iterates: Whether a part does. ending: Keys of
-            the guidance at whose end an event looks.
+            hand to an estimator, by their keys; belief: rows of what it believes. iterates: Whether a part does.
+            ending: Keys of the guidance at whose end an event looks.
         """
         commands, row = {}, 0
         for key, count in channels.items():

@@ -29,6 +29,7 @@ from lgvi_warp.physics.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from lgvi_warp.common.places import LocalPlane
+    from lgvi_warp.physics.terms.events import Event
 
 # A part of a component below this is round-off, when it is asked what actuators can make.
 SPANNED = 1e-8
@@ -181,7 +182,7 @@ class Controller:
         self,
         terms: Sequence[Term],
         nominal: Mapping[str, np.ndarray] | None = None,
-        events: Sequence[Term] = (),
+        events: Sequence[Event] = (),
     ) -> Controller:
         """The same controller, whose parts know their actuators and the rows of the memory.
 

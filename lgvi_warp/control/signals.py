@@ -117,7 +117,10 @@ add_signals(
 )
 add_signals(
     Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""),
-    Signal(Field(NAVIGATION_ERROR, (3,), "m", "measured or estimated position less the true one, inertial axes"), "measured"),
+    Signal(
+        Field(NAVIGATION_ERROR, (3,), "m", "measured or estimated position less the true one, inertial axes"),
+        "measured",
+    ),
 )
 
 

@@ -79,9 +79,7 @@ class SampleLayout:
         """Whether a field is gathered at ticks: a signal always, the motion where a statistic or the host reads it."""
         if name == "position" and NAVIGATION_ERROR in self.fields:
             return True
-        return name in self.fields and (
-            name in SIGNALS or self.read_at_ticks is None or name in self.read_at_ticks
-        )
+        return name in self.fields and (name in SIGNALS or self.read_at_ticks is None or name in self.read_at_ticks)
 
     @property
     def noted_bits(self) -> int:

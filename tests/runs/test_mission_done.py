@@ -79,9 +79,10 @@ def test_the_first_of_two_events_counts_also_within_a_step_that_ends_at_the_last
 
 
 def test_it_is_an_outcome_with_its_time_and_energy():
-    account = dict(statistics=[lw.statistics.Outcome("mission_done"), lw.statistics.EndTime("mission_done", then=[lw.statistics.Mean()])])  # fmt: skip
+    ends = lw.statistics.EndTime("mission_done", then=[lw.statistics.Mean()])
+    asked = [lw.statistics.Outcome("mission_done"), ends]
     members = fleet()
-    result = solved(members, 60.0, **account)
+    result = solved(members, 60.0, statistics=asked)
     assert result.statistics["outcome mission_done"].value[-1] == 1.0
     mean = result.statistics["mean end_time mission_done"].value.ravel()[-1]
     assert mean == pytest.approx(result.end_time.mean(), rel=1e-12)

@@ -16,12 +16,16 @@ RUN = dict(method="psi_s", h=1.0, t1=T1, threads=1)
 ERROR = "norm(navigation_error)"
 SAVED = ("position", "measured_position", "navigation_error")
 SAVE = lw.SaveAt(every=10.0, fields=SAVED)
+GOES_ON = lw.SaveAt(every=10.0, fields=(*SAVED, "attitude", "velocity", "angular_velocity"), final=True)
 
 
 def scene(velocity="velocity", current=0.0, sensors=None, noise=0.0, events=()):
     """A body that nothing brakes goes north through the water; it reckons by its compass and a log."""
     if sensors is None:
-        sensors = [lw.control.Sensor(of="heading", name="compass", noise=noise), lw.control.DeadReckoning(velocity=velocity)]
+        sensors = [
+            lw.control.Sensor(of="heading", name="compass", noise=noise),
+            lw.control.DeadReckoning(velocity=velocity),
+        ]
     guidance, laws = [lw.control.SetPoint(speed=PACE)], [lw.control.SpeedPID(kp=0.0)]
     controller = lw.Controller(period=1.0, sensors=sensors, guidance=guidance, laws=laws)
     body = lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(10.0, 10.0, 10.0), buoyancy=20.0 * 9.8)
@@ -98,7 +102,9 @@ def test_with_bottom_lock_the_current_does_not_matter(current):
     b = biases(members)
     # The way over ground is that of the current too, which the compass turns with the rest.
     way = np.hypot(D, current * T1)
-    np.testing.assert_allclose(np.linalg.norm(result.navigation_error[-1], axis=-1), 2 * way * np.abs(np.sin(b / 2)), **EXACT)
+    np.testing.assert_allclose(
+        np.linalg.norm(result.navigation_error[-1], axis=-1), 2 * way * np.abs(np.sin(b / 2)), **EXACT
+    )
     np.testing.assert_array_equal(result.navigation_error, result.measured_position - result.position)
 
 
@@ -112,7 +118,7 @@ def test_without_it_the_current_is_the_error():
 
 
 def test_a_log_that_is_lost_for_a_part_of_the_run():
-    first = lw.solve(scene("velocity", DRIFT), **RUN, save=lw.SaveAt(every=10.0, fields=(*SAVED, "attitude", "velocity", "angular_velocity"), final=True))  # fmt: skip
+    first = lw.solve(scene("velocity", DRIFT), **RUN, save=GOES_ON)
     later = lw.solve(scene("water_velocity", DRIFT), **RUN | {"t1": T1 + 40.0}, save=SAVE, start=first.final)
     assert np.abs(first.navigation_error).max() < 1e-11
     # The rule of trapezoids takes half of the last velocity over ground at the first tick without it.
@@ -167,7 +173,9 @@ def test_rare_event_and_estimate_know_the_name(r):
 def test_splitting_follows_it():
     # East: the sum of PACE sin(n), n of each tick by itself, of which the rule takes half of the first and the last.
     sd = PACE * np.sqrt((99 + 0.5) * 0.5 * -np.expm1(-2 * 0.05**2))
-    answer = lw.rare_event(scene(noise=0.05), f"navigation_error[1] above {3.0 * sd}", **RUN, by="splitting", relative_error=0.2)
+    answer = lw.rare_event(
+        scene(noise=0.05), f"navigation_error[1] above {3.0 * sd}", **RUN, by="splitting", relative_error=0.2
+    )
     assert abs(answer.probability / norm.sf(3.0) - 1.0) < 4.0 * answer.relative_error
 
 
@@ -196,8 +204,9 @@ def test_the_metric_is_that_of_the_members():
     asked += [lw.metrics.NavigationError("end", horizontal=True, name="flat", then=[lw.statistics.MemberValues()])]
     result = lw.solve(members, **RUN, keep="none", statistics=asked)
     exact = D * np.abs(np.sin(biases(members) / 2))
-    each = {name: result.statistics[f"each {name}"].value[0, 0] for name in ("navigation end", "navigation largest", "navigation percent", "flat")}  # fmt: skip
-    for name in ("navigation end", "navigation largest", "flat"):
+    lengths = ("navigation end", "navigation largest", "flat")
+    each = {name: result.statistics[f"each {name}"].value[0, 0] for name in (*lengths, "navigation percent")}
+    for name in lengths:
         np.testing.assert_allclose(each[name], exact, **EXACT)
     np.testing.assert_allclose(each["navigation percent"], 100.0 * exact / (0.5 * D), rtol=0.0, atol=1e-11)
 
@@ -207,12 +216,14 @@ def test_stores_exports_and_pictures_have_it(tmp_path):
     whole = lw.solve(members, **RUN, save=SAVE)
     stored = lw.solve(members, **RUN, save=SAVE, store=tmp_path / "run.zarr")
     np.testing.assert_array_equal(stored.navigation_error, whole.navigation_error)
-    np.testing.assert_array_equal(lw.Result.load(whole.save(tmp_path / "run.npz")).navigation_error, whole.navigation_error)
+    np.testing.assert_array_equal(
+        lw.Result.load(whole.save(tmp_path / "run.npz")).navigation_error, whole.navigation_error
+    )
     assert whole.dataset.navigation_error.attrs["units"] == "m"
     axes = lw.plots.fan(whole, ERROR, path=tmp_path / "error.svg")
     assert axes.get_ylabel().endswith("[m]")
     # In two parts, the second of which goes on in the memory of the first.
-    half = lw.solve(members, **RUN | {"t1": 50.0}, save=lw.SaveAt(every=10.0, fields=("position", "attitude", "velocity", "angular_velocity", *SAVED[1:]), final=True))  # fmt: skip
+    half = lw.solve(members, **RUN | {"t1": 50.0}, save=GOES_ON)
     again = lw.solve(members, **RUN, save=SAVE, start=half.final)
     np.testing.assert_array_equal(again.navigation_error[-1], whole.navigation_error[-1])
     np.testing.assert_array_equal(again.navigation_error[0], half.navigation_error[-1])
@@ -223,10 +234,14 @@ def test_the_command_knows_the_names(tmp_path, capsys):
     path.write_text(FILE)
     assert cli.main(["estimate", str(path), "--of", f"{ERROR} above 30", "--error", "0.01", "--json", "-q"]) == 0
     assert abs(json.loads(capsys.readouterr().out)["value"] - beyond(30.0)) < 0.04
-    to = ["--out", str(tmp_path / "rare")]
-    assert cli.main(["rare", str(path), "--limit", f"{ERROR} - 60", *to, "--json", "-q"]) == 0
-    (answer,) = (tmp_path / "rare").glob("*.json")
-    assert json.loads(answer.read_text())["probability"] == pytest.approx(beyond(60.0), rel=0.4)
+    to = ["--out", str(tmp_path), "--json", "-q"]
+    assert cli.main(["rare", str(path), "--limit", f"{ERROR} - 60", *to]) == 0
+    answer = json.loads(capsys.readouterr().out)["content"]["rare"]
+    assert abs(answer["probability"] / beyond(60.0) - 1.0) < 4.0 * answer["relative_error"]
+    assert cli.main(["sensitivity", str(path), "--of", ERROR, "--samples", "64", *to]) == 0
+    # The mean of |b| is S sqrt(2 / pi); 256 members of a design that is spread evenly.
+    mean = json.loads(capsys.readouterr().out)["content"]["sensitivity"]["mean"]
+    assert mean == pytest.approx([D * S * np.sqrt(2.0 / np.pi)], rel=0.02)
 
 
 @pytest.mark.parametrize("sensors", [[], [lw.control.Sensor(of="heading", bias=0.1)]], ids=["none", "compass"])

@@ -171,7 +171,11 @@ class MissionDone(Event):
         >>> controller = lw.Controller(period=0.1, guidance=[lw.control.Waypoints(**way)], laws=laws)
         >>> push = lw.terms.ControlWrench(limit=[60.0] * 6)
         >>> scene = lw.Scene.named(
-        ...     "sphere", terms=[push], start={"velocity": [1.0, 0.0, 0.0]}, controller=controller, events=[lw.events.MissionDone()]
+        ...     "sphere",
+        ...     terms=[push],
+        ...     start={"velocity": [1.0, 0.0, 0.0]},
+        ...     controller=controller,
+        ...     events=[lw.events.MissionDone()],
         ... )
         >>> lw.solve(scene, "psi_s", h=0.05, t1=30.0).status.counts()
         {'mission_done': 1}

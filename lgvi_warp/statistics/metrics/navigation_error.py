@@ -31,8 +31,8 @@ class NavigationError(Metric):
     manufacturers state the error of logs and inertial systems. It is NaN for a member that does not move.
 
     Args:
-        of: "end", the default: at the last tick under way [m]; "largest": over all ticks [m]; "percent": at the end, as a part of
-            the distance run [%].
+        of: "end", the default: at the last tick under way [m]; "largest": over all ticks [m]; "percent": at the end, as a
+            part of the distance run [%].
         horizontal: Whether the length is that of the north and east components alone; by default False.
 
     Raises:
@@ -40,7 +40,7 @@ class NavigationError(Metric):
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> metric = lw.metrics.NavigationError("percent", horizontal=True, then=[lw.statistics.Quantiles(levels=(0.5, 0.95))])
+        >>> metric = lw.metrics.NavigationError("percent", horizontal=True, then=[lw.statistics.Quantiles(levels=(0.95,))])
         >>> metric.key, metric.unit
         ('navigation percent', '%')
     """

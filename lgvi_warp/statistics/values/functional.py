@@ -122,7 +122,11 @@ def functional(key: str, of: Any) -> Functional:
     if not isinstance(of, str):
         meaning = quantity(key, of)
         return Functional(meaning.name, meaning)
-    text = of.replace(" ", "")
+    return _parsed(key, of, of.replace(" ", ""))
+
+
+def _parsed(key: str, of: str, text: str) -> Functional:
+    """The expression of a text without spaces, which is the whole of `of` or a part of it."""
     outer, entry = text, None
     if len(_operands(text)) == 1 and (match := re.fullmatch(r"(\w+\(.*\))\[(\d+)\]", text)):
         outer, entry = match[1], int(match[2])
@@ -135,7 +139,7 @@ def functional(key: str, of: Any) -> Functional:
         faults.add(key, of, "looks over the path twice", f"keep one of {', '.join(OVER_TIME)}")
     faults.raise_if_any()
     if len(operands := _operands(inner)) > 1:
-        meaning = _difference(key, of, [functional(key, operand) for operand in operands])
+        meaning = _difference(key, of, [_parsed(key, of, operand) for operand in operands])
     elif re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
         meaning = named(key, of, inner)
     else:

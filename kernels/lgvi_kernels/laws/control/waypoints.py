@@ -115,7 +115,7 @@ def chosen(which: Any, a: Any, b: Any):
 
 @functools.cache
 def made(features):
-    """The device code of "legs", where they are "timed", where some points have "circles", and where an event "ends" the way."""
+    """The device code of "legs": "timed", with "circles" about points, or where an event "ends" the way."""
     timed, circles, ends = "timed" in features, "circles" in features, "ends" in features
 
     def params(width, real):
@@ -125,7 +125,15 @@ def made(features):
         and times of circles, as far as there are any.
         """
         names = ("speed", "look_ahead", "radius", "kappa", "gamma", *(("circle", "sense") if circles else ()))
-        words = ("first", "memory", "legs", "method", "stops", *(("circles",) if circles else ()), *(("done",) if ends else ()))
+        words = (
+            "first",
+            "memory",
+            "legs",
+            "method",
+            "stops",
+            *(("circles",) if circles else ()),
+            *(("done",) if ends else ()),
+        )
         numbers = dict.fromkeys(names, lane(width, real))
         return struct("Waypoints", **numbers, **dict.fromkeys(words, wp.int32))
 

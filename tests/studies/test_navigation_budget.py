@@ -9,6 +9,7 @@ from scipy.stats import norm
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from tests.support.pages import blocks
 
 PACE, T1, DRIFT, S = 4.12, 100.0, 0.3, np.radians(2.0)
 D = PACE * T1
@@ -44,51 +45,13 @@ def turned(b):
     return D * np.stack([np.cos(b), np.sin(b)], axis=-1)
 
 
-def beyond(r):
-    """Probability that 2 D |sin(b / 2)| is larger than r [m]."""
-    return 2.0 * norm.cdf(-2.0 * np.arcsin(r / (2.0 * D)) / S)
+def beyond(r, way=D):
+    """Probability that 2 way |sin(b / 2)| is larger than r [m]."""
+    return 2.0 * norm.cdf(-2.0 * np.arcsin(r / (2.0 * way)) / S)
 
 
 def biases(members):
     return members.select(0, members.members).parameters["compass.bias"]
-
-
-FILE = f"""
-[vehicle]
-mass = 20.0
-inertia = [1.0, 1.2, 1.4]
-added_mass = [10.0, 10.0, 10.0]
-buoyancy = 196.0
-[environment]
-gravity = 9.8
-[[terms]]
-type = "control_wrench"
-limit = [60.0, 60.0, 60.0, 60.0, 60.0, 60.0]
-[start]
-velocity = [{PACE}, 0.0, 0.0]
-[controller]
-period = 1.0
-[[controller.sensors]]
-name = "compass"
-type = "sensor"
-of = "heading"
-[[controller.sensors]]
-type = "dead_reckoning"
-[[controller.guidance]]
-type = "set_point"
-speed = {PACE}
-[[controller.laws]]
-type = "speed_pid"
-kp = 0.0
-[ensemble]
-members = 64
-[ensemble.vary]
-"compass.bias" = {{ normal = {{ std = {S} }} }}
-[run]
-method = "psi_s"
-step = 1.0
-duration = {T1}
-"""
 
 
 # Sums of 100 numbers of 4 m: their round-off.
@@ -229,19 +192,24 @@ def test_stores_exports_and_pictures_have_it(tmp_path):
     np.testing.assert_array_equal(again.navigation_error[0], half.navigation_error[-1])
 
 
-def test_the_command_knows_the_names(tmp_path, capsys):
-    path = tmp_path / "scene.toml"
-    path.write_text(FILE)
-    assert cli.main(["estimate", str(path), "--of", f"{ERROR} above 30", "--error", "0.01", "--json", "-q"]) == 0
-    assert abs(json.loads(capsys.readouterr().out)["value"] - beyond(30.0)) < 0.04
-    to = ["--out", str(tmp_path), "--json", "-q"]
-    assert cli.main(["rare", str(path), "--limit", f"{ERROR} - 60", *to]) == 0
-    answer = json.loads(capsys.readouterr().out)["content"]["rare"]
-    assert abs(answer["probability"] / beyond(60.0) - 1.0) < 4.0 * answer["relative_error"]
-    assert cli.main(["sensitivity", str(path), "--of", ERROR, "--samples", "64", *to]) == 0
+def test_the_page_and_the_command_know_the_names(tmp_path, capsys):
+    (text,) = blocks("docs/guide/how_far_off.md", "toml")
+    path, way, to = tmp_path / "budget.toml", 900.0, ["--out", str(tmp_path / "out"), "--json", "-q"]
+    path.write_text(text)
+
+    def answer(*words):
+        assert cli.main([words[0], str(path), *words[1:], *to]) == 0
+        document = json.loads(capsys.readouterr().out)
+        return document.get("content", {words[0]: document})[words[0]]
+
+    # As on the page.
+    assert beyond(50.0, way) == pytest.approx(0.11, abs=0.005)
+    assert abs(answer("estimate", "--of", f"{ERROR} above 50", "--error", "0.01")["value"] - beyond(50.0, way)) < 0.04
+    rare = answer("rare", "--limit", f"{ERROR} above 120")
+    assert abs(rare["probability"] / beyond(120.0, way) - 1.0) < 4.0 * rare["relative_error"]
     # The mean of |b| is S sqrt(2 / pi); 256 members of a design that is spread evenly.
-    mean = json.loads(capsys.readouterr().out)["content"]["sensitivity"]["mean"]
-    assert mean == pytest.approx([D * S * np.sqrt(2.0 / np.pi)], rel=0.02)
+    mean = answer("sensitivity", "--of", ERROR, "--samples", "64")["mean"]
+    assert mean == pytest.approx([way * S * np.sqrt(2.0 / np.pi)], rel=0.02)
 
 
 @pytest.mark.parametrize("sensors", [[], [lw.control.Sensor(of="heading", bias=0.1)]], ids=["none", "compass"])

@@ -3,6 +3,7 @@
 
 from lgvi_warp.physics.terms.events import Battery as Battery
 from lgvi_warp.physics.terms.events import Box as Box
+from lgvi_warp.physics.terms.events import MissionDone as MissionDone
 from lgvi_warp.physics.terms.events import Outside as Outside
 from lgvi_warp.physics.terms.events import StopTime as StopTime
 from lgvi_warp.physics.terms.events import Surface as Surface

@@ -14,6 +14,7 @@ from lgvi_warp.statistics.metrics.actuator_metrics import SaturationShare as Sat
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure as TimeToFailure
 from lgvi_warp.statistics.metrics.actuator_metrics import Travel as Travel
 from lgvi_warp.statistics.metrics.dock_contact import DockContact as DockContact
+from lgvi_warp.statistics.metrics.navigation_error import NavigationError as NavigationError
 from lgvi_warp.statistics.metrics.nearest import Nearest as Nearest
 from lgvi_warp.statistics.metrics.tracking_metrics import IAE as IAE
 from lgvi_warp.statistics.metrics.tracking_metrics import ISE as ISE

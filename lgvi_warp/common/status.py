@@ -50,6 +50,7 @@ class Status(IntEnum):
     CONDITION = 20
     BATTERY = 21
     OUTSIDE = 22
+    MISSION_DONE = 23
 
     @property
     def stopped(self) -> bool:
@@ -88,6 +89,7 @@ _TEXT = {
     Status.CONDITION: "stopped by an event: a condition of the user",
     Status.BATTERY: "stopped by an event: it used the capacity of its battery",
     Status.OUTSIDE: "stopped by an event: left the data of a field",
+    Status.MISSION_DONE: "stopped by an event: reached all waypoints of its mission",
     Status.NON_FINITE: "a number of the state is not finite; check the start state, the parameters and the step",
 }
 

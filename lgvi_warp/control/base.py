@@ -58,6 +58,7 @@ class Bus(NamedTuple):
         row of the step from which the former act. period: Time between two ticks [s]. ranges: Row of each altimeter's reading.
     unconverged: Row of the number of solutions by iterations that had not converged at their tick; the row behind it holds the
         time of the first one, a period later [s]. -1 where no part iterates.
+    done: First of two rows of each guidance at whose end an event looks, by its key: 1 once it is done, and since when [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -72,6 +73,7 @@ class Bus(NamedTuple):
     handed: Mapping[str, int] = MappingProxyType({})
     belief: int = -1
     unconverged: int = -1
+    done: Mapping[str, int] = MappingProxyType({})
 
     @property
     def channels(self) -> int:
@@ -88,11 +90,13 @@ class Bus(NamedTuple):
         handed: Mapping[str, int] = MappingProxyType({}),
         belief: int = 0,
         iterates: bool = False,
+        ending: Sequence[str] = (),
     ) -> Bus:
         """The bus of some actuators, with a time between two ticks [s].
 
         channels: Commands of each. answers: Rows for answers of the host. altimeters: Their keys. handed: Rows that sensors
             hand to an estimator, by their keys; belief: rows of what it believes. iterates: Whether a part does.
+            ending: Keys of the guidance at whose end an event looks.
         """
         commands, row = {}, 0
         for key, count in channels.items():
@@ -108,7 +112,9 @@ class Bus(NamedTuple):
             "answer": rows, "ranges": ranges, "handed": handing, "belief": end if belief else -1,
             "unconverged": end + belief if iterates else -1,
         }  # fmt: skip
-        return cls(commands, row, row + 6, 2 * row + 6, end + belief + 2 * iterates, period=period, **places)
+        end += belief + 2 * iterates
+        places["done"] = {key: end + 2 * i for i, key in enumerate(ending)}
+        return cls(commands, row, row + 6, 2 * row + 6, end + 2 * len(ending), period=period, **places)
 
     def values_of(self, key: str) -> dict[str, Any]:
         """Numbers that the device code of an actuator reads."""
@@ -269,6 +275,11 @@ class MeasuringPart(Part):
     belief_rows: ClassVar[int] = 0
 
     @property
+    def estimates_position(self) -> bool:
+        """Whether it changes the measured position, whose difference from the true one is then the navigation error."""
+        return False
+
+    @property
     def uses(self) -> Mapping[str, str]:
         """Keys of the sensors that hand their readings to this estimator alone, by what they are to it; by default none."""
         return {}
@@ -304,6 +315,11 @@ class Guidance(Part):
     kinds: ClassVar[registry.Kinds] = _built_in(
         "guidance", "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
+
+    @property
+    def ends(self) -> bool:
+        """Whether it can tell an event `mission_done` that it is done, in the rows `bus.done`; by default False."""
+        return False
 
     @property
     def wanted(self) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ from lgvi_warp.physics.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from lgvi_warp.common.places import LocalPlane
+    from lgvi_warp.physics.terms.events import Event
 
 # A part of a component below this is round-off, when it is asked what actuators can make.
 SPANNED = 1e-8
@@ -186,7 +187,7 @@ class Controller(Documented):
         self,
         terms: Sequence[Term],
         nominal: Mapping[str, np.ndarray] | None = None,
-        events: Sequence[Term] = (),
+        events: Sequence[Event] = (),
     ) -> Controller:
         """The same controller, whose parts know their actuators and the rows of the memory.
 
@@ -222,7 +223,8 @@ class Controller(Documented):
         answers = 0 if callback is None else channels[callback.to] if callback.to else 6
         shared = max(law.shared_rows for law in self.laws)
         altimeters = [part.key for part in self.sensors if isinstance(part, Altimeter)]
-        rows = self.handed_rows, self.belief_rows, any(part.iterates for part in wired.parts)
+        ending = [part.key for part in self.guidance if part.ends and part.key in {event.follows for event in events}]
+        rows = self.handed_rows, self.belief_rows, any(part.iterates for part in wired.parts), ending
         controller = wired.on(Bus.of(channels, self.period, max(answers, shared), altimeters, *rows))
         for part in controller.allocation:
             part.check_actuator(faults)

@@ -41,6 +41,10 @@ class DeadReckoning(MeasuringPart):
     depth: str = word("reckoned", known=DEPTHS)
     start_error: Any = number((3,), "m", (0.0, 0.0, 0.0))
 
+    @property
+    def estimates_position(self) -> bool:
+        return True
+
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The weights of the rule, what it takes, the start's error, and the rows of position and velocity.
         last, now = RULES[self.rule]

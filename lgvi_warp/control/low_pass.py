@@ -35,5 +35,9 @@ class LowPass(MeasuringPart):
         return f"low_pass:{self.of}"
 
     @property
+    def estimates_position(self) -> bool:
+        return self.of == "position"
+
+    @property
     def memory_rows(self) -> int:  # type: ignore[override]
         return 9 if self.of == "attitude" else READINGS[self.of]

@@ -99,6 +99,10 @@ class Sensor(MeasuringPart):
         super().__post_init__()
 
     @property
+    def estimates_position(self) -> bool:
+        return self.of == "position"
+
+    @property
     def count(self) -> int:
         """Count of numbers that it reads."""
         return READINGS[self.of]

@@ -30,6 +30,8 @@ class Signal(NamedTuple):
 
 # The one that needs no controller, but a term that keeps the account.
 ENERGY_USED = "energy_used"
+# The measured position less the true one: the kernel writes the former, and the host takes the latter off.
+NAVIGATION_ERROR = "navigation_error"
 # Signals with one number for each command of the scene.
 CHANNELS = ("command", "actuator")
 _OF_ACTUATORS = (
@@ -84,8 +86,13 @@ class SignalTable(registry.Kinds):
 
 
 SIGNALS = SignalTable("", {}, "signals")
-# Groups of signals that only some controllers have: what a scene lacks that has not, and the remedy.
-_SOME: dict[str, tuple[str, str]] = {}
+# Groups of signals that only some controllers have, and single ones: what a scene lacks that has not, and the remedy.
+_SOME: dict[str, tuple[str, str]] = {
+    NAVIGATION_ERROR: (
+        "needs an estimate of the position, which nothing in this scene makes",
+        'give [[controller.sensors]] of = "position", or type = "dead_reckoning" behind the sensors that it uses',
+    )
+}
 
 
 def add_signals(*signals: Signal, absent: tuple[str, str] | None = None) -> None:
@@ -108,7 +115,13 @@ add_signals(
     Signal(_OF_ITERATIONS, UNCONVERGED),
     absent=("is told by parts that iterate, which this controller has not", "leave it out"),
 )
-add_signals(Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""))
+add_signals(
+    Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""),
+    Signal(
+        Field(NAVIGATION_ERROR, (3,), "m", "measured or estimated position less the true one, inertial axes"),
+        "measured",
+    ),
+)
 
 
 class Names(Collection[str]):
@@ -144,19 +157,20 @@ def saved_fields(controller: Controller | None, accounted: bool = False) -> dict
         fields[ENERGY_USED] = SIGNALS[ENERGY_USED].field
     if controller is None or controller.bus is None:
         return fields
-    absent = _absent_groups(controller)
+    absent = _absent(controller)
     signals = {
         name: signal.field
         for name, signal in SIGNALS.loaded.items()
-        if name != ENERGY_USED and signal.group not in absent
+        if name != ENERGY_USED and not {name, signal.group} & absent
     }
     channels = sum(count for _, count in controller.bus.commands.values())
     return fields | signals | {name: replace(signals[name], shape=(channels,)) for name in CHANNELS}
 
 
-def _absent_groups(controller: Controller) -> set[str]:
-    """The groups of signals that a wired controller has not."""
+def _absent(controller: Controller) -> set[str]:
+    """The groups of signals, and the single ones, that a wired controller has not."""
     rows = {ESTIMATE: controller.bus.belief, UNCONVERGED: controller.bus.unconverged}
+    rows[NAVIGATION_ERROR] = max((int(part.estimates_position) for part in controller.sensors), default=0) - 1
     return {group for group, row in rows.items() if row < 0}
 
 
@@ -201,10 +215,10 @@ def check_signals(faults: Faults, key: str, names: Iterable[str], scene: Any) ->
                 faults.add(key, name, "is not accounted in this scene", remedy)
         elif scene.controller is None:
             problem = "is a signal of a controller, which this scene has not"
-            faults.add(key, name, problem, "give [controller], or leave it out")
+            faults.add(key, name, *_SOME.get(name, (problem, "give [controller], or leave it out")))
     controller = scene.controller
     wired = controller is not None and controller.bus is not None
-    absent = _absent_groups(controller) if wired else set(_SOME)
+    absent = _absent(controller) if wired else set(_SOME)
     for name in ordered(names) if controller is not None else ():
-        if name in SIGNALS and SIGNALS[name].group in absent:
-            faults.add(key, name, *_SOME[SIGNALS[name].group])
+        for group in {name, SIGNALS[name].group} & absent if name in SIGNALS else ():
+            faults.add(key, name, *_SOME[group])

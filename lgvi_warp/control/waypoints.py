@@ -158,9 +158,13 @@ class Waypoints(Guidance):
         """Whether it circles about some point."""
         return self.loiter_radius is not None
 
+    @property
+    def ends(self) -> bool:
+        return self.at_end != "go_on"
+
     def device_in(self, aligned: bool) -> Any:
-        timed = ("timed",) if self.times is not None else ()
-        return "waypoints:" + ",".join(("legs", *timed, *(("circles",) if self.circles else ())))
+        has = {"timed": self.times is not None, "circles": self.circles, "ends": self.key in self.bus.done}
+        return "waypoints:" + ",".join(("legs", *(name for name, present in has.items() if present)))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The points in the table, then times, turns and times of circles; memory of the leg, J or beta, and of a circle.
@@ -175,6 +179,8 @@ class Waypoints(Guidance):
             values |= {"circle": numbers["loiter_radius"], "sense": np.full(1, 1.0 if self.clockwise else -1.0)}
             words["circles"] = int(self.at_end == "loiter")
             rows += [numbers.get(name, np.zeros((1, k))) for name in CIRCLES]
+        if self.key in self.bus.done:
+            words["done"] = self.bus.done[self.key]
         table = np.concatenate(repeated(*rows), axis=1)
         return Packed(values | words, table, np.zeros((1, 6 if self.circles else 2)))
 

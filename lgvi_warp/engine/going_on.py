@@ -197,9 +197,12 @@ def _in_steps(final: Final, plan: Plan) -> Mapping[str, np.ndarray]:
         steps = np.where(event, np.floor(at), np.rint(at))
         lanes["failed_step"] = steps.astype(lanes["failed_step"].dtype)
         lanes["failed_size"] = np.where(event, (at - steps) ** 2, size)
-    if controller is not None and controller.bus.delayed and SIGNALS in lanes:
+    if controller is not None and SIGNALS in lanes:
         rows, begin = lanes[SIGNALS].copy(), controller.bus.acting + 2 * controller.bus.channels
-        rows[:, begin] = rows[:, begin] * ratio + shift
+        if controller.bus.delayed:
+            rows[:, begin] = rows[:, begin] * ratio + shift
+        for row in controller.bus.done.values():
+            rows[:, row + 1 : row + 2] += shift * plan.grid.h
         lanes[SIGNALS] = rows
     return lanes
 

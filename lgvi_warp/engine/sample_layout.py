@@ -12,7 +12,7 @@ from typing import Any
 
 from lgvi_kernels.advance.noting import ASKED_NOTES, NOTED, bit
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
-from lgvi_warp.control.signals import ENERGY_USED, SIGNALS, row_of, saved_fields
+from lgvi_warp.control.signals import ENERGY_USED, NAVIGATION_ERROR, SIGNALS, row_of, saved_fields
 from lgvi_warp.engine.kernel_choice import KernelChoice
 from lgvi_warp.physics.fields import Field
 
@@ -45,11 +45,11 @@ class SampleLayout:
 
     @functools.cached_property
     def sizes(self) -> dict[str, int]:
-        """Fields that the kernel writes of a sample: those kept, and those needed to move them back to the user's origin.
+        """Fields that the kernel writes of a sample: those kept, and those from which the host computes others.
 
         Returns: Field -> numbers per sample, as written; a compensated position is b, then b_low. Signals come last.
         """
-        needed = set(self.fields)
+        needed = {*self.fields, *(("position",) if NAVIGATION_ERROR in self.fields else ())}
         if self.choice.moved:
             needed |= {"attitude"} if "position" in needed else set()
             needed |= {"angular_velocity"} if "velocity" in needed else set()
@@ -64,21 +64,22 @@ class SampleLayout:
 
         Of signals all, as in samples.
         """
-        sizes = {name: size for name, size in self.sizes.items() if name in self.fields}
         entries = self.tick_entries
-        return {name: len(entries.get(name, ())) or size for name, size in sizes.items() if self._reads(name)}
+        return {name: len(entries.get(name, ())) or size for name, size in self.sizes.items() if self._reads(name)}
 
     @functools.cached_property
     def tick_entries(self) -> dict[str, tuple[int, ...]]:
         """Fields of the motion of which some numbers alone are gathered at ticks: field -> these, counted from 0."""
         entries = {name: numbers for name, numbers in (self.read_at_ticks or {}).items() if numbers}
-        if self.compensated:  # a place is a pair of sums
+        if self.compensated or NAVIGATION_ERROR in self.fields:  # a place is a pair of sums, or taken off whole
             entries.pop("position", None)
         return entries
 
     def _reads(self, name: str) -> bool:
-        """Whether a field is gathered at ticks: a signal always, the motion where a statistic reads it."""
-        return name in SIGNALS or self.read_at_ticks is None or name in self.read_at_ticks
+        """Whether a field is gathered at ticks: a signal always, the motion where a statistic or the host reads it."""
+        if name == "position" and NAVIGATION_ERROR in self.fields:
+            return True
+        return name in self.fields and (name in SIGNALS or self.read_at_ticks is None or name in self.read_at_ticks)
 
     @property
     def noted_bits(self) -> int:

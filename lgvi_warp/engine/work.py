@@ -14,7 +14,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import DTYPES
-from lgvi_warp.control.signals import SIGNALS
+from lgvi_warp.control.signals import NAVIGATION_ERROR, SIGNALS
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
 from lgvi_warp.physics import notation
@@ -132,6 +132,7 @@ def run_block(
                 values = divided(
                     plan.layout.tick_fields, packets.gathered(when), plan.layout.table, plan.layout.tick_entries
                 )
+                less_truth(values, values.get("position"))
                 if warned and "position" in values:
                     packets.heights.look(values["position"][..., 2], grid.sample_steps[when])
                 samples = samples_of(plan, grid, when, values, ends)
@@ -189,7 +190,8 @@ def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.nda
     if not plan.layout.signals:
         return states
     sizes = {name: plan.layout.sizes[name] for name in plan.layout.signals}
-    return states | divided(sizes, packets.first_signals()[:, : members.count], plan.layout.table)
+    signals = divided(sizes, packets.first_signals()[:, : members.count], plan.layout.table)
+    return states | less_truth(signals, members.position)
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:
@@ -224,6 +226,14 @@ def unpacked(
             samples["position"] = samples["position"] - np.einsum("knij,nj->kni", samples["attitude"], o)
         if "velocity" in samples:
             samples["velocity"] = samples["velocity"] - notation.cross(samples["angular_velocity"], o)
+    return less_truth(samples, samples.get("position"))
+
+
+def less_truth(samples: dict[str, np.ndarray], position: Any) -> dict[str, np.ndarray]:
+    """The samples, or their slopes; the navigation error among them, written as the measured position, less the true one."""
+    if NAVIGATION_ERROR in samples:
+        measured = samples[NAVIGATION_ERROR]
+        samples[NAVIGATION_ERROR] = (measured - position).astype(measured.dtype)
     return samples
 
 
@@ -282,7 +292,7 @@ def slopes_of_samples(
         if "velocity" in slopes:
             turned = notation.cross(slopes["angular_velocity"], o) + notation.cross(user["angular_velocity"], do)
             slopes["velocity"] = slopes["velocity"] - turned
-    return slopes
+    return less_truth(slopes, slopes.get("position"))
 
 
 def slopes_at_start(packets: Packets, fields: Sequence[str]) -> list[dict[str, np.ndarray]]:
@@ -292,7 +302,9 @@ def slopes_at_start(packets: Packets, fields: Sequence[str]) -> list[dict[str, n
     if not layout.signals:
         return each
     sizes, raw = {name: layout.sizes[name] for name in layout.signals}, packets.slopes_of_first_signals()
-    return [motion | divided(sizes, rows, layout.table) for motion, rows in zip(each, raw, strict=True)]
+    truth = packets.slopes_of_start(["position"])
+    signals = (divided(sizes, rows, layout.table) for rows in raw)
+    return [m | less_truth(s, t["position"]) for m, s, t in zip(each, signals, truth, strict=True)]
 
 
 def slopes_in_advance(packets: Packets, k0: int, k1: int) -> list[dict[str, np.ndarray]]:

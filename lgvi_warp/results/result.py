@@ -75,7 +75,8 @@ class Result(Summarized):
             exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
             _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed. Of a
             filter (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k, n, 6), nees, nis, nis_count
-            (k, n), innovation and innovation_sigma (k, n, 12). So is energy_used (k, n) [J], of a scene that accounts it.
+            (k, n), innovation and innovation_sigma (k, n, 12). So are energy_used (k, n) [J], of a scene that accounts it, and
+            navigation_error (k, n, 3) [m, inertial], of one that estimates the position.
         status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
         failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN where there
             was neither.
@@ -226,7 +227,7 @@ class Result(Summarized):
         """Angular velocities in body axes [rad/s], shape (k, n, 3)."""
         return self._kept("angular_velocity")
 
-    energy_used = _Signal()
+    energy_used, navigation_error = _Signal(), _Signal()
     command, actuator, demand, unmet, exerted = _Signal(), _Signal(), _Signal(), _Signal(), _Signal()
     measured_position, measured_attitude, measured_velocity = _Signal(), _Signal(), _Signal()
     measured_water_velocity, measured_angular_velocity = _Signal(), _Signal()

@@ -157,6 +157,7 @@ class Scene(Summarized):
         if self.controller is not None:
             object.__setattr__(self, "controller", self.controller.wired(self.terms, self._nominal(), self.events))
             bus = self.controller.bus
+        object.__setattr__(self, "events", tuple(event.wired(bus) for event in self.events))
         driven = set(bus.commands) if bus else set()
         accounted = any(term.accounts for term in self.terms)
         terms = (term.beside_account(accounted) for term in self.terms)

@@ -48,6 +48,7 @@ TYPES = registry.Kinds(
             *("max_error", "cross_track", "iae", "ise", "itae", "rms"),
         ),
         "metrics.nearest": ("nearest",),
+        "metrics.navigation_error": ("navigation",),
         "metrics.dock_contact": ("dock_contact",),
         "metrics.actuator_metrics": (
             *("effort", "travel", "saturation_share", "energy", "electrical_energy", "time_to_failure", "own_metric"),

@@ -38,6 +38,7 @@ OF_TESTS = {
     "house/test_develop_pages.py":
         "docs/develop/add_a_method.md docs/develop/add_a_sampling.md docs/develop/add_a_statistic.md",
     "house/test_gallery.py": "docs/gallery.md",
+    "studies/test_navigation_budget.py": "docs/guide/how_far_off.md",
     "studies/test_rare_event.py": "docs/guide/rare_events.md",
     "studies/test_sweep_pages.py": "docs/guide/is_my_controller_robust.md",
     "house/test_wheel.py": "docs/start/tutorial.md",

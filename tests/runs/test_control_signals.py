@@ -22,12 +22,10 @@ from lgvi_warp.store.folder import Folder
 from tests.support.stores import differing
 from tests.unit.views.test_recording import rows
 
-# Those of a scene without a filter and without parts that iterate.
+# Those of a scene without a filter, without parts that iterate, and without an estimate of the position.
 OTHERS = [name for name, signal in signals.SIGNALS.items() if signal.group == signals.ESTIMATE]
-SIGNALS, SAVED = (
-    tuple(name for name in names if name not in (*OTHERS, signals.ENERGY_USED, signals.UNCONVERGED))
-    for names in (signals.SIGNALS, signals.SAVED)
-)
+OTHERS += [signals.ENERGY_USED, signals.UNCONVERGED, signals.NAVIGATION_ERROR]
+SIGNALS, SAVED = (tuple(name for name in names if name not in OTHERS) for names in (signals.SIGNALS, signals.SAVED))
 H, EVERY, STEPS, MEMBERS = 0.01, 5, 60, 600
 LIMIT, LAG, DELAY = 0.4, 0.1, 2
 KP, KD, LEVEL = 1.0, 2.0, 3.0

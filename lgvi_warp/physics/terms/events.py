@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -11,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.declared import text
-from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, build, check_list, number
 
@@ -33,6 +34,25 @@ class Event(Term):
     status: ClassVar[Status] = Status.CONDITION
     kinds: ClassVar[registry.Kinds] = registry.Kinds("lgvi_warp.physics.terms", {}, "events")
     acts: ClassVar[bool] = False
+
+    @property
+    def follows(self) -> str:
+        """Key of the guidance at whose end it looks; by default "", none."""
+        return ""
+
+    def wired(self, bus: Any) -> Any:
+        """Tell the event where it finds what guidance writes.
+
+        Args:
+            bus: Rows of the controller's memory; None in a scene without a controller.
+
+        Returns:
+            A copy, or the event where it needs nothing; by default the latter.
+
+        Raises:
+            SceneError: Where no such guidance ends.
+        """
+        return self
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -132,6 +152,61 @@ class Battery(Event):
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Where the account lies is filled in with the rows of the memory.
         return Packed({"capacity": numbers["capacity"], "account_row": 0})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MissionDone(Event):
+    """Stop a member at the tick at which it reaches the last of its waypoints, and has circled about it as long as asked.
+
+    With `at_end = "loiter"` and no turns or time about the last point, the mission is done as the circle begins. A mission
+    that is done at the last tick of a run ends it as "ok".
+
+    Args:
+        guidance: Name of the guidance `lw.control.Waypoints`; "waypoints" by default. Its `at_end` is not "go_on".
+
+    Raises:
+        SceneError: As a scene is built that has no such guidance; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> way = dict(points=[[0.0, 0.0, 2.0], [8.0, 0.0, 2.0]], speed=1.0, look_ahead=2.0, radius=1.0)
+        >>> laws = [lw.control.SpeedPID(kp=40.0, drag=20.0), lw.control.HeadingPID(kp=30.0, kd=40.0)]
+        >>> controller = lw.Controller(period=0.1, guidance=[lw.control.Waypoints(**way)], laws=laws)
+        >>> push = lw.terms.ControlWrench(limit=[60.0] * 6)
+        >>> scene = lw.Scene.named(
+        ...     "sphere",
+        ...     terms=[push],
+        ...     start={"velocity": [1.0, 0.0, 0.0]},
+        ...     controller=controller,
+        ...     events=[lw.events.MissionDone()],
+        ... )
+        >>> lw.solve(scene, "psi_s", h=0.05, t1=30.0).status.counts()
+        {'mission_done': 1}
+    """
+
+    type: ClassVar[str] = "mission_done"
+    status: ClassVar[Status] = Status.MISSION_DONE
+    timed: ClassVar[bool] = True
+    # First of the rows in which that guidance tells that it is done; set for an event of a scene.
+    row: ClassVar[int] = 0
+
+    guidance: str = text("is no name", "give the name of guidance of the type waypoints", "waypoints")
+
+    @property
+    def follows(self) -> str:
+        return self.guidance
+
+    def wired(self, bus: Any) -> Any:
+        if bus is None or self.guidance not in bus.done:
+            problem = "is the name of no guidance that ends"
+            remedy = 'give [[controller.guidance]] type = "waypoints" whose at_end is "stop" or "loiter"'
+            raise refusal(f"{self.key}.guidance", self.guidance, problem, remedy)
+        event = copy.copy(self)
+        object.__setattr__(event, "row", bus.done[self.guidance])
+        return event
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        return Packed({"done": self.row})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

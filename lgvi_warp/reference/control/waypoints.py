@@ -12,7 +12,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class Waypoints(Part):
-    """Numbers as those of `lw.control.Waypoints`."""
+    """Numbers as those of `lw.control.Waypoints`; done: time of the tick at which the last point was reached [s]."""
 
     method, kappa, gamma, at_end = "los", 0.1, 0.002, "stop"
     times: Any = None
@@ -25,6 +25,7 @@ class Waypoints(Part):
         """The first leg, and no circle; J and beta are 0."""
         self.leg, self.J, self.beta = 0, 0.0, 0.0
         self.circling, self.angle, self.since, self.bearing = False, 0.0, 0.0, 0.0
+        self.done: float | None = None
 
     def way(self, leg: int, position: Array) -> tuple[float, float, float, float]:
         """Angle and length of a leg on the map; how far the position is along, and to starboard of it."""
@@ -46,6 +47,8 @@ class Waypoints(Part):
             done = self.circled_enough(y, i + 1, done and self.leg < legs)
         if done:
             self.leg = min(self.leg + 1, last)
+            if self.leg == legs and self.done is None:
+                self.done = y.t
         if self.circling or (self.leg == legs and self.at_end == "loiter"):
             return circled(r, y, center, self.loiter_radius, self.look_ahead, self.speed, self.clockwise)
         i = min(self.leg, legs - 1)

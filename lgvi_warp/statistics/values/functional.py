@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Expressions for quantities: a name, a component of it, a norm, and a reduction over the path.
+"""Expressions for quantities: a name, a component of it, a difference, a length, and a reduction over the path.
 
-"position[2]" and "norm(velocity)" give numbers of each member at each time; "max(depth)" and "range(norm(velocity))"
-give one number of each member, over its path. Statistics, sensitivity, trade-offs and stability maps all read them
-here.
+"position[2]" and "norm(velocity)" give numbers of each member at each time, as does the difference
+"measured_position - position"; "max(depth)" and "range(norm(velocity))" give one number of each member, over its path.
+Statistics, sensitivity, trade-offs and stability maps all read them here.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.control.signals import ordered
 from lgvi_warp.statistics.values import reductions
 from lgvi_warp.statistics.values.quantity import KNOWN, Quantity, joined, named
 from lgvi_warp.statistics.values.reductions import Reduction
@@ -27,7 +28,9 @@ if TYPE_CHECKING:
     from lgvi_warp.statistics.values.samples import Fields
 
 OVER_TIME = {"max": reductions.MAXIMUM, "min": reductions.MINIMUM, "mean": reductions.MEAN, "range": reductions.RANGE}
-FUNCTIONS = (*OVER_TIME, "norm")
+# The length of a vector: of all of it, or of its first two components, which of one in inertial axes are north and east.
+LENGTHS = {"norm": slice(None), "horizontal": slice(2)}
+FUNCTIONS = (*OVER_TIME, *LENGTHS)
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,8 @@ class Functional:
 
     def _applied(self, functions: Sequence[str], values: np.ndarray) -> np.ndarray:
         """The lengths that the functions name, and the entry, along the last axis."""
-        for _ in functions:
-            values = np.sqrt(np.sum(values**2, axis=-1, keepdims=True))
+        for name in functions:
+            values = np.sqrt(np.sum(values[..., LENGTHS[name]] ** 2, axis=-1, keepdims=True))
         return values if self.entry is None else values[..., self.entry : self.entry + 1]
 
     @property
@@ -86,7 +89,7 @@ class Functional:
     @property
     def size(self) -> int:
         """Number of components of the result."""
-        return 1 if self.entry is not None or "norm" in self.functions else self.quantity.size
+        return 1 if self.entry is not None or LENGTHS.keys() & set(self.functions) else self.quantity.size
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -94,7 +97,7 @@ class Functional:
         if self.size == 1:
             return (self.label,)
         if not self.functions:
-            return tuple(label.replace(" ", "") for label in self.quantity.labels)
+            return tuple(label.replace(", ", ",") for label in self.quantity.labels)
         return tuple(f"{self.label}[{i}]" for i in range(self.quantity.size))
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
@@ -119,9 +122,13 @@ def functional(key: str, of: Any) -> Functional:
     if not isinstance(of, str):
         meaning = quantity(key, of)
         return Functional(meaning.name, meaning)
-    text = of.replace(" ", "")
+    return _parsed(key, of, of.replace(" ", ""))
+
+
+def _parsed(key: str, of: str, text: str) -> Functional:
+    """The expression of a text without spaces, which is the whole of `of` or a part of it."""
     outer, entry = text, None
-    if match := re.fullmatch(r"(\w+\(.*\))\[(\d+)\]", text):
+    if len(_operands(text)) == 1 and (match := re.fullmatch(r"(\w+\(.*\))\[(\d+)\]", text)):
         outer, entry = match[1], int(match[2])
     names, inner = _nested(outer)
     faults = Faults()
@@ -131,10 +138,16 @@ def functional(key: str, of: Any) -> Functional:
     if sum(name in OVER_TIME for name in names) > 1:
         faults.add(key, of, "looks over the path twice", f"keep one of {', '.join(OVER_TIME)}")
     faults.raise_if_any()
-    if not re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
-        form = 'write "position[2]", "depth", "norm(velocity)" or "max(depth)"'
+    if len(operands := _operands(inner)) > 1:
+        meaning = _difference(key, of, [_parsed(key, of, operand) for operand in operands])
+    elif re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
+        meaning = named(key, of, inner)
+    else:
+        form = 'write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"'
         raise refusal(key, of, "is no quantity", f"{form}, of {', '.join(KNOWN)}")
-    base = Functional(text, named(key, of, inner), tuple(reversed(names)))
+    base = Functional(text.replace("-", " - "), meaning, tuple(reversed(names)))
+    if "horizontal" in base.functions and (base.functions[0] != "horizontal" or meaning.size != 3):
+        raise refusal(key, of, "has a horizontal length of what is no vector", "write horizontal(navigation_error)")
     if entry is not None and (base.size == 1 or entry >= base.size):
         fault = f"{outer} has {base.size} component{'s' * (base.size > 1)}"
         raise refusal(key, of, fault, f"give one of them from 0, or {outer} alone")
@@ -144,10 +157,47 @@ def functional(key: str, of: Any) -> Functional:
 def _nested(text: str) -> tuple[list[str], str]:
     """Names of the functions around a name, the outermost first; and the name."""
     functions = []
-    while match := re.fullmatch(r"(\w+)\((.*)\)", text):
+    while len(_operands(text)) == 1 and (match := re.fullmatch(r"(\w+)\((.*)\)", text)):
         functions.append(match[1])
         text = match[2]
     return functions, text
+
+
+def _operands(text: str) -> list[str]:
+    """The parts of a text between the minus signs that are in no brackets."""
+    parts, depth = [""], 0
+    for character in text:
+        depth += (character in "([") - (character in ")]")
+        if character == "-" and not depth:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return parts
+
+
+def _difference(key: str, of: str, operands: Sequence[Functional]) -> Quantity:
+    """The first quantity less the others; of angles within half a turn."""
+    for operand in operands:
+        if operand.over_path:
+            remedy = "give a difference of quantities at each time, as in max(measured_depth - depth)"
+            raise refusal(key, of, f"{operand.label} looks over the path, and has no difference", remedy)
+    first, *others = parts = [operand.as_quantity() for operand in operands]
+    for other in others:
+        if (other.size, other.unit) != (first.size, first.unit):
+            told = (f"{part.name} has {part.size} x [{part.unit or '1'}]" for part in (first, other))
+            raise refusal(key, of, " and ".join(told), "give quantities of one unit and size")
+
+    def function(samples: Fields, members: Members) -> np.ndarray:
+        values = first(samples, members).astype(np.float64, copy=False)
+        for other in others:
+            values = values - other(samples, members)
+        if first.unit == "rad":
+            values -= 2.0 * np.pi * np.rint(values / (2.0 * np.pi))
+        return values.transpose(0, 2, 1)
+
+    name, *labels = (" - ".join(each) for each in zip(*((part.name, *part.labels) for part in parts), strict=True))
+    fields = ordered(field for part in parts for field in part.fields)
+    return Quantity(name, function, first.unit, fields, tuple(labels), needs_limit=True)
 
 
 def quantity(key: str, of: Any) -> Quantity:

@@ -91,6 +91,7 @@ MARKERS = {
     Status.CONDITION: "diamond",
     Status.BATTERY: "plus",
     Status.OUTSIDE: "asterisk",
+    Status.MISSION_DONE: "cross",
 }
 MOST_MARKS = 12
 

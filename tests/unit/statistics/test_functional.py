@@ -23,6 +23,8 @@ PAPER = ROOT / "examples" / "paper.toml"
 # Text -> (unit, components): at each time, and over the path.
 AT_EACH_TIME = {
     "position": ("m", 3), "position[2]": ("m", 1), "depth": ("m", 1), "speed": ("m/s", 1), "euler[1]": ("rad", 1),
+    "position - position": ("m", 3), "depth - position[0]": ("m", 1),
+    "norm(velocity) - speed": ("m/s", 1), "horizontal(position)": ("m", 1), "euler[2] - euler[0]": ("rad", 1),
     "attitude[0, 1]": ("1", 1), "norm(velocity)": ("m/s", 1), "energy": ("J", 1), "quaternion_wxyz[3]": ("1", 1),
 }  # fmt: skip
 OVER_PATH = {
@@ -43,7 +45,13 @@ REFUSED = {
     "median(speed)": "has a function 'median' that is not known; did you mean 'mean'?",
     "max(min(depth))": "looks over the path twice; keep one of max, min, mean, range",
     "max(position)[3]": "max(position) has 3 components; give one of them from 0, or max(position) alone",
-    "max(speed": 'is no quantity; write "position[2]", "depth", "norm(velocity)" or "max(depth)", of position, depth,',
+    "max(speed": 'is no quantity; write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"',
+    "max(depth) - depth": "max(depth) looks over the path, and has no difference; give a difference of quantities at",
+    "depth - speed": "depth has 1 x [m] and speed has 1 x [m/s]; give quantities of one unit and size",
+    "position - depth": "position has 3 x [m] and depth has 1 x [m]; give quantities of one unit and size",
+    "depth - deph": "is not known; did you mean 'depth'?",
+    "horizontal(depth)": "has a horizontal length of what is no vector; write horizontal(navigation_error)",
+    "horizontal(max(position))": "has a horizontal length of what is no vector; write horizontal(navigation_error)",
 }  # fmt: skip
 
 

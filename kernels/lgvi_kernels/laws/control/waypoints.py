@@ -115,8 +115,8 @@ def chosen(which: Any, a: Any, b: Any):
 
 @functools.cache
 def made(features):
-    """The device code of "legs", where they are "timed", and where some points, or the last one, have "circles"."""
-    timed, circles = "timed" in features, "circles" in features
+    """The device code of "legs": "timed", with "circles" about points, or where an event "ends" the way."""
+    timed, circles, ends = "timed" in features, "circles" in features, "ends" in features
 
     def params(width, real):
         """Params: numbers of each lane; first row of the points; first row of the memory.
@@ -125,7 +125,15 @@ def made(features):
         and times of circles, as far as there are any.
         """
         names = ("speed", "look_ahead", "radius", "kappa", "gamma", *(("circle", "sense") if circles else ()))
-        words = ("first", "memory", "legs", "method", "stops", *(("circles",) if circles else ()))
+        words = (
+            "first",
+            "memory",
+            "legs",
+            "method",
+            "stops",
+            *(("circles",) if circles else ()),
+            *(("done",) if ends else ()),
+        )
         numbers = dict.fromkeys(names, lane(width, real))
         return struct("Waypoints", **numbers, **dict.fromkeys(words, wp.int32))
 
@@ -209,4 +217,16 @@ def made(features):
                 r = chosen(circling, circled(before, y, where, p.circle, p.look_ahead, p.speed, p.sense), r)
         return r
 
-    return device(__name__, features, params=params, guide=guide)
+    @wp.func
+    def guide_and_note(r: Any, y: Any, p: Any):
+        """The same; notes that the last point is reached, and since when."""
+        r = guide(r, y, p)
+        unity = ones(p.speed)
+        half = y.h.dtype(0.5) * unity
+        was = remembered(y, p.done)
+        finished = remembered(y, p.memory) - y.h.dtype(p.legs) * unity + half
+        remember(y, p.done + 1, positive(was - half, remembered(y, p.done + 1), y.t * unity))
+        remember(y, p.done, positive(finished, unity, was))
+        return r
+
+    return device(__name__, features, params=params, guide=guide_and_note if ends else guide)

@@ -112,6 +112,10 @@ class ErrorStateFilter(MeasuringPart):
         super().__post_init__()
 
     @property
+    def estimates_position(self) -> bool:
+        return True
+
+    @property
     def uses(self) -> Mapping[str, str]:
         return {role: getattr(self, role) for role in ROLES if getattr(self, role)}
 

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Distance of each member's estimated position from the true one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.arguments import flag
+from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.control.signals import NAVIGATION_ERROR
+from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
+from lgvi_warp.statistics.values.quantity import Quantity
+
+if TYPE_CHECKING:
+    from lgvi_warp.sampling.members import Members
+    from lgvi_warp.statistics.values.samples import Fields
+
+FIELDS = (NAVIGATION_ERROR, "position")
+# Numbers that the metric may be, and their units.
+UNITS = {"end": "m", "largest": "m", "percent": "%"}
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationError(Metric):
+    """Length of the `navigation_error` of each member over its ticks; then statistics of it.
+
+    "percent" is the error at the end over the length of the path over ground, by straight lines between ticks, as
+    manufacturers state the error of logs and inertial systems. It is NaN for a member that does not move.
+
+    Args:
+        of: "end", the default: at the last tick under way [m]; "largest": over all ticks [m]; "percent": at the end, as a
+            part of the distance run [%].
+        horizontal: Whether the length is that of the north and east components alone; by default False.
+
+    Raises:
+        SceneError: where `of` is none of these; and as a run begins, where nothing estimates the position.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> metric = lw.metrics.NavigationError("percent", horizontal=True, then=[lw.statistics.Quantiles(levels=(0.95,))])
+        >>> metric.key, metric.unit
+        ('navigation percent', '%')
+    """
+
+    type: ClassVar[str] = "navigation"
+    default: ClassVar[str | None] = "end"
+
+    horizontal: bool = False
+
+    def check(self, faults: Faults) -> None:
+        super().check(faults)
+        with faults.including():
+            flag("navigation.horizontal", self.horizontal)
+        if flag("navigation.measured", self.measured):
+            faults.add("measured", self.measured, "has no meaning for what compares both", "leave it out")
+
+    def meant(self) -> Quantity:
+        if not isinstance(self.of, str) or self.of not in UNITS:
+            raise refusal("navigation.of", self.of, "is not known", closest(str(self.of), UNITS))
+
+        def numbers(samples: Fields, members: Members) -> np.ndarray:
+            error, place = (samples[name].astype(np.float64, copy=False) for name in FIELDS)
+            size = np.linalg.norm(error[..., :2] if self.horizontal else error, axis=-1, keepdims=True)
+            return np.concatenate([size, place], axis=-1)
+
+        labels = (f"error {self.of}", *(f"position[{i}]" for i in range(3)))
+        return Quantity(self.of, numbers, UNITS[self.of], FIELDS, labels, needs_limit=True)
+
+    @property
+    def key(self) -> str:
+        return self.name or f"{self.type} {self.of}"
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"last": x[0].copy(), "most": x[0].copy(), "run": np.zeros(x.shape[1])}
+
+    def follow(self, state: State, ticks: Ticks) -> State:
+        way, last = np.linalg.norm(ticks.x[:, 1:] - ticks.before[:, 1:], axis=1), state["last"]
+        for _, size, alive in ticks.rows(ticks.x[:, 0]):
+            last = np.where(alive, size, last)
+        most = np.maximum(state["most"], ticks.of_living(ticks.x[:, 0], 0.0).max(axis=0))
+        return {"last": last, "most": most, "run": accumulated(state["run"], ticks, way)}
+
+    def finish(self, state: State) -> np.ndarray:
+        if self.of == "percent":
+            return np.where(state["run"] > 0.0, 100.0 * state["last"] / state["run"], np.nan)
+        return state["most" if self.of == "largest" else "last"]

@@ -358,9 +358,10 @@ class RareSearch:
         """The answer; members that chains repeat are one, with the weights of all."""
         distinct, first, place = np.unique(members.u, axis=0, return_index=True, return_inverse=True)
         weights, rows = np.bincount(place.reshape(-1), members.weights, len(distinct)), members.rows[:, first]
-        related = (each[first] for each in (members.chains, members.ancestors, members.parts))
-        return RareAnswer(*reported, estimator, self.members, distinct, rows.max(axis=0), weights, tuple(runs),
-                          tuple(self.notes), rows, *related, bounds)  # fmt: skip
+        return RareAnswer(
+            *reported, estimator, self.members, distinct, rows.max(axis=0), weights, tuple(runs), tuple(self.notes), rows,
+            chains=members.chains[first], ancestors=members.ancestors[first], parts=members.parts[first], bounds=bounds,
+        )  # fmt: skip
 
     def importance(self, groups: Groups, chains: tuple[float, float] | None, seen: Witness) -> RareAnswer | None:
         """Weights of members drawn about the failing ones of all runs; None where they are not the answer.

@@ -15,6 +15,7 @@ from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.files import place_of, write_text
+from lgvi_warp.common.reading import file_text
 from lgvi_warp.scene.examples import PREFIX, example_files, example_title, located
 
 # A scene to begin with; {} are filled by `new`.
@@ -172,7 +173,7 @@ def example_arguments(verb: Any) -> None:
 def example(chosen: argparse.Namespace) -> int:
     """Run the verb example: list the files that come with the package, or print one as it is."""
     if chosen.name is not None:
-        text = Path(located(f"{PREFIX}{chosen.name.removeprefix(PREFIX)}")).read_text(encoding="utf-8")
+        text = file_text(located(f"{PREFIX}{chosen.name.removeprefix(PREFIX)}"), "scene file")
         if chosen.json:
             tell(chosen, lambda: {"name": chosen.name, "text": text}, str)
         else:

@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 from lgvi_warp.common.errors import SceneError, closest
+from lgvi_warp.common.reading import file_text
 
 PREFIX = "example:"
 # Folders of such files.
@@ -23,7 +24,7 @@ def example_files() -> dict[str, Path]:
 
 def example_title(path: Path) -> str:
     """The first comment of a file, without the page that it names."""
-    comment = re.search(r"# *(.*?)(?:: docs/.*|\.)?$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    comment = re.search(r"# *(.*?)(?:: docs/.*|\.)?$", file_text(path, "scene file"), re.MULTILINE)
     return comment[1] if comment else ""
 
 

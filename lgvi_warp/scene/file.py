@@ -37,11 +37,11 @@ def tables_of_text(
     """
     content = parsed(text, name)
     given = {} if settings is None else mapping_of("overrides", settings, "names to values")
-    others = _replace(content, given) if given else {}
+    others = _set_keys(content, given) if given else {}
     return _files_in(folder, content) if folder else content, others
 
 
-def _replace(content: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+def _set_keys(content: dict[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Replace values of keys in the tables of a scene file, in place; return the values of names that are no keys."""
     faults, others, taken = Faults(), dict[str, Any](), []
     for name, value in settings.items():

@@ -45,9 +45,12 @@ def answer(limit, seed, parted=False, **more):
     )
 
 
-def compared(first, second, seed, other=None, **more):
+def compared(first, second, seed, seed_of_second=None, **more):
     # As in sweeps, no two answers have a seed in common: the same first members would be wrong in the same way.
-    a, b = answer(first, seed, **more), answer(second, seed + 1000 if other is None else other, **more)
+    a, b = (
+        answer(first, seed, **more),
+        answer(second, seed + 1000 if seed_of_second is None else seed_of_second, **more),
+    )
     shares = shared(members_of(a), first, second), shared(members_of(b), second, first)
     return ratio_of(a, b, *shares)
 

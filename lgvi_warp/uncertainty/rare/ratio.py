@@ -28,7 +28,10 @@ class Share:
 
     @classmethod
     def of(cls, happens: np.ndarray, weights: np.ndarray, ancestors: np.ndarray) -> Share:
-        """From members (n,) with weights, of which those of one ancestor (n,), counted from 0, are related."""
+        """From members (n,) with weights, of which those of one ancestor (n,), counted from 0, are related.
+
+        docs/theory/rare_events.md, (B18).
+        """
         total = np.bincount(ancestors, weights)
         alike = bool((happens == happens[0]).all())
         share = float(happens[0]) if alike else float(weights @ happens) / total.sum()

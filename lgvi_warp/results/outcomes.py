@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lgvi_warp.common.status import Status, Warnings, stop_time, stopped
+from lgvi_warp.common.status import Status, Warnings, failed, stop_time, stopped
+from lgvi_warp.common.summaries import counted, plural
 from lgvi_warp.methods.limits import too_large
 from lgvi_warp.methods.method import Method
 
@@ -26,6 +27,37 @@ def outcomes(result: Result) -> list[Status]:
         The statuses in order of their codes: OK first.
     """
     return [Status(int(code)) for code in np.unique(np.asarray(result.status))]
+
+
+def answer_of(result: Result) -> str:
+    """How the members of a run ended, in one sentence."""
+    status, end = np.asarray(result.status), result.provenance["step"] * result.provenance["steps"]
+    groups = {"ends ok": status == Status.OK, "is stopped by an event": stopped(status), "fails": failed(status)}
+    several = {"ends ok": "end ok", "is stopped by an event": "are stopped by an event", "fails": "fail"}
+    texts = []
+    for verb, members in groups.items():
+        if count := int(members.sum()):
+            verb = verb if count == 1 else several[verb]
+            counts = counted(
+                {
+                    code.name.lower(): int((status == code).sum())
+                    for code in outcomes(result)
+                    if members[status == code].any()
+                }
+            )
+            when = (
+                f"at {end:.6g} s"
+                if Status.OK in status[members]
+                else f"({counts}), the first at {stop_time(result)[members].min():.4g} s"
+            )
+            texts.append(f"{count:,} {verb} {when}")
+    if len(texts) > 1:
+        return f"Of {plural(len(status), 'member')} {'; '.join(texts)}."
+    return (
+        f"{'The member' if len(status) == 1 else f'All {len(status):,} members'} {texts[0].partition(' ')[2]}."
+        if texts
+        else "No member ran."
+    )
 
 
 def outcome_text(result: Result, code: Status) -> str:

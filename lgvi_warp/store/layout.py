@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -139,23 +139,29 @@ def _parameters(plan: Plan, length: int) -> list[StoreArray]:
     for name in ensemble.varied():
         attributes = {"long_name": f"parameter {name}", "units": units[name]}
         arrays.append(StoreArray(name, first[name].shape[1:], "<f8", length, 0, attributes))
-    units |= {f"start.{item.name}": item.metadata.get("unit", "1") for item in dataclasses.fields(Start)}
     for name, values in ensemble.starts(0, 1).items():
         attributes = {"long_name": f"{name} of the member", "units": units[name]}
         arrays.append(StoreArray(name, values.shape[1:], "<f8", length, 0, attributes))
     return arrays
 
 
+def units_of_numbers(scene: Any, names: Iterable[str]) -> dict[str, str]:
+    """Look up the units of numbers of a scene, also of entries: "drag.linear[0]"; "1" where none is known."""
+    known = parameter_units(scene)
+    return {name: known.get(name.partition("[")[0], "1") for name in names}
+
+
 def parameter_units(scene: Any) -> dict[str, str]:
-    """Look up the units of a scene's parameters."""
+    """Look up the units of a scene's parameters and of its start."""
     from lgvi_warp.physics import vehicle
     from lgvi_warp.physics.terms.base import word_of
 
     known: dict[str, str | None] = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
     known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
-    for term in scene.parts:
+    for term in (*scene.parts, *([scene.controller] if scene.controller else [])):
         known |= {f"{term.key}.{word_of(item)}": item.metadata.get("unit") for item in dataclasses.fields(term)}
-    return {name: known.get(name) or "1" for name in scene.parameters()}
+    units = {name: known.get(name) or "1" for name in scene.parameters()}
+    return units | {f"start.{item.name}": item.metadata.get("unit", "1") for item in dataclasses.fields(Start)}
 
 
 def size(plan: Plan, store: Chunking) -> int:

@@ -29,35 +29,26 @@ def outcomes(result: Result) -> list[Status]:
     return [Status(int(code)) for code in np.unique(np.asarray(result.status))]
 
 
+# Ways to end of one member, and of several.
+ENDS = {"ends ok": "end ok", "is stopped by an event": "are stopped by an event", "fails": "fail"}
+
+
 def answer_of(result: Result) -> str:
     """How the members of a run ended, in one sentence."""
-    status, end = np.asarray(result.status), result.provenance["step"] * result.provenance["steps"]
-    groups = {"ends ok": status == Status.OK, "is stopped by an event": stopped(status), "fails": failed(status)}
-    several = {"ends ok": "end ok", "is stopped by an event": "are stopped by an event", "fails": "fail"}
+    status, run = np.asarray(result.status), result.provenance
+    end = run.get("start", {}).get("time", 0.0) + run["step"] * run["steps"]
     texts = []
-    for verb, members in groups.items():
+    for (one, several), members in zip(
+        ENDS.items(), (status == Status.OK, stopped(status), failed(status)), strict=True
+    ):
         if count := int(members.sum()):
-            verb = verb if count == 1 else several[verb]
-            counts = counted(
-                {
-                    code.name.lower(): int((status == code).sum())
-                    for code in outcomes(result)
-                    if members[status == code].any()
-                }
-            )
-            when = (
-                f"at {end:.6g} s"
-                if Status.OK in status[members]
-                else f"({counts}), the first at {stop_time(result)[members].min():.4g} s"
-            )
-            texts.append(f"{count:,} {verb} {when}")
-    if len(texts) > 1:
-        return f"Of {plural(len(status), 'member')} {'; '.join(texts)}."
-    return (
-        f"{'The member' if len(status) == 1 else f'All {len(status):,} members'} {texts[0].partition(' ')[2]}."
-        if texts
-        else "No member ran."
-    )
+            names = counted(result.status[members].counts())
+            first = f"({names}), the first at {stop_time(result)[members].min():.4g} s"
+            when = f"at {end:.6g} s" if status[members][0] == Status.OK else first
+            texts.append(f"{count:,} {one if count == 1 else several} {when}")
+    if len(texts) != 1:
+        return f"Of {plural(len(status), 'member')} {'; '.join(texts) or 'none ran'}."
+    return f"{'The member' if len(status) == 1 else f'All {len(status):,} members'} {texts[0].partition(' ')[2]}."
 
 
 def outcome_text(result: Result, code: Status) -> str:

@@ -62,26 +62,17 @@ def ends_of(sweep: SweepTable) -> tuple[list[SweepCell], list[SweepCell]]:
 
 def answer_of(sweep: SweepTable) -> str:
     """The best and the worst cells in one sentence."""
-    best, worst = ends_of(sweep)
-    if not best:
-        return f"No cell ran: {plural(len(sweep.cells), 'cell')} refused, the first as {sweep.record(sweep.cells[0]).refused}"
+    (best, worst), count = ends_of(sweep), len(sweep.cells)
     refused = sum(bool(sweep.record(cell).refused) for cell in sweep.cells)
-    left = f"; {plural(refused, 'cell')} refused." if refused else "."
-    (of_best, of_worst), members = (
-        (_share(sweep, cells[0]) for cells in (best, worst)),
-        plural(sweep.members_count, "member"),
-    )
+    if not best:
+        return f"No cell ran: {plural(refused, 'cell')} refused."
     verb = "reach the end" if sweep.conditions == Success() else "hold"
-    if best == worst:
-        where = (
-            f"In {_place(sweep, best)} "
-            if len(best) == 1 < len(sweep.cells)
-            else f"In all {len(best)} cells " * (len(best) > 1)
-        )
-        return f"{where}{of_best} of {members} {verb}{left}"
-    return (
-        f"Best: {_place(sweep, best)}: {of_best} of {members} {verb}; worst: {_place(sweep, worst)}: {of_worst}{left}"
-    )
+    said = f"{_share(sweep, best[0])} of {plural(sweep.members_count, 'member')} {verb}"
+    if best != worst:
+        said = f"Best: {_place(sweep, best)}: {said}; worst: {_place(sweep, worst)}: {_share(sweep, worst[0])}"
+    elif count > 1:
+        said = f"In {_place(sweep, best) if refused else f'all {count} cells'} {said}"
+    return f"{said}; {plural(refused, 'cell')} refused." if refused else f"{said}."
 
 
 def _share(sweep: SweepTable, cell: SweepCell) -> str:
@@ -91,11 +82,9 @@ def _share(sweep: SweepTable, cell: SweepCell) -> str:
 
 
 def _place(sweep: SweepTable, cells: Sequence[SweepCell]) -> str:
-    """Cases and points of cells: "soft, kp 0.2, delay 1 or 2 s"; of axes with several values, of cases where there are several."""
+    """Cases and points of cells, "soft, kp 0.2, delay 1 or 2 s", of axes with several values."""
     axes = {name: values for name, values in sweep.setup.axes.items() if len(values) > 1}
-    units = {
-        name: "" if unit == "1" else f" {unit}" for name, unit in units_of_numbers(sweep.setup.scene, axes).items()
-    }
+    units = {name: f" {unit}" * (unit != "1") for name, unit in units_of_numbers(sweep.setup.scene, axes).items()}
     cases = list(dict.fromkeys(cell.case.name for cell in cells)) if len(sweep.cases) > 1 or not axes else []
     values = {name: list(dict.fromkeys(str(cell.point[name]) for cell in cells)) for name in axes}
     if max(1, len(cases)) * np.prod([len(each) for each in values.values()]) == len(cells):

@@ -78,14 +78,11 @@ def moved_texts(moved: Mapping[str, Sequence[float]], noise: Mapping[str, float]
 
     moved: (mean, size, spread, z) by name. noise: z by name. normal: numbers that are normal, whose middle is their mean.
     """
-    said = [(abs(z), f"{name} {words}") for name, (mean, size, spread, z) in moved.items()
-            if abs(z) >= SIGNIFICANT and (words := _words("mean" if name in normal else "median", mean, size, spread))]  # fmt: skip
-    said += [
-        (z, f"the noise of {name} differs from that of all (z = {z:.0f})")
-        for name, z in noise.items()
-        if z >= SIGNIFICANT
-    ]
-    return [words for _, words in sorted(said, key=lambda pair: -pair[0])]
+    said = [(z, f"the noise of {name} differs from that of all (z = {z:.0f})") for name, z in noise.items()]
+    for name, (mean, size, spread, z) in moved.items():
+        if words := _words("mean" if name in normal else "median", mean, size, spread):
+            said.append((abs(z), f"{name} {words}"))
+    return [words for z, words in sorted(said, key=lambda pair: -pair[0]) if z >= SIGNIFICANT]
 
 
 def _words(middle: str, mean: float, size: float, spread: float) -> str:

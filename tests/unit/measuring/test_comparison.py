@@ -598,11 +598,11 @@ def test_a_tradeoff_in_words():
                                  setting=Candidate("psi_s", 0.1, solver="newton"))  # fmt: skip
     found = traded(measured("psi_x", 1.0, 1e-2, "float32", 0.2), second, messages=("one",),
                    refused={"gauss4": "a", "gauss6": "b"})  # fmt: skip
-    assert tradeoffs.report_text(found) == REPORT
+    assert str(found) == REPORT
     lost = traded(measured("psi_x", 1.0, 1e-2, energy_drift=math.nan))
-    assert "energy drift" not in tradeoffs.report_text(lost)
-    assert "note" not in tradeoffs.report_text(lost)
-    bare = tradeoffs.report_text(traded(growth=None, reference_error={}))
+    assert "energy drift" not in str(lost)
+    assert "note" not in str(lost)
+    bare = str(traded(growth=None, reference_error={}))
     assert bare == "sample      8 members, 0 to 4 s, 0 settings in 12 s"
 
 
@@ -729,7 +729,7 @@ def test_what_was_asked_for_and_has_no_reading_is_named(scene):
     assert "rk4" not in unasked.missing
     assert set(found.missing) <= {"rk4", "gauss4"}
     assert unasked.missing == {}
-    text = tradeoffs.report_text(found)
+    text = str(found)
     assert text.startswith("missing     rk4: members failed")
     assert "path; nothing of rk4" in text
     again = Tradeoff.from_dict(json.loads(found.to_json()))

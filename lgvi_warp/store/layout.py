@@ -147,8 +147,13 @@ def _parameters(plan: Plan, length: int) -> list[StoreArray]:
 
 def units_of_numbers(scene: Any, names: Iterable[str]) -> dict[str, str]:
     """Look up the units of numbers of a scene, also of entries: "drag.linear[0]"; "1" where none is known."""
-    known = parameter_units(scene)
-    return {name: known.get(name.partition("[")[0], "1") for name in names}
+    known, units = parameter_units(scene), {}
+    for name in names:
+        base, _, entry = name.rstrip("]").partition("[")
+        # Of six entries "N s/m, N m s" has the unit of three forces and of three moments.
+        parts = known.get(base, "1").split(", ")
+        units[name] = parts[int(entry) // 3] if entry.isdigit() and len(parts) == 2 else ", ".join(parts)
+    return units
 
 
 def parameter_units(scene: Any) -> dict[str, str]:
@@ -156,12 +161,16 @@ def parameter_units(scene: Any) -> dict[str, str]:
     from lgvi_warp.physics import vehicle
     from lgvi_warp.physics.terms.base import word_of
 
+    def unit(item: Any) -> str | None:
+        found: str | None = item.metadata.get("unit") or item.metadata.get("arguments", {}).get("unit")
+        return found
+
     known: dict[str, str | None] = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
     known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
     for term in (*scene.parts, *([scene.controller] if scene.controller else [])):
-        known |= {f"{term.key}.{word_of(item)}": item.metadata.get("unit") for item in dataclasses.fields(term)}
+        known |= {f"{term.key}.{word_of(item)}": unit(item) for item in dataclasses.fields(term)}
     units = {name: known.get(name) or "1" for name in scene.parameters()}
-    return units | {f"start.{item.name}": item.metadata.get("unit", "1") for item in dataclasses.fields(Start)}
+    return units | {f"start.{item.name}": unit(item) or "1" for item in dataclasses.fields(Start)}
 
 
 def size(plan: Plan, store: Chunking) -> int:

@@ -80,8 +80,8 @@ class Estimated(Summarized, Saved):
     def answer(self) -> str:
         if math.isnan(self.value):
             return f"{self.of} has no finite value."
-        reached = few_digits(self.error_reached, self.unit, 2)
-        asked = f", {self.error:.2g} requested" if math.isfinite(self.error) else ""
+        reached = few_digits(self.error_reached, self.unit, 3)
+        asked = f", {self.error:.3g} requested" if math.isfinite(self.error) else ""
         return f"{self.of} is {self._value()}; root-mean-square error {reached}{asked}."
 
     def _value(self) -> str:

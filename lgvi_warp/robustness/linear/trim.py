@@ -88,19 +88,23 @@ class Trim(Saved):
 
     @property
     def answer(self) -> str:
-        return f"The motion is steady with {listed(_texts(self.values or self.fixed), MOST_NAMED)}."
+        # Without round-off, of which the text has all digits.
+        rounded = {name: round(value, 9) + 0.0 for name, value in (self.values or self.fixed).items()}
+        return f"The motion is steady with {listed(_texts(rounded, 4), MOST_NAMED)}."
 
     def _report(self) -> list[str]:
-        # The answer has a few.
-        free = [f"free        {', '.join(_texts(self.values))}"] if len(self.values) > MOST_NAMED else []
         remainder = f"accelerations below {np.abs(self.residual).max():.1e} m/s2, rad/s2"
-        return [*free, f"fixed       {', '.join(_texts(self.fixed)) or 'nothing'}", f"left        {remainder}"]
+        lists = {"free": self.values, "fixed": self.fixed}
+        return [
+            *(f"{name:<12}{', '.join(_texts(each)) or 'nothing'}" for name, each in lists.items()),
+            f"left        {remainder}",
+        ]
 
 
-def _texts(values: Mapping[str, float]) -> list[str]:
+def _texts(values: Mapping[str, float], digits: int = 6) -> list[str]:
     """Names with values; a command is in the unit of its term, which is the user's."""
     units = {name: "rad" for name in ANGLES} | {"speed": "m/s"}
-    return [f"{name} {few_digits(value, units.get(name, ''))}" for name, value in values.items()]
+    return [f"{name} {few_digits(value, units.get(name, ''), digits)}" for name, value in values.items()]
 
 
 @near_names()

@@ -92,13 +92,13 @@ def _place(sweep: SweepTable, cells: Sequence[SweepCell]) -> str:
         return ", ".join([*([_either(cases)] if cases else []), *texts])
     points = [", ".join([*[cell.case.name] * bool(cases), *(f"{name} {cell.point[name]}{units[name]}" for name in axes)])
               for cell in cells]  # fmt: skip
-    return _either(points)
+    return _either(points, 1 if len(axes) > 1 else MOST_NAMED)
 
 
-def _either(texts: Sequence[str]) -> str:
+def _either(texts: Sequence[str], most: int = MOST_NAMED) -> str:
     """Alternatives, a few by name."""
-    more = [f"{len(texts) - MOST_NAMED:,} more"] if len(texts) > MOST_NAMED else []
-    return " or ".join([*texts[:MOST_NAMED], *more])
+    more = [f"{len(texts) - most:,} more"] if len(texts) > most else []
+    return " or ".join([*texts[:most], *more])
 
 
 def _above_surface(sweep: Sweep) -> list[str]:

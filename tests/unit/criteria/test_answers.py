@@ -86,8 +86,11 @@ def test_ties_of_a_sweep_are_listed_and_cut():
     near(sweep.answer, 1, 1, 2, 100.0, *ends(N), N, 2, 2, 0.0, *ends(0))
     # No rectangle of values: points by themselves, and of five the rest is counted.
     sweep = swept(lambda i: float(i % 2), {"p": [1, 2, 3], "q": [1, 2, 3]}, cases="a")
-    assert sweep.answer.startswith("Best: p 1, q 2 or p 2, q 1 or 2 more: 100 %")
-    assert "; worst: p 1, q 1 or p 1, q 3 or 3 more: 0 %" in one_sentence(sweep.answer)
+    assert sweep.answer.startswith("Best: p 1, q 2 or 3 more: 100 %")
+    assert "; worst: p 1, q 1 or 4 more: 0 %" in one_sentence(sweep.answer)
+    line = swept(lambda i: float(i < 3), {"p": [1, 2, 3, 4, 5]}, cases="a")
+    assert line.answer.startswith("Best: p 1 or 2 or 1 more: 100 %")
+    assert "; worst: p 4 or 5: 0 %" in line.answer
     cases = swept([0.5, 0.5, 0.25].__getitem__, cases="abc")
     assert cases.answer.startswith("Best: a or b: 50 %")
     assert "; worst: c: 25 %" in cases.answer
@@ -268,6 +271,9 @@ def test_the_numbers_of_a_steady_motion():
     many = dataclasses.replace(steady(), values={f"thrusters[{i}]": 0.5 for i in range(8)})
     assert many.answer.endswith("thrusters[4] 0.5 and 3 more.")
     assert "thrusters[7] 0.5" in str(many)
+    small = dataclasses.replace(steady(), values={"roll": -1e-11, "speed": 1.23456789})
+    assert small.answer == "The motion is steady with roll 0 rad, speed 1.235 m/s."
+    assert "roll -1e-11 rad, speed 1.23457 m/s" in str(small)
     still = dataclasses.replace(steady(), values={})
     assert still.answer == "The motion is steady with roll 0 rad."
     assert "fixed       nothing" in str(dataclasses.replace(steady(), fixed={}))

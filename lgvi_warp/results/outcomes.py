@@ -34,7 +34,7 @@ ENDS = {"ends ok": "end ok", "is stopped by an event": "are stopped by an event"
 
 
 def answer_of(result: Result) -> str:
-    """How the members of a run ended, in one sentence."""
+    """Sentence on how the members of a run ended."""
     status, run = np.asarray(result.status), result.provenance
     end = run.get("start", {}).get("time", 0.0) + run["step"] * run["steps"]
     texts = []

@@ -64,7 +64,7 @@ def test_a_sweep_with_nothing_to_draw_says_why(draw, sweep, words):
 
 
 def test_responses_are_those_of_the_best_and_the_worst_cell():
-    """Of four cells the second is best and the third worst. Medians of depth are less apart than those of heading."""
+    """The second of four cells is best and the third worst. Medians of depth are less apart than those of heading."""
     sweep = swept([0.5, 0.9, 0.1, 0.6].__getitem__, {"k": [1, 2]})
     sweep.setup.metrics["h"] = SimpleNamespace(unit="rad", quantity=SimpleNamespace(unit=""), of="heading")
     for i, cell in enumerate(sweep.cells):

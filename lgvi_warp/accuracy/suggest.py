@@ -15,6 +15,7 @@ from lgvi_warp.accuracy.tradeoff import chosen_methods, growth_of, growth_text, 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.summaries import few_digits, plural
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.plan import Plan, choose_plan
@@ -115,12 +116,17 @@ class Suggestion:
         """Factor by which the expected error is below the error asked for; infinite without any error."""
         return self.error / self.expected if self.expected > 0.0 else math.inf
 
+    @property
+    def answer(self) -> str:
+        """The answer in one sentence; `str` ends with it."""
+        s, asked, expected = self.setting, *(few_digits(each, self.unit, 2) for each in (self.error, self.expected))
+        chosen = f"{s.text} with step {s.h:.6g} s is the cheapest setting found"
+        return f"{chosen} that keeps {self.of} to {asked} up to {self.t1:g} s: {expected} is expected."
+
     def __str__(self) -> str:
-        s = self.setting
         lines = [
             *(f"note        {message}" for message in self.messages),
-            f"chosen      {s.name}, {s.dtype}, step {s.h:.6g} s: {self.of} to {self.expected:.1e} {self.unit} up to "
-            f"{self.t1:g} s, {self.margin:.2g} times better than asked ({self.members} members checked)",
+            f"checked     {plural(self.members, 'member')}, {self.margin:.2g} times better than requested",
             f"predicted   {self.run_seconds:.2g} s on {self.threads} thread{'s' * (self.threads > 1)}, "
             f"{self.memory_bytes / 1e6:.2g} MB",
             f"reference   {self.reference}: they agree to {self.reference_error:.1e} {self.unit}",
@@ -129,7 +135,7 @@ class Suggestion:
             times = price / self.us_per_vehicle_second
             lines.append(f"  next best {rival.name}, {rival.dtype}, step {rival.h:.4g} s: {times:.2f} times the time, "
                          f"{self.of} to {error:.1e} {self.unit}")  # fmt: skip
-        return "\n".join(lines)
+        return "\n".join([*lines, self.answer])
 
 
 @shows_progress

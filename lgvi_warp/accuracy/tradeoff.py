@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.summaries import few_digits
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.measuring import comparison, cost
 from lgvi_warp.measuring.budget import Budget
@@ -114,8 +115,29 @@ class Tradeoff(Saved):
     missing: dict[str, str] = field(default_factory=dict)
     study: ClassVar[str] = "tradeoff"
 
-    def __str__(self) -> str:
-        return report_text(self)
+    @property
+    def answer(self) -> str:
+        front, count = self.front(), len(self.measurements)
+        if not count:
+            return f"No setting of a method has a measurement up to {self.t1:g} s."
+        if not front:
+            why = f"the reference tells none of their errors in {self.of}" if self.reference_error else "noise acts"
+            return f"No setting of {count} is the most accurate: {why}."
+        if len(front) == 1:
+            return f"For {self.of} {self._text(front[0])} is the cheapest and the most accurate setting of {count}."
+        between = f"; {len(front) - 2} of {count} lie between" if len(front) > 2 else ""
+        return (
+            f"For {self.of} the cheapest is {self._text(front[0])}, the most accurate {self._text(front[-1])}{between}."
+        )
+
+    def _text(self, measured: Measurement) -> str:
+        """A setting with its error and its cost."""
+        s, unit = measured.setting, self.units[self.of]
+        error, price = few_digits(measured.error(self.of), unit, 2), measured.us_per_vehicle_second
+        return f"{s.text} at {s.h:.4g} s ({error}, {price:.3g} us/vehicle/s)"
+
+    def _report(self) -> list[str]:
+        return report_lines(self)
 
     def shown(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
         """List the measurements whose error the reference can resolve, the cheapest first.
@@ -153,11 +175,11 @@ class Tradeoff(Saved):
                 front.append(measurement)
         return front
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         return finite_or_none(asdict(self) | {"front": [asdict(measurement.setting) for measurement in self.front()]})
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Tradeoff:
+    def _of_content(cls, content: dict[str, Any]) -> Tradeoff:
         # Errors and times that were not finite were infinite, other numbers NaN.
         growth = content["growth"]
         if growth is not None:
@@ -410,8 +432,8 @@ def measurements(
     return measured
 
 
-def report_text(tradeoff: Tradeoff) -> str:
-    """The trade-off as a text of several lines."""
+def report_lines(tradeoff: Tradeoff) -> list[str]:
+    """The trade-off as lines of text."""
     unit = tradeoff.units[tradeoff.of]
     lines = [f"missing     {name}: {why}" for name, why in tradeoff.missing.items()]
     lines += [f"note        {message}" for message in tradeoff.messages]
@@ -440,7 +462,7 @@ def report_text(tradeoff: Tradeoff) -> str:
         lines.append(f"{measurement.us_per_vehicle_second:>12.3g}  {s.name:<18}{s.dtype:<20}{s.h:>10.4g}"
                      f"{measurement.error(tradeoff.of):>15.1e}{measurement.error(tradeoff.of, 'path_rms'):>10.1e}"
                      + (f"{measurement.energy_drift:>18.1e}" if kept else ""))  # fmt: skip
-    return "\n".join([*lines, *bias_lines(tradeoff)])
+    return [*lines, *bias_lines(tradeoff)]
 
 
 def growth_text(growth: Growth) -> str:

@@ -20,8 +20,11 @@ def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
 
 def of_result(result: Any) -> dict[str, Any]:
     """Outcomes of a run's members, statistics at its end, and its settings."""
+    from lgvi_warp.results.outcomes import answer_of
+
     divided = result.substeps > 0
     return {
+        "answer": answer_of(result),
         "members": result.members,
         "settings": of_settings(result.provenance),
         "outcomes": result.status.counts(),

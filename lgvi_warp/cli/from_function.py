@@ -268,14 +268,15 @@ class FunctionOptions:
 def as_study(
     name: str, *places: str, help: str = "", shared: str = "--set", forms: Mapping[str, Form] | None = None,
     more: Callable[[Any], None] = without, about: Callable[[argparse.Namespace, Any, dict[str, Any]], Any] | None = None,
-    picture: bool = False, always: bool = True, report: Callable[[argparse.Namespace, Any, Path | None], str] | None = None,
+    picture: bool = False, always: bool = True, above: Callable[[argparse.Namespace, Any, Path | None], str] | None = None,
     faults: Callable[[Any], list[str]] | None = None,
 ) -> Verb:  # fmt: skip
     """A verb that asks a question and writes the answer's files.
 
     help: In place of the function's first sentence. more: adds further options. about: from what was parsed, the scene and
     the arguments to what is asked about, which may refuse them. picture: whether it has one, of its own name. always: whether
-    files are written without --out, too. report: its text, from the answer and the folder. faults: of an answer.
+    files are written without --out, too. above: text above the answer's, from the answer and the folder. faults: of an
+    answer.
     """
     options = FunctionOptions(places, shared, forms or {})
     stem = name.replace("-", "_")
@@ -300,7 +301,7 @@ def as_study(
                 answer = (study or function)(fleet, **values, **shown)
         except FailedMembers as error:
             return len(print_faults([str(error)]))
-        text = report(chosen, answer, out) if report else str(answer)
+        text = f"{above(chosen, answer, out)}\n{answer}" if above else str(answer)
         if out is None:
             tell(chosen, answer.to_dict, lambda: text)
             return 0
@@ -317,11 +318,11 @@ def as_study(
 
 
 def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:
-    """Print a study's report, its files and its notes, and say what failed."""
+    """Print a study's notes, its files and its report, whose last line is the answer, and say what failed."""
     tell(
         chosen,
         lambda: {"content": content} | documents.of_files(written),
-        lambda: "\n".join([text, "", *written.note_lines(), *map(file_line, written.files)]),
+        lambda: "\n".join([*written.note_lines(), *map(file_line, written.files), "", text.rstrip()]),
     )
     print_faults(written.empty)
     return 1 if print_faults(written.faults) else 0

@@ -145,7 +145,7 @@ def summary(
     limit: Most numbers of samples that are looked through.
     """
     from lgvi_warp.common.status import Status
-    from lgvi_warp.results.outcomes import outcome_text, outcomes
+    from lgvi_warp.results.outcomes import answer_of, outcome_text, outcomes
     from lgvi_warp.statistics.estimates.table import table
 
     settings = result.provenance
@@ -155,7 +155,6 @@ def summary(
         *(how_lines(settings) if verbose else ()),
         *controller_lines(settings["scene"]),
         *_speed(result, seconds),
-        "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
     ]
     if missing := unsaved(result):
         lines.append(f"pictures    none, and no energy: {', '.join(missing)} not saved")
@@ -177,7 +176,7 @@ def summary(
     if result.statistics:
         lines.append(f"statistics  at {result.time[-1]:g} s, with intervals")
         lines += [f"  {line}" for line in table(result.statistics)]
-    return "\n".join([*lines, *map(file_line, files), *look_lines(files)])
+    return "\n".join([*lines, *map(file_line, files), *look_lines(files), answer_of(result)])
 
 
 def look_lines(files: Sequence[Path]) -> list[str]:

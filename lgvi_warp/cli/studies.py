@@ -112,18 +112,18 @@ def run_again(chosen: argparse.Namespace, table: Path) -> str:
 
 worst_case = as_study(
     "worst-case", "robustness.search.worst_case:worst_case",
-    report=lambda chosen, answer, out: f"{answer}\nagain       {run_again(chosen, (out or Path()) / 'worst_case.csv')}",
+    above=lambda chosen, answer, out: f"again       {run_again(chosen, (out or Path()) / 'worst_case.csv')}",
 )  # fmt: skip
 
 tune_gains = as_study("tune-gains", "robustness.search.tune:tune_gains", shared="--members --set", forms={"risk": RISK})
 
 
 def _start(chosen: argparse.Namespace, answer: Any, out: Path | None) -> str:
-    """A steady motion, and the section [start] of a scene file that begins in it."""
-    return "\n".join([f"{answer}\n\n[start]", *(f"{name} = {value}" for name, value in answer.start.to_dict().items())])
+    """The section [start] of a scene file that begins in a steady motion."""
+    return "\n".join(["[start]", *(f"{name} = {value}" for name, value in answer.start.to_dict().items()), ""])
 
 
-trim = as_study("trim", "robustness.linear.trim:trim", always=False, report=_start)
+trim = as_study("trim", "robustness.linear.trim:trim", always=False, above=_start)
 
 STABILITY = FunctionOptions(("accuracy.stability.map:stability_map",))
 

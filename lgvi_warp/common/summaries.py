@@ -77,17 +77,30 @@ def counted(counts: dict[str, int]) -> str:
     return ", ".join(f"{name} {number:,}" for name, number in counts.items())
 
 
-def few_digits(value: Any, unit: str = "") -> str:
+def plural(count: int, noun: str) -> str:
+    """Write how many there are of a thing."""
+    return f"{count:,} {noun}{'s' * (count != 1)}"
+
+
+def percent(value: float, digits: int = 4) -> str:
+    """Write a fraction in percent; only none is 0 and only all is 100."""
+    text = f"{100.0 * value:.{digits}g}"
+    return (
+        text if digits == 17 or float(text) not in (0.0, 100.0) or value in (0.0, 1.0) else percent(value, digits + 1)
+    )
+
+
+def few_digits(value: Any, unit: str = "", digits: int = 6) -> str:
     """Write a number or an array in a few digits of each entry; a matrix by its diagonal or its shape."""
     array = np.asarray(value, dtype=np.float64)
     after = f" {unit}" if unit not in ("", "1") else ""
     if array.ndim == 2 and array.shape[0] == array.shape[1] and not np.any(array - np.diag(np.diag(array))):
         return f"diagonal {few_digits(np.diag(array), unit)}"
     if array.ndim == 0:
-        return f"{array:.6g}{after}"
+        return f"{array:.{digits}g}{after}"
     if array.ndim > 1 or array.size > ENTRIES:
         return f"{' x '.join(map(str, array.shape))} numbers{after}"
-    return f"[{', '.join(f'{entry:.6g}' for entry in array)}]{after}"
+    return f"[{', '.join(f'{entry:.{digits}g}' for entry in array)}]{after}"
 
 
 def curves(time: np.ndarray, values: np.ndarray, marked: np.ndarray, label: str) -> str:

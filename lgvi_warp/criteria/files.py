@@ -94,13 +94,29 @@ class Saved(ABC):
     study: ClassVar[str]
     endings: ClassVar[tuple[str, ...]] = ("json", "csv")
 
+    @property
     @abstractmethod
+    def answer(self) -> str:
+        """The answer in one sentence, in the words of the question; `str` ends with it."""
+
     def to_dict(self) -> dict[str, Any]:
         """Convert it to plain types for JSON.
 
         Returns:
-            Its content; numbers that are not finite are None.
+            The answer in one sentence, and the content; numbers that are not finite are None.
         """
+        return {"answer": self.answer} | self._content()
+
+    @abstractmethod
+    def _content(self) -> dict[str, Any]:
+        """Content of the JSON file but for the answer."""
+
+    def _report(self) -> Iterable[str]:
+        """Lines of text above the answer; none by default."""
+        return ()
+
+    def __str__(self) -> str:
+        return "\n".join([*self._report(), self.answer])
 
     @abstractmethod
     def rows(self) -> Iterable[dict[str, Any]]:
@@ -156,16 +172,21 @@ class Saved(ABC):
         return write_text(path, self.to_json() if path.suffix == ".json" else f"{self}\n", root)
 
     @classmethod
-    @abstractmethod
     def from_dict(cls, content: dict[str, Any]) -> Self:
         """Build it from the content of a JSON file.
 
         Args:
-            content: as `to_dict` returns it.
+            content: as `to_dict` returns it; the answer follows from the rest.
 
         Returns:
             What the study found; numbers that were not finite are infinite or NaN.
         """
+        return cls._of_content({name: value for name, value in content.items() if name != "answer"})
+
+    @classmethod
+    @abstractmethod
+    def _of_content(cls, content: dict[str, Any]) -> Self:
+        """Build it from what `_content` returned."""
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lgvi_warp.common.status import Status, Warnings, stop_time, stopped
+from lgvi_warp.common.status import Status, Warnings, failed, stop_time, stopped
+from lgvi_warp.common.summaries import counted, plural
 from lgvi_warp.methods.limits import too_large
 from lgvi_warp.methods.method import Method
 
@@ -26,6 +27,28 @@ def outcomes(result: Result) -> list[Status]:
         The statuses in order of their codes: OK first.
     """
     return [Status(int(code)) for code in np.unique(np.asarray(result.status))]
+
+
+# Ways to end of one member, and of several.
+ENDS = {"ends ok": "end ok", "is stopped by an event": "are stopped by an event", "fails": "fail"}
+
+
+def answer_of(result: Result) -> str:
+    """Sentence on how the members of a run ended."""
+    status, run = np.asarray(result.status), result.provenance
+    end = run.get("start", {}).get("time", 0.0) + run["step"] * run["steps"]
+    texts = []
+    for (one, several), members in zip(
+        ENDS.items(), (status == Status.OK, stopped(status), failed(status)), strict=True
+    ):
+        if count := int(members.sum()):
+            names = counted(result.status[members].counts())
+            first = f"({names}), the first at {stop_time(result)[members].min():.4g} s"
+            when = f"at {end:.6g} s" if status[members][0] == Status.OK else first
+            texts.append(f"{count:,} {one if count == 1 else several} {when}")
+    if len(texts) != 1:
+        return f"Of {plural(len(status), 'member')} {'; '.join(texts) or 'none ran'}."
+    return f"{'The member' if len(status) == 1 else f'All {len(status):,} members'} {texts[0].partition(' ')[2]}."
 
 
 def outcome_text(result: Result, code: Status) -> str:

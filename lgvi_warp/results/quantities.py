@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.arguments import items_of
-from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.common.status import failed
 from lgvi_warp.common.times import rows_at
@@ -296,6 +296,16 @@ def samples_of(result: Result, when: slice = slice(None), members: Any = None) -
     start = {name: result.samples[name][0] for name in fields}
     known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
     return _Samples(fields, result.time[when], result), known if members is None else members
+
+
+def unit_of(of: OfInterest) -> str:
+    """The unit of a quantity of interest; "" where it has none, or is not known."""
+    try:
+        (each,) = quantities(of)
+    except SceneError:
+        return ""
+    metric = getattr(each, "metric", None)
+    return each.unit if metric is None else getattr(metric, "unit", metric.quantity.unit)
 
 
 def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -139,23 +139,38 @@ def _parameters(plan: Plan, length: int) -> list[StoreArray]:
     for name in ensemble.varied():
         attributes = {"long_name": f"parameter {name}", "units": units[name]}
         arrays.append(StoreArray(name, first[name].shape[1:], "<f8", length, 0, attributes))
-    units |= {f"start.{item.name}": item.metadata.get("unit", "1") for item in dataclasses.fields(Start)}
     for name, values in ensemble.starts(0, 1).items():
         attributes = {"long_name": f"{name} of the member", "units": units[name]}
         arrays.append(StoreArray(name, values.shape[1:], "<f8", length, 0, attributes))
     return arrays
 
 
+def units_of_numbers(scene: Any, names: Iterable[str]) -> dict[str, str]:
+    """Look up the units of numbers of a scene, also of entries: "drag.linear[0]"; "1" where none is known."""
+    known, units = parameter_units(scene), {}
+    for name in names:
+        base, _, entry = name.rstrip("]").partition("[")
+        # Of six entries "N s/m, N m s" has the unit of three forces and of three moments.
+        parts = known.get(base, "1").split(", ")
+        units[name] = parts[int(entry) // 3] if entry.isdigit() and len(parts) == 2 else ", ".join(parts)
+    return units
+
+
 def parameter_units(scene: Any) -> dict[str, str]:
-    """Look up the units of a scene's parameters."""
+    """Look up the units of a scene's parameters and of its start."""
     from lgvi_warp.physics import vehicle
     from lgvi_warp.physics.terms.base import word_of
 
+    def unit(item: Any) -> str | None:
+        found: str | None = item.metadata.get("unit") or item.metadata.get("arguments", {}).get("unit")
+        return found
+
     known: dict[str, str | None] = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
     known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
-    for term in scene.parts:
-        known |= {f"{term.key}.{word_of(item)}": item.metadata.get("unit") for item in dataclasses.fields(term)}
-    return {name: known.get(name) or "1" for name in scene.parameters()}
+    for term in (*scene.parts, *([scene.controller] if scene.controller else [])):
+        known |= {f"{term.key}.{word_of(item)}": unit(item) for item in dataclasses.fields(term)}
+    units = {name: known.get(name) or "1" for name in scene.parameters()}
+    return units | {f"start.{item.name}": unit(item) or "1" for item in dataclasses.fields(Start)}
 
 
 def size(plan: Plan, store: Chunking) -> int:

@@ -393,7 +393,12 @@ def test_a_run_that_all_sink_exits_with_0_and_has_its_pictures(scene_file, capsy
     assert "not written" not in errors
     files = sorted(path.name for path in (scene_file.parent / "out").iterdir())
     assert files == ["fleet.png", "fleet.rrd", "result.npz"]
-    says(said, "status      floor 4", "drift       energy ", "floor, 4 of 4 members (first: member")
+    says(
+        said,
+        "All 4 members are stopped by an event (floor 4), the first at ",
+        "drift       energy ",
+        "floor, 4 of 4 members (first: member",
+    )
 
 
 def test_members_that_are_kept_since_they_failed_are_drawn(mixed, tmp_path):
@@ -471,7 +476,7 @@ def test_remus_100_that_all_sink(tmp_path, capsys):
     path.write_text(REMUS)
     code, said, _ = run(path, capsys)
     assert code == 0
-    assert "status      floor 8" in said
+    assert "All 8 members are stopped by an event (floor 8), the first at " in said
     assert "nan" not in said
     assert "J, through drag_matrix, control_fins, wrench, body_lift (largest of all members)" in said
     assert len(list((tmp_path / "out").iterdir())) == 3

@@ -2,12 +2,14 @@
 """Answers of studies are saved, read back to the bit, and shown in a report."""
 
 import dataclasses
+import html
 import json
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp import cli
 from lgvi_warp.cli.folders import contents
 from tests.support.refusals import refused, says
 
@@ -59,6 +61,8 @@ def test_an_answer_is_saved_read_and_reported(name, tmp_path):
     (held,) = contents(tmp_path)
     assert type(held.load()) is type(found)
     page = lw.report(tmp_path, tmp_path / "report.html").read_text()
+    assert f"<p>{html.escape(found.answer)}</p>" in page
+    assert page.count(html.escape(found.answer)) == 1
     says(page, "How it was made", name.replace("_", " ").capitalize())
     if name == "estimate":
         says(page, "recipe", "estimator", str(found.recipe["seed"]))
@@ -91,3 +95,31 @@ def test_a_damaged_array_is_refused(tmp_path):
     content["final"]["arrays"]["final.status"]["dtype"] = "object"
     file.write_text(json.dumps(content))
     says(refused(lw.studies.Assimilated.load, file), "assimilate.json", "is damaged, or of another version")
+
+
+FALLING = """
+vehicle = { mass = 2.0, inertia = [1.0, 1.0, 1.0], buoyancy = 19.6133 }
+start = { velocity = [0.0, 0.0, 0.5] }
+run = { method = "psi_x", step = 0.1, duration = 2.0 }
+"""
+
+
+@pytest.mark.parametrize(("verb", "words"), [
+    # A neutral body moves on: the depth is v t.
+    ("run", "The member ends ok at 2 s."),
+    ("derivatives --of depth --by start.velocity[2]", "depth changes by 2 m (+- "),
+    ("worst-case --of depth --within start.velocity[2]=0.1:0.7 --budget 64",
+     "The largest depth found is 1.4 m at start.velocity[2] 0.7 m/s (its upper bound), in "),
+])  # fmt: skip
+def test_the_last_line_of_the_command_is_the_answer(verb, words, tmp_path, capsys):
+    (tmp_path / "scene.toml").write_text(FALLING)
+    name, *options = verb.split()
+    given = [name, str(tmp_path / "scene.toml"), *options, "--out", str(tmp_path / "out")]
+    assert cli.main(given) == 0
+    line = capsys.readouterr().out.splitlines()[-1]
+    assert line.startswith(words)
+    assert name != "derivatives" or line.endswith(" per m/s of start.velocity[2].")
+    assert cli.main([*given, "--json", "-q"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    held = document if name == "run" else document["content"][name.replace("-", "_")]
+    assert held["answer"].partition(" (+- ")[0] == line.partition(" (+- ")[0]

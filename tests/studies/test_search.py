@@ -69,7 +69,7 @@ def test_a_known_worst_corner():
     assert told[-1] <= 1.0
     again = lw.solve(found.fleet, "psi_s", h=PERIOD, t1=20.0)
     assert np.linalg.norm(again.position[-1, 0]) == pytest.approx(found.value, abs=1e-10)
-    says(str(found), "a lower bound of the largest", "(low)")
+    says(str(found), "a lower bound of the largest", "(its lower bound)")
     least = lw.worst_case(scene, within, "norm(position)", worst="smallest", budget=600, **RUN)
     assert 0.0 <= least.value < 1e-2
     assert "an upper bound of the smallest" in str(least)
@@ -80,7 +80,7 @@ def test_a_failure_is_the_worst_case():
     found = lw.worst_case(regulated(), {"start.angular_velocity[2]": (0.0, 40.0)}, "norm(position)", budget=600, **RUN)
     assert found.value == np.inf
     assert found.parameters["start.angular_velocity[2]"] > 19.0
-    assert str(found).startswith("a member fails: start.angular_velocity[2]")
+    assert str(found).startswith("A member fails at start.angular_velocity[2]")
     assert found.runs < 100
 
 

@@ -10,7 +10,7 @@ import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.accuracy.stability import map as stability
 from lgvi_warp.accuracy.stability.grid import StabilityGrid
-from lgvi_warp.accuracy.stability.map import Cell, StabilityMap, report_text
+from lgvi_warp.accuracy.stability.map import Cell, StabilityMap
 from lgvi_warp.accuracy.stability.runs import column, make_references
 from lgvi_warp.engine.step_warnings import COARSE
 from lgvi_warp.physics import energy as invariants
@@ -245,7 +245,7 @@ def test_a_map_of_whatever_statistics_know(scene):
     asked = {"points": 3, "t1": 4.0, "error_time": 2.0, "directions": 2, "error": 1e-4}
     depth, position = (lw.stability_map(scene, *axes, ["psi_x"], of=of, **asked) for of in ("depth", "position"))
     assert (depth.of, depth.unit) == ("depth", "m")
-    assert "accurate    depth to 0.0001 m" in report_text(depth)
+    assert "accurate    depth to 0.0001 m" in str(depth)
     assert (depth.errors["psi_x"] <= position.errors["psi_x"] * (1.0 + 1e-9)).all()
     assert (depth.errors["psi_x"] > 0.0).all()
     good = position.classes["psi_x"] == Cell.ACCURATE

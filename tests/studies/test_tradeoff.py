@@ -126,7 +126,7 @@ def test_errors_of_whatever_statistics_know(scene, tmp_path):
         assert one.error(of) <= one.error("position") * (1.0 + 1e-9)
     assert f"{of}_path_max" in found.rows()[0]
     assert json.loads(found.to_json())["units"][of]
-    assert of in tradeoffs.report_text(found)
+    assert of in str(found)
     lw.plots.tradeoff(found, path=tmp_path / "of.png")
     assert (tmp_path / "of.png").stat().st_size > 10_000
     suggested = lw.suggest(fleet, 1e-4, of, t1=4.0, methods=["su4(psi_x)"], seconds=ENOUGH)

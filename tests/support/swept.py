@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.robustness.sweeps.output import Sweep
 from lgvi_warp.robustness.sweeps.record import Record
@@ -52,6 +53,7 @@ def swept(share, axes=None, cases="ab", refused=(), metrics=("m",), failed=0):
     statistics = {name: SimpleNamespace(unit=unit[name], quantity=SimpleNamespace(unit=""), of="depth")
                   for name in (*metrics, END)}  # fmt: skip
     members = SimpleNamespace(members=N, seed=1)
-    setup = SimpleNamespace(cases=cases, axes=axes, metrics=statistics, members=members, settings={})
+    scene = lw.Scene.named("sphere")
+    setup = SimpleNamespace(scene=scene, cases=cases, axes=axes, metrics=statistics, members=members, settings={})
     conditions = SimpleNamespace(passed=lambda status, numbers: numbers["passes"], limits={})
     return ByHand(setup, cells, records, conditions, "a", 0.9, "wilson")

@@ -27,12 +27,13 @@ from lgvi_warp.accuracy.stability.runs import (
     run_method,
 )
 from lgvi_warp.accuracy.tradeoff import chosen_methods
-from lgvi_warp.common import machine
+from lgvi_warp.common import machine, summaries
 from lgvi_warp.common.arguments import listed, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
+from lgvi_warp.common.summaries import few_digits, percent, plural
 from lgvi_warp.criteria.files import Saved, finite_or_none
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.plan import Plan
@@ -72,6 +73,8 @@ class Cell(IntEnum):
         return TEXTS[self]
 
 
+# Methods that the answer names.
+MOST_NAMED = 3
 TEXTS = {
     Cell.ACCURATE: "error below the bound",
     Cell.BOUNDED: "error above it, energy bounded",
@@ -135,8 +138,27 @@ class StabilityMap(Saved):
         if not self.unit:  # a map written before `of` could be any quantity
             object.__setattr__(self, "unit", QUANTITIES.get(self.of, "1"))
 
-    def __str__(self) -> str:
-        return report_text(self)
+    @property
+    def answer(self) -> str:
+        ranked: dict[tuple[float, float], list[str]] = {}
+        for method, codes in self.classes.items():
+            ranked.setdefault(
+                (float((codes <= Cell.BOUNDED).mean()), float((codes == Cell.ACCURATE).mean())), []
+            ).append(method)
+        best, worst = max(ranked), min(ranked)
+        (bounded, accurate), cells = best, plural(len(self.x.values) * len(self.y.values), "cell")
+        text = f"Runs with {summaries.listed(ranked[best], MOST_NAMED)} stay bounded without a flag in "
+        text += f"{percent(bounded, 3)} % of {cells} (accurate in {percent(accurate, 3)} %)"
+        good = np.min([self.limit(method).min() for method in ranked[best]])
+        if np.isfinite(good):
+            text += f", in every row up to {self.x.name} {few_digits(good, self.x.unit, 3)}"
+        if len(ranked) > 1:
+            text += f"; with {summaries.listed(ranked[worst], MOST_NAMED)} in {percent(worst[0], 3)} %, the least"
+        silent = [f"{method} in {count}" for method in self.methods if (count := len(self.silent(method)))]
+        return text + (f"; unbounded without a flag: {summaries.listed(silent, MOST_NAMED)}." if silent else ".")
+
+    def _report(self) -> list[str]:
+        return report_lines(self)
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -195,7 +217,7 @@ class StabilityMap(Saved):
         faults.raise_if_any()
         return self.classes[method]
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         last = {"x": self.x.to_dict(), "y": self.y.to_dict()}
         last |= {name: getattr(self, name) for name in (*ARRAYS, "ratios")}
         content = {name: value for name, value in vars(self).items() if name not in last} | last
@@ -204,7 +226,7 @@ class StabilityMap(Saved):
         return dict(finite_or_none(content))
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> StabilityMap:
+    def _of_content(cls, content: dict[str, Any]) -> StabilityMap:
         kept = {name: value for name, value in content.items() if name not in ("limits", "legend")}
         kept |= {"x": Line.from_dict(content["x"]), "y": Line.from_dict(content["y"])}
         for name, kind in ARRAYS.items():
@@ -447,8 +469,8 @@ def _provenance(
     return content | {"axes": {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}}
 
 
-def report_text(stability: StabilityMap) -> str:
-    """The map as a text of several lines."""
+def report_lines(stability: StabilityMap) -> list[str]:
+    """The map as lines of text."""
     unit = stability.unit
     lines = [f"note        {message}" for message in stability.messages]
     lines += [
@@ -469,4 +491,4 @@ def report_text(stability: StabilityMap) -> str:
         good = limit[np.isfinite(limit)]
         span = f"{good.min():.3g} to {good.max():.3g}" if len(good) else "none"
         lines.append(f"{method:<18}" + "".join(f"{number:>10}" for number in numbers) + f"   {span} {stability.x.unit}")
-    return "\n".join(lines)
+    return lines

@@ -10,9 +10,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.near import near_names
+from lgvi_warp.common.summaries import few_digits, plural
 from lgvi_warp.control.delay import MOST_PERIODS
 from lgvi_warp.criteria.files import Saved
 from lgvi_warp.criteria.running import step_of
@@ -38,6 +40,8 @@ NARROW = {"eigenvalues": 1e-6, "runs": 2e-3}
 PERCENTILES = (0.0, 5.0, 25.0, 50.0, 75.0, 95.0, 100.0)
 UNITS = {"delay": "s", "disk_phase": "rad", "frequency": "rad/s"}
 GAINS = ("gain_lower", "gain_upper")
+# Margins beside the gain in the words of the answer, and how many it has.
+NAMED, MOST_NAMED = {"delay": "a delay of", "disk": "a disk margin of"}, 4
 DISKS = ("disk", "disk_gain_lower", "disk_gain_upper", "disk_phase", "disk_frequency")
 NAMES = {"gain": GAINS, "delay": ("delay",), "disk": DISKS, "peak": ()}
 
@@ -100,13 +104,8 @@ class Margins(Saved):
         """The number of members, n."""
         return len(self.why)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Convert the margins to plain values, for JSON.
-
-        Returns:
-            "loop", "step", "why", "messages", and under "eigenvalues" and "runs" lists by name: None for NaN, "inf" for
-            infinity.
-        """
+    def _content(self) -> dict[str, Any]:
+        # Lists by name: None for NaN, "inf" for infinity.
 
         def plain(value: float) -> float | str | None:
             return value if np.isfinite(value) else None if np.isnan(value) else str(value)
@@ -119,7 +118,7 @@ class Margins(Saved):
         return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), "messages": list(self.messages), **ways}
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         values, by_runs = (
             {name: np.array([np.nan if v is None else float(v) for v in column]) for name, column in columns.items()}
             for columns in (content.get(way, {}) for way in WAYS)
@@ -189,7 +188,26 @@ class Margins(Saved):
     def _columns(self) -> Mapping[str, np.ndarray]:
         return self.values or self.by_runs
 
-    def __str__(self) -> str:
+    @property
+    def answer(self) -> str:
+        every, bad = plural(self.members, "member"), f" ({self.reasons_text})" if self.reasons else ""
+        if not self.steady.any():
+            return f"{self.loop} has no margins in any of {every}{bad}."
+        texts = []
+        worst = {name: np.fmax.reduce(v) if name.endswith(("lower", "peak")) else np.fmin.reduce(v)
+                 for name, column in self._columns().items() for v in [column[self.steady]]}  # fmt: skip
+        if "gain_upper" in worst:
+            ends = (few_digits(worst[name], "", 4) for name in GAINS)
+            texts.append("factors on its demand from {} to {}".format(*ends))
+        texts += [
+            f"{word} {few_digits(worst[name], unit_of(name), 4)}" for name, word in NAMED.items() if name in worst
+        ]
+        texts += [f"{name} up to {few_digits(value, '', 4)}" for name, value in worst.items() if name.endswith("_peak")]
+        good, some = int(self.steady.sum()), f"{int(self.steady.sum()):,} of {every}" if bad else every
+        least = f"; member {self.worst(self.members)[self.members - good]} bears least" if good > 1 else ""
+        return f"{self.loop} bears {summaries.listed(texts, MOST_NAMED)} in {some}{bad}{least}."
+
+    def _report(self) -> list[str]:
         lines = [f"{self.loop}: margins of {self.members} members"]
         if self.reasons:
             lines.append(f"{sum(self.reasons.values())} of them have none ({self.reasons_text}); the others:")
@@ -197,7 +215,7 @@ class Margins(Saved):
         lines.append(f"{'':{width}}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
         for name, row in self.percentiles().items():
             lines.append(f"{f'{name} {unit_of(name)}'.strip():{width}}" + "".join(f"{value:10.4g}" for value in row))
-        return "\n".join([*lines, *self.messages])
+        return [*lines, *self.messages]
 
 
 @near_names()

@@ -11,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.near import near_names
+from lgvi_warp.common.summaries import few_digits, listed
 from lgvi_warp.control.over_floor import seen_floors
 from lgvi_warp.criteria.files import Saved
 from lgvi_warp.criteria.running import step_of
@@ -29,6 +30,8 @@ STEP = 1e-6
 # Commands to begin with, as parts of their limits: where thrust goes with n |n|, it has no derivative at 0.
 GUESSES = (0.0, 0.05, 0.5)
 ANGLES = ("roll", "pitch", "drift")
+# Numbers that the answer names.
+MOST_NAMED = 5
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class Trim(Saved):
         """Names of what was free, in the order of the values."""
         return tuple(self.values)
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         # "start" as the section of a scene file; of the method what is no default.
         commands = {key: each.tolist() for key, each in self.commands.items()}
         found = {"start": self.start.to_dict(), "commands": commands, "values": dict(self.values)}
@@ -71,7 +74,7 @@ class Trim(Saved):
         return {**found, "fixed": dict(self.fixed), "residual": self.residual.tolist(), **method}
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         commands = {key: np.array(each, np.float64) for key, each in content["commands"].items()}
         method = Method(content["method"], **content.get("method_options", {}))
         residual = np.array(content["residual"], np.float64)
@@ -83,14 +86,25 @@ class Trim(Saved):
             for name, value in values.items():
                 yield {"name": name, "value": float(value), "kind": kind}
 
-    def __str__(self) -> str:
-        units = {name: "rad" for name in ANGLES} | {"speed": "m/s"}
+    @property
+    def answer(self) -> str:
+        # Without round-off, of which the text has all digits.
+        rounded = {name: round(value, 9) + 0.0 for name, value in (self.values or self.fixed).items()}
+        return f"The motion is steady with {listed(_texts(rounded, 4), MOST_NAMED)}."
 
-        def listed(values: Mapping[str, float]) -> str:
-            return ", ".join(f"{name} {value:.6g} {units.get(name, '')}".strip() for name, value in values.items())
+    def _report(self) -> list[str]:
+        remainder = f"accelerations below {np.abs(self.residual).max():.1e} m/s2, rad/s2"
+        lists = {"free": self.values, "fixed": self.fixed}
+        return [
+            *(f"{name:<12}{', '.join(_texts(each)) or 'nothing'}" for name, each in lists.items()),
+            f"left        {remainder}",
+        ]
 
-        remainder = f"accelerations below {np.abs(self.residual).max():.1e} m/s2, rad/s2 are left"
-        return f"steady motion: {listed(self.values)}; fixed: {listed(self.fixed)}; {remainder}"
+
+def _texts(values: Mapping[str, float], digits: int = 6) -> list[str]:
+    """Names with values; a command is in the unit of its term, which is the user's."""
+    units = {name: "rad" for name in ANGLES} | {"speed": "m/s"}
+    return [f"{name} {few_digits(value, units.get(name, ''), digits)}" for name, value in values.items()]
 
 
 @near_names()

@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.calls.prepared import Prepared, prepare
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.results.quantities import MetricQuantity, names_an_end
+from lgvi_warp.results.quantities import MetricQuantity, names_an_end, unit_of
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.member_metrics import names_a_statistic
+from lgvi_warp.store.layout import units_of_numbers
+
+# Numbers of a search that its answer names.
+MOST_NAMED = 4
 
 
 class Numbers:
@@ -31,7 +35,12 @@ class Numbers:
             self.label = of.label
         else:
             self.label = of if isinstance(of, str) else getattr(of, "__name__", str(of))
+        self._scene, self._unit = scene, unit_of(of)
         self.run: Prepared = prepare(scene, names, of, failed="nan", **settings)
+
+    def units(self, names: Iterable[str]) -> dict[str, str]:
+        """The unit of the objective and of numbers of the scene, by name."""
+        return {self.label: self._unit} | units_of_numbers(self._scene, names)
 
     def __call__(self, call: Callable[[Prepared], Any]) -> np.ndarray:
         """The numbers of members (n,)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -15,12 +15,13 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.summaries import few_digits, listed, plural
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.criteria.risk import risk_of
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, search
-from lgvi_warp.robustness.search.numbers import Numbers
+from lgvi_warp.robustness.search.numbers import MOST_NAMED, Numbers
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.names import single_number
@@ -45,6 +46,7 @@ class Tuned(Saved):
         at_bounds: names of the numbers that lie at their bounds: these may be too narrow.
         restarts: (r,), the least risk of each evolution.
         runs: number of members that were run.
+        units: unit of the quantity and of the numbers, by name.
     """
 
     study: ClassVar[str] = "tune_gains"
@@ -61,17 +63,18 @@ class Tuned(Saved):
     at_bounds: tuple[str, ...]
     restarts: np.ndarray
     runs: int
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def optimism(self) -> float:
         """Difference between the risk of fresh members and that seen in the search."""
         return self.fresh_cost - self.cost
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         return dict(finite_or_none({item.name: getattr(self, item.name) for item in fields(self)}))
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         # A risk that is not finite is of members that fail; without fresh members there is none.
         costs = {name: with_missing_as(content[name], math.inf if content["fresh"] or name == "cost" else math.nan)
                  for name in ("cost", "fresh_cost", "fresh_before")}  # fmt: skip
@@ -82,18 +85,32 @@ class Tuned(Saved):
         for name, value in self.parameters.items():
             yield {"name": name, "value": value, "before": self.before[name], "at_bounds": name in self.at_bounds}
 
-    def __str__(self) -> str:
-        numbers = ", ".join(
-            f"{name} = {value:.6g} (was {self.before[name]:.6g})" for name, value in self.parameters.items()
+    @property
+    def answer(self) -> str:
+        numbers = [
+            f"{name} {few_digits(value, self.units.get(name, ''), 4)} (was {self.before[name]:.4g})"
+            for name, value in self.parameters.items()
+        ]
+        after, before, seen = (
+            few_digits(cost, self.units.get(self.of, ""), 4) if math.isfinite(cost) else "infinite, as members fail,"
+            for cost in (self.fresh_cost, self.fresh_before, self.cost)
         )
+        risk, where = f"{self.risk} of {self.of}", f"with {listed(numbers, MOST_NAMED)}."
+        if not self.fresh:
+            return f"{risk} is {seen} over the {plural(self.members, 'member')} of the search {where}"
+        change = f"{'falls' if self.fresh_cost < self.fresh_before else 'rises'} from {before} to {after}"
+        if self.fresh_cost == self.fresh_before:
+            change = f"stays {after}"
+        return f"{risk} {change} over {plural(self.fresh, 'fresh member')} {where}"
+
+    def _report(self) -> list[str]:
         lines = [
-            f"{self.risk} of {self.of}: {numbers}",
-            f"{self.cost:.6g} over the {self.members} members of the search, {self.fresh_cost:.6g} over {self.fresh} fresh "
-            f"ones (optimism {self.optimism:.3g}); the scene's numbers: {self.fresh_before:.6g}; {self.runs} runs",
+            f"search      {self.cost:.6g} over its {plural(self.members, 'member')} (optimism {self.optimism:.3g}); "
+            f"{plural(self.runs, 'run')}"
         ]
         if self.at_bounds:
-            lines.append(f"at their bounds, which may be too narrow: {', '.join(self.at_bounds)}")
-        return "\n".join(lines)
+            lines.append(f"bounds      may be too narrow, they are reached: {', '.join(self.at_bounds)}")
+        return lines
 
 
 @shows_progress
@@ -188,6 +205,7 @@ def tune_gains(
         at_bounds=tuple(name for name, value, low, high in edges if value in (low, high)),
         restarts=optimum.restarts,
         runs=n * optimum.runs + 2 * count,
+        units=numbers_of.units(box.names),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -15,10 +15,11 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.common.summaries import few_digits, listed, plural
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, least_peak, search
-from lgvi_warp.robustness.search.numbers import Numbers
+from lgvi_warp.robustness.search.numbers import MOST_NAMED, Numbers
 from lgvi_warp.runs.request import scene_of
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.ensemble import Ensemble
@@ -44,6 +45,7 @@ class WorstCase(Saved):
             worst_case.csv: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")) is the member.
         of_metric: whether the quantity is a metric, which is infinite where a loop never gets there; by default False.
         points: number of members that were spread evenly over the box, whatever their quantity.
+        units: unit of the quantity and of the numbers, by name.
     """
 
     study: ClassVar[str] = "worst_case"
@@ -58,17 +60,18 @@ class WorstCase(Saved):
     fleet: Ensemble | None
     of_metric: bool = False
     points: int = 0
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def unseen(self) -> float:
         """Part of the box that a separate peak needs so that one of the spread points meets it with 95 %; 1 without points."""
         return least_peak(self.points)
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         return finite_or_none({item.name: getattr(self, item.name) for item in fields(self) if item.name != "fleet"})
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         # What is not finite is a member that failed, or never got there.
         worse = math.inf if content["worst"] == "largest" else -math.inf
         restarts = np.array(with_missing_as(content["restarts"], worse), np.float64)
@@ -78,18 +81,27 @@ class WorstCase(Saved):
     def rows(self) -> Iterator[dict[str, Any]]:
         yield dict(self.parameters)
 
-    def __str__(self) -> str:
-        where = ", ".join(
-            f"{name} = {value:.6g}" + (f" ({side})" if (side := self.at_bounds[name]) else "")
+    @property
+    def answer(self) -> str:
+        sides = {"low": " (its lower bound)", "high": " (its upper bound)", "": ""}
+        numbers = [
+            f"{name} {few_digits(value, self.units.get(name, ''), 4)}{sides[self.at_bounds[name]]}"
             for name, value in self.parameters.items()
-        )
-        if math.isinf(self.value):
-            event = f"{self.of} is infinite, or a member fails" if self.of_metric else "a member fails"
-            return f"{event}: {where}; found in {self.runs} runs"
+        ]
+        where = f"at {listed(numbers, MOST_NAMED)}, in {plural(self.runs, 'run')}."
+        if math.isfinite(self.value):
+            return (
+                f"The {self.worst} {self.of} found is {few_digits(self.value, self.units.get(self.of, ''), 4)} {where}"
+            )
+        return f"{f'{self.of} is infinite, or a member fails,' if self.of_metric else 'A member fails'} {where}"
+
+    def _report(self) -> list[str]:
+        if not math.isfinite(self.value):
+            return []
         bound = "a lower bound of the largest" if self.worst == "largest" else "an upper bound of the smallest"
         restarts = ", ".join(f"{value:.6g}" for value in self.restarts)
         seen = f"; a separate peak in {self.unseen:.2g} of the box or more was met with 95 %" if self.points else ""
-        return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {restarts}{seen}"
+        return [f"bound       {bound}; restarts: {restarts}{seen}"]
 
 
 @shows_progress
@@ -175,6 +187,7 @@ def worst_case(
     # A search by the sign; a failure is infinite whatever is worst.
     value = math.inf if math.isinf(best.cost) else sign * best.cost
     label, of_metric = numbers_of.label, numbers_of.of_metric
+    units = numbers_of.units(box.names)
     return WorstCase(
-        parameters, value, label, worst, sides, sign * best.restarts, best.runs, member, of_metric, best.points
+        parameters, value, label, worst, sides, sign * best.restarts, best.runs, member, of_metric, best.points, units
     )

@@ -24,7 +24,7 @@ from lgvi_warp.robustness.sweeps.comparisons import PairedComparison, compared, 
 from lgvi_warp.robustness.sweeps.rare import RareComparison
 from lgvi_warp.robustness.sweeps.rare_output import provenance_of_rare, rare_against_baseline, rare_rows
 from lgvi_warp.robustness.sweeps.setup import END, SweepCell, rerun_members_of
-from lgvi_warp.robustness.sweeps.summary import against_baseline, summary
+from lgvi_warp.robustness.sweeps.summary import against_baseline, answer_of, summary
 from lgvi_warp.robustness.sweeps.sweep_table import SUCCESS, SweepTable
 from lgvi_warp.robustness.sweeps.verdicts import matters_of
 from lgvi_warp.statistics.estimates import paired
@@ -67,6 +67,11 @@ class Sweep(SweepTable):
         rows: Success and metrics of each cell, as records.
         save: Write tables and summary into a folder.
     """
+
+    @property
+    def answer(self) -> str:
+        """The best and the worst cells in one sentence; `str` ends with it."""
+        return answer_of(self)
 
     def compare(
         self,
@@ -293,7 +298,7 @@ class Sweep(SweepTable):
             tables["rare_comparison"] = [row.row() for row in rare_against_baseline(self)]
         files = [write_csv(rows, target / f"{name}.csv", target) for name, rows in tables.items()]
         texts = {
-            "sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1),
+            "sweep.json": json.dumps({"answer": self.answer} | finite_or_none(provenance(self)), indent=1),
             "summary.md": markdown(str(self)),
         }
         return files + [write_text(target / name, text, target) for name, text in texts.items()]

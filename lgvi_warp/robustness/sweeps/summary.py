@@ -11,19 +11,23 @@ import numpy as np
 
 from lgvi_warp.common.errors import printable
 from lgvi_warp.common.status import Status
-from lgvi_warp.criteria.success import none_text
+from lgvi_warp.common.summaries import percent, plural
+from lgvi_warp.criteria.success import Success, none_text
 from lgvi_warp.results.outcomes import RISEN
 from lgvi_warp.robustness.sweeps.comparisons import PairedComparison
 from lgvi_warp.robustness.sweeps.rare_output import rare_lines
 from lgvi_warp.robustness.sweeps.setup import SweepCell
 from lgvi_warp.robustness.sweeps.sweep_table import SUCCESS, SweepTable
 from lgvi_warp.robustness.sweeps.verdicts import VERDICTS
+from lgvi_warp.store.layout import units_of_numbers
 
 # A Sweep, of `output`, which asks for this summary.
 Sweep = Any
 
 # More cells than these are summed up by case; so many cases are named then, and so many inputs.
 MOST_CELLS, MOST_CASES, MOST_INPUTS = 10, 5, 2
+# Values, or points of the grid, that the answer names.
+MOST_NAMED = 2
 
 
 def against_baseline(sweep: Sweep) -> list[PairedComparison]:
@@ -45,7 +49,56 @@ def summary(sweep: Sweep) -> str:
         at = len(lines) if brief else lines.index("## What failures go with") - 1
         lines[at:at] = ["", "## Rare failures", "", *rare_lines(sweep)]
     # A name of a file may hold line ends.
-    return "\n".join(map(printable, [*lines, *_above_surface(sweep)])) + "\n"
+    return "\n".join(map(printable, [*lines, *_above_surface(sweep), "", answer_of(sweep)])) + "\n"
+
+
+def ends_of(sweep: SweepTable) -> tuple[list[SweepCell], list[SweepCell]]:
+    """The cells in which most members pass, and those in which fewest do; both empty where none ran."""
+    counts = {cell.index: int(sweep.passed(cell).sum()) for cell in sweep.cells if not sweep.record(cell).refused}
+    ends = (max(counts.values(), default=0), min(counts.values(), default=0))
+    best, worst = ([cell for cell in sweep.cells if counts.get(cell.index) == end] for end in ends)
+    return best, worst
+
+
+def answer_of(sweep: SweepTable) -> str:
+    """The best and the worst cells in one sentence."""
+    (best, worst), count = ends_of(sweep), len(sweep.cells)
+    refused = sum(bool(sweep.record(cell).refused) for cell in sweep.cells)
+    if not best:
+        return f"No cell ran: {plural(refused, 'cell')} refused."
+    verb = "reach the end" if sweep.conditions == Success() else "hold"
+    said = f"{_share(sweep, best[0])} of {plural(sweep.members_count, 'member')} {verb}"
+    if best != worst:
+        said = f"Best: {_place(sweep, best)}: {said}; worst: {_place(sweep, worst)}: {_share(sweep, worst[0])}"
+    elif count > 1:
+        said = f"In {_place(sweep, best) if refused else f'all {count} cells'} {said}"
+    return f"{said}; {plural(refused, 'cell')} refused." if refused else f"{said}."
+
+
+def _share(sweep: SweepTable, cell: SweepCell) -> str:
+    """Share of the members that pass, with its interval."""
+    value, lower, upper = (percent(each, 3) for each in sweep.success(cell.case.name, cell.point))
+    return f"{value} % ({lower} to {upper} %)"
+
+
+def _place(sweep: SweepTable, cells: Sequence[SweepCell]) -> str:
+    """Cases and points of cells, "soft, kp 0.2, delay 1 or 2 s", of axes with several values."""
+    axes = {name: values for name, values in sweep.setup.axes.items() if len(values) > 1}
+    units = {name: f" {unit}" * (unit != "1") for name, unit in units_of_numbers(sweep.setup.scene, axes).items()}
+    cases = list(dict.fromkeys(cell.case.name for cell in cells)) if len(sweep.cases) > 1 or not axes else []
+    values = {name: list(dict.fromkeys(str(cell.point[name]) for cell in cells)) for name in axes}
+    if max(1, len(cases)) * np.prod([len(each) for each in values.values()]) == len(cells):
+        texts = [f"{name} {_either(each)}{units[name]}" for name, each in values.items()]
+        return ", ".join([*([_either(cases)] if cases else []), *texts])
+    points = [", ".join([*[cell.case.name] * bool(cases), *(f"{name} {cell.point[name]}{units[name]}" for name in axes)])
+              for cell in cells]  # fmt: skip
+    return _either(points, 1 if len(axes) > 1 else MOST_NAMED)
+
+
+def _either(texts: Sequence[str], most: int = MOST_NAMED) -> str:
+    """Alternatives, a few by name."""
+    more = [f"{len(texts) - most:,} more"] if len(texts) > most else []
+    return " or ".join([*texts[:most], *more])
 
 
 def _above_surface(sweep: Sweep) -> list[str]:
@@ -138,11 +191,6 @@ def _at(points: Sequence[Mapping[str, Any]]) -> str:
     if np.prod([len(each) for each in values.values()]) == len(points):
         return " at " + ", ".join(f"{name} = {' or '.join(each)}" for name, each in values.items())
     return " at " + "; ".join(", ".join(f"{name} = {value}" for name, value in point.items()) for point in points)
-
-
-def percent(value: float) -> str:
-    """A fraction in percent, as text."""
-    return f"{100.0 * value:.4g}"
 
 
 def _rank_text(row: Mapping[str, Any]) -> str:

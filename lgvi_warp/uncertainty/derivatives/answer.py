@@ -10,10 +10,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.common.summaries import few_digits, plural
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 
-# Pairs of names that are told with one reason.
-MOST_NAMES = 2
+# Pairs of names that are told with one reason, and derivatives that the answer names.
+MOST_NAMES, MOST_NAMED = 2, 3
 ARRAYS = ("value", "jacobian", "error", "increments")
 
 
@@ -37,6 +38,7 @@ class Derivatives(Saved):
         messages: notes for the user.
         members: copies of members that were run.
         provenance: scene, settings, versions and machine.
+        by_units: units of the numbers (k,), "1" for none.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -59,8 +61,35 @@ class Derivatives(Saved):
     messages: tuple[str, ...] = ()
     members: int = 0
     provenance: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    by_units: tuple[str, ...] = ()
 
-    def __str__(self) -> str:
+    @property
+    def answer(self) -> str:
+        jacobian = np.atleast_3d(self.jacobian.T).T
+        defined = np.isfinite(jacobian)
+        texts: dict[str, list[str]] = {}
+        named = [(i, j) for i, j in np.ndindex(defined.shape[1:]) if defined[:, i, j].any()]
+        for i, j in named[:MOST_NAMED]:
+            slope = few_digits(jacobian[defined[:, i, j], i, j].mean(), self.units[i], 4)
+            error = f" (+- {self.error[i, j]:.1g})" if self.jacobian.ndim == 2 and np.isfinite(self.error[i, j]) else ""
+            unit = dict(enumerate(self.by_units)).get(j, "1")
+            step = "unit" if unit == "1" else unit
+            texts.setdefault(self.of[i], []).append(f"{slope}{error} per {step} of {self.by[j]}")
+        if not named:
+            return f"None of {plural(defined[0].size, 'derivative')} is defined."
+        said = "; ".join(f"{of} changes by {', '.join(each)}" for of, each in texts.items())
+        more = f", and {plural(len(named) - MOST_NAMED, 'more derivative')}" if len(named) > MOST_NAMED else ""
+        undefined = int((~defined.any(axis=0)).sum())
+        none = f"; {undefined} of {defined[0].size} are undefined" if undefined else ""
+        return (
+            said
+            + more
+            + (f", on average over {len(jacobian):,} members" if self.jacobian.ndim == 3 else "")
+            + none
+            + "."
+        )
+
+    def _report(self) -> list[str]:
         fleet = self.value.ndim == 2
         lines = ["of a fleet: mean over members, and the least and the largest"] if fleet else []
         for i, label in enumerate(self.of):
@@ -77,15 +106,15 @@ class Derivatives(Saved):
         for reason, names in pairs.items():
             more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
             lines.append(f"undefined   {', '.join(names[:MOST_NAMES])}{more}: {reason}")
-        return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
+        return [*lines, *(f"note        {message}" for message in self.messages)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         return finite_or_none({item.name: getattr(self, item.name) for item in fields(self)})
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         arrays = {name: np.array(with_missing_as(content[name], math.nan), dtype=np.float64) for name in ARRAYS}
-        texts = {name: tuple(content[name]) for name in ("of", "units", "by", "messages")}
+        texts = {name: tuple(content.get(name, ())) for name in ("of", "units", "by", "by_units", "messages")}
         return cls(**content | arrays | texts)
 
     def rows(self) -> Iterator[dict[str, Any]]:

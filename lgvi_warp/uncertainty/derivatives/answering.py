@@ -14,6 +14,7 @@ from lgvi_warp.measuring.reference import ROUND_OFF
 from lgvi_warp.results.quantities import EndQuantity, OfResult
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.variations import Target
+from lgvi_warp.store.layout import units_of_numbers
 from lgvi_warp.uncertainty.derivatives import undefined
 from lgvi_warp.uncertainty.derivatives.answer import Derivatives
 from lgvi_warp.uncertainty.derivatives.copies import CopyRuns, MovedCopies, Neighbours, neighbours
@@ -100,6 +101,7 @@ class Answering:
             messages=(*([smoothed] if question.smoothed else ()), *self._sides.values()),
             members=runs.members,
             provenance=runs.provenance,
+            by_units=tuple(units_of_numbers(question.scene, question.names).values()),
         )  # fmt: skip
 
     def _legs_of(self, at_end: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Self
 
 from lgvi_warp.common import summaries
-from lgvi_warp.common.summaries import Summarized
+from lgvi_warp.common.summaries import Summarized, few_digits
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.uncertainty.estimating.levels import Setting
 
@@ -76,10 +76,23 @@ class Estimated(Summarized, Saved):
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         return f"Estimated {self.of}", self._rows()
 
-    def _rows(self) -> summaries.Rows:
-        after = "" if self.unit in ("", "1") else f" {self.unit}"
+    @property
+    def answer(self) -> str:
+        if math.isnan(self.value):
+            return f"{self.of} has no finite value."
+        reached = few_digits(self.error_reached, self.unit, 3)
+        asked = f", {self.error:.3g} requested" if math.isfinite(self.error) else ""
+        return f"{self.of} is {self._value()}; root-mean-square error {reached}{asked}."
+
+    def _value(self) -> str:
+        """The estimate with its interval."""
         low, high = self.interval
         digits = _digits(self.value, 0.5 * (high - low))
+        text = few_digits(self.value, self.unit, digits)
+        return f"{text}, 95 % interval {low:.{digits}g} to {high:.{digits}g}"
+
+    def _rows(self) -> summaries.Rows:
+        after = "" if self.unit in ("", "1") else f" {self.unit}"
         members = ", ".join(f"{name}: {count:,}" for name, count in self.members.items())
         below, above = self.bias_interval
         gain = f" ({self.plain_seconds / self.seconds:.2g} times)" if self.seconds > 0.0 else ""
@@ -89,7 +102,7 @@ class Estimated(Summarized, Saved):
             cost += f", at the scene's own step {self.own_seconds:.2g} s"
         tried = ", ".join(f"{name} {gain:.2g} times" for name, gain in self.rivals.items())
         return [
-            ("value", f"{self.value:.{digits}g}{after}, 95 % interval {low:.{digits}g} to {high:.{digits}g}"),
+            ("value", self._value()),
             ("sampling", f"{self.sampling_error:.2g}{after}   {self.estimator}: {members}"),
             ("bias", f"{self.bias:.2g}{after} ({below:.2g} to {above:.2g})   {self.setting} against {self.reference}"),
             ("cost", cost),
@@ -97,19 +110,17 @@ class Estimated(Summarized, Saved):
             *(("note", message) for message in self.messages),
         ]
 
-    def __str__(self) -> str:
-        rows = self._rows()
-        first, width = self.of, max(len(self.of), 10)
-        labels = [first, *(label for label, _ in rows[1:])]
-        return "\n".join(f"{label:<{width}}  {text}" for label, (_, text) in zip(labels, rows, strict=True))
+    def _report(self) -> Iterator[str]:
+        # The answer has the value.
+        yield from (f"{label:<10}  {text}" for label, text in self._rows()[1:])
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         names = [item.name for item in fields(self) if item.name not in ("provenance", "settings")]
         content = {name: getattr(self, name) for name in names} | {"members": dict(self.members)}
         return dict(finite_or_none(content | {"rivals": dict(self.rivals), "recipe": dict(self.recipe)}))
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         low, high = content["interval"]
         ends = (-math.inf if low is None else low, math.inf if high is None else high)
         settings = Setting.from_dict(content["recipe"]["setting"]).options()

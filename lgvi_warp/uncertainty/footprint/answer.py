@@ -99,7 +99,7 @@ class Footprint(Saved):
         within = f"within {number_text(region.radius, region.radius)} m of" if region.radius > 0.0 else "at"
         return f"{before}{share} {are} {within} {place}"
 
-    def __str__(self) -> str:
+    def _report(self) -> Iterator[str]:
         lines = [f"footprint   {self.members:,} members, at {self.at}{' s' * (time_of(self.at) is not None)}"]
         if self.lacking:
             counts = ", ".join(f"{name} {count:,}" for name, count in self.lacking.items())
@@ -115,19 +115,18 @@ class Footprint(Saved):
             lines += [
                 f"growth      {self.main.percent} of {n:,} members: {_area_text(*areas)}" for n, *areas in self.growth
             ]
-        return "\n".join([*lines, *(f"note        {text}" for text in self.messages), f"answer      {self.answer}"])
+        return iter([*lines, *(f"note        {text}" for text in self.messages)])
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         content = {item.name: getattr(self, item.name) for item in fields(self) if item.name != "provenance"}
-        content |= {"regions": [asdict(region) for region in self.regions], "answer": self.answer}
+        content |= {"regions": [asdict(region) for region in self.regions]}
         return dict(finite_or_none(content)) | {"provenance": self.provenance}
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
-        told = {name: value for name, value in content.items() if name != "answer"}
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         arrays = {name: np.array(content[name], np.float64) for name in ("centre", "covariance")}
         places = np.array(content["places"], np.float64).reshape(-1, 2)
-        return cls(**told | arrays | {
+        return cls(**content | arrays | {
             "places": places,
             "regions": tuple(_region(entry) for entry in content["regions"]),
             "growth": tuple((n, *with_missing_as(areas, math.inf)) for n, *areas in content["growth"]),

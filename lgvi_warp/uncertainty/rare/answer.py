@@ -9,10 +9,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.common.summaries import listed
 from lgvi_warp.criteria.files import Saved, finite_or_none
 from lgvi_warp.criteria.running import duration_text
 from lgvi_warp.sampling.designs.table import Table
-from lgvi_warp.uncertainty.rare.causes import Chance, moved_text
+from lgvi_warp.uncertainty.rare.causes import Chance, moved_texts
 from lgvi_warp.uncertainty.rare.subset import SubsetRun
 
 # Most numbers that are listed as moved by the event.
@@ -99,14 +100,28 @@ class RareEvent(Saved):
     by_condition: Mapping[str, Chance] = field(default_factory=dict)
     ancestors: np.ndarray = field(default_factory=lambda: np.zeros(0, int), repr=False)
 
-    def __str__(self) -> str:
+    @property
+    def answer(self) -> str:
         low, high = self.interval
+        found = f"Probability of {self.event}: {self.probability:.3g} (95 % interval {low:.3g} to {high:.3g})"
+        if not len(self.weights):
+            return f"{found}; no failing member was found."
+        if not (self.moved or self.noise_moved):
+            return f"{found}."
+        return f"{found}; in failing members {listed(self._moved() or ['nothing differs beyond chance'], 1)}."
+
+    def _moved(self) -> list[str]:
+        """Differences of the failing members from all in words, the clearest first."""
+        columns = [each.values() for each in (self.moved, self.moved_size, self.moved_spread, self.moved_z)]
+        moved = dict(zip(self.moved, zip(*columns, strict=False), strict=False))
+        laws = self.provenance.get("ensemble", {}).get("vary", {})
+        normal = {name for name in moved if "normal" in laws.get(name, laws.get(name.partition("[")[0], {}))}
+        return moved_texts(moved, self.noise_moved, normal)
+
+    def _report(self) -> list[str]:
         members = ", ".join(f"{count:,} at {name}" for name, count in self.members.items())
         lines = [
-            f"probability {self.probability:.3g}, 95 % interval {low:.3g} to {high:.3g} "
-            f"(error {100.0 * self.relative_error:.2g} % of it)",
-            f"event       {self.event}",
-            f"by          {ESTIMATORS[self.estimator]}",
+            f"by          {ESTIMATORS[self.estimator]}, to {100.0 * self.relative_error:.2g} % of the probability",
             f"members     {members}; {duration_text(self.seconds)}",
             f"plain       would take {self.plain_members:,.3g} members for this error, {duration_text(self.plain_seconds)}",
         ]
@@ -118,12 +133,11 @@ class RareEvent(Saved):
             numbers = ", ".join(f"{name} = {_short(value)}" for name, value in self.likeliest.items())
             noise = " and its noise" if len(self.likeliest_draws) or self.estimator == "splitting" else ""
             lines.append(f"likeliest   {numbers or 'the scene'}{noise}: {self.distance:.2f} sd from the middle")
-            columns = [each.values() for each in (self.moved, self.moved_size, self.moved_spread, self.moved_z)]
-            moved = dict(zip(self.moved, zip(*columns, strict=False), strict=False))
-            lines.append(f"moved       {moved_text(moved, self.noise_moved, MOST_MOVED)}")
-        return "\n".join([*lines, *(f"note        {message}" for message in self.messages)])
+            # The answer has the first one.
+            lines += [f"moved       {text}" for text in self._moved()[1:MOST_MOVED]]
+        return [*lines, *(f"note        {message}" for message in self.messages)]
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         failing = None if self.failing is None else self.failing.own_values()
         kept = ("probability", "spread", "thresholds", "acceptance", "size", "members")
         runs = [{name: getattr(run, name) for name in kept} | {"limits": list(run.limits)} for run in self.runs]
@@ -134,7 +148,7 @@ class RareEvent(Saved):
         )
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         arrays = {name: np.array(content[name], float) for name in ("draws", "normals", "weights", "likeliest_draws")}
         for name in ("draws", "normals"):
             arrays[name] = arrays[name].reshape(len(arrays["weights"]), -1)

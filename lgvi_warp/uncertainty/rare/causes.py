@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -73,23 +73,29 @@ def noise_score(x: np.ndarray, weights: np.ndarray, chains: np.ndarray, parts: n
     return max(path, abs(squares))
 
 
-def moved_text(moved: Mapping[str, Sequence[float]], noise: Mapping[str, float], most: int) -> str:
-    """Significant differences in words, the clearest first; moved: (mean, size, spread, z) by name. noise: z by name."""
-    said = [(abs(z), words) for name, (mean, size, spread, z) in moved.items()
-            if abs(z) >= SIGNIFICANT and (words := _words(name, mean, size, spread))]  # fmt: skip
-    said += [(z, f"{name} (z = {z:.0f})") for name, z in noise.items() if z >= SIGNIFICANT]
-    ranked = [words for _, words in sorted(said, key=lambda pair: -pair[0])]
-    return ", ".join(ranked[:most]) or "no number or noise beyond chance"
+def moved_texts(moved: Mapping[str, Sequence[float]], noise: Mapping[str, float], normal: Container[str]) -> list[str]:
+    """Significant differences in words, the clearest first.
+
+    moved: (mean, size, spread, z) by name. noise: z by name. normal: numbers that are normal, whose middle is their mean.
+    """
+    said = [(z, f"the noise of {name} differs from that of all (z = {z:.0f})") for name, z in noise.items()]
+    for name, (mean, size, spread, z) in moved.items():
+        if words := _words("mean" if name in normal else "median", mean, size, spread):
+            said.append((abs(z), f"{name} {words}"))
+    return [words for z, words in sorted(said, key=lambda pair: -pair[0]) if z >= SIGNIFICANT]
 
 
-def _words(name: str, mean: float, size: float, spread: float) -> str:
+def _words(middle: str, mean: float, size: float, spread: float) -> str:
+    """A difference in words; "" for none that is worth a line. Deviations of other laws are those of the normal score."""
+    deviations = "standard deviations" if middle == "mean" else "standard deviations of its normal score"
+    away = f"is on average {abs(mean):.1f} {deviations} {'below' if mean < 0.0 else 'above'} its {middle}"
     if abs(mean) >= max(LEAST_MEAN, 0.5 * size):
-        return f"{name} {mean:+.1f} sd"
+        return away
     if size >= (1.0 + LEAST_RATIO) * SIZE:
-        return f"{name} to both sides, {size:.1f} sd on average"
+        return f"is on average {size:.1f} {deviations} from its {middle}, to both sides"
     if size <= (1.0 - LEAST_RATIO) * SIZE or spread <= 1.0 - LEAST_RATIO:
-        return f"{name} near its middle, spread {spread:.1f} sd"
-    return f"{name} {mean:+.1f} sd" if abs(mean) >= LEAST_MEAN else ""
+        return f"is near its {middle}, with a spread of {spread:.1f} {deviations}"
+    return away if abs(mean) >= LEAST_MEAN else ""
 
 
 def chances_of(

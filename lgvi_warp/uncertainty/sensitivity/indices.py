@@ -9,7 +9,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.summaries import few_digits, listed, percent
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
+from lgvi_warp.results.quantities import unit_of
+
+# Quantities that the answer names.
+MOST_QUANTITIES = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +52,8 @@ class Indices(Saved):
     intervals: ClassVar[dict[str, str]] = {}
     # Columns that a picture shows; empty: all.
     drawn: ClassVar[tuple[str, ...]] = ()
+    # Column by which the answer ranks the factors.
+    ranked: ClassVar[str] = "first"
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """List one record for each quantity, factor and index.
@@ -65,7 +72,34 @@ class Indices(Saved):
     def _heading(self) -> str:
         return f"{self.name}: {self.samples} samples, {self.members} members, {self.failed} failed"
 
-    def __str__(self) -> str:
+    @property
+    def answer(self) -> str:
+        texts = [self._ranking(q) for q in range(len(self.quantities))]
+        more = f"; and {len(texts) - MOST_QUANTITIES:,} more" if len(texts) > MOST_QUANTITIES else ""
+        return f"{'; '.join(texts[:MOST_QUANTITIES])}{more}."
+
+    def _ranking(self, q: int) -> str:
+        """The factors on which a quantity depends most: several where their intervals overlap."""
+        quantity, values = self.quantities[q], getattr(self, self.ranked)[q]
+        half = np.nan_to_num(getattr(self, self.intervals[self.ranked])[q])
+        known = [f for f in np.argsort(-values, kind="stable") if np.isfinite(values[f])]
+        if not known:
+            return f"{quantity} does not vary, or has no finite values"
+        least = values[known[0]] - half[known[0]]
+        if least <= 0.0:
+            return f"{quantity} depends on no factor beyond sampling error"
+        first = [f for f in known if values[f] + half[f] >= least]
+        texts = [f"{self.factors[f]} ({self._amount(q, values[f], half[f])})" for f in known[: max(2, len(first))]]
+        if len(first) > 1:
+            return f"{quantity} depends most on {listed(texts, 2)}, which sampling error does not tell apart"
+        then = f", then on {texts[1]}" if len(texts) > 1 and len(self.quantities) == 1 else ""
+        return f"{quantity} depends most on {texts[0]}{then}"
+
+    def _amount(self, q: int, value: float, half: float) -> str:
+        """The amount that a factor explains of a quantity."""
+        return f"{percent(value, 3)} +- {100.0 * half:.2g} % of its variance"
+
+    def _report(self) -> list[str]:
         """A table for each quantity."""
         width = max(len(label) for label in (*self.factors, "factor"))
         lines = [self._heading(), *(f"note: {message}" for message in self.messages)]
@@ -76,8 +110,7 @@ class Indices(Saved):
                 cells = "".join(f"  {self._cell(column, q, f):>21}" for column in self.columns)
                 lines.append(f"  {factor:<{width}}{cells}")
             lines += self._more(q)
-        lines.append(f"+- is half the {self.confidence:.0%} interval")
-        return "\n".join(lines)
+        return [*lines, f"+- is half the {self.confidence:.0%} interval"]
 
     def _cell(self, column: str, q: int, f: int) -> str:
         value = getattr(self, column)[q, f]
@@ -88,25 +121,15 @@ class Indices(Saved):
         """Lines below a quantity's table."""
         return []
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         names = ("name", "factors", "quantities", "samples", "members", "failed", "confidence", "messages")
         content = {name: getattr(self, name) for name in (*names, "mean", "std")}
         content["rows"] = list(self.rows())
         return finite_or_none(content) | {"provenance": self.provenance}
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Indices:
-        """Build the result of an analysis from the content of a JSON file.
-
-        Args:
-            content: as `to_dict` returns it.
-
-        Returns:
-            Indices of the analysis that it names; numbers that were not finite are NaN.
-
-        Raises:
-            ValueError: where it names no known analysis.
-        """
+    def _of_content(cls, content: dict[str, Any]) -> Indices:
+        """Indices of the analysis that the content names. Raises ValueError where that is not known."""
         kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
         if not kinds:
             raise ValueError(f"{content['name']!r} is no analysis")
@@ -167,6 +190,7 @@ class SobolIndices(Indices):
     second_confidence: np.ndarray | None
     name: ClassVar[str] = "Sobol indices"
     columns: ClassVar[tuple[str, ...]] = ("first", "total")
+    ranked: ClassVar[str] = "total"
     intervals: ClassVar[dict[str, str]] = {"first": "first_confidence", "total": "total_confidence"}
 
     def rows(self) -> Iterator[dict[str, Any]]:
@@ -193,6 +217,9 @@ class SobolIndices(Indices):
             second[q, j, k] = second[q, k, j] = with_missing_as(row["value"], np.nan)
             half[q, j, k] = half[q, k, j] = with_missing_as(row["confidence"], np.nan)
         return {"second": second, "second_confidence": half}
+
+    def _amount(self, q: int, value: float, half: float) -> str:
+        return f"{super()._amount(q, value, half)}, with interactions"
 
     def _pairs(self) -> list[tuple[int, int, int]]:
         d = 0 if self.second is None else len(self.factors)
@@ -228,3 +255,7 @@ class MorrisEffects(Indices):
     name: ClassVar[str] = "Morris screening"
     columns: ClassVar[tuple[str, ...]] = ("mu_star", "mu", "sigma")
     intervals: ClassVar[dict[str, str]] = {"mu_star": "mu_star_confidence"}
+    ranked: ClassVar[str] = "mu_star"
+
+    def _amount(self, q: int, value: float, half: float) -> str:
+        return f"{few_digits(value, '', 3)} +- {few_digits(half, unit_of(self.quantities[q]), 2)} over its range"

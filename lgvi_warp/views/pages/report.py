@@ -23,7 +23,7 @@ from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_bytes, fi
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.criteria.files import of_study, study_files
-from lgvi_warp.results.outcomes import outcome_text, outcomes
+from lgvi_warp.results.outcomes import answer_of, outcome_text, outcomes
 from lgvi_warp.results.varied import varied
 from lgvi_warp.statistics.estimates.table import table
 from lgvi_warp.views.commands import faults
@@ -107,7 +107,10 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
         if run is not None:
             held, file = run
             parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {place}."), *_of_run(held)]
-        parts += [_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}.") for study in studies]
+        for study in studies:
+            parts.append(_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}."))
+            with of_study(study):
+                parts.append(_paragraph(str(file_json(study).pop("answer", ""))))
         if studies:
             parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
         for study in studies:
@@ -153,6 +156,7 @@ def _words(path: Path) -> str:
 def _of_run(result: Result) -> Iterator[str]:
     """The parts of a run's page."""
     yield _paragraph(title(result))
+    yield _paragraph(answer_of(result))
     yield _section("What became of the members", _outcome_table(result))
     remarks = [*result.messages, *_warnings(result), *(fault.text for fault in faults(result))]
     if remarks:
@@ -237,7 +241,11 @@ def _again(result: Result) -> str:
 def _of_study(path: Path) -> Iterator[str]:
     """The parts of a study's page but for its pictures: words, its table, and its settings."""
     with of_study(path):
-        short = {key: _shortened(value) for key, value in file_json(path).items() if not isinstance(value, list)}
+        short = {
+            key: _shortened(value)
+            for key, value in file_json(path).items()
+            if key != "answer" and not isinstance(value, list)
+        }
     table_file = "table.csv" if path.stem == "sweep" else f"{path.stem}.csv"
     if path.stem == "sweep" and os.path.lexists(path.with_name("summary.md")):
         yield _section("Summary", _preformatted(file_text(inside(path.parent, "summary.md"), "text file")))

@@ -6,7 +6,7 @@ Each draws on `figure=` or on a figure of its own, writes a file where `path` na
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,15 @@ import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import failed, under_way
+from lgvi_warp.common.summaries import percent
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import samples_of
 from lgvi_warp.robustness.sweeps.output import Sweep
 from lgvi_warp.robustness.sweeps.setup import END, SweepCell
-from lgvi_warp.robustness.sweeps.summary import against_baseline
+from lgvi_warp.robustness.sweeps.summary import against_baseline, ends_of
 from lgvi_warp.robustness.sweeps.sweep_table import SUCCESS
 from lgvi_warp.statistics import tracking
+from lgvi_warp.store.layout import units_of_numbers
 from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, legend_below, panels, point_down, style, wrapped
 from lgvi_warp.views.plots.fans import draw_bands
 from lgvi_warp.views.plots.picture import FilePath
@@ -56,7 +58,13 @@ def _short(sweep: Sweep, case: str, point: Mapping[str, Any]) -> str:
 
 def _meaning(sweep: Sweep) -> str:
     """Meanings of the words of `_short`."""
-    return ", ".join(["case", *_long(sweep)])
+    return ", ".join(["case", *_labels(sweep, _long(sweep)).values()])
+
+
+def _labels(sweep: Sweep, names: Iterable[str]) -> dict[str, str]:
+    """Names of numbers, and axes of the grid, with their units."""
+    units = units_of_numbers(sweep.setup.scene, names)
+    return {name: name if unit == "1" else f"{name} [{unit}]" for name, unit in units.items()}
 
 
 def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
@@ -75,7 +83,7 @@ def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
                 line = {"marker": MARKERS[i], "label": case} | style(i)
                 _ends(axes, sweep, _ran(sweep, case), _places(values), long[0], **line)
             axes.set_xticks(_places(values), [str(value) for value in values])
-            axes.set_xlabel(long[0])
+            axes.set_xlabel(_labels(sweep, long)[long[0]])
             axes.legend()
         else:
             _ends(axes, sweep, cells, list(map(float, range(len(cells)))), None, marker="o", linestyle="none")
@@ -108,6 +116,7 @@ def _places(values: list[Any]) -> list[float]:
 def _maps(sweep: Sweep, long: list[str], path: FilePath | None, figure: Any) -> np.ndarray:
     """Success over two axes, one map a case, at the first value of any other axis."""
     x, y = (sweep.setup.axes[name] for name in long[:2])
+    labels = _labels(sweep, long)
     further = {name: values[0] for name, values in sweep.setup.axes.items() if name not in long[:2]}
     size = (1.6 + 1.1 * len(x)) * len(sweep.cases), 1.8 + 0.6 * len(y)
     with panels(figure, path, (1, len(sweep.cases)), size, sharey=True) as grid:
@@ -124,10 +133,10 @@ def _maps(sweep: Sweep, long: list[str], path: FilePath | None, figure: Any) -> 
             axes.imshow(values, origin="lower", vmin=0.0, vmax=100.0, cmap="viridis", aspect="auto")
             axes.set_xticks(range(len(x)), [str(value) for value in x])
             axes.set_yticks(range(len(y)), [str(value) for value in y])
-            axes.set_xlabel(long[0])
+            axes.set_xlabel(labels[long[0]])
             axes.set_title(f"{case}: passes [%]")
-        grid[0, 0].set_ylabel(long[1])
-        if remark := ", ".join(f"{name} = {further[name]}" for name in long[2:]):
+        grid[0, 0].set_ylabel(labels[long[1]])
+        if remark := ", ".join(f"{labels[name]} = {further[name]}" for name in long[2:]):
             grid[0, 0].figure.suptitle(f"at {remark}")
     return grid.ravel()
 
@@ -190,11 +199,14 @@ def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any 
 
 
 def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
-    """Draw which members pass over the two inputs that explain most of it, in the cell where most is open."""
-    away, _, cell = min((abs(sweep.passed(cell).mean() - 0.5), cell.index, cell) for cell in _ran(sweep))
-    rows = sweep.causes(cell.case.name, cell.point)[:2]
-    if away == 0.5 or not rows:
+    """Draw which members pass over the two inputs that explain most of it, in the worst cell in which some pass."""
+    shares = [(sweep.passed(cell).mean(), cell.index, cell) for cell in _ran(sweep)]
+    share, _, cell = min([each for each in shares if 0.0 < each[0] < 1.0], default=(0.0, 0, sweep.cells[0]))
+    rows = sweep.causes(cell.case.name, cell.point)[:2] if share else []
+    if not rows:
         raise NothingToDraw("in no case some members pass and some do not, or nothing varies")
+    some = "" if share == min(shares)[0] else " of those in which some members pass"
+    labels = _labels(sweep, [row["input"] for row in rows])
     passed, inputs = sweep.passed(cell)[:MOST_POINTS], sweep.inputs(cell)
     x = inputs[rows[0]["input"]][:MOST_POINTS]
     y = inputs[rows[1]["input"]][:MOST_POINTS] if len(rows) > 1 else np.arange(len(x))
@@ -204,8 +216,9 @@ def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = Non
             axes.plot(
                 x[chosen], y[chosen], marker, color=color, markersize=4.0, label=f"{label}: {int(chosen.sum()):,}"
             )
-        words = [f"{row['input']}: explains {100.0 * row['share']:.3g} % of success" for row in rows]
-        axes.set(xlabel=words[0], ylabel=words[1] if len(rows) > 1 else "member", title=cell.name)
+        words = [f"{labels[row['input']]}: explains {100.0 * row['share']:.3g} % of success" for row in rows]
+        axes.set(xlabel=words[0], ylabel=words[1] if len(rows) > 1 else "member")
+        axes.set_title(wrapped(f"Worst cell{some}: {cell.name}", axes.figure))
         axes.legend()
     return grid.ravel()
 
@@ -213,16 +226,16 @@ def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = Non
 def plot_responses(
     sweep: Sweep, path: FilePath | None = None, of: str = "", members: int = MOST_PATHS, *, figure: Any = None
 ) -> np.ndarray:
-    """Draw fans of what is tracked over time, by case at one point of the grid, of members that are run again.
+    """Draw fans of what is tracked over time, in the best cell and the worst, of members that are run again.
 
-    The point is the one where the success of the cases differs most; the first one of equals.
+    Of equals it is the first one; where all are equal, the cases at the first point of the grid.
 
     of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
         "cross_track". By default what that metric is of whose medians differ most between cases there, in interquartile
         ranges; the first one of equals.
     """
-    cells = _most_apart(sweep)
-    of = of or _tracked(sweep, cells)
+    cells = _extremes(sweep)
+    of = of or _tracked(sweep, [cell for _, cell in cells])
     if of not in tracking.ERRORS:
         raise NothingToDraw("no metric is of a number that is tracked over time")
     count = min(members, sweep.members_count)
@@ -230,9 +243,10 @@ def plot_responses(
     rows = -(-len(cells) // columns)
     size = 4.5 * columns, 4.0 * rows
     with panels(figure, path, (rows, columns), size, len(cells), sharex=True, sharey=True) as grid:
-        for axes, cell in zip(grid.flat, cells, strict=False):
+        for axes, (word, cell) in zip(grid.flat, cells, strict=False):
             _response(axes, sweep, cell, of, count)
-            axes.set_title(wrapped(cell.name, axes.figure, 0.9 / columns))
+            title = f"{word}{percent(sweep.passed(cell).mean(), 3)} % pass: {cell.name}"
+            axes.set_title(wrapped(title, axes.figure, 0.9 / columns))
         grid[0, 0].figure.supxlabel("time [s]")
         unit = tracking.error(of, False).unit
         away = "" if of in tracking.CHANNELS[False] else " from what is wanted"
@@ -243,12 +257,12 @@ def plot_responses(
     return grid.ravel()[: len(cells)]
 
 
-def _most_apart(sweep: Sweep) -> list[SweepCell]:
-    """The cells that ran at the point of the grid where the success of the cases differs most."""
-    by_point: dict[tuple[Any, ...], list[SweepCell]] = {}
-    for cell in _ran(sweep):
-        by_point.setdefault(tuple(cell.point.values()), []).append(cell)
-    return max(by_point.values(), key=lambda cells: np.ptp([sweep.passed(cell).mean() for cell in cells]))
+def _extremes(sweep: Sweep) -> list[tuple[str, SweepCell]]:
+    """The best cell and the worst, with these words; where all are equal, those at the first point of the grid."""
+    ran, (best, worst) = _ran(sweep), ends_of(sweep)
+    if best != worst:
+        return [("best, ", best[0]), ("worst, ", worst[0])]
+    return [("", cell) for cell in ran if cell.point == ran[0].point]
 
 
 def _tracked(sweep: Sweep, cells: list[SweepCell]) -> str:

@@ -34,7 +34,15 @@ def test_run_writes_three_files_and_a_summary(finished):
     out, done = finished
     assert (done.returncode, done.stderr) == (0, "")
     assert sorted(path.name for path in out.iterdir()) == ["fleet.png", "fleet.rrd", "result.npz"]
-    for word in ("members     20", "psi_s", "vehicle-steps per second", "ok 20", "energy", "momentum", "result.npz"):
+    for word in (
+        "members     20",
+        "psi_s",
+        "vehicle-steps per second",
+        "All 20 members end ok at 2 s.",
+        "energy",
+        "momentum",
+        "result.npz",
+    ):
         assert word in done.stdout
 
 

@@ -38,10 +38,10 @@ def summary(result, drawn="same", **options):
 def test_a_plain_run_is_summed_up():
     result = told()
     lines = summary(result)
-    assert lines[:2] == ["members     4, psi_s, float64, step 0.01 s, 100 steps", "status      ok 4"]
-    assert lines[2].startswith("drift       ")
-    assert lines[2].endswith(" (largest of all members)")
-    assert len(lines) == 3
+    assert lines[0] == "members     4, psi_s, float64, step 0.01 s, 100 steps"
+    assert lines[1].startswith("drift       ")
+    assert lines[1].endswith(" (largest of all members)")
+    assert lines[2:] == ["All 4 members end ok at 1 s."]
     verbose = summary(result, verbose=True)
     assert verbose[1] == "how         seed 1, checks safe, packets of 8, 2 threads on a cpu (avx2)"
     assert verbose[2] == "versions    numpy 2, warp 1"
@@ -53,7 +53,6 @@ def test_notes_come_first_and_the_speed_before_the_outcomes():
     lines = summary(result, seconds=1.5)
     assert lines[:2] == ["note        odd", "note        odder"]
     assert lines[3] == "speed       800 vehicle-steps per second (0.50 s; kernel loaded in 0.25 s; 1.50 s in all)"
-    assert lines[4] == "status      ok 4"
     compiled = dataclasses.replace(result, compile_phases=Phases(0.1, 2.0, 0.2))
     assert summary(compiled)[3:5] == [lines[3].replace("1.50", "0.00"),
                                       f"kernel      compiled: {Phases(0.1, 2.0, 0.2)}"]  # fmt: skip
@@ -61,11 +60,11 @@ def test_notes_come_first_and_the_speed_before_the_outcomes():
 
 def test_what_was_not_kept_is_said():
     bare = dataclasses.replace(told(), samples={})
-    assert summary(bare, None)[2:] == report.unsaved(bare) == []
+    assert summary(bare, None)[1:-1] == report.unsaved(bare) == []
     whole = told()
     missing = {name: values for name, values in whole.samples.items() if name in ("position", "attitude")}
     text = "pictures    none, and no energy: velocity, angular_velocity not saved"
-    assert summary(dataclasses.replace(whole, samples=missing), None)[2:] == [text]
+    assert summary(dataclasses.replace(whole, samples=missing), None)[1:-1] == [text]
     assert report.unsaved(whole) == []
 
 
@@ -89,7 +88,7 @@ def test_the_first_member_with_a_warning_is_named():
     texts = [f"  {str(warning.name).lower()}: {warning.text} (first: member {member} at {time} s, "
              f"{warning.value_name} = {value})" for warning, member, time, value in ((Warnings.INERTIA, 4, "1.5", "7"),
                                                   (Warnings.PRECISION_LOSS, 2, "2", "1.235"))]  # fmt: skip
-    assert summary(result)[-3:] == ["warnings    inertia 2, precision_loss 3", *texts]
+    assert summary(result)[-4:-1] == ["warnings    inertia 2, precision_loss 3", *texts]
     assert not any("warnings" in line for line in summary(told()))
 
 
@@ -206,8 +205,9 @@ def test_the_end_of_a_run_is_told(tmp_path, capsys):
     assert "; 5.0" in out
     assert lines[2].startswith("how  ")
     assert err == "lgvi-warp: a is empty\n"
-    assert lines[-3].startswith("file        ")
-    assert lines[-2] == f"look        open {tmp_path}/fleet.png"
+    assert lines[-4].startswith("file        ")
+    assert lines[-3] == f"look        open {tmp_path}/fleet.png"
+    assert lines[-2:] == ["All 4 members end ok at 1 s.", ""]
 
 
 def test_a_part_of_a_run_is_to_be_merged(tmp_path, capsys):

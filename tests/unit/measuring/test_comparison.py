@@ -598,12 +598,12 @@ def test_a_tradeoff_in_words():
                                  setting=Candidate("psi_s", 0.1, solver="newton"))  # fmt: skip
     found = traded(measured("psi_x", 1.0, 1e-2, "float32", 0.2), second, messages=("one",),
                    refused={"gauss4": "a", "gauss6": "b"})  # fmt: skip
-    assert tradeoffs.report_text(found) == REPORT
+    assert str(found) == f"{REPORT}\n{found.answer}"
     lost = traded(measured("psi_x", 1.0, 1e-2, energy_drift=math.nan))
-    assert "energy drift" not in tradeoffs.report_text(lost)
-    assert "note" not in tradeoffs.report_text(lost)
-    bare = tradeoffs.report_text(traded(growth=None, reference_error={}))
-    assert bare == "sample      8 members, 0 to 4 s, 0 settings in 12 s"
+    assert "energy drift" not in str(lost)
+    assert "note" not in str(lost)
+    bare = str(traded(growth=None, reference_error={}))
+    assert bare.splitlines()[0] == "sample      8 members, 0 to 4 s, 0 settings in 12 s"
 
 
 def test_growth_in_words():
@@ -729,7 +729,7 @@ def test_what_was_asked_for_and_has_no_reading_is_named(scene):
     assert "rk4" not in unasked.missing
     assert set(found.missing) <= {"rk4", "gauss4"}
     assert unasked.missing == {}
-    text = tradeoffs.report_text(found)
+    text = str(found)
     assert text.startswith("missing     rk4: members failed")
     assert "path; nothing of rk4" in text
     again = Tradeoff.from_dict(json.loads(found.to_json()))
@@ -922,11 +922,11 @@ def test_a_suggestion_in_words():
     one = suggested(rivals=((Candidate("rk4", 0.1, "float32"), 3.0, 2e-4),), messages=("busy",))
     assert str(one).splitlines() == [
         "note        busy",
-        "chosen      psi_s, float64, step 0.0123457 s: position to 4.0e-04 m up to 150 s, 2.5 times better than asked "
-        "(64 members checked)",
+        "checked     64 members, 2.5 times better than requested",
         "predicted   1.2 s on 2 threads, 3.4 MB",
         "reference   a against b: they agree to 1.0e-09 m",
         "  next best rk4, float32, step 0.1 s: 1.50 times the time, position to 2.0e-04 m",
+        one.answer,
     ]
     assert "on 1 thread, " in str(suggested(threads=1))
     assert "note" not in str(suggested())

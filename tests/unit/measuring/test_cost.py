@@ -10,7 +10,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.accuracy import tradeoff as tradeoffs
-from lgvi_warp.accuracy.tradeoff import Measurement, Tradeoff, report_text
+from lgvi_warp.accuracy.tradeoff import Measurement, Tradeoff
 from lgvi_warp.measuring import cost
 from lgvi_warp.measuring.comparison import Candidate, Sample
 from lgvi_warp.measuring.cost import Kind, of_steps
@@ -139,7 +139,7 @@ def found(spread):
 
 
 def test_the_report_says_how_costs_were_read():
-    quiet, busy = report_text(found(1.01)), report_text(found(4.0))
+    quiet, busy = str(found(1.01)), str(found(4.0))
     assert "note" not in quiet
     assert "at most 1.01 times" in quiet
     says(busy, "note        readings of cost disagree", "at most 4.00 times")

@@ -381,7 +381,7 @@ comparison.csv has the differences of all metrics.
 
 def test_the_summary_in_words(answer):
     # The numbers are those of the tests above.
-    assert str(answer) == SUMMARY
+    assert str(answer) == f"{SUMMARY}\n{answer.answer}\n"
 
 
 def test_the_summary_of_a_grid(gridded):
@@ -404,7 +404,7 @@ def test_the_summary_of_a_grid(gridded):
     assert text + "seen on the same members (10 pass only there, 0 only with soft)" in lines
     # Metrics differ too, but with a grid they would be too many.
     assert not any("iae heading +" in line for line in lines)
-    assert lines[-5] == "- member 39 of soft at controller.delay = 0.02, status ok"
+    assert lines[-7] == "- member 39 of soft at controller.delay = 0.02, status ok"
 
 
 def test_a_summary_where_the_second_is_worse_and_a_cause_is_known():
@@ -445,7 +445,7 @@ def test_files_hold_the_tables(answer, tmp_path):
     assert len(tables["worst"]) == 20
     causes = [(row["case"], row["of"]) for row in tables["causes"]]
     assert causes == [(case, of) for case in ("soft", "stiff") for of in ("success", *METRICS) for _ in range(4)]
-    assert files[6].read_text() == SUMMARY
+    assert files[6].read_text() == str(answer)
     content = json.loads(files[5].read_text())
     assert {name: content[name] for name in ("baseline", "confidence", "interval", "settings", "success")} == {
         "baseline": "soft", "confidence": 0.95, "interval": "wilson", "settings": {},

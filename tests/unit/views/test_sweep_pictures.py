@@ -63,16 +63,40 @@ def test_a_sweep_with_nothing_to_draw_says_why(draw, sweep, words):
         draw(sweep)
 
 
-def test_responses_are_drawn_where_cases_differ_and_of_what_differs():
-    """Passes of two cases at two points: 50 and 60 %, 90 and 10 %. Medians of depth are less apart than those of heading."""
-    sweep = swept([0.5, 0.9, 0.6, 0.1].__getitem__, {"k": [1, 2]})
+def test_responses_are_those_of_the_best_and_the_worst_cell():
+    """The second of four cells is best and the third worst. Medians of depth are less apart than those of heading."""
+    sweep = swept([0.5, 0.9, 0.1, 0.6].__getitem__, {"k": [1, 2]})
     sweep.setup.metrics["h"] = SimpleNamespace(unit="rad", quantity=SimpleNamespace(unit=""), of="heading")
     for i, cell in enumerate(sweep.cells):
         sweep.record(cell).numbers["h"] = 100.0 * i + np.arange(N)
     panels = sweeps.plot_responses(sweep, members=3)
-    assert [asked[:3] for asked in sweep.asked] == [(name, range(3), {"k": 2}) for name in "ab"]
-    assert [panel.get_title() for panel in panels] == ["a at k = 2", "b at k = 2"]
+    assert [asked[:3] for asked in sweep.asked] == [("a", range(3), {"k": 2}), ("b", range(3), {"k": 1})]
+    assert [panel.get_title() for panel in panels] == ["best, 90 % pass: a at k = 2", "worst, 10 % pass: b at k = 1"]
     assert panels[0].figure.get_supylabel() == "heading [rad]: 3 members"
+
+
+def test_responses_of_cells_that_are_alike_are_those_of_the_cases():
+    sweep = swept(half, {"k": [1, 2]})
+    panels = sweeps.plot_responses(sweep, members=3)
+    assert [panel.get_title() for panel in panels] == ["50 % pass: a at k = 1", "50 % pass: b at k = 1"]
+
+
+def test_the_worst_cell_is_explained_if_some_pass_there():
+    for shares, title in (((0.9, 0.4, 0.65), "Worst cell: b"),
+                          ((0.9, 0.0, 0.65), "Worst cell of those in which some members pass: c")):  # fmt: skip
+        (axes,) = sweeps.plot_causes(swept(shares.__getitem__, cases="abc"))
+        assert axes.get_title() == title
+        passes = round(N * (0.4 if "b" in title[-1] else 0.65))
+        assert [line.get_label() for line in axes.lines] == [f"passes: {passes}", f"fails: {N - passes}"]
+
+
+def test_axes_have_the_units_of_their_numbers():
+    sweep = swept(half, {"vehicle.mass": [5.0, 6.0]}, cases="a")
+    assert sweeps.plot_success(sweep)[0].get_xlabel() == "vehicle.mass [kg]"
+    (axes,) = sweeps.plot_metrics(sweep)
+    assert axes.get_xlabel() == "case, vehicle.mass [kg]"
+    maps = sweeps.plot_success(swept(half, {"vehicle.mass": [5.0, 6.0], "start.velocity[0]": [1.0, 2.0]}, cases="a"))
+    assert (maps[0].get_xlabel(), maps[0].get_ylabel()) == ("vehicle.mass [kg]", "start.velocity[0] [m/s]")
 
 
 def test_responses_of_a_distance_and_their_times():

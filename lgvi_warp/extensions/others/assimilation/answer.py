@@ -5,18 +5,21 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from lgvi_warp.common import summaries
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.common.summaries import Summarized
+from lgvi_warp.common.summaries import Summarized, few_digits
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.extensions.others.assimilation.innovations import InnovationTest, tested
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.sampling.final import NUMBERS, Final
+
+# Numbers and series that the answer names.
+MOST_NAMED = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,6 +48,7 @@ class Assimilated(Summarized, Saved):
         method: Name of the filter.
         messages: What the user should know.
         provenance: Scene, ensemble, settings, versions and machine.
+        units: Units of the learned numbers by name.
     """
 
     study: ClassVar[str] = "assimilate"
@@ -66,6 +70,19 @@ class Assimilated(Summarized, Saved):
     method: str
     messages: tuple[str, ...]
     provenance: dict[str, Any]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def answer(self) -> str:
+        units = {name: self.units.get(name, "") for name in self.parameters} | {"position": "m"}
+        texts = [f"{name} is {few_digits(self.mean[name][-1], '', 4)} +- {few_digits(self.std[name][-1], unit, 2)}"
+                 for name, unit in units.items()]  # fmt: skip
+        doubts = [f"{name} {test.verdict}" for name, test in self.consistency().items()]
+        innovations = f"; innovations: {summaries.listed(doubts, MOST_NAMED)}" if doubts else ""
+        return f"At {self.time[-1]:g} s {summaries.listed(texts, MOST_NAMED)}{innovations}."
+
+    def _report(self) -> list[str]:
+        return repr(self).splitlines()
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """Learned numbers, and the check of the innovations."""
@@ -83,7 +100,7 @@ class Assimilated(Summarized, Saved):
         rows += [("message", text) for text in self.messages]
         return f"Assimilation of {len(self.time):,} times to {self.time[-1]:g} s", rows
 
-    def to_dict(self) -> dict[str, Any]:
+    def _content(self) -> dict[str, Any]:
         content = {item.name: getattr(self, item.name) for item in fields(self)}
         ends = {name: getattr(self.final, name) for name in NUMBERS}
         arrays = [self.final.to_arrays(), self.final.parameters]
@@ -91,7 +108,7 @@ class Assimilated(Summarized, Saved):
         return dict(finite_or_none({**content, "final": ends}))
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> Self:
+    def _of_content(cls, content: dict[str, Any]) -> Self:
         ends, read = content["final"], dict[str, Any](content)
         arrays, parameters = (
             {name: _unpacked(rows) for name, rows in ends[key].items()} for key in ("arrays", "parameters")

@@ -33,6 +33,7 @@ from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.variations import Target
+from lgvi_warp.store.layout import units_of_numbers
 
 METHODS = ("etkf", "enkf", "particles")
 MOST_SEED = 2**63
@@ -474,6 +475,7 @@ class _Track:
             method=self.filter,
             messages=(),
             provenance=self.provenance,
+            units=units_of_numbers(self.fleet.scene, self.columns),
         )
         return replace(found, messages=tuple(self.messages + self._remarks() + _doubts(found)))
 

@@ -70,6 +70,7 @@ def of_study(path: str | os.PathLike[str]) -> AbstractContextManager[None]:
     return corrupt_file_as_scene_error(path, "of another version", "run the study again")
 
 
+@explained
 class Saved(ABC):
     """Answer of a study, as content of a JSON file and as records of a CSV file.
 

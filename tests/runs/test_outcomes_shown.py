@@ -175,7 +175,7 @@ def test_outcomes_look_different():
     seen = [(look.color, look.marker) for look in looks.OUTCOME_STYLES.values()]
     assert set(looks.OUTCOME_STYLES) == set(Status)
     assert len(set(seen)) == len(seen)
-    assert len({look.color for code, look in looks.OUTCOME_STYLES.items() if code == Status.OK or code.stopped}) == 8
+    assert len({look.color for code, look in looks.OUTCOME_STYLES.items() if code == Status.OK or code.stopped}) == 9
 
 
 def test_nothing_to_draw_says_why(mixed, tmp_path):

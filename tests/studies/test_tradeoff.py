@@ -436,7 +436,8 @@ def test_run_with_an_error_chooses_and_checks(tmp_path, capsys):
     options = ["--error", "1e-4", "--of", "attitude", "--method", "psi_s"]
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SHORT, *options]) == 0
     out = capsys.readouterr().out
-    says(out, "chosen      psi_s", "attitude to", "predicted", "members     8, psi_s", "checked     error of attitude")
+    says(out, "psi_s float32 with step", "keeps attitude to 0.0001 rad", "predicted", "members     8, psi_s")
+    says(out, "checked     error of attitude")
     assert lw.Result.load(tmp_path / "result.npz").provenance["method"]["name"] == "psi_s"
 
 

@@ -45,7 +45,7 @@ def mean_and_error(x: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> tu
 
 
 def moves_of(u: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> Moves:
-    """Differences of the normals (m, k) of failing members from standard normals. docs/theory/rare_events.md, (B15)."""
+    """Differences of the normals (m, k) of failing members from standard normals. docs/theory/rare_events.md, (B16)."""
     tests = []
     for x, nominal in ((u, 0.0), (np.abs(u), SIZE), (u**2, 1.0)):
         mean, error = mean_and_error(x, weights, chains)
@@ -59,7 +59,7 @@ def moves_of(u: np.ndarray, weights: np.ndarray, chains: np.ndarray) -> Moves:
 def noise_score(x: np.ndarray, weights: np.ndarray, chains: np.ndarray, parts: np.ndarray) -> float:
     """A z-score of the draws (m, k) of a source: of their mean path, or of their sum of squares, whichever is larger.
 
-    docs/theory/rare_events.md, (B16).
+    docs/theory/rare_events.md, (B17).
     """
     k = x.shape[1]
     mean, error = mean_and_error(np.column_stack([x, (x**2).sum(axis=1)]), weights, chains)
@@ -104,6 +104,7 @@ def chances_of(
     """Probability of each condition alone, of any and of all, from the failing members' limits (k, m).
 
     ancestors: (m,), those of one are related. spread: of the relative error of the probability of any.
+    docs/theory/rare_events.md, (B13).
     """
     from scipy.stats import chi2, t
 

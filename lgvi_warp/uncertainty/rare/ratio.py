@@ -30,7 +30,7 @@ class Share:
     def of(cls, happens: np.ndarray, weights: np.ndarray, ancestors: np.ndarray) -> Share:
         """From members (n,) with weights, of which those of one ancestor (n,), counted from 0, are related.
 
-        docs/theory/rare_events.md, (B18).
+        docs/theory/rare_events.md, (B13).
         """
         total = np.bincount(ancestors, weights)
         alike = bool((happens == happens[0]).all())

@@ -134,7 +134,7 @@ class Groups(dict[int, list[SubsetRun]]):
 def united(groups: Groups) -> tuple[float, float, float]:
     """(probability, spread of its relative error, degrees of freedom) that any condition holds.
 
-    docs/theory/rare_events.md, (B14).
+    docs/theory/rare_events.md, (B15).
     """
     told = [joined(runs) for runs in groups.values()]
     if len(told) == 1:
@@ -164,7 +164,7 @@ def beyond(seen: Witness, probability: float, spread: float) -> bool:
 
 
 def unseen(share: float, count: float) -> float:
-    """Root mean square of the part of an event that weights do not see. docs/theory/rare_events.md, (B17).
+    """Root mean square of the part of an event that weights do not see. docs/theory/rare_events.md, (B18).
 
     share: of the second look's members where the mixture hardly draws. count: independent ones of them, 0 where it met none.
     """
@@ -305,7 +305,7 @@ class RareSearch:
     def _parted(self, runs: list[SubsetRun], count: int) -> list[SubsetRun]:
         """Runs to one condition of so many; a member that m of these count is an m-th of the event in each.
 
-        docs/theory/rare_events.md, (B14).
+        docs/theory/rare_events.md, (B15).
         """
         if count == 1:
             return runs

@@ -82,7 +82,7 @@ def wide_of(probability: float) -> float:
 
 
 def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator, particles: int = PARTICLES) -> Witness:
-    """Failing members from draws that are `wide` times as wide in each direction. docs/theory/rare_events.md, (B13)."""
+    """Failing members from draws that are `wide` times as wide in each direction. docs/theory/rare_events.md, (B14)."""
     u = wide * rng.standard_normal((FIRST, d))
     u = u[happens(u)]
     if not len(u):

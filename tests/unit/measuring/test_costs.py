@@ -159,15 +159,16 @@ def test_numbers_that_json_cannot_hold_are_none():
 
 class Study(files.Saved):
     study = "example"
+    answer = "One and a half."
 
-    def to_dict(self):
+    def _content(self):
         return {"x": 1.5}
 
     def rows(self):
         return [{"x": 1.5, "y": "a"}]
 
     @classmethod
-    def from_dict(cls, content):
+    def _of_content(cls, content):
         assert content == {"x": 1.5}
         return cls()
 
@@ -178,10 +179,12 @@ def test_a_study_writes_two_files(tmp_path):
         "new/folder/example.json",
         "new/folder/example.csv",
     ]
-    assert (paths[0].read_text(), paths[1].read_text().split()) == ('{\n "x": 1.5\n}', ["x,y", "1.5,a"])
+    assert (paths[0].read_text(), paths[1].read_text().split()) == (
+        '{\n "answer": "One and a half.",\n "x": 1.5\n}', ["x,y", "1.5,a"])  # fmt: skip
     named = Study().save(tmp_path, "other")
     assert [path.name for path in named] == ["other.json", "other.csv"]
-    assert json.loads(named[0].read_text()) == {"x": 1.5}
+    assert json.loads(named[0].read_text()) == {"answer": Study.answer, "x": 1.5}
+    assert isinstance(Study.load(named[0]), Study)
 
 
 def test_a_damaged_file_is_said_to_be_damaged(tmp_path):

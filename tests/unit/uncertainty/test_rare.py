@@ -64,7 +64,7 @@ def test_spreads_are_told_as_they_are_over_seeds(name, p, most):
     assert (np.abs(ratios - 1.0) <= 3.0 * spreads).sum() >= 38
     # A standard deviation of 40 runs is known to 11 %, which is less than what 1.5 allows.
     assert ratios.std() / math.sqrt((spreads**2).mean()) < 1.5
-    # What weights may not have seen (B17), at most half of the error asked, is told beside, and is absent here.
+    # What weights may not have seen (B18), at most half of the error asked, is told beside, and is absent here.
     by_weights = [each for each in found if each.estimator == "importance"]
     beside = (0.5 * 0.1) ** 2 * len(by_weights) / len(found)
     assert ratios.std() / math.sqrt((spreads**2).mean() - beside) > 1.0 / 1.5

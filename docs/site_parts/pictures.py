@@ -123,6 +123,7 @@ MADE = {
     **{f"guide/named_{name}.png": of_vehicle(name) for name in ("lauv", "eca_a9", "girona_500", "rexrov", "dsrv")},
     "guide/where_to_search.png": of_example("examples/where_to_search.py", "where_to_search.png"),
     "guide/glider_survey.png": of_script("examples/studies/glider_survey.py"),
+    "guide/survey_how_far_off.png": of_script("examples/studies/survey_how_far_off.py"),
     "guide/rescue_vehicle.png": of_script("examples/laws/rescue_vehicle.py"),
     "guide/tune_worst_5_percent.png": of_script("examples/sweeps/tune_worst_5_percent.py"),
     **{

@@ -20,11 +20,11 @@ def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
 
 def of_result(result: Any) -> dict[str, Any]:
     """Outcomes of a run's members, statistics at its end, and its settings."""
-    from lgvi_warp.results.outcomes import answer_of
+    from lgvi_warp.uncertainty.footprint.footprint import run_answer
 
     divided = result.substeps > 0
     return {
-        "answer": answer_of(result),
+        "answer": run_answer(result),
         "members": result.members,
         "settings": of_settings(result.provenance),
         "outcomes": result.status.counts(),

@@ -145,8 +145,9 @@ def summary(
     limit: Most numbers of samples that are looked through.
     """
     from lgvi_warp.common.status import Status
-    from lgvi_warp.results.outcomes import answer_of, outcome_text, outcomes
+    from lgvi_warp.results.outcomes import outcome_text, outcomes
     from lgvi_warp.statistics.estimates.table import table
+    from lgvi_warp.uncertainty.footprint.footprint import run_answer
 
     settings = result.provenance
     lines = [
@@ -176,7 +177,7 @@ def summary(
     if result.statistics:
         lines.append(f"statistics  at {result.time[-1]:g} s, with intervals")
         lines += [f"  {line}" for line in table(result.statistics)]
-    return "\n".join([*lines, *map(file_line, files), *look_lines(files), answer_of(result)])
+    return "\n".join([*lines, *map(file_line, files), *look_lines(files), run_answer(result)])
 
 
 def look_lines(files: Sequence[Path]) -> list[str]:

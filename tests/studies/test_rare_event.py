@@ -294,7 +294,9 @@ def test_what_moved_is_the_number_that_decides():
     found = lw.rare_event(fleet, deep_or_high, relative_error=0.2, save=lw.SaveAt(at=[T1]), **RUN)
     assert found.probability == pytest.approx(2.0 * ndtr(-3.5), rel=4.0 * found.relative_error)
     assert found.moved_size["start.velocity[2]"] == pytest.approx(3.75, abs=0.1)
-    assert "start.velocity[2] is on average 3.7" in found.answer or "start.velocity[2] is on average 3.8" in found.answer
+    assert (
+        "start.velocity[2] is on average 3.7" in found.answer or "start.velocity[2] is on average 3.8" in found.answer
+    )
     assert found.answer.endswith("standard deviations from its mean, to both sides.")
     assert "wrench_noise" not in str(found)
     assert abs(found.noise_moved["wrench_noise"]) < 4.5

@@ -15,6 +15,7 @@ from lgvi_warp.common.errors import SceneError, closest, refusal
 from lgvi_warp.common.status import failed, stop_time
 from lgvi_warp.common.times import rows_at
 from lgvi_warp.physics.terms.events import from_list
+from lgvi_warp.results.outcomes import answer_of
 from lgvi_warp.results.quantities import quantities
 from lgvi_warp.statistics.ends import outcomes
 from lgvi_warp.uncertainty.footprint.answer import MAIN, Footprint, Region, time_of
@@ -28,8 +29,22 @@ SHARES = (0.5, 0.9, MAIN, 0.99)
 MOST_PLACES = 1000
 # Places whose spread across is below this part of that along lie on a line.
 THIN = 1e-6
+# The answer of a run names circles from this radius on [m].
+LEAST_CIRCLE = 0.01
 # Spread below so many units in the last place of the coordinates is round-off.
 ROUND_OFF = 16.0
+
+
+def run_answer(result: Result) -> str:
+    """Sentence on how the members of a run ended, and where."""
+    how = answer_of(result)
+    if result.members < least_members(MAIN):
+        return how
+    try:
+        found = _footprint(result, "end", outlined=False)
+    except SceneError:  # positions were not kept, or no member has an end
+        return how
+    return f"{how[:-1]}; {found.answer}." if found.main.radius >= LEAST_CIRCLE else how
 
 
 def footprint(result: Result, at: str | float = "end") -> Footprint:
@@ -60,9 +75,14 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
         >>> found.answer
         '95 % end within 6.10 m of a point 9.74 m north and 2.40 m west of the origin'
     """
+    return _footprint(result_of(result), at)
+
+
+def _footprint(result: Result, at: str | float, outlined: bool = True) -> Footprint:
+    """The footprint; without outlines it has circles and ellipses alone, and needs no contourpy."""
     word = at.strip() if isinstance(at, str) else str(at) if isinstance(at, Real) else ""
     word = word if (when := time_of(word)) is None else f"{when:.12g}"
-    positions, there = _positions(result_of(result), word, at)
+    positions, there = _positions(result, word, at)
     lacking = result.status[~there].counts()
     weights = np.ones(result.members) if result.weights is None else np.asarray(result.weights, np.float64)
     counted = there & (weights > 0.0)
@@ -83,7 +103,7 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
         away, messages = 0.0 * away, [*messages, "all members are at one point: a region has no area"]
     elif len(places) < 3 or across <= max(round_off, THIN * along):
         messages.append("the members are on a line: a region has no area")
-    else:
+    elif outlined:
         main = max(share for share in shares if share <= MAIN)
         levels, growth, resolved = regions(places, weights, covariance, shares, main)
         if not resolved:

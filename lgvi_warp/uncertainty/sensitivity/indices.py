@@ -92,7 +92,8 @@ class Indices(Saved):
         texts = [f"{self.factors[f]} ({self._amount(q, values[f], half[f])})" for f in known[: max(2, len(first))]]
         if len(first) > 1:
             return f"{quantity} depends most on {listed(texts, 2)}, which sampling error does not tell apart"
-        then = f", then on {texts[1]}" if len(texts) > 1 and len(self.quantities) == 1 else ""
+        second = len(known) > 1 and values[known[1]] > half[known[1]] and len(self.quantities) == 1
+        then = f", then on {texts[1]}" if second else ""
         return f"{quantity} depends most on {texts[0]}{then}"
 
     def _amount(self, q: int, value: float, half: float) -> str:

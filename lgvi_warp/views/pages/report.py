@@ -23,9 +23,10 @@ from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_bytes, fi
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.criteria.files import of_study, study_files
-from lgvi_warp.results.outcomes import answer_of, outcome_text, outcomes
+from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.results.varied import varied
 from lgvi_warp.statistics.estimates.table import table
+from lgvi_warp.uncertainty.footprint.footprint import run_answer
 from lgvi_warp.views.commands import faults
 from lgvi_warp.views.fleet import OUTCOME_STYLES, title
 from lgvi_warp.views.pages.run_again import how_to_run_again
@@ -156,7 +157,7 @@ def _words(path: Path) -> str:
 def _of_run(result: Result) -> Iterator[str]:
     """The parts of a run's page."""
     yield _paragraph(title(result))
-    yield _paragraph(answer_of(result))
+    yield _paragraph(run_answer(result))
     yield _section("What became of the members", _outcome_table(result))
     remarks = [*result.messages, *_warnings(result), *(fault.text for fault in faults(result))]
     if remarks:

@@ -27,6 +27,8 @@ MOST_AXES = 1
 LEAST_VIEW = 0.01
 # Contours of a floor, about so many, and the coast, where its depth is zero; their colour.
 LEVELS, FLOOR = 8, "#7A4A00"
+# Places on a contour of which one takes the label.
+LABEL_PLACES = 201
 
 
 @picture
@@ -111,7 +113,7 @@ def draw_floor(axes: Any, scene: Mapping[str, Any], label: str | None = None) ->
         if np.ptp(relief.depth) > 0.0:
             lines = axes.contour(relief.east, relief.north, relief.depth, levels=LEVELS, colors=FLOOR, linewidths=0.6,
                                  linestyles="solid", alpha=0.6, zorder=0.5)  # fmt: skip
-            axes.clabel(lines, fmt="%g m", fontsize="x-small")
+            axes.clabel(lines, fmt="%g m", fontsize="x-small", manual=_in_view(lines, across, up))
             if label is not None:
                 axes.plot([], [], color=FLOOR, linewidth=0.6, label=label)
             if relief.depth.min() < 0.0 < relief.depth.max():
@@ -119,6 +121,19 @@ def draw_floor(axes: Any, scene: Mapping[str, Any], label: str | None = None) ->
     # What is in view is that of the paths.
     axes.dataLim.set(shown)
     axes.autoscale_view()
+
+
+def _in_view(lines: Any, across: np.ndarray, up: np.ndarray) -> list[tuple[float, float]]:
+    """A place on each contour for its label: near one end of what is in view."""
+    found = []
+    for line in (line for path in lines.get_paths() for line in path.to_polygons(closed_only=False)):
+        share = np.linspace(0.0, len(line) - 1.0, LABEL_PLACES)
+        x, y = (np.interp(share, np.arange(len(line)), line[:, i]) for i in (0, 1))
+        (seen,) = np.nonzero((x > across[0]) & (x < across[1]) & (y > up[0]) & (y < up[1]))
+        if len(seen):
+            place = seen[len(seen) // 10]
+            found.append((float(x[place]), float(y[place])))
+    return found
 
 
 @picture

@@ -156,7 +156,7 @@ def test_a_run_in_a_store(tmp_path, capsys):
     assert cli.main([*run, "--quiet", "--resume"]) == 0
     assert cli.main([*run, "--quiet", "--overwrite"]) == 0
     assert cli.main(["resume", str(out)]) == 0
-    assert "ok 20" in capsys.readouterr().out
+    assert "All 20 members end ok at 2 s." in capsys.readouterr().out
     assert cli.main(["info", str(out)]) == 0
     text = capsys.readouterr().out
     assert "1 of 1 finished; complete" in text

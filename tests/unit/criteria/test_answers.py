@@ -136,6 +136,11 @@ def test_the_factor_that_explains_most_and_the_next():
         "depth depends most on f1 (72 +- 5 % of its variance, with interactions), then on f0 (20 +- 2 %"
     )
     assert "f2" not in text
+    # What sampling error explains as well is not named.
+    assert (
+        sobol([0.72, 0.1], [0.05, 0.1]).answer
+        == "depth depends most on f0 (72 +- 5 % of its variance, with interactions)."
+    )
 
 
 def test_factors_that_overlap_are_not_told_apart():

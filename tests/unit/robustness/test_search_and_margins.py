@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 from scipy.special import gamma
+from scipy.stats import binom
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import Faults
@@ -88,10 +89,7 @@ def two_peaks(d, seed, width):
 
 
 def peaks_found(d, most, part, seeds):
-    """Number of narrow peaks that a search finds, to a thousandth, whose two widths are the radius of a part of the cube.
-
-    Before.
-    """
+    """Number of narrow peaks, as large as a part of the cube, that evolution finds to a thousandth, and the whole search."""
     found = np.zeros(2, int)
     for seed in seeds:
         cost, least = two_peaks(d, seed, 0.5 * radius_of(part, d))
@@ -118,7 +116,8 @@ def test_separate_peaks_are_found_over_seeds(d, times):
     """Parts of the box from that which is told as hardly missed, by the points that are left of 20,000 runs or 10,000."""
     part = times * box.least_peak({1: 9000, 6: 8000}.get(d, 11_000))
     before, now = peaks_found(d, 20_000 if d > 1 else 10_000, part, range(20))
-    assert now >= 19
+    # The points are spread at random: a peak of `times` the part that is missed once in 20 is missed with 0.05^times.
+    assert now >= binom.ppf(0.01, 20, 1.0 - 0.05**times)
     assert before <= 12
 
 

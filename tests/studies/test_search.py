@@ -197,7 +197,7 @@ def test_searches_by_metrics_of_a_loop():
     # Nothing acts: what starts away from its goal never settles.
     never = lw.worst_case(regulated(), within, "settling_time depth", budget=64, **RUN)
     assert never.value == np.inf
-    assert str(never).startswith("settling_time depth is infinite, or a member fails: start.position[2]")
+    assert str(never).startswith("settling_time depth is infinite, or a member fails, at start.position[2]")
     for of, message in (
         ("iae depht", "depht"),
         ("mean", "is no metric"),

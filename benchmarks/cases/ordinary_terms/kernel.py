@@ -72,7 +72,7 @@ def make_ordinary(real):
         schedule_torque: vectors
         noise_force: vec3
         noise_torque: vec3
-        # thrusters; lag: what is left of the distance to the command after half a step
+        # thrusters; lag: what is left of the distance to the command after half a step; delay: time constant over half a step
         thruster_direction: vectors
         thruster_arm: vectors
         thruster_ahead: numbers
@@ -80,6 +80,7 @@ def make_ordinary(real):
         thruster_band: numbers
         thruster_limit: numbers
         thruster_lag: numbers
+        thruster_delay: numbers
         thruster_time: numbers
         thruster_command: numbers2
         # fins, the fixed ones and then those that turn: half_area is rho A / 2
@@ -205,16 +206,18 @@ def make_ordinary(real):
         return angle
 
     @wp.func
-    def lagged(n: thrusts, t: real, c: Parameters):
-        """The thrusters' commands half a step later."""
+    def lagged(n: thrusts, t: real, half: real, c: Parameters):
+        """The thrusters' commands at t, half a step after n: exact along a straight command."""
+        before = thruster_commands(t - half, c)
         u = thruster_commands(t, c)
         for j in range(wp.static(THRUSTERS)):
-            n[j] = u[j] + c.thruster_lag[j] * (n[j] - u[j])
+            behind = c.thruster_delay[j] * (u[j] - before[j])
+            n[j] = u[j] - behind + c.thruster_lag[j] * (n[j] - before[j] + behind)
         return n
 
     @wp.func
     def steered(angle: angles, t: real, half: real, c: Parameters):
-        """The rudders half a step later."""
+        """The rudders at t, half a step after angle: exact along a straight command that is slower than their rate."""
         u = rudder_commands(t, c)
         for j in range(wp.static(CONTROL_FINS)):
             most = half * c.rudder_rate[j]
@@ -404,7 +407,6 @@ def make_ordinary(real):
         n = thruster_commands(real(0.0), c)
         angle = rudder_commands(real(0.0), c)
         half = real(0.5) * h
-        quarter = real(0.25) * h
         gamma = real(wp.static(GAMMA)) * h
         rest = h - gamma
         over_root_h = one / wp.sqrt(h)
@@ -420,8 +422,8 @@ def make_ordinary(real):
             p = wp.transpose(F) * p
             q = wp.transpose(F) * q
             # K: what laws remember, half of the water's drift, half the kick
-            n = lagged(n, t - quarter, c)
-            angle = steered(angle, t - quarter, half, c)
+            n = lagged(n, t, half, c)
+            angle = steered(angle, t, half, c)
             xi, rng = randn3(rng)
             new = c.markov_decay * wander + wp.cw_mul(c.markov_spread, xi)
             wander_rate = (new - wander) / h
@@ -455,8 +457,8 @@ def make_ordinary(real):
             p = p + half * f
             q = q + half * m
             x = before + h * flow.velocity
-            n = lagged(n, t + quarter, c)
-            angle = steered(angle, t + quarter, half, c)
+            n = lagged(n, t + half, half, c)
+            angle = steered(angle, t + half, half, c)
             # D, T
             F = equation_24(half * q, c.J, c.J_inverse)
             A = A * F
@@ -555,6 +557,7 @@ def _thrusters(law, h):
         "thruster_band": law.dead_band,
         "thruster_limit": law.limit,
         "thruster_lag": np.exp(-0.5 * h / law.time_constant),
+        "thruster_delay": law.time_constant / (0.5 * h),
         "thruster_time": law.times,
         "thruster_command": law.command_schedule,
     }

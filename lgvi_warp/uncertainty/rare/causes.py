@@ -98,6 +98,10 @@ def _words(middle: str, mean: float, size: float, spread: float) -> str:
     return away if abs(mean) >= LEAST_MEAN else ""
 
 
+# Independent failing members from which on their weights tell how likely a condition is.
+FEW_MET = 10.0
+
+
 def chances_of(
     names: Iterable[str], rows: np.ndarray, weights: np.ndarray, ancestors: np.ndarray, of_any: Chance, spread: float
 ) -> dict[str, Chance]:
@@ -133,5 +137,7 @@ def chances_of(
             few = float(own.sum() ** 2 / (own**2).sum())
             low = min(math.exp(-away), float(chi2.ppf(0.025, 2.0 * few)) / (2.0 * few))
             high = max(math.exp(away), float(chi2.ppf(0.975, 2.0 * few + 2.0)) / (2.0 * few))
-            found[name] = Chance(p, p * low, min(of_any.upper, p * high))
+            # Where hardly any meets it, those that do may be its odd ones: it reaches as far as if none had.
+            least = hidden * of_any.upper if few < FEW_MET else 0.0
+            found[name] = Chance(p, p * low, min(of_any.upper, max(p * high, least)))
     return found

@@ -27,7 +27,7 @@ from lgvi_warp.uncertainty.rare.mixture import (
 )  # fmt: skip
 from lgvi_warp.uncertainty.rare.plain import sampled
 from lgvi_warp.uncertainty.rare.subset import SHARE, Limit, NoProgress, SubsetRun, climb, levels_of
-from lgvi_warp.uncertainty.rare.witness import PARTICLES, Surroundings, Witness, grown, wide_of, witnessed
+from lgvi_warp.uncertainty.rare.witness import Surroundings, Witness, grown, wide_of, witnessed
 
 # Independent runs of chains; the members of a level in the first ones, and at least and at most in those that follow.
 RUNS, FIRST_SIZE, LEAST_SIZE, LARGEST_SIZE = 4, 500, 1000, 200_000
@@ -45,8 +45,8 @@ AIM, LEFT, ROUNDS = 1.0, 1.2, 4
 BEYOND_THREE = 0.00135
 # The least probability: the cube's levels end at 1e-16.
 LEAST = 1e-15
-# Members of the second look times the error asked: what they do not see is then below half of that error.
-LOOKED = 6.0
+# Independent members of the second look times the error asked: what they do not see is then below half of that error.
+LOOKED = 3.5
 # The least part of the second look's members that makes a failure mode which the chains passed by.
 LEAST_MISSED = 0.03
 BLIND = (
@@ -166,7 +166,7 @@ def beyond(seen: Witness, probability: float, spread: float) -> bool:
 def unseen(share: float, count: float) -> float:
     """Root mean square of the part of an event that weights do not see. docs/theory/rare_events.md, (B18).
 
-    share: of the second look's members where the mixture hardly draws. count: independent ones of them, 0 where it met none.
+    share: of the second look's independent members where the mixture hardly draws. count: of these, 0 where it met none.
     """
     odd = share * count
     return math.sqrt((odd + 1.0) * (odd + 2.0) / ((count + 2.0) * (count + 3.0))) if count else 0.0
@@ -324,8 +324,8 @@ class RareSearch:
             return None
         rng = generator(self.seed, "rare witness")
         # Chains that did not arrive know no probability: an event of one in a million is looked for.
-        particles = max(PARTICLES, math.ceil(LOOKED / self.relative_error))
-        seen = witnessed(self._happens, self.d, wide_of(probability or 1e-6), rng, particles)
+        lookers = math.ceil(LOOKED / self.relative_error)
+        seen = witnessed(self._happens, self.d, wide_of(probability or 1e-6), rng, lookers)
         if not len(seen.u) and probability is not None:
             self.notes.append("the second look for other failure modes met no failing member, and tells nothing")
         return seen
@@ -375,14 +375,14 @@ class RareSearch:
             return None
         asked, shares = AIM * self.relative_error, np.array([joined(each)[0] for each in groups.values()])
         fits = [fitted(each, rng) for each in points]
-        around, missed = None, seen.u
+        around, missed, part = None, np.concatenate([seen.lookers, seen.u]), 1.0
         if chains is not None:
             around = Surroundings([run.failing for run in runs], generator(self.seed, "rare surroundings"))
-            logs = log_weights(spread_over(fits, shares).widened(), seen.u)
-            missed = seen.u[around.apart(seen.u) & (logs > math.log(LARGEST * chains[0] * TRIED))]
-            missed = missed[: len(missed) * (len(missed) > LEAST_MISSED * len(seen.u))]
+            logs = log_weights(spread_over(fits, shares).widened(), missed)
+            odd = around.apart(missed) & (logs > math.log(LARGEST * chains[0] * TRIED))
+            part = float(odd[: len(seen.lookers)].mean())
+            missed = missed[odd & (part > LEAST_MISSED)]
         if len(missed):
-            part = len(missed) / len(seen.u)
             points.append(grown(self._happens, missed, generator(self.seed, "rare grown")))
             fits.append(fitted(points[-1], rng))
             shares = np.append(shares / max(shares.sum(), 1e-300) * (1.0 - part), part)
@@ -409,7 +409,7 @@ class RareSearch:
                 self._beside = found.probability * outside.sum(), math.sqrt((outside**2).sum()) / outside.sum()
             if not reasons:
                 self._note_beside(found.probability)
-                hidden = unseen(uncovered(found, mixture, [seen.u]), seen.independent)
+                hidden = unseen(uncovered(found, mixture, [seen.lookers]), len(seen.lookers))
                 told = found.probability, math.hypot(found.spread, hidden), found.effective
                 members = FailingGroup.alone(found.failing, found.rows, found.weights)
                 return self._answer_of("importance", told, members, runs)

@@ -3,6 +3,8 @@
 
 Members are drawn with all spreads enlarged; those that fail are carried back to the nominal spreads in stages (sequential
 importance sampling, Papaioannou, Papadimitriou & Straub 2016). No level leads, so that no level can lead past a failure mode.
+Stages tell a probability, and their members soon descend from few of the wide ones. Each wide one is therefore also led to the
+nominal spread by itself: these lookers stay in the modes where they were met, and none is related to another.
 """
 
 from __future__ import annotations
@@ -15,8 +17,10 @@ import numpy as np
 
 # (n, d) standard normals -> (n,): whether the event happens.
 Happens = Callable[[np.ndarray], np.ndarray]
-# Members that are drawn wide, particles of a stage, steps of each, and least part of these that weights are worth.
-FIRST, PARTICLES, MOVES, WORTH = 1000, 150, 2, 0.4
+# Members that are drawn wide at once, and at most; particles of a stage, steps of each, and what weights are worth at least.
+FIRST, MOST_FIRST, PARTICLES, MOVES, WORTH = 1000, 10_000, 150, 2, 0.4
+# Rounds by which a wide member is led to the nominal spread, and the part of its numbers that each draws anew.
+LED, ANEW = 12, 0.3
 # The enlarged spread: the distance of a half-space with the probability of the chains, over this; its least and largest value.
 WIDE_OF, LEAST_WIDE, MOST_WIDE = 1.6, 1.8, 4.0
 # First scale of steps, the acceptance that they are steered to, and most stages.
@@ -33,17 +37,14 @@ GROWTH, GROWN = 6, 100
 class Witness:
     """Members that fail, as the standard normals have them: u (m, d), about equally likely each; m = 0 where none was met.
 
-    probability: of the event, as the stages say it. spread: of its relative error, roughly.
+    lookers: (k, d), independent ones, as often in each mode as wide members meet it. probability: of the event, as the stages
+    say it. spread: of its relative error, roughly.
     """
 
     u: np.ndarray
+    lookers: np.ndarray
     probability: float
     spread: float
-
-    @property
-    def independent(self) -> float:
-        """Number of members in effect: copies are one, and others are related."""
-        return len(np.unique(self.u, axis=0)) / RELATED**2
 
 
 class Surroundings:
@@ -81,13 +82,19 @@ def wide_of(probability: float) -> float:
     return float(np.clip(-ndtri(max(probability, 1e-300)) / WIDE_OF, LEAST_WIDE, MOST_WIDE))
 
 
-def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator, particles: int = PARTICLES) -> Witness:
-    """Failing members from draws that are `wide` times as wide in each direction. docs/theory/rare_events.md, (B14)."""
-    u = wide * rng.standard_normal((FIRST, d))
-    u = u[happens(u)]
+def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator, lookers: int = 1) -> Witness:
+    """Failing members from draws that are `wide` times as wide in each direction. docs/theory/rare_events.md, (B14).
+
+    lookers: the fewest that are wanted.
+    """
+    drawn, u = 0, np.zeros((0, d))
+    while drawn < FIRST or (0 < len(u) < lookers and drawn < MOST_FIRST):
+        places = wide * rng.standard_normal((FIRST, d))
+        drawn, u = drawn + FIRST, np.concatenate([u, places[happens(places)]])
     if not len(u):
-        return Witness(u, 0.0, math.inf)
-    log_probability, variance = math.log(len(u) / FIRST), (1.0 - len(u) / FIRST) / len(u)
+        return Witness(u, u, 0.0, math.inf)
+    alone = led(happens, u[: max(lookers, PARTICLES)], rng)
+    log_probability, variance = math.log(len(u) / drawn), (1.0 - len(u) / drawn) / len(u)
     now, scale = wide, SCALE
     for _ in range(STAGES):
         if now <= 1.0:
@@ -99,12 +106,12 @@ def witnessed(happens: Happens, d: int, wide: float, rng: np.random.Generator, p
         log_probability += float(logs.max()) + math.log(float(weights.mean()))
         variance += float(weights.var() / weights.mean() ** 2) / len(u)
         # Systematic: each particle as often as it weighs, but for one.
-        places = (np.arange(particles) + rng.random()) / particles
+        places = (np.arange(PARTICLES) + rng.random()) / PARTICLES
         u = u[np.minimum(np.searchsorted(np.cumsum(weights) / weights.sum(), places), len(u) - 1)]
         for _ in range(MOVES):
             u, scale = moved(happens, u, then, scale, rng)
         now = then
-    return Witness(u, math.exp(log_probability), RELATED * max(1.0, d / MANY) * math.sqrt(variance))
+    return Witness(u, alone, math.exp(log_probability), RELATED * max(1.0, d / MANY) * math.sqrt(variance))
 
 
 def _next(now: float, squares: np.ndarray) -> float:
@@ -132,6 +139,16 @@ def moved(
     accepted = happens(places)
     factor = math.exp(float(accepted.mean()) - ACCEPTANCE)
     return np.where(accepted[:, None], places, u), float(np.clip(scale * factor, 0.02, 0.95))
+
+
+def led(happens: Happens, u: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Wide members (n, d) led to the nominal spread within the event: some numbers drawn anew in turn with steps (B4)."""
+    scale = SCALE
+    for _ in range(LED):
+        places = np.where(rng.random(u.shape) < ANEW, rng.standard_normal(u.shape), u)
+        u = np.where(happens(places)[:, None], places, u)
+        u, scale = moved(happens, u, 1.0, scale, rng)
+    return u
 
 
 def grown(happens: Happens, u: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -238,6 +238,7 @@ def test_advantages_are_sums_of_what_surprises():
 def test_two_learners_keep_the_depth_better_than_the_law(tmp_path):
     """200,000 steps each; then on 1,000 vehicles that they have not met, in the kernel."""
     pytest.importorskip("stable_baselines3")
+    pytest.importorskip("torch")
     picture = tmp_path / "learnt.png"
     script = ROOT / "examples" / "controllers" / "learn_depth_keeping.py"
     command = [sys.executable, script, "200000", picture]

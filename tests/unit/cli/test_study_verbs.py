@@ -72,7 +72,8 @@ CALLS = {
     "merge": ([lw.merge], set()), "export": ([lw.export], set()), "report": ([lw.report], {"--open"}),
     "check": ([lw.solve], set()), "sweep": ([lw.sweep], {"--plan", "--record"}), "view": ([lw.record], {"--movie"}),
     "warm": ([lw.solve], {"--methods", "--dtypes"}), "new": ([], {"--vehicle"}), "bench": ([], {"--members", "--steps"}),
-    **dict.fromkeys(("info", "list", "schema", "plot", "completion", "help"), ([], set())),
+    "footprint": ([lw.studies.footprint], set()),
+    **dict.fromkeys(("example", "info", "list", "schema", "plot", "completion", "help"), ([], set())),
 }  # fmt: skip
 # Options that are keys of a scene file; a word of `existing` of a Store, and its dtype beside that of the run.
 OF_FILES = {"--step", "--duration", "--members", "--seed"}

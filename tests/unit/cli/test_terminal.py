@@ -106,7 +106,7 @@ def test_verbose_says_where_an_error_came_from(capsys):
 def test_every_verb_is_of_those_that_write_or_of_those_that_do_not():
     writing = {"run", "resume", "merge", "export", "tradeoff", "sensitivity", "stability", "sweep", "rare",
                "derivatives", "margins", "worst-case", "tune-gains", "new", "plot", "report", "view",
-               "footprint", "example"}  # fmt: skip
+               "footprint"}  # fmt: skip
     assert writing | set(command.READING) == set(command.VERBS) == set(cli.parser().verbs)
     assert not writing & set(command.READING)
 

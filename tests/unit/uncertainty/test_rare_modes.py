@@ -175,8 +175,24 @@ def test_the_second_look_gives_the_probability_of_a_half_space():
     assert (u[0].u[:, 0] > 4.0).all()
     # The law beyond 4 has the mean phi(4) / (1 - Phi(4)).
     assert np.mean([each.u[:, 0].mean() for each in u]) == pytest.approx(4.226, abs=0.08)
+    # Of members with the spread s the part Phi(-4 / s) is beyond 4: so many lookers are met, and none is lost.
+    assert {len(each.lookers) for each in u} <= set(range(25, 90))
+    assert all((each.lookers[:, 0] > 4.0).all() for each in u)
     none = witnessed(lambda u: u[:, 0] > 99.0, 2, 2.5, np.random.default_rng(0))
+    assert (len(none.u), len(none.lookers)) == (0, 0)
     assert (len(none.u), none.probability, none.spread) == (0, 0.0, math.inf)
+
+
+@pytest.mark.parametrize("d", [2, 12, 30])
+def test_lookers_are_as_independent_as_they_are_many(d):
+    """Two equal modes: the share of one varies over seeds as that of so many draws does, whatever the number of normals."""
+    happens = lambda u: (u[:, 0] > 4.3) | (u[:, 1] > 4.3)  # noqa: E731
+    seen = [witnessed(happens, d, wide_of(1e-5), np.random.default_rng(seed)).lookers for seed in range(60)]
+    shares = np.array([(u[:, 1] > 4.3).mean() for u in seen])
+    z = (shares - 0.5) * np.sqrt(4.0 * np.array([len(u) for u in seen]))
+    assert chi2.ppf(0.001, 60) < (z**2).sum() < chi2.ppf(0.999, 60)
+    # Numbers that the event does not ask for are nominal again, from 2.7 times as wide.
+    assert all(np.sqrt((u[:, 2:] ** 2).mean()) < 1.3 for u in seen if d > 2)
 
 
 def test_surroundings_are_where_other_runs_go_too():

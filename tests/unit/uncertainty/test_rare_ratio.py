@@ -91,7 +91,7 @@ def test_intervals_hold_as_often_as_they_say(weighted):
     found = [compared(first, second, seed, weighted=weighted, relative_error=0.2) for seed in range(30)]
     logs = np.log([each.value for each in found])
     told = np.array([np.log(each.upper / each.lower) / (2.0 * 1.96) for each in found])
-    assert all(each.paired for each in found) is not weighted
+    assert all(each.paired for each in found)
     # 28.5 of 30 are expected, and fewer than 26 in 2 of 100 such tests.
     assert sum(each.lower < 1.0 < each.upper for each in found) >= 26
     assert 1.0 / 1.5 < np.sqrt((logs**2).mean()) / np.sqrt((told**2).mean()) < 1.5

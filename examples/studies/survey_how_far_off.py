@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far off a LAUV is after a survey: three legs of 2 km at 3 m altitude over a sloping floor, in a tide.
+"""Navigation error of a LAUV after a survey: three legs of 2 km at 3 m altitude over a sloping floor, in a tide.
 
     python examples/studies/survey_how_far_off.py
 
@@ -73,7 +73,7 @@ def scene():
     )
 
 
-def plot(result, found, path):
+def plot(result, region, path):
     """Paths from above, the errors at the end, and where the vehicles are."""
     from matplotlib.figure import Figure
 
@@ -88,7 +88,7 @@ def plot(result, found, path):
     errors.semilogy(size, 1.0 - np.arange(len(size)) / len(size), color="#0072B2")
     errors.axvline(LIMIT, color="0.5", linestyle=":")
     errors.set(xlabel="navigation error at the end [m]", ylabel="probability of more", title="How far off")
-    lw.plots.footprint(found, ax=ends)
+    lw.plots.footprint(region, ax=ends)
     ends.set(title="Where the vehicles are at the end")
     figure.savefig(path, dpi=100)
     return path
@@ -111,9 +111,9 @@ def main(path, members):
     low, middle, high = ends.value[-1, :, 0]
     print(f"time: {middle:.0f} s, 90 % from {low:.0f} s to {high:.0f} s; energy: {energy.value[-1, 0] / 1e3:.0f} kJ")
     print(lw.uq.given_data(result, error).answer)
-    found = lw.studies.footprint(result, "mission_done")
-    print(found.answer)
-    print(plot(result, found, path))
+    region = lw.studies.footprint(result, "mission_done")
+    print(region.answer)
+    print(plot(result, region, path))
 
 
 if __name__ == "__main__":

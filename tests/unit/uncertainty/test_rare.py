@@ -59,7 +59,7 @@ def test_the_answer_is_within_three_spreads(name):
 @pytest.mark.parametrize("name", CASES)
 def test_spreads_are_told_as_they_are_over_seeds(name, p, most, monkeypatch):
     hidden = []
-    monkeypatch.setattr(search, "unseen", lambda *given: hidden.append(unseen(*given)) or hidden[-1])
+    monkeypatch.setattr(search, "unseen", lambda *values: hidden.append(unseen(*values)) or hidden[-1])
     found = answers(name, p, range(40))
     ratios = np.array([each.probability for each in found]) / p
     spreads = np.array([each.spread for each in found])

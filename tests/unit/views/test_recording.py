@@ -455,11 +455,8 @@ def test_2000_members_take_a_second(tmp_path):
 
 
 @pytest.mark.slow
-def test_100000_members_take_5_seconds(tmp_path):
-    large = fleet(100_000, 200)
-    begun = time.process_time()
-    path = lw.record(large, tmp_path / "large.rrd")
-    assert time.process_time() - begun < 5.0
+def test_a_recording_of_100000_members_is_small(tmp_path):
+    path = lw.record(fleet(100_000, 200), tmp_path / "large.rrd")
     assert path.stat().st_size < 15e6
 
 

@@ -246,6 +246,15 @@ def test_angles_are_drawn_about_their_mean_direction(solved):
     np.testing.assert_allclose(np.diff(median), 9.0 / (len(solved.time) - 1), atol=1e-9)
 
 
+def test_probabilities_have_an_axis_of_their_own(solved):
+    """The axis says what the line is, and not the quantity of its condition."""
+    asked = [lw.statistics.Exceedance("depth", above=1.0), lw.statistics.Outcome("failed"), lw.statistics.Mean("depth")]
+    result = dataclasses.replace(solved, statistics=lw.gather(solved, asked))
+    labels = [axes.get_ylabel() for axes in lw.plots.statistics(result)]
+    assert labels[:2] == ["probability", "probability"]
+    assert labels[2].startswith("depth [m]")
+
+
 def test_statistics_stand_for_samples(solved, drawn):
     bare = dataclasses.replace(solved, samples={})
     (axes,) = lw.plots.fan(bare).figure.axes

@@ -61,6 +61,9 @@ def statistics(result: Result, *, figure: Any = None, path: FilePath | None = No
 
 def _units(axes: Any, result: Result, estimate: Estimate) -> None:
     """Say the unit of the vertical axis, and turn an axis of depths downwards."""
+    if estimate.settings["type"] in _PROBABILITIES:
+        axes.set(ylabel="probability", ylim=(-0.02, 1.02) if float(np.nanmax(estimate.upper)) > 0.5 else (0.0, None))
+        return
     components = [str(label) for label in estimate.coordinates.get("component", ())]
     histogram = estimate.settings["type"] == "histogram"
     unit = unit_of(components[0]) if histogram else estimate.unit
@@ -125,6 +128,7 @@ def _histogram_panel(axes: Any, estimate: Estimate) -> None:
     axes.figure.colorbar(drawn, ax=axes, label="share of members [%]")
 
 
-_LINES = ("mean", "circular_mean", "exceedance", "first_passage", "outcome")
+_PROBABILITIES = ("exceedance", "first_passage", "outcome")
+_LINES = ("mean", "circular_mean", *_PROBABILITIES)
 _PANEL = {"quantiles": _levels_panel, "extremes": _extremes_panel, "histogram": _histogram_panel}
 _PANEL |= dict.fromkeys(_LINES, _lines_panel)

@@ -380,7 +380,7 @@ class RareSearch:
             around = Surroundings([run.failing for run in runs], generator(self.seed, "rare surroundings"))
             logs = log_weights(spread_over(fits, shares).widened(), missed)
             odd = around.apart(missed) & (logs > math.log(LARGEST * chains[0] * TRIED))
-            part = float(odd[: len(seen.lookers)].mean())
+            part = int(odd[: len(seen.lookers)].sum()) / max(len(seen.lookers), 1)
             missed = missed[odd & (part > LEAST_MISSED)]
         if len(missed):
             points.append(grown(self._happens, missed, generator(self.seed, "rare grown")))

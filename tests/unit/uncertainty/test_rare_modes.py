@@ -14,13 +14,14 @@ from scipy.stats import beta, chi2
 
 import lgvi_warp as lw
 from lgvi_warp.criteria.success import success_of
+from lgvi_warp.uncertainty.rare import search
 from lgvi_warp.uncertainty.rare.causes import PARTS, Chance, chances_of, moves_of, noise_score
 from lgvi_warp.uncertainty.rare.failing import failing_of
 from lgvi_warp.uncertainty.rare.mixture import fitted
 from lgvi_warp.uncertainty.rare.plain import sampled
 from lgvi_warp.uncertainty.rare.search import RareAnswer, unseen
 from lgvi_warp.uncertainty.rare.subset import NoProgress, climb, widths_of
-from lgvi_warp.uncertainty.rare.witness import Surroundings, wide_of, witnessed
+from lgvi_warp.uncertainty.rare.witness import Surroundings, Witness, wide_of, witnessed
 from tests.support.levels import first_levels
 from tests.support.rare import searched
 
@@ -193,6 +194,14 @@ def test_lookers_are_as_independent_as_they_are_many(d):
     assert chi2.ppf(0.001, 60) < (z**2).sum() < chi2.ppf(0.999, 60)
     # Numbers that the event does not ask for are nominal again, from 2.7 times as wide.
     assert all(np.sqrt((u[:, 2:] ** 2).mean()) < 1.3 for u in seen if d > 2)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_second_look_that_meets_nothing_leaves_the_answer_to_the_chains(monkeypatch):
+    monkeypatch.setattr(search, "witnessed", lambda happens, d, *rest: Witness(*np.zeros((2, 0, d)), 0.0, math.inf))
+    found = searched(lambda u: u[:, 0] - 4.0, 2, seed=1)
+    assert abs(found.probability / ndtr(-4.0) - 1.0) < 4.0 * found.spread
+    assert any("met no failing member" in note for note in found.notes)
 
 
 def test_surroundings_are_where_other_runs_go_too():

@@ -49,15 +49,23 @@ def not_kept(key: str, field: str, kept: tuple[str, ...]) -> SceneError:
 
 
 class KnownMembers:
-    """Stored facts about a block's members, without their ensemble: parameters, and the start as the first sample has it."""
+    """Stored facts about a block's members, without their ensemble: their numbers, and the start as the first sample has it."""
 
-    def __init__(self, parameters: Mapping[str, np.ndarray], count: int, start: KeptFields | None):
-        self.parameters, self.count, self._start = parameters, count, start
+    def __init__(self, result: Result, at: slice, start: KeptFields | None):
+        self.parameters, self.starts = (_of_members(numbers, at) for numbers in (result.parameters, result.starts))
+        self.count, self._start = at.stop - at.start, start
 
     def __getattr__(self, name: str) -> Any:
         if name not in SAVED or self.__dict__.get("_start") is None:
             raise AttributeError(f"members of a result have parameters, count and the start's fields, and no {name!r}")
         return self._start[name][0].astype(np.float64, copy=False)  # type: ignore[index]
+
+
+def _of_members(numbers: Mapping[str, np.ndarray], at: slice) -> dict[str, np.ndarray]:
+    """Numbers of some members, those that all share as they are."""
+    if isinstance(numbers, Arrays):
+        return dict(numbers.part(at))
+    return {name: values[at] if len(values) > 1 else values for name, values in numbers.items()}
 
 
 class KeptSamples:
@@ -134,23 +142,19 @@ class KeptSamples:
         known = self.result.parameters
         if isinstance(known, DrawnParameters):
             return known.select(block.first, block.stop)
-        at = slice(block.first, block.stop)
-        of_block = known.part(at) if isinstance(known, Arrays) else known
-        parameters = {name: of_block[name] for name in of_block}
-        if not isinstance(known, Arrays):
-            parameters = {name: values[at] if len(values) > 1 else values for name, values in parameters.items()}
         start = next(self.pieces(block, names, np.zeros(1, np.int64)))[1] if names else None
-        return KnownMembers(parameters, block.count, start)
+        return KnownMembers(self.result, slice(block.first, block.stop), start)
 
     def of_block(self, block: Block, names: tuple[str, ...]) -> Result:
         """The members of a block as a result in memory, with some of their samples."""
         result, at = self.result, slice(block.first, block.stop)
         rows = np.arange(len(result.time))
-        known = result.parameters
-        parameters = known.part(at) if isinstance(known, Arrays) else known
+        parameters, starts = (numbers.part(at) if isinstance(numbers, Arrays) else numbers
+                              for numbers in (result.parameters, result.starts))  # fmt: skip
         bare = replace(result, samples={}, parameters={}, starts={}, store=None)
         few = bare.part(np.arange(block.first, block.stop))
-        return replace(few, samples={name: self._read(name, rows, at) for name in names}, parameters=parameters)
+        samples = {name: self._read(name, rows, at) for name in names}
+        return replace(few, samples=samples, parameters=parameters, starts=starts)
 
     def pieces(
         self, block: Block, names: tuple[str, ...], rows: np.ndarray, controller: Any = None

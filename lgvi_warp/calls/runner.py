@@ -22,7 +22,7 @@ from lgvi_warp.engine.state_lanes import MANY, kernel_for
 from lgvi_warp.engine.survey import Survey, survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.results.drawn import DrawnParameters
+from lgvi_warp.results.drawn import DrawnParameters, DrawnStarts
 from lgvi_warp.results.provenance import provenance_but_scene, starts_at
 from lgvi_warp.results.quantities import EndQuantity, MetricQuantity, OfResult
 from lgvi_warp.results.result import Result
@@ -157,9 +157,9 @@ class Runner:
         if not single_block.fits(plan, blocks):
             return None
         samples, status = single_block.run_for_samples(plan)
-        parameters, terms = DrawnParameters(fleet, fleet.members), fleet.scene.terms
-        known = dict(samples=samples, time=plan.grid.times, terms=terms, members=fleet.members, parameters=parameters)
-        return SimpleNamespace(**known), status
+        numbers = dict(parameters=DrawnParameters(fleet, fleet.members), starts=DrawnStarts(fleet, fleet.members))
+        known = dict(samples=samples, time=plan.grid.times, terms=fleet.scene.terms, members=fleet.members)
+        return SimpleNamespace(**known, **numbers), status
 
     def evaluate(
         self,

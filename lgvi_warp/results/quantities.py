@@ -294,7 +294,7 @@ def samples_of(result: Result, when: slice = slice(None), members: Any = None) -
     """The (samples, members) of a result in the form that a Quantity's function takes."""
     fields = {name: result.samples[name][when] for name in ordered(result.samples)}
     start = {name: result.samples[name][0] for name in fields}
-    known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
+    known = SimpleNamespace(parameters=result.parameters, starts=result.starts, count=result.members, **start)
     return _Samples(fields, result.time[when], result), known if members is None else members
 
 

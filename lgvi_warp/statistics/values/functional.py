@@ -2,7 +2,7 @@
 """Expressions for quantities: a name, a component of it, a difference, a length, and a reduction over the path.
 
 "position[2]" and "norm(velocity)" give numbers of each member at each time, as does the difference
-"measured_position - position"; "max(depth)" and "range(norm(velocity))" give one number of each member, over its path.
+"measured_position - position"; "vehicle.buoyancy" gives the member's own; "max(depth)" and "range(norm(velocity))" give one number of each member, over its path.
 Statistics, sensitivity, trade-offs and stability maps all read them here.
 """
 
@@ -20,7 +20,7 @@ from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.statistics.values import reductions
-from lgvi_warp.statistics.values.quantity import KNOWN, Quantity, joined, named
+from lgvi_warp.statistics.values.quantity import KNOWN, Quantity, joined, named, of_number
 from lgvi_warp.statistics.values.reductions import Reduction
 
 if TYPE_CHECKING:
@@ -142,6 +142,8 @@ def _parsed(key: str, of: str, text: str) -> Functional:
         meaning = _difference(key, of, [_parsed(key, of, operand) for operand in operands])
     elif re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
         meaning = named(key, of, inner)
+    elif re.fullmatch(r"\w+(\[\d+\])?(\.\w+)+(\[[\d,]+\])?", inner):
+        meaning = of_number(key, of, inner)
     else:
         form = 'write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"'
         raise refusal(key, of, "is no quantity", f"{form}, of {', '.join(KNOWN)}")
@@ -183,21 +185,23 @@ def _difference(key: str, of: str, operands: Sequence[Functional]) -> Quantity:
             raise refusal(key, of, f"{operand.label} looks over the path, and has no difference", remedy)
     first, *others = parts = [operand.as_quantity() for operand in operands]
     for other in others:
-        if (other.size, other.unit) != (first.size, first.unit):
+        if other.size != first.size or (other.unit != first.unit and other.unit and first.unit):
             told = (f"{part.name} has {part.size} x [{part.unit or '1'}]" for part in (first, other))
             raise refusal(key, of, " and ".join(told), "give quantities of one unit and size")
+
+    unit = next((part.unit for part in parts if part.unit), "")
 
     def function(samples: Fields, members: Members) -> np.ndarray:
         values = first(samples, members).astype(np.float64, copy=False)
         for other in others:
             values = values - other(samples, members)
-        if first.unit == "rad":
+        if unit == "rad":
             values -= 2.0 * np.pi * np.rint(values / (2.0 * np.pi))
         return values.transpose(0, 2, 1)
 
     name, *labels = (" - ".join(each) for each in zip(*((part.name, *part.labels) for part in parts), strict=True))
     fields = ordered(field for part in parts for field in part.fields)
-    return Quantity(name, function, first.unit, fields, tuple(labels), needs_limit=True)
+    return Quantity(name, function, unit, fields, tuple(labels), needs_limit=True)
 
 
 def quantity(key: str, of: Any) -> Quantity:

@@ -194,6 +194,28 @@ def _channel(key: str, of: str, name: str, index: str) -> Quantity:
     return Quantity(label, function, SIGNALS[name].field.unit, (name,), needs_limit=True)
 
 
+def of_number(key: str, of: str, text: str) -> Quantity:
+    """One number of each member, the same at all times: only the scene knows which there are."""
+    match = re.fullmatch(r"(.+?)(\[[\d,]+\])?", text)
+    assert match is not None
+    name, index = match[1], match[2] or ""
+    place = tuple(int(i) for i in index[1:-1].split(",") if i)
+
+    def function(samples: Fields, members: Members) -> np.ndarray:
+        starts = getattr(members, "starts", {})
+        if name not in (*members.parameters, *starts):
+            raise refusal(key, of, "is no number of this scene", closest(name, (*members.parameters, *starts)))
+        values = members.parameters[name] if name in members.parameters else starts[name]
+        shape = values.shape[1:]
+        if len(place) != len(shape) or any(i >= most for i, most in zip(place, shape, strict=True)):
+            first, last = (",".join(str(i) for i in entry) for entry in ([0] * len(shape), [n - 1 for n in shape]))
+            remedy = f"give '{name}[{first}]' to '{name}[{last}]'" if shape else f"give {name!r}"
+            raise refusal(key, of, f"is no single number: {name} has shape {shape}", remedy)
+        return np.broadcast_to(values[(slice(None), *place)], (len(samples.time), members.count))
+
+    return Quantity(name + index, function, fields=("position",), needs_limit=True)
+
+
 def component(base: Quantity, i: int) -> Quantity:
     """Return one component of a quantity as a quantity."""
     if base.size == 1:

@@ -38,8 +38,8 @@ HINT = "start and end alone were kept: give SaveAt(every=...) for the motion bet
 def label_of(of: Quantity) -> str:
     """Label of an axis, as "speed [m/s]"; depths say that they point down."""
     name = WORDS.get(of.name, of.name.replace("_", " "))
-    unit = of.unit or "1"
-    return f"{name} [{unit}], down" if is_depth(of) else f"{name} [{unit}]"
+    unit = f" [{of.unit}]" if of.unit else ""
+    return f"{name}{unit}, down" if is_depth(of) else f"{name}{unit}"
 
 
 def in_words(text: str) -> str:

@@ -46,7 +46,7 @@ def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
 
 def export_arguments(verb: Any) -> None:
     """Add the arguments of the verb export."""
-    add_shared(verb, "dir", dir="a store, a result.npz, or a folder with one of the two")
+    add_shared(verb, "dir", dir="a store, a result.npz, a folder with one of the two, or the footprint.json of a run")
     verb.add_argument(
         "--to",
         metavar="FILE",
@@ -70,8 +70,13 @@ def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
 
     settings = {"members": _members(chosen.members), "origin": _origin(chosen.origin), "start": chosen.start,
                 "overwrite": chosen.overwrite}  # fmt: skip
+    run = chosen.dir
+    if run.suffix == ".json":
+        from lgvi_warp.uncertainty.footprint.answer import Footprint
+
+        run = Footprint.load(run)
     with progress_bar(chosen.quiet, "writing") as progress:
-        path = (write or write_as)(chosen.dir, chosen.to, chosen.out, **settings, progress=progress)
+        path = (write or write_as)(run, chosen.to, chosen.out, **settings, progress=progress)
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
     return 0
 

@@ -5,6 +5,7 @@ import dataclasses
 import json
 import math
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.ndimage import map_coordinates
 from scipy.stats import binom, gaussian_kde
 
 import lgvi_warp as lw
+from lgvi_warp.cli.command import main
 from lgvi_warp.common.status import Status
 from lgvi_warp.uncertainty.footprint.answer import number_text, place_text
 from lgvi_warp.uncertainty.footprint.density import GAIN, DensityGrid, Whitening
@@ -265,6 +267,11 @@ def test_a_footprint_is_saved_and_read(tmp_path):
     assert json.loads(files[0].read_text())["answer"] == found.answer
     np.testing.assert_array_equal(again.regions[0].polygons[0][0], found.regions[0].polygons[0][0])
     assert len(files[1].read_text().splitlines()) == 1 + len(found.regions)
+    # The command takes the file, too.
+    for name in ("by_command.geojson", "by_command.kml"):
+        assert main(["export", str(files[0]), "--to", str(tmp_path / name), "--origin=63.4,10.4", "-q"]) == 0
+        direct = lw.export(found, tmp_path / f"direct{Path(name).suffix}", origin=[63.4, 10.4])
+        assert (tmp_path / name).read_bytes().replace(b"by_command", b"direct") == direct.read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def not_kept(key: str, field: str, kept: tuple[str, ...]) -> SceneError:
 
 
 class KnownMembers:
-    """Stored facts about a block's members, without their ensemble: their numbers, and the start as the first sample has it."""
+    """Stored facts about a block's members, without their ensemble: numbers, and the start as the first sample has it."""
 
     def __init__(self, result: Result, at: slice, start: KeptFields | None):
         self.parameters, self.starts = (_of_members(numbers, at) for numbers in (result.parameters, result.starts))

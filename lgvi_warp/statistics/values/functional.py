@@ -2,7 +2,8 @@
 """Expressions for quantities: a name, a component of it, a difference, a length, and a reduction over the path.
 
 "position[2]" and "norm(velocity)" give numbers of each member at each time, as does the difference
-"measured_position - position"; "vehicle.buoyancy" gives the member's own; "max(depth)" and "range(norm(velocity))" give one number of each member, over its path.
+"measured_position - position"; "vehicle.buoyancy" gives the member's own; "max(depth)" and "range(norm(velocity))" give one
+number of each member, over its path.
 Statistics, sensitivity, trade-offs and stability maps all read them here.
 """
 

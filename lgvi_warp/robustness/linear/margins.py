@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.near import near_names
@@ -40,8 +39,8 @@ NARROW = {"eigenvalues": 1e-6, "runs": 2e-3}
 PERCENTILES = (0.0, 5.0, 25.0, 50.0, 75.0, 95.0, 100.0)
 UNITS = {"delay": "s", "disk_phase": "rad", "frequency": "rad/s"}
 GAINS = ("gain_lower", "gain_upper")
-# Margins beside the gain in the words of the answer, and how many it has.
-NAMED, MOST_NAMED = {"delay": "a delay of", "disk": "a disk margin of"}, 4
+# Margins beside the gain in the words of the answer.
+NAMED = {"delay": "{} more delay", "disk": "a disk margin of {}"}
 DISKS = ("disk", "disk_gain_lower", "disk_gain_upper", "disk_phase", "disk_frequency")
 NAMES = {"gain": GAINS, "delay": ("delay",), "disk": DISKS, "peak": ()}
 
@@ -192,20 +191,19 @@ class Margins(Saved):
     def answer(self) -> str:
         every, bad = plural(self.members, "member"), f" ({self.reasons_text})" if self.reasons else ""
         if not self.steady.any():
-            return f"{self.loop} has no margins in any of {every}{bad}."
+            return f"The loop of {self.loop} has no margins in any of {every}{bad}."
         texts = []
         worst = {name: np.fmax.reduce(v) if name.endswith(("lower", "peak")) else np.fmin.reduce(v)
                  for name, column in self._columns().items() for v in [column[self.steady]]}  # fmt: skip
         if "gain_upper" in worst:
             ends = (few_digits(worst[name], "", 4) for name in GAINS)
-            texts.append("factors on its demand from {} to {}".format(*ends))
-        texts += [
-            f"{word} {few_digits(worst[name], unit_of(name), 4)}" for name, word in NAMED.items() if name in worst
-        ]
-        texts += [f"{name} up to {few_digits(value, '', 4)}" for name, value in worst.items() if name.endswith("_peak")]
+            texts.append("{} to {} times its gain".format(*ends))
+        texts += [f.format(few_digits(worst[name], unit_of(name), 4)) for name, f in NAMED.items() if name in worst]
+        peaks = [f"{name} up to {few_digits(value, '', 4)}" for name, value in worst.items() if name.endswith("_peak")]
+        said = [f"tolerates {' or '.join(texts)}"] * bool(texts) + [f"has {' and '.join(peaks)}"] * bool(peaks)
         good, some = int(self.steady.sum()), f"{int(self.steady.sum()):,} of {every}" if bad else every
-        least = f"; member {self.worst(self.members)[self.members - good]} bears least" if good > 1 else ""
-        return f"{self.loop} bears {summaries.listed(texts, MOST_NAMED)} in {some}{bad}{least}."
+        least = f"; member {self.worst(self.members)[self.members - good]} has the least margin" if good > 1 else ""
+        return f"The loop of {self.loop} {' and '.join(said)} in {some}{bad}{least}."
 
     def _report(self) -> list[str]:
         lines = [f"{self.loop}: margins of {self.members} members"]

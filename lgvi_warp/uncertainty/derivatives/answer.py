@@ -76,7 +76,13 @@ class Derivatives(Saved):
             step = "unit" if unit == "1" else unit
             texts.setdefault(self.of[i], []).append(f"{slope}{error} per {step} of {self.by[j]}")
         if not named:
-            return f"None of {plural(defined[0].size, 'derivative')} is defined."
+            count, why = defined[0].size, "; ".join([*dict.fromkeys(self.undefined.values())][:2])
+            none = (
+                f"None of {count} derivatives is defined"
+                if count > 1
+                else f"{self.of[0]} has no derivative by {self.by[0]}"
+            )
+            return f"{none}: {why}."
         said = "; ".join(f"{of} changes by {', '.join(each)}" for of, each in texts.items())
         more = f", and {plural(len(named) - MOST_NAMED, 'more derivative')}" if len(named) > MOST_NAMED else ""
         undefined = int((~defined.any(axis=0)).sum())

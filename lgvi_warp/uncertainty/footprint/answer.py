@@ -97,7 +97,7 @@ class Footprint(Saved):
             share, are = f"{share} of the {who}", are if failed else "do so"
         place = place_text(self.centre, region.radius or 1.0)
         within = f"within {number_text(region.radius, region.radius)} m of" if region.radius > 0.0 else "at"
-        return f"{before}{share} {are} {within} {place}"
+        return f"{before}{share} {are} {within} {place}."
 
     def _report(self) -> Iterator[str]:
         lines = [f"footprint   {self.members:,} members, at {self.at}{' s' * (time_of(self.at) is not None)}"]

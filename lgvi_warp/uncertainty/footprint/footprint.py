@@ -44,7 +44,7 @@ def run_answer(result: Result) -> str:
         found = _footprint(result, "end", outlined=False)
     except SceneError:  # positions were not kept, or no member has an end
         return how
-    return f"{how[:-1]}; {found.answer}." if found.main.radius >= LEAST_CIRCLE else how
+    return f"{how[:-1]}; {found.answer}" if found.main.radius >= LEAST_CIRCLE else how
 
 
 def footprint(result: Result, at: str | float = "end") -> Footprint:
@@ -73,7 +73,7 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
         >>> fleet = lw.Ensemble(scene, members=200, vary={"start.position": start})
         >>> found = lw.studies.footprint(lw.solve(fleet, h=0.1, t1=10.0))
         >>> found.answer
-        '95 % end within 6.10 m of a point 9.74 m north and 2.40 m west of the origin'
+        '95 % end within 6.10 m of a point 9.74 m north and 2.40 m west of the origin.'
     """
     return _footprint(result_of(result), at)
 

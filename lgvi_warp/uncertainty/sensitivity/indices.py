@@ -13,8 +13,8 @@ from lgvi_warp.common.summaries import few_digits, listed, percent
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.results.quantities import unit_of
 
-# Quantities that the answer names.
-MOST_QUANTITIES = 2
+# Quantities that the answer names; and part of the first factor's amount from which on it names a second one.
+MOST_QUANTITIES, LEAST_SECOND = 2, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,8 @@ class Indices(Saved):
         texts = [f"{self.factors[f]} ({self._amount(q, values[f], half[f])})" for f in known[: max(2, len(first))]]
         if len(first) > 1:
             return f"{quantity} depends most on {listed(texts, 2)}, which sampling error does not tell apart"
-        second = len(known) > 1 and values[known[1]] > half[known[1]] and len(self.quantities) == 1
+        worth = max(half[known[1]], LEAST_SECOND * values[known[0]]) if len(known) > 1 else np.inf
+        second = len(self.quantities) == 1 and len(known) > 1 and values[known[1]] > worth
         then = f", then on {texts[1]}" if second else ""
         return f"{quantity} depends most on {texts[0]}{then}"
 

@@ -50,7 +50,7 @@ def footprint(
     with panel(ax, path, (8.0, 7.5)) as axes:
         draw_footprint(axes, found)
         if ax is None:
-            axes.set_title(wrapped(found.answer, axes.figure, 0.9))
+            axes.set_title(wrapped(found.answer.rstrip("."), axes.figure, 0.9))
     return axes
 
 

@@ -258,16 +258,21 @@ def test_margins_are_those_that_all_members_bear():
     upper = np.geomspace(2.0, 8.0, 4)
     upper[-1] = np.inf
     near(text, (1.0 / upper).max(), upper.min(), 0.1 * upper.min(), 4)
-    assert text.startswith("heading_pid bears factors on its demand from 0.5 to 2, a delay of 0.2 s in 4 members; ")
-    assert text.endswith("member 0 bears least.")
+    assert text.startswith(
+        "The loop of heading_pid tolerates 0.5 to 2 times its gain or 0.2 s more delay in 4 members; "
+    )
+    assert text.endswith("member 0 has the least margin.")
     some = both("does not settle", "", "").answer
     near(some, 0.25, 4.0, 0.4, 2, 3, 1)
-    assert some.endswith("in 2 of 3 members (1: does not settle); member 1 bears least.")
-    assert loops("failed", "failed").answer == "heading_pid has no margins in any of 2 members (2: failed)."
+    assert some.endswith("in 2 of 3 members (1: does not settle); member 1 has the least margin.")
+    assert loops("failed", "failed").answer == "The loop of heading_pid has no margins in any of 2 members (2: failed)."
     one = Margins(
         "all laws", {"disk": np.array([0.6]), "sensitivity_peak": np.array([1.7])}, {}, np.array([""], object), 0.1
     )
-    assert one.answer == "all laws bears a disk margin of 0.6, sensitivity_peak up to 1.7 in 1 member."
+    assert (
+        one.answer
+        == "The loop of all laws tolerates a disk margin of 0.6 and has sensitivity_peak up to 1.7 in 1 member."
+    )
 
 
 def test_the_numbers_of_a_steady_motion():
@@ -365,7 +370,14 @@ def test_derivatives_have_the_units_of_both():
     assert text.endswith("of a, and 1 more derivative.")
     alone = slopes([[2.0, np.nan]], of=("depth",), units=("m",)).answer
     assert alone == "depth changes by 2 m (+- 0.0001) per N of a; 1 of 2 are undefined."
-    assert slopes([[np.nan]], by=("a",), of=("depth",), units=("m",)).answer == "None of 1 derivative is defined."
+    none = dataclasses.replace(
+        slopes([[np.nan]], by=("a",), of=("depth",), units=("m",)), undefined={"depth by a": "a sticks"}
+    )
+    assert none.answer == "depth has no derivative by a: a sticks."
+    two = dataclasses.replace(
+        slopes([[np.nan] * 2] * 2), undefined={"depth by a": "a sticks", "speed by a": "all fail"}
+    )
+    assert two.answer == "None of 4 derivatives is defined: a sticks; all fail."
     fleet = np.array([[[1.0, 5.0]], [[3.0, np.nan]], [[5.0, 7.0]]])
     mean = slopes(fleet, of=("depth",), units=("",)).answer
     assert mean == "depth changes by 3 per N of a, 6 per unit of b, on average over 3 members."

@@ -197,7 +197,7 @@ def test_few_members_have_few_regions(n, shares):
 
 def test_places_without_an_area():
     spot = footprint(np.tile([3.0, -4.0], (50, 1)))
-    assert spot.answer == "All end at a point 3.00 m north and 4.00 m west of the origin"
+    assert spot.answer == "All end at a point 3.00 m north and 4.00 m west of the origin."
     line = footprint(np.outer(np.linspace(0.0, 10.0, 101), [0.6, 0.8]))
     # 95 % of 102 places between members from the middle: 4.85 m, in steps of 0.1 m.
     assert line.main.radius == pytest.approx(4.85, abs=0.1)
@@ -234,7 +234,7 @@ def test_members_without_a_place_are_counted():
     says(str(last), "left out    30 members without such a place: non_finite 30")
     # At 1 s the failed members have stopped; at the start they are under way.
     assert lw.studies.footprint(result, 1.0).lacking == {"non_finite": 30}
-    assert lw.studies.footprint(result, "0").answer == "At 0 s all are at the origin"
+    assert lw.studies.footprint(result, "0").answer == "At 0 s all are at the origin."
     says(lw.studies.footprint(result, 1).answer, "At 1 s 95 % of the 270 members that did not fail are within")
     assert lw.studies.footprint(result, "stopped").members == 200
     lost = run_to(np.where(np.arange(300)[:, None] == 299, np.nan, places))
@@ -299,7 +299,7 @@ def test_the_picture_shows_the_numbers():
     found = lw.studies.footprint(result)
     axes = lw.plots.footprint(result)
     assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_aspect()) == ("east [m]", "north [m]", 1.0)
-    assert axes.get_title().replace("\n", " ") == found.answer
+    assert axes.get_title().replace("\n", " ") == found.answer.rstrip(".")
     shown = dict(
         zip(
             [f"{region.percent}: {number_text(region.area, region.area)} m$^2$" for region in found.regions],

@@ -152,6 +152,9 @@ class StabilityMap(Saved):
         good = np.min([self.limit(method).min() for method in ranked[best]])
         if np.isfinite(good):
             text += f", in every row up to {self.x.name} {few_digits(good, self.x.unit, 3)}"
+        elif not bounded:
+            codes = np.concatenate([self.statuses[method].ravel() for method in ranked[best]])
+            text += f"; the most frequent status is {status_name(int(np.bincount(codes).argmax()))}"
         if len(ranked) > 1:
             text += f"; with {summaries.listed(ranked[worst], MOST_NAMED)} in {percent(worst[0], 3)} %, the least"
         silent = [f"{method} in {count}" for method in self.methods if (count := len(self.silent(method)))]

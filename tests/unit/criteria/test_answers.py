@@ -339,8 +339,11 @@ def test_methods_of_a_map_by_their_cells():
         good
         == "Runs with psi_s stay bounded without a flag in 100 % of 6 cells (accurate in 100 %), in every row up to h 4 s."
     )
-    none = made_map([[3, 3, 3], [3, 3, 3]]).answer
-    assert none == "Runs with psi_s stay bounded without a flag in 0 % of 6 cells (accurate in 0 %)."
+    none = made_map([[3, 3, 3], [3, 3, 3]])
+    ends = np.array([[255, 255, 255], [255, 1, 1]])
+    none = dataclasses.replace(none, statuses={"psi_s": ends}).answer
+    refused = "Runs with psi_s stay bounded without a flag in 0 % of 6 cells (accurate in 0 %)"
+    assert none == f"{refused}; the most frequent status is refused."
 
 
 # Estimates and derivatives

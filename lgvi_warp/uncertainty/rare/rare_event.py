@@ -238,12 +238,12 @@ def _refused(stuck: NoProgress, condition: RareCondition) -> SceneError:
         problem = "has the same value for most members, so that nothing says how near one is to the event"
         remedy = 'give a number that grows towards it: a distance, "peak depth above 12", or the name of an event'
         return refusal("limit", condition.label, problem, remedy)
-    largest = "farthest from it" if stuck.largest <= -SURE else f"{stuck.largest:.4g}"
     reached = "fewer than a tenth of the last level's members" if stuck.largest > 0.0 else "no member"
+    short = "" if stuck.largest > 0.0 else f"; the nearest member is {-stuck.largest:.4g} short of it"
     problem = (
-        f"was reached by {reached} within {MOST_LEVELS} levels, each a tenth of the one before, or before the limit grew no "
-        f"more: it never happens, or is rarer than about 1e-{MOST_LEVELS - 2}; the largest limit that members reached is "
-        f"{largest}"
+        f"was reached by {reached} within {MOST_LEVELS} levels, each a tenth of the one before, or until members came no "
+        f"nearer: it never happens, or is rarer than about 1e-{MOST_LEVELS - 2}"
+        f"{'; none came near it' if stuck.largest <= -SURE else short}"
     )
     return refusal("limit", condition.label, problem, "move the bound, or widen what varies")
 

@@ -149,6 +149,22 @@ def test_what_cannot_be_tuned():
             lw.tune_gains(fleet, **{"over": OVER, "minimise": "depth", **words}, **RUN)
 
 
+def test_a_course_is_searched_among_starts():
+    """A neutral body moves on along its axis: the farthest west is due west, and the members' own spread adds its mean."""
+    vary = {"start.position[1]": lw.distributions.Normal(std=1.0)}
+    fleet = lw.Ensemble(
+        lw.Scene.named("sphere", start={"velocity": [0.5, 0.0, 0.0], "euler_deg": [0.0] * 3}), 8, 1, vary
+    )
+    over = {"start.euler_deg[2]": (-150.0, 20.0), "start.velocity[0]": (0.2, 1.5)}
+    found = lw.tune_gains(fleet, over, "position[1]", budget=8 * 600, fresh=16, h=0.1, t1=2.0)
+    assert abs(found.parameters["start.euler_deg[2]"] + 90.0) < 0.5
+    assert found.parameters["start.velocity[0]"] == 1.5
+    np.testing.assert_allclose(found.cost, fleet.select(0, 8).position[:, 1].mean() - 3.0, atol=1e-4)
+    turned = lw.Ensemble(fleet.scene, 8, 1, {"start.euler_deg": lw.distributions.Normal(std=[0.1, 0.1, 0.1])})
+    with pytest.raises(lw.SceneError, match="varies by member too"):
+        lw.tune_gains(turned, {"start.euler_deg[2]": (-150.0, 20.0)}, "position[1]", h=0.1, t1=2.0)
+
+
 def test_indices_of_members_are_whole_numbers():
     run = lw.prepare(regulated(), None, "depth", **RUN)
     for wrong, words in (

@@ -24,8 +24,10 @@ from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, search
 from lgvi_warp.robustness.search.numbers import MOST_NAMED, Numbers
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.names import numbers_of as every_number
 from lgvi_warp.scene.names import single_number
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.start import ATTITUDES, resolve_attitude
 from lgvi_warp.statistics.base import Statistic
 
 
@@ -214,9 +216,9 @@ def _checked_box(faults: Faults, ensemble: Ensemble, over: Any, budget: Any) -> 
     box = None
     with faults.including():
         box = SearchBox.of("over", over, ensemble.scene)
-    varied = {name.split("[")[0] for name in ensemble.varied_names}
+    varied = {_array_of(name) for name in ensemble.varied_names}
     for name in box.names if box else ():
-        if name.split("[")[0] in varied:
+        if _array_of(name) in varied:
             faults.add(f'over."{name}"', over[name], "varies by member too", "leave it out of one of them")
     least = ensemble.members * max(LEAST, POPULATION * (len(box.names) if box else 1))
     if not is_whole(budget, least, 2**31):
@@ -224,12 +226,21 @@ def _checked_box(faults: Faults, ensemble: Ensemble, over: Any, budget: Any) -> 
     return box
 
 
+def _array_of(name: str) -> str:
+    """The array that a number is of; all forms of an attitude are one."""
+    array = name.split("[")[0]
+    return "attitude" if array.removeprefix("start.") in ATTITUDES else array
+
+
 class _Costs:
     """Costs of candidates (k, d), of each member: (k, members)."""
 
     def __init__(self, numbers_of: Numbers, fleet: Ensemble, box: SearchBox):
         n = fleet.members
-        self._numbers_of, self._box, self._members = numbers_of, box, fleet.select(0, n)
+        self._numbers_of, self._members = numbers_of, fleet.select(0, n)
+        self._found = {name: single_number(fleet.scene, name)[0] for name in box.names}
+        self._starts = {target.name: every_number(fleet.scene)[target.name] for target in self._found.values()
+                        if target.name.startswith("start.")}  # fmt: skip
         varied = {name: self._members.parameters[name] for name in fleet.varied()}
         self._varied = {name: np.broadcast_to(v, (n, *v.shape[1:])) for name, v in varied.items()}
 
@@ -239,7 +250,15 @@ class _Costs:
         every = np.tile(np.arange(n), k)
         states: Any = {name: getattr(members, name)[every] for name in FIELDS}
         parameters = {name: v[every] for name, v in self._varied.items()}
-        parameters |= dict(zip(self._box.names, np.repeat(candidates, n, axis=0).T, strict=True))
+        starts = {name: np.tile(value, (k * n,) + (1,) * value.ndim) for name, value in self._starts.items()}
+        for (name, target), column in zip(self._found.items(), np.repeat(candidates, n, axis=0).T, strict=True):
+            if target.name in starts:
+                starts[target.name][(slice(None), *(target.index or ()))] = column
+            else:
+                parameters[name] = column
+        for name, values in starts.items():
+            form = name.removeprefix("start.")
+            states |= {"attitude": resolve_attitude({form: values})} if form in ATTITUDES else {form: values}
 
         def called(run: Prepared) -> Any:
             indices = None if run.common_noise else members.indices[every]

@@ -61,8 +61,9 @@ def tradeoff(found: Tradeoff, of: str | None = None, *, figure: Any = None, path
                 named.append((name if dtype == "float64" else f"{name}, {dtype}", errors[0], prices[0], line["color"]))
         costs.plot(*_errors_and_costs(front, of), color="black", linewidth=6, alpha=0.2, solid_capstyle="round",
                    label="cheapest for each error", zorder=0)  # fmt: skip
-        _words(costs, biases, found, of, bool(shown))
-        _name(costs, named)
+        _words(costs, biases, found, of, any(point.error(of) > 0.0 for point in shown))
+        if any(error > 0.0 for _, error, _, _ in named):
+            _name(costs, [each for each in named if each[1] > 0.0])
         others = [name for name, _ in groups if name not in best]
         _legend(costs.figure, {dtype for _, dtype in groups}, others, bool(front))
     return grid[0]
@@ -96,7 +97,11 @@ def _words(costs: Any, biases: Any, tradeoff: Tradeoff, of: str, any_shown: bool
     biases.set(xlabel="step [s]", ylabel=f"bias / standard error of {tradeoff.members} members",
                title=wrapped(f"Bias of the mean of {of} up to {tradeoff.t1:g} s", figure, 0.4))  # fmt: skip
     for axes, drawn, reason in (
-        (costs, any_shown, "no error of members: noise acts, or the reference is not good enough"),
+        (
+            costs,
+            any_shown,
+            "no error of members: noise acts, the reference is not good enough, or all settings are exact",
+        ),
         (biases, any(point.biases for point in tradeoff.measurements), "no statistics: there is one member"),
     ):
         if drawn:

@@ -2,6 +2,7 @@
 """Navigation errors by their name, through every study: against closed forms of dead reckoning by compass and log."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -210,6 +211,17 @@ def test_the_page_and_the_command_know_the_names(tmp_path, capsys):
     # The mean of |b| is S sqrt(2 / pi); 256 members of a design that is spread evenly.
     mean = answer("sensitivity", "--of", ERROR, "--samples", "64")["mean"]
     assert mean == pytest.approx([way * S * np.sqrt(2.0 / np.pi)], rel=0.02)
+    # A run with a statistic, and a sweep over noise that adds nothing.
+    above = f'run.statistics=[{{type = "exceedance", of = "{ERROR}", above = 50.0}}]'
+    told = answer("run", "--set", above, "--set", "ensemble.members=400")["statistics"]
+    share, error = beyond(50.0, way), np.sqrt(beyond(50.0, way) / 400)
+    assert np.ravel(told[0]["value"])[-1] == pytest.approx(share, abs=4.0 * error)
+    path = tmp_path / "sweep.toml"
+    path.write_text('scene = "budget.toml"\nmembers = 400\nmetrics = ["navigation end"]\n'
+                    '[success]\n"navigation end" = { below = 50.0 }\n[grid]\n"compass.noise" = [0.0, 1e-9]\n')  # fmt: skip
+    assert cli.main(["sweep", str(path), "--out", str(tmp_path / "swept")]) == 0
+    line = capsys.readouterr().out.splitlines()[-1]
+    assert float(re.search(r"(\S+) % \(", line)[1]) == pytest.approx(100.0 * (1.0 - share), abs=400.0 * error)
 
 
 @pytest.mark.parametrize("sensors", [[], [lw.control.Sensor(of="heading", bias=0.1)]], ids=["none", "compass"])

@@ -80,8 +80,21 @@ def _model(root: Element, name: str, include: Element) -> Element:
 
 
 def _merged(model: Element, name: str) -> list[Element]:
-    """The parts of a model that becomes one with the model that includes it."""
-    pose = text_of(model.find("pose"))
-    if any(float(word) != 0.0 for word in pose.split() if word.replace(".", "").replace("-", "").isdigit()):
-        raise SceneError([f"SDF include {name!r}: is merged at a pose of its own; include it without merge"])
-    return [child for child in model if child.tag not in ("pose", "static")]
+    """The parts of a model that becomes one with the model that includes it; its own frame becomes a frame of that model."""
+    if model.get("placement_frame"):
+        raise SceneError([f"SDF include {name!r}: is merged by a placement_frame; include it without merge"])
+    parts = [child for child in model if child.tag not in ("pose", "static")]
+    pose = model.find("pose")
+    if pose is None:
+        return parts
+    frame = Element("frame", {"name": f"_merged__{model.get('name', '')}__model__"})
+    frame.append(pose)
+    for part in parts:
+        if part.tag in ("link", "model", "frame") and not part.get("attached_to") and part.find("pose") is None:
+            part.append(Element("pose"))
+        own = part.find("pose")
+        for each in part.iter("pose"):
+            by_default = each is own and part.tag != "joint" and not part.get("attached_to")
+            if each.get("relative_to", "__model__" if by_default else "") == "__model__":
+                each.set("relative_to", frame.get("name", ""))
+    return [frame, *parts]

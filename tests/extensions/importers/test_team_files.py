@@ -126,6 +126,44 @@ def test_a_world_includes_what_the_user_names(key, tmp_path):
     assert outer["terms"] == plain["terms"]
 
 
+def test_a_merged_model_lies_where_its_pose_says():
+    """Beside the same links written into one model; c hangs below b and turns with the merged model by a quarter."""
+
+    def link(name, pose):
+        return LINK.format(name, 0, 5).replace("<pose>0 0 0 0 0 0</pose>", pose).replace("<ixx>1", "<ixx>2")
+
+    joint = '<joint name="j{0}" type="fixed"><parent>a</parent><child>{0}</child></joint>'
+    merged = (
+        link("b", "<pose>1 0 0 0 0 0</pose>")
+        + link("c", '<pose relative_to="b">0 0 -0.5 0 0 0</pose>')
+        + link("e", '<pose relative_to="__model__">0 0 0.3 0 0 0</pose>')
+        + link("g", "")
+        + link("h", '<pose relative_to="f"/>')
+        + '<frame name="f"><pose>0 0.2 0 0 0 0</pose></frame>'
+    )
+    include = '<include merge="true"><uri>tail</uri><pose degrees="true">-2 0.1 0 0 0 90</pose></include>'
+    whole = '<sdf version="1.9"><model name="m">{}</model></sdf>'
+    own = LINK.format("a", 0, 20) + "".join(joint.format(name) for name in "bcegh")
+    read = from_sdf(whole.format(own + include), include={"tail": whole.format(merged)})
+    turn = " 0 0 1.5707963267948966</pose>"
+    flat = (
+        link("b", "<pose>-2 1.1 0" + turn)
+        + link("c", "<pose>-2 1.1 -0.5" + turn)
+        + link("e", "<pose>-2 0.1 0.3" + turn)
+        + link("g", "<pose>-2 0.1 0" + turn)
+        + link("h", "<pose>-2.2 0.1 0" + turn)
+    )
+    beside = from_sdf(whole.format(own + flat))
+    numbers = {key: value for key, value in beside["vehicle"].items() if np.asarray(value).dtype.kind == "f"}
+    assert len(numbers) > 3
+    for key, value in numbers.items():
+        np.testing.assert_allclose(read["vehicle"][key], value, rtol=1e-12, atol=1e-12, err_msg=key)
+    np.testing.assert_allclose(read["vehicle"]["weight"], 45.0 * 9.80665)
+    placed = whole.replace('"m"', '"m" placement_frame="f"').format(merged)
+    with pytest.raises(lw.SceneError, match="is merged by a placement_frame"):
+        from_sdf(whole.format(own + include), include={"tail": placed})
+
+
 @pytest.mark.parametrize(("include", "words"), [
     (None, "the file has none of its own that can move, it includes .*swimmer; pass include="),
     ({"swimer": HULL}, "include = 'swimer': is none that the file includes; did you mean 'swimmer'"),

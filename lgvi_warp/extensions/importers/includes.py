@@ -7,6 +7,7 @@ import copy
 import os
 from collections.abc import Mapping
 from typing import Any
+from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
 from lgvi_warp.common.errors import SceneError, closest, refusal
@@ -27,7 +28,8 @@ def put_in_place(root: Element, given: Any) -> None:
     known: set[str] = set()
     size = _put(root, files, used, known, 0)
     if unused := [name for name in files if name not in used]:
-        raise refusal("include", unused[0], "is none that the file includes", closest(unused[0], sorted(known)))
+        remedy = closest(unused[0], sorted(known)) if known else "leave it out: it includes nothing"
+        raise refusal("include", unused[0], "is none that the file includes", remedy)
     if size > MOST_ELEMENTS:
         raise SceneError([f"SDF include: makes more than {MOST_ELEMENTS:,} elements; give the vehicle alone"])
 
@@ -56,9 +58,10 @@ def _put(root: Element, files: Mapping[str, Element], used: set[str], known: set
 
 
 def names_of(include: Element) -> list[str]:
-    """By what an <include> may be named: its <name>, its <uri>, and the last part of that."""
+    """By what an <include> may be named: its <name>, its <uri>, and the last part of that, also without %20."""
     uri = text_of(include.find("uri"))
-    return [each for each in (text_of(include.find("name")), uri, uri.rstrip("/").rpartition("/")[2]) if each]
+    last = uri.rstrip("/").rpartition("/")[2]
+    return [each for each in dict.fromkeys((text_of(include.find("name")), uri, last, unquote(last))) if each]
 
 
 def _model(root: Element, name: str, include: Element) -> Element:

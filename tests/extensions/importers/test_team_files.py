@@ -122,6 +122,8 @@ def test_a_world_includes_what_the_user_names(key, tmp_path):
         assert read["terms"] == plain["terms"]
         assert read["vehicle"]["weight"] == plain["vehicle"]["weight"] == 20.0 * 9.8
         assert read["environment"]["gravity"] == 9.8
+    named = from_sdf(WORLD.format("").replace("tethys_equipped", "MBARI%20Tethys"), include={"MBARI Tethys": HULL})
+    assert named["vehicle"]["weight"] == plain["vehicle"]["weight"]
     outer = from_sdf(WORLD.format(PLUGIN.format("a", "")), include={key: HULL})
     assert outer["terms"] == plain["terms"]
 

@@ -65,7 +65,8 @@ def draw(content: dict[str, Any]) -> None:
         axes.set_title(
             f"{content['members']:,} REMUS 100 for {content['t1']:g} s on one core, right to 1 cm", loc="left"
         )
-        axes.set_xlabel("seconds: each line is ten times the one before")
+        axes.set_xlabel("time, logarithmic")
+        axes.xaxis.set_major_formatter(lambda seconds, _: f"{seconds:,.3g} s" if seconds < 1e3 else f"{seconds:,.0f} s")
         axes.grid(True, axis="x", alpha=0.3)
         axes.set_axisbelow(True)
         axes.minorticks_off()

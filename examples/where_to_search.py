@@ -9,6 +9,6 @@ scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 285.0}, start=start, te
 normal = lw.distributions.Normal
 unknown = {"vehicle.buoyancy": normal(std=1.0), "current.velocity": normal(std=[0.05, 0.05, 0.0])}  # N and m/s
 result = lw.solve(lw.Ensemble(scene, 10_000, seed=1, vary=unknown), h=0.1, t1=240.0, save=lw.SaveAt(every=1.0))
-north, east, _ = 2.0 * result.position[-1].std(axis=0)
-print(f"{result.status.counts()}: two standard deviations are {north:.0f} m north and {east:.0f} m east")
-lw.plots.plan_view(result, 200, path="where_to_search.png")
+found = lw.studies.footprint(result, "floor")
+print(f"{result.status.counts()}\n{found.answer}\nThe 95 % region: {found.main.area_text}")
+lw.plots.footprint(found, path="where_to_search.png")

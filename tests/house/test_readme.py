@@ -3,6 +3,7 @@
 
 import re
 import runpy
+import tomllib
 
 import matplotlib
 
@@ -18,7 +19,7 @@ def test_readme(tmp_path, monkeypatch, capsys):
     _, code, output = snippets("README.md", "python")[0]
     exec(code, {})
     assert capsys.readouterr().out == output
-    assert output.count("\n") == 1
+    assert output.count("\n") == 3
     assert (tmp_path / "where_to_search.png").stat().st_size > 1000
 
 
@@ -37,6 +38,14 @@ def test_the_readme_is_short_and_shows_what_comes_of_it():
         "## Citation",
     ]  # fmt: skip
     assert sorted(order, key=text.index) == order
+
+
+def test_the_readme_can_be_cited():
+    text = (ROOT / "README.md").read_text().partition("```bibtex")[2].partition("```")[0]
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"version = {{{version}}}" in text
+    assert re.findall(r"^@(\w+)\{", text, re.MULTILINE) == ["software", "inproceedings"]
+    assert text.count("{") == text.count("}")
 
 
 def test_six_questions_are_answered_where_the_page_says():

@@ -56,10 +56,10 @@ def given_data(
 ) -> GivenDataIndices:
     """Estimate first-order indices of a run that is over, by every number that varied in it, those of the start too.
 
-    No design is needed: members are divided into bins of each input, and the variance between the bins' means is compared
-    with that of all, less what chance puts there. The interval is of the noncentral F distribution, widened by the spread of
-    what members add. Interactions are not seen (see `lw.uq.sobol`), and inputs are meant to be independent: what correlated
-    ones explain is counted for each.
+    No design is needed. The members are divided into bins of each input. The index is the part of the variance that lies
+    between the bins' means, less the part that chance alone would put there. The interval is that of the noncentral F
+    distribution, wider where the numbers are not normal. Interactions are not seen (see `lw.uq.sobol`). Inputs are meant to
+    be independent: what correlated inputs explain together counts for each of them.
 
     Args:
         result: What `lw.solve`, `lw.open_run` or `lw.Result.load` returned, or the path of a store.

@@ -407,7 +407,7 @@ def remove(path):
 
 STUDIES = {
     "tradeoff": ["--members", 4, "--duration", 0.1, "--methods", "psi_s"],
-    "sensitivity": ["--samples", 8, "--duration", 0.1],
+    "sensitivity": ["--of", "position", "--samples", 8, "--duration", 0.1],
     "stability": ["--points", 2, "--duration", 0.1, "--methods", "psi_s"],
 }
 # What writes a file under a name of its own into a folder: the command before its name, a good folder or "", and the file.

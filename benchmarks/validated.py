@@ -120,12 +120,18 @@ def draw(name: str, content: Content) -> None:
     module = case(name)
     with plt.rc_context({"font.size": 12, "axes.titlesize": 12, "legend.fontsize": 10.5}):
         figure = plt.figure(figsize=getattr(module, "SIZE", SIZE), layout="constrained")
-        figure.suptitle(module.TITLE, fontsize=14)
-        module.draw(content, figure)
+        plot(name, content, figure)
         target = page_of(name).with_suffix(".png")
         figure.savefig(target, dpi=FINE)
         plt.close(figure)
     pictures.keep(target, target, script=pictures.made_of(f"validation/{target.name}"))
+
+
+def plot(name: str, content: Content, figure: Any) -> None:
+    """Put the picture of a comparison into a figure, with its title."""
+    module = case(name)
+    figure.suptitle(module.TITLE, fontsize=14)
+    module.draw(content, figure)
 
 
 def number(value: float | None) -> str:

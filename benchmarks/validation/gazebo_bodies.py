@@ -189,4 +189,4 @@ def draw(content: Content, figure: Any) -> None:
         axes.plot([], [], ".", color="0.4", markersize=4, label="SciPy")
         axes.plot([], [], "o", color=PUBLISHED, label="Gazebo's test, at 1 s")
         axes.set(xlabel="time [s]", ylabel=f"speed along {axis} [m/s]", xlim=(0.0, 1.0), ylim=(-0.02, 0.6))
-    figure.axes[0].legend(loc="upper left", ncols=2)
+    figure.axes[0].legend(loc="upper left", ncols=2, fontsize=9.5)

@@ -120,11 +120,18 @@ def draw(name: str, content: Content) -> None:
     module = case(name)
     with plt.rc_context({"font.size": 12, "axes.titlesize": 12, "legend.fontsize": 10.5}):
         figure = plt.figure(figsize=getattr(module, "SIZE", SIZE), layout="constrained")
-        module.draw(content, figure)
+        plot(name, content, figure)
         target = page_of(name).with_suffix(".png")
         figure.savefig(target, dpi=FINE)
         plt.close(figure)
     pictures.keep(target, target, script=pictures.made_of(f"validation/{target.name}"))
+
+
+def plot(name: str, content: Content, figure: Any) -> None:
+    """Put the picture of a comparison into a figure, with its title."""
+    module = case(name)
+    figure.suptitle(module.TITLE, fontsize=14)
+    module.draw(content, figure)
 
 
 def number(value: float | None) -> str:
@@ -160,13 +167,28 @@ def within(rows: Sequence[Row]) -> str:
     return f"{sum(abs(row.error) <= row.within for row in told)} of {len(told)}" if told else ""  # type: ignore[operator]
 
 
+def largest(content: Content) -> float | None:
+    """Largest error of a page's rows in percent of the published number; None where all of these are 0."""
+    return max((100.0 * abs(row.error / row.published) for row in content.rows if row.published), default=None)
+
+
+def agreement(name: str, content: Content) -> float:
+    """Error of the headline in percent of what is published, or of the row that the module names in OF."""
+    module, rows = case(name), {row.what: row for row in content.rows}
+    of = rows[getattr(module, "OF", module.HEADLINE)].published
+    return 100.0 * abs(rows[module.HEADLINE].error / of)
+
+
 def overview(contents: Mapping[str, Content]) -> str:
-    """The table of all comparisons."""
-    head = ["comparison", "with", "what stands for it", "published", "computed", "error", "within what is known"]
+    """The table of all comparisons, the best agreement first."""
+    head = ["comparison", "with", "what is known of the numbers", "what stands for it", "published", "computed", "error",
+            "largest error of the page", "within what is known"]  # fmt: skip
     lines = []
-    for name in sorted(contents, key=lambda name: KINDS.index(case(name).AGAINST)):
+    for name in sorted(contents, key=lambda name: agreement(name, contents[name])):
         module, content = case(name), contents[name]
         (row,) = (row for row in content.rows if row.what == module.HEADLINE)
-        lines.append([f"[{module.TITLE}]({name}.md)", module.AGAINST, f"{row.what} [{row.unit}]", number(row.published),
-                      number(row.computed), f"{row.error:+.2g}", within(content.rows)])  # fmt: skip
-    return markdown(head, lines, "lllrrrr")
+        of = f" of {module.OF_WORDS}" if hasattr(module, "OF") else ""
+        lines.append([f"[{module.TITLE}]({name}.md)", module.AGAINST, module.KNOWN, f"{row.what} [{row.unit}]",
+                      number(row.published), number(row.computed), f"{agreement(name, content):.2g} %{of}",
+                      f"{largest(content):.2g} %", within(content.rows)])  # fmt: skip
+    return markdown(head, lines, "llllrrrrr")

@@ -14,8 +14,11 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "BlueROV2: steps ahead, down and about"
 AGAINST = "published code"
+KNOWN = "equations and coefficients in two transcripts of the article; no measured step"
 PICTURE = "Surge, heave and yaw rate of a BlueROV2 after steps of its thrusters, by this package and by SciPy"
 HEADLINE = "all terms: largest distance of the paths"
+# The largest distance is a part of this way.
+OF, OF_WORDS = "all terms: way ahead at 10.9 s", "the way ahead"
 SCENES = ("examples/validation/bluerov2_steps.toml",)
 # Von Benzon et al. (2022), table A1: mass, weight, buoyancy, its centre; inertia and added mass; drag.
 MASS, GRAVITY, BUOYANCY, ABOVE = 13.5, 9.82, 1000.0 * 9.82 * 0.0134, -0.01

@@ -13,6 +13,7 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "NPS AUV II: a turn"
 AGAINST = "published code"
+KNOWN = "equations and coefficients in a public program; no sea trial"
 PICTURE = "Path and yaw rate of the NPS AUV II under 10 degrees of rudder, by this package and by SciPy"
 HEADLINE = "all terms: steady yaw rate"
 SCENES = ("examples/validation/nps_auv_2.toml",)

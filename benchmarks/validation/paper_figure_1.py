@@ -13,6 +13,7 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "Nordkvist and Sanyal: the paper's own example"
 AGAINST = "published computation"
+KNOWN = 'one sentence of the text ("about"); no number in the figure could be read'
 PICTURE = "Change of energy by Psi and by Crouch-Grossman 3, and the depth over 150 s"
 HEADLINE = "depth at 150 s, printed as about that at 0 s"
 SCENES = ("examples/paper.toml", "tests/data/paper_example.json",

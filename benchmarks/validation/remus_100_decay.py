@@ -11,6 +11,7 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "REMUS 100: free decay in roll and pitch"
 AGAINST = "published code"
+KNOWN = "numbers printed in a README, to the last digit; no measurement"
 PICTURE = "Roll and pitch of a REMUS 100 that was let go at 10 degrees, as computed and as published"
 HEADLINE = "period of roll"
 AXES = ("roll", "pitch")

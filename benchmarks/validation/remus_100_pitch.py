@@ -11,6 +11,7 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "REMUS 100: steps of the stern planes"
 AGAINST = "experiment at sea"
+KNOWN = "readings of a thesis' figures by others, to half a step; one coefficient is doubtful"
 PICTURE = "Pitch of a REMUS 100 after steps of its stern planes, as computed and as published"
 HEADLINE = "up: pitch at 3.8 s"
 WAYS = ("up", "down")

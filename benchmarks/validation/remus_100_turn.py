@@ -11,6 +11,7 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "REMUS 100: rudder steps"
 AGAINST = "experiment at sea"
+KNOWN = "readings of a thesis' figures by others, to half a step"
 PICTURE = "Yaw rate and path of a REMUS 100 in two rudder steps, as computed and as published"
 HEADLINE = "mean yaw rate, 25 to 38 s"
 SCENES = ("examples/validation/remus_100_turn.toml",)

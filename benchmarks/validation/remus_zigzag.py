@@ -12,8 +12,11 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "REMUS of Python Vehicle Simulator: a zigzag"
 AGAINST = "published code"
+KNOWN = "equations of a public program; no measurement"
 PICTURE = "Path and heading of a REMUS in a zigzag, by this package and by the equations of another simulator"
 HEADLINE = "its equations: largest distance of the paths"
+# The largest distance is a part of this length.
+OF, OF_WORDS = "its equations: length of the path", "the path"
 SCENES = ("examples/validation/remus_zigzag.toml",)
 ANGLE, FIRST, EVERY, SPEED = np.radians(10.0), 5.0, 6.0, 2.0  # rad, s, s, m/s
 

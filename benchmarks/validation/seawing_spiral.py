@@ -11,6 +11,7 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "Seawing: a steady spiral"
 AGAINST = "published computation"
+KNOWN = "numbers and coefficients in a transcript of the article, to the last digit"
 PICTURE = "Angles and speed of the glider Seawing over time, and the published steady spiral"
 HEADLINE = "speed"
 SCENES = ("examples/validation/seawing_spiral.toml",)

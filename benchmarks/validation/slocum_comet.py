@@ -12,6 +12,7 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row
 
 TITLE = "Slocum: dives and climbs at sea"
 AGAINST = "experiment at sea"
+KNOWN = "raw data of the vehicle; spread between legs"
 PICTURE = "Speed and depth rate of a Slocum glider on 36 legs, as computed and as measured"
 HEADLINE = "speed through the water, mean of 17 dives"
 SCENES = ("examples/validation/slocum_comet.toml", "examples/validation/slocum_comet.csv")

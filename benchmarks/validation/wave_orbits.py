@@ -12,6 +12,7 @@ from benchmarks.validated import COMPUTED, PUBLISHED, Content, Row, curve
 
 TITLE = "Orbits and drift in waves"
 AGAINST = "theory"
+KNOWN = "first term of a series: parts of (k a)^2 are left out"
 PICTURE = "Orbits of a neutral sphere under waves at four depths, and their drift by depth"
 HEADLINE = "drift at 5 m"
 SCENES = ("examples/validation/wave_orbits.toml",)

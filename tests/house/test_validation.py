@@ -36,6 +36,71 @@ def test_the_overview_holds_their_headlines():
     assert README.read_text() == f"{before}\n\n{validation.text_of().strip()}\n\n{after}"
 
 
+def test_the_best_agreement_comes_first():
+    contents = {name: validated.kept(name) for name in validated.CASES}
+    errors = {name: validated.agreement(name, content) for name, content in contents.items()}
+    lines = validated.overview(contents).splitlines()[2:]
+    names = [line.split("](", 1)[1].split(".md", 1)[0] for line in lines]
+    assert names == sorted(errors, key=errors.__getitem__)
+    for name, line in zip(names, lines, strict=True):
+        assert f"| {errors[name]:.2g} %" in line
+        # A stranger reads from where the numbers are, and how far the worst of the page is off.
+        assert validated.case(name).KNOWN in line
+        assert f"| {validated.largest(contents[name]):.2g} % |" in line
+
+
+@pytest.mark.parametrize("name", validated.CASES)
+def test_a_picture_has_a_title(name):
+    from matplotlib.figure import Figure
+
+    figure = Figure(layout="constrained")
+    validated.plot(name, validated.kept(name), figure)
+    assert figure.get_suptitle() == validated.case(name).TITLE
+    assert any(axes.get_xlabel() and axes.get_ylabel() for axes in figure.axes)
+
+
+# Comparison -> its rows outside of what is known: the page has the reason of each.
+APART = {
+    "gazebo_bodies": ["duck: height"],
+    "lrauv_300_rpm": [],
+    "bluerov2_gazebo": [
+        "surge: mean of the last three readings",
+        "heave: the only reading",
+        "seconds of the simulation in one of the clock, by the reading of heave",
+        "sway by that rate",
+        "heave steady; theirs is the closed form of drag alone",
+    ],
+}
+
+
+@pytest.mark.parametrize("name", APART)
+def test_rows_of_other_programs_agree(name):
+    rows = validated.kept(name).rows
+    assert [row.what for row in rows if row.within is not None and abs(row.error) > row.within] == APART[name]
+    # SciPy and closed forms: to the error of the step.
+    exact = [row for row in rows if "SciPy" in row.what or row.what.startswith("closed form")]
+    assert len(exact) == 3
+    assert all(abs(row.error) < 2e-7 for row in exact)
+
+
+def test_what_explains_the_differences_to_gazebo():
+    rows = {row.what: row for row in validated.kept("gazebo_bodies").rows}
+    for body in ("body 1", "body 2", "body 3"):
+        # The printed rates have the error of a step of order 1: what is left is of order 2.
+        plain, stepped = (
+            rows[f"{body}: rate about z"],
+            rows[f"{body}: rate about z, with the error of a step of 0.1 ms"],
+        )
+        assert abs(stepped.error) < 0.01 * abs(plain.error)
+    for name in ("sinking submarine", "buoyant submarine", "duck"):
+        row = rows[f"{name}: height, by Gazebo's step"]
+        assert abs(row.error) <= row.within
+    rows = {row.what: row for row in validated.kept("bluerov2_gazebo").rows}
+    # One rate, that of the only reading of heave, gives the two other readings.
+    assert abs(rows["surge by that rate"].error) < 0.0005
+    assert abs(rows["sway by that rate"].error) < 0.002
+
+
 def test_a_changed_row_changes_its_page():
     name = validated.CASES[0]
     content = validated.kept(name)
@@ -105,3 +170,30 @@ def test_the_scene_of_nps_auv_2_follows_from_the_printed_numbers():
     module = validated.case("nps_auv_2")
     # The file has the numbers to the last digit.
     assert lw.Scene.load(ROOT / module.SCENES[0]).to_dict() == lw.Scene.from_dict(module.tables()).to_dict()
+
+
+def test_the_scenes_beside_gazebo_follow_from_the_printed_numbers():
+    import lgvi_warp as lw
+
+    bodies, rov, lrauv = (validated.case(name) for name in ("gazebo_bodies", "bluerov2_gazebo", "lrauv_300_rpm"))
+    shaken, rising = (lw.Scene.load(ROOT / path) for path in bodies.SCENES)
+    (push,), table = shaken.terms, lw.Scene.from_dict(bodies.tables("body 1"))
+    for key in ("times", "force", "torque"):
+        assert np.asarray(getattr(push, key)) == pytest.approx(np.asarray(getattr(table.terms[0], key)), abs=2e-6)
+    assert {**shaken.to_dict(), "terms": None} == {**table.to_dict(), "terms": None}
+    mass, volume, _ = bodies.RISING["buoyant submarine"]
+    assert rising.vehicle.mass == pytest.approx(mass, rel=1e-12)
+    assert rising.vehicle.buoyancy == pytest.approx(bodies.GRAVITY * bodies.DENSITY * volume, rel=1e-12)
+    scene = lw.Scene.load(ROOT / rov.SCENES[0])
+    matrix, center = rov.rigid_body()
+    assert np.asarray(scene.vehicle.rigid_body_mass_matrix) == pytest.approx(matrix, abs=1e-12)
+    assert np.asarray(scene.vehicle.center_of_gravity) == pytest.approx(center, abs=1e-15)
+    assert scene.vehicle.weight == pytest.approx(matrix[0, 0] * scene.environment.gravity, rel=1e-12)
+    assert np.asarray(scene.terms[1].force) == pytest.approx(
+        np.asarray(rov.pushed(scene, "surge").terms[1].force), abs=1e-12
+    )
+    drag, thrusters = lw.Scene.load(ROOT / lrauv.SCENES[0]).terms
+    # model.sdf: thrust coefficient, density and diameter of the propeller.
+    assert np.ravel(thrusters.coefficient)[0] == pytest.approx(0.004312328425753156 * 1025.0 * 0.2**4, rel=1e-12)
+    assert np.ravel(thrusters.command)[0] == pytest.approx(10.0 * np.pi, rel=1e-15)
+    assert np.asarray(drag.quadratic)[0] == 6.2282

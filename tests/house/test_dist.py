@@ -61,7 +61,7 @@ def build(folder, root=ROOT, *targets):
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in Path(folder).iterdir()}
 
 
-def made(folder, wheel, source):
+def archives_of(folder, wheel, source):
     """Archives with these files."""
     with zipfile.ZipFile(folder / "a-1.whl", "w") as archive:
         for name, text in wheel.items():
@@ -75,11 +75,11 @@ def made(folder, wheel, source):
 
 def test_what_does_not_belong_is_listed(tmp_path):
     complete = dict.fromkeys(IN_THE_SOURCE, "text")
-    made(tmp_path, {"lgvi_warp/__init__.py": ""}, complete)
+    archives_of(tmp_path, {"lgvi_warp/__init__.py": ""}, complete)
     assert list(faults(tmp_path)) == []
     home = "/".join(("", "home", "someone", ""))
     complete.pop("LICENSE")
-    made(tmp_path, {"tests/conftest.py": "", "lgvi_warp/a.py": home + "clone"}, complete | {"note.txt": ""})
+    archives_of(tmp_path, {"tests/conftest.py": "", "lgvi_warp/a.py": home + "clone"}, complete | {"note.txt": ""})
     assert list(faults(tmp_path)) == [
         "tests/conftest.py: does not belong into the wheel.",
         "LICENSE: is missing in the source archive.",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The constraints of the oldest versions are the lower bounds of pyproject.toml.
 
-`python -m tests.house.test_oldest` writes .ci/oldest.txt anew. The workflow installs these versions and runs the unit tests with them.
+`python -m tests.house.test_oldest` writes .ci/oldest.txt anew. The workflow runs the unit tests with these versions.
 """
 
 import re

@@ -132,7 +132,7 @@ def draw(rows: Path, picture: Path) -> None:
         for one, case in zip(column, cases, strict=True):
             for label, values in of_processor.get(case, {}).items():
                 one.plot([commits.index(commit) for commit in values], list(values.values()), ".-", label=label)
-            one.set(yscale="log", ylabel=case, xticks=range(len(commits)), xticklabels=commits)
+            one.set(ylim=(0.0, None), ylabel=case, xticks=range(len(commits)), xticklabels=commits)
             one.tick_params(axis="x", rotation=30)
             one.grid(True, alpha=0.3)
             one.legend(fontsize=6, loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Processes that tests start load the bytecode that others left.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run quick test test-core test-long coverage mutants lint docs gallery pictures bench bench-peers bench-loops clean
+.PHONY: run quick test test-core test-long coverage mutants lint dist docs gallery pictures bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -44,6 +44,13 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# Wheel and source archive in dist/, the same bytes for each build of a commit. The last check loads twine.
+dist: $(VENV)/.dev
+	rm -rf dist
+	SOURCE_DATE_EPOCH="$$(git log -1 --format=%ct)" $(BIN)/python -m hatchling build -d dist
+	$(BIN)/python -m tests.house.test_dist dist
+	$(BIN)/uv tool run twine check --strict dist/*
 
 # The documentation site, without network: build/site/index.html.
 docs: $(VENV)/.dev

@@ -4,6 +4,7 @@
 python -m benchmarks run [CASE...]           speed: JSON lines, each figure a ratio to a peer or a limit of the same run
 python -m benchmarks peers [--help]          the same problem solved by other systems
 python -m benchmarks table NAME [--help]     measure, print, and write the table into its page
+python -m benchmarks history [--draw]        append the small set to the history of speed, or draw its ratios over commits
 """
 
 import argparse
@@ -14,7 +15,7 @@ import sys
 from pathlib import Path
 
 # NumPy counts the cores as it is imported, and peers are given theirs first: nothing up here imports it.
-from benchmarks import cases, pages, tables
+from benchmarks import cases, history, pages, tables
 from benchmarks.peers import run as peers
 
 
@@ -84,6 +85,22 @@ def compare(arguments):
     peers.main(**vars(parser.parse_args(arguments)))
 
 
+def keep(arguments):
+    """Append to the history of speed, or draw it."""
+    parser = parser_of("history", history.__doc__)
+    parser.add_argument("--rows", type=Path, default=history.ROWS, help="the file of JSON lines (default %(default)s)")
+    parser.add_argument("--quick", action="store_true", help="fewer members and steps: to see that it runs")
+    parser.add_argument("--draw", action="store_true", help="draw the file and measure nothing")
+    parser.add_argument("--picture", type=Path, default=history.PICTURE, help="with --draw (default %(default)s)")
+    chosen = parser.parse_args(arguments)
+    if chosen.draw:
+        return history.draw(chosen.rows, chosen.picture)
+    from lgvi_warp.common import warp_setup
+
+    warp_setup.start()
+    return history.record(chosen.rows, chosen.quick)
+
+
 def parser_of(command, text):
     """A parser whose help keeps the lines of a text."""
     form = argparse.RawDescriptionHelpFormatter
@@ -96,7 +113,7 @@ def known(parser, chosen, every):
         parser.error(f"no {name!r}; one of {', '.join(every)}")
 
 
-COMMANDS = {"run": run, "peers": compare, "table": table}
+COMMANDS = {"run": run, "peers": compare, "table": table, "history": keep}
 
 
 def main(arguments):

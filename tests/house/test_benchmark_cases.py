@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from benchmarks import pages
+from benchmarks import history, pages
 from benchmarks.tables import peers, term
 from tests.house.test_benchmarks import CASES
 
@@ -30,6 +30,9 @@ def test_a_case_runs_to_its_end(name, tmp_path):
     assert records
     assert {record["case"] for record in records} == {name}
     assert all(len(record) > 1 for record in records)
+    if name in history.CASES:
+        assert all(line["peer_ns"] > 0.0 for line in history.lines({}, name, records))
+        assert history.lines({}, name, records)
 
 
 @pytest.mark.slow

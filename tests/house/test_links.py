@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every relative link of README, changelog and docs leads to a file, and every anchor to a heading."""
+"""Every relative link of README, changelog, community files and docs leads to a file, and every anchor to a heading."""
 
 import re
 
@@ -7,7 +7,10 @@ import pytest
 
 from tests.conftest import ROOT
 
-PAGES = sorted([*ROOT.glob("*.md"), *(page for page in (ROOT / "docs").rglob("*.md") if page.parent.name != "built")])
+COMMUNITY = (ROOT / ".github").glob("[A-Z]*.md")
+PAGES = sorted(
+    [*ROOT.glob("*.md"), *COMMUNITY, *(page for page in (ROOT / "docs").rglob("*.md") if page.parent.name != "built")]
+)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Published facts agree with pyproject.toml: addresses, versions, requirements; and it runs where nothing else is."""
 
+import datetime
 import os
 import re
 import shutil
@@ -16,10 +17,13 @@ import lgvi_warp as lw
 from tests.conftest import ROOT
 from tests.support.pages import snippets
 
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+CONFIGURATION = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PROJECT = CONFIGURATION["project"]
 SOURCE = PROJECT["urls"]["Source"]
 RECIPE = (ROOT / ".ci" / "conda" / "recipe.yaml").read_text()
 WORKFLOWS = {path.stem: path.read_text() for path in (ROOT / ".github" / "workflows").glob("*.yml")}
+# Pages that say how to install it.
+PAGES = ("README.md", "docs/start/install.md")
 OTHER_PYTHONS = ("3.12", "3.13", "3.14")
 
 
@@ -33,15 +37,46 @@ def test_one_version():
 
 def test_one_address():
     owner = re.fullmatch(r"https://github\.com/([\w-]+)/lgvi_warp", SOURCE)[1]
-    for name in ("pyproject.toml", ".ci/conda/recipe.yaml"):
-        assert set(re.findall(r"github\.com/([\w-]+)/lgvi_warp", (ROOT / name).read_text())) == {owner}
+    names = (
+        "pyproject.toml",
+        ".ci/conda/recipe.yaml",
+        "CITATION.cff",
+        "CONTRIBUTING.md",
+        "docs/develop/roadmap.md",
+        *PAGES,
+    )
+    files = [ROOT / name for name in names]
+    files += [path for path in (ROOT / ".github").rglob("*") if path.is_file()]
+    assert set(re.findall(r"github\.com/([\w-]+)/lgvi_warp", "".join(map(Path.read_text, files)))) == {owner}
     assert all(address.startswith((SOURCE, f"https://{owner}.github.io/")) for address in PROJECT["urls"].values())
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_the_pages_install_it_from_where_it_is(page):
+    text, published = (ROOT / page).read_text(), CONFIGURATION["tool"]["lgvi_warp"]["published"]
+    if published:
+        assert "pip install 'lgvi-warp" in text
+    else:
+        assert f"git clone {SOURCE}" in text
+        assert re.search(r"pip install (-e )?'\.\[viz\]'", text)
+        assert not re.search(r"(pip install|uvx) '?lgvi-warp", text)
+
+
 def test_the_recipe_asks_for_what_the_package_asks_for():
-    needed = {re.sub(r"([><=])", r" \1", text, count=1) for text in PROJECT["dependencies"]}
-    run = re.search(r"\n  run:\n((?:    - .*\n)+)", RECIPE)[1]
-    assert set(re.findall(r"- (.*)", run)) == needed | {f"python {PROJECT['requires-python']}"}
+    def requirements(section):
+        lines = re.search(rf"\n  {section}:\n((?:    - .*\n)+)", RECIPE)[1]
+        return set(re.findall(r"- (.*)", lines))
+
+    def spaced(texts):
+        return {re.sub(r"([><=])", r" \1", text, count=1) for text in texts}
+
+    python = {f"python {PROJECT['requires-python']}"}
+    assert requirements("run") == spaced(PROJECT["dependencies"]) | python
+    assert requirements("host") == spaced(CONFIGURATION["build-system"]["requires"]) | python | {"pip"}
+    assert f"license: {PROJECT['license']}\n" in RECIPE
+    assert f'summary: "{PROJECT["description"]}"\n' in RECIPE
+    for name, place in PROJECT["scripts"].items():
+        assert f"- {name} = {place}\n" in RECIPE
 
 
 def test_the_workflow_has_each_python_that_is_promised():
@@ -52,8 +87,17 @@ def test_the_workflow_has_each_python_that_is_promised():
     assert "password" not in WORKFLOWS["release"]
 
 
-def test_the_dockerfile_is_short():
-    assert len((ROOT / ".ci" / "Dockerfile").read_text().splitlines()) <= 10
+def test_the_dockerfile_is_short_and_has_a_promised_python():
+    text = (ROOT / ".ci" / "Dockerfile").read_text()
+    assert len(text.splitlines()) <= 10
+    assert re.match(r"#.*\nFROM python:(.*)-slim\n", text)[1] in OTHER_PYTHONS
+    ignored = (ROOT / ".ci" / "Dockerfile.dockerignore").read_text().split()
+    assert {".git", ".venv*", "runs", "build", "dist"} <= set(ignored)
+
+
+def test_the_citation_has_the_day_of_a_release():
+    day = re.search(r'^date-released: "(.*)"$', (ROOT / "CITATION.cff").read_text(), re.MULTILINE)[1]
+    assert datetime.date.fromisoformat(day)
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from lgvi_warp.engine.sample_layout import SampleLayout
 from lgvi_warp.engine.step_warnings import watched
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
+from lgvi_warp.physics.terms.wrench import JUMP_EARLY
 
 COMPENSATED = "float32_compensated"
 
@@ -103,4 +104,5 @@ def _explicit(method: Method, choice: KernelChoice) -> Explicit | None:
         kind = "inertial"
     # Without damping a linearly implicit method has no matrix, and is the explicit one of its tableau.
     implicit = tableau.implicit if choice.resisted else ()
-    return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate, method.adaptive, implicit)
+    early = 2.0 * JUMP_EARLY if any(getattr(term, "jumps", False) for term, _ in choice.laws) else 0.0
+    return Explicit(kind, tableau.a, tableau.b, tableau.c, *estimate, method.adaptive, implicit, early)

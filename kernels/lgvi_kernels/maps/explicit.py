@@ -37,6 +37,7 @@ class Explicit(NamedTuple):
     errors: rows of error estimates, (stages,) or one longer with f of the new state at its end, which go as h to the power
     `estimate`. adaptive: each packet chooses its steps.
     implicit: rows of the matrix g of a linearly implicit method (see maps/linearly_implicit.py), or none.
+    early: the part of a step by which stages at its end are early, where a law jumps at whole steps and they come before.
     """
 
     kind: str
@@ -47,6 +48,7 @@ class Explicit(NamedTuple):
     estimate: int = 0
     adaptive: bool = False
     implicit: tuple = ()
+    early: float = 0.0
 
     @property
     def goes_back(self):
@@ -182,8 +184,8 @@ def make_recall(View, follow, before, node):
     return recall
 
 
-def make_stage(moves, push, node, timed, recall):
-    """The state of one stage. push, recall: functions as of make_push and make_recall, or None."""
+def make_stage(moves, push, node, timed, recall, early=0.0):
+    """The state of one stage. push, recall: functions as of make_push and make_recall, or None; early: as of Explicit."""
 
     @wp.func
     def at_node(x: Any, k: Any, c: Any, h: Any):
@@ -192,6 +194,8 @@ def make_stage(moves, push, node, timed, recall):
             y = push(y, c, h.dtype(wp.static(node)) * h)
         if wp.static(timed):
             y.time = x.time + wp.float64(wp.static(node)) * wp.float64(h)
+        if wp.static(early > 0.0):
+            y.time = y.time - wp.float64(wp.static(early)) * wp.float64(h)
         if wp.static(recall is not None):
             y = recall(y, c, h)
         return y
@@ -338,7 +342,7 @@ def make_explicit(spec, types, everything, velocities, slope):
         a, c = (*a, method.b), (*c, 1.0)
     *recalls, last = (make_recall(View, follow, before, node) for before, node in zip((0.0, *c), (*c, 1.0)))
     states = [
-        make_stage(make_moves(move, row, complete), push, node, timed, recall)
+        make_stage(make_moves(move, row, complete), push, node, timed, recall, method.early if node == 1.0 else 0.0)
         for row, node, recall in zip(a, c, recalls)
     ]
     kept = follow is not None and method.goes_back

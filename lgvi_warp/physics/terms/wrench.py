@@ -14,6 +14,9 @@ from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, side_by_side
 
 SHAPES = ("linear", "steps")
+# The part of a step by which a schedule jumps early: whatever the round-off, stages at the end of a step, which are earlier
+# still, come before a jump there, and those at the beginning of the next step after it.
+JUMP_EARLY = 2.0**-31
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,7 +92,8 @@ class WrenchSchedule(Term):
         # Two tables: the force, and the torque about the origin of the forces.
         force = context.frame.vector(numbers["force"])
         torque = context.frame.torque(*repeated(numbers["torque"], numbers["force"]))
-        tables = [knots(numbers["times"], values, self.jumps) for values in (force, torque)]
+        times = numbers["times"] - JUMP_EARLY * context.h if self.jumps else numbers["times"]
+        tables = [knots(times, values, self.jumps) for values in (force, torque)]
         return Packed({"count": numbers["times"].shape[1] - 1}, side_by_side(*tables))
 
 

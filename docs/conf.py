@@ -16,14 +16,15 @@ from sphinx.application import Sphinx
 DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS), str(DOCS.parent), str(DOCS.parent / "kernels")]
 
-from site_parts import equations, pages, sources  # noqa: E402
+from site_parts import equations, order, pages, sources  # noqa: E402
 
 import lgvi_warp as lw  # noqa: E402
 
 project = "lgvi_warp"
 version = release = lw.__version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_design"]
-exclude_patterns = ["index.md"]
+# The side bar is this page.
+exclude_patterns = ["pages.md"]
 html_theme = "furo"
 html_static_path = ["site_parts/static"]
 html_css_files = ["site.css", "equations.css"]
@@ -60,18 +61,23 @@ highlight_language = "none"
 smartquotes = False
 
 DOORS = "|".join(name for name in lw.__all__ if inspect.ismodule(getattr(lw, name)))
-# Page -> the pages below it: Markdown pages have no table of contents of their own.
-BELOW = {
+PAGES = (DOCS / "pages.md").read_text()
+# Page -> the pages below it: those of pages.md, and those that the build writes.
+BELOW = order.below(PAGES) | {
     "guide/terms/README": [f"/guide/terms/{page.stem}" for page in sorted(DOCS.glob("guide/terms/[a-z]*.md"))],
     "reference/api": [f"/reference/built/{pages.slug(title)}" for title in pages.groups()],
+    "start/scene_file": ["Key by key </reference/built/scene_file_keys>"],
+    "start/cli": ["The command's own help </reference/built/command_help>"],
 }
 
 
 def fit_to_site(app: Sphinx, name: str, content: list[str]) -> None:
-    """Append the table of contents of a page that has pages below it, and link to the site's copy of the changelog."""
-    content[0] = content[0].replace("](../../CHANGELOG.md)", "](../reference/built/changelog.md)")
-    if name in BELOW:
-        content[0] += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(BELOW[name]) + "\n```\n"
+    """Lay out the first page, append tables of contents, and link to the site's copy of the changelog."""
+    content[0] = order.ON_GITHUB.sub("", content[0])
+    if name == app.config.root_doc:
+        content[0] = order.landing(content[0]) + order.side_bar(PAGES)
+    content[0] = re.sub(r"\]\((?:\.\./)+CHANGELOG\.md\)", f"]({'../' * name.count('/')}reference/built/changelog.md)", content[0])
+    content[0] += order.contents(BELOW.get(name, []))
 
 
 def document(app: Sphinx, what: str, name: str, subject: Any, options: Any, lines: list[str]) -> None:

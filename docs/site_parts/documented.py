@@ -112,7 +112,10 @@ def methods(kind: type) -> list[str]:
     own = [base for base in kind.__mro__ if base not in public]
     found = {name: member for owner in own for name, member in vars(owner).items() if name not in hidden}
     return [
-        name for name, member in found.items() if not name.startswith("_") and _is_method(member) and member.__doc__
+        name
+        for name, member in found.items()
+        # `dir` leaves out what only the package itself calls.
+        if not name.startswith("_") and name in dir(kind) and _is_method(member) and member.__doc__
     ]
 
 

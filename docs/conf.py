@@ -76,7 +76,9 @@ def fit_to_site(app: Sphinx, name: str, content: list[str]) -> None:
     content[0] = order.ON_GITHUB.sub("", content[0])
     if name == app.config.root_doc:
         content[0] = order.landing(content[0]) + order.side_bar(PAGES)
-    content[0] = re.sub(r"\]\((?:\.\./)+CHANGELOG\.md\)", f"]({'../' * name.count('/')}reference/built/changelog.md)", content[0])
+    content[0] = re.sub(
+        r"\]\((?:\.\./)+CHANGELOG\.md\)", f"]({'../' * name.count('/')}reference/built/changelog.md)", content[0]
+    )
     content[0] += order.contents(BELOW.get(name, []))
 
 

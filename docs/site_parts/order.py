@@ -9,7 +9,9 @@ DOCS = Path(__file__).parents[1]
 COPIES = {"../CHANGELOG": "reference/built/changelog"}
 # A line for those who read the pages without the site and its side bar.
 ON_GITHUB = re.compile(r"^\[All pages.*\]\((?:\.\./)*pages\.md\)\n", re.MULTILINE)
-CARD = re.compile(r"^## \[(.+?)\]\((.+?)\.md\)\n\n!\[(.+?)\]\((.+?)\)\n\n(.+?)\n(?=\n(?:#|\[)|\Z)", re.MULTILINE | re.DOTALL)
+CARD = re.compile(
+    r"^## \[(.+?)\]\((.+?)\.md\)\n\n!\[(.+?)\]\((.+?)\)\n\n(.+?)\n(?=\n(?:#|\[)|\Z)", re.MULTILINE | re.DOTALL
+)
 
 
 def captions(text: str) -> dict[str, list[tuple[str, str, str]]]:

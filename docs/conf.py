@@ -72,13 +72,12 @@ BELOW = order.below(PAGES) | {
 
 
 def fit_to_site(app: Sphinx, name: str, content: list[str]) -> None:
-    """Lay out the first page, append tables of contents, and link to the site's copy of the changelog."""
+    """Lay out the first page, add index terms and tables of contents, and link to the site's copy of the changelog."""
     content[0] = order.ON_GITHUB.sub("", content[0])
     if name == app.config.root_doc:
         content[0] = order.landing(content[0]) + order.side_bar(PAGES)
-    content[0] = re.sub(
-        r"\]\((?:\.\./)+CHANGELOG\.md\)", f"]({'../' * name.count('/')}reference/built/changelog.md)", content[0]
-    )
+    copy = "../" * name.count("/") + "reference/built/changelog.md"
+    content[0] = order.indexed(re.sub(r"\]\((?:\.\./)+CHANGELOG\.md\)", f"]({copy})", content[0]))
     content[0] += order.contents(BELOW.get(name, []))
 
 
@@ -87,11 +86,11 @@ def document(app: Sphinx, what: str, name: str, subject: Any, options: Any, line
     lines[:] = pages.fields(subject, "\n".join(lines))
 
 
-def shorten(
+def show_defaults(
     app: Sphinx, what: str, name: str, subject: Any, options: Any, signature: str | None, result: str | None
 ) -> Any:
-    """Leave out of a signature what a call of the class makes anew; the list of parameters has it."""
-    return (signature.replace("<factory>", "..."), result) if signature else None
+    """Show every default in a signature."""
+    return (pages.signature(subject, signature), result) if signature else None
 
 
 def link_public_names(app: Sphinx, tree: nodes.document) -> None:
@@ -124,7 +123,7 @@ def setup(app: Sphinx) -> None:
     pages.write(DOCS / "reference" / "built")
     app.connect("source-read", fit_to_site)
     app.connect("autodoc-process-docstring", document)
-    app.connect("autodoc-process-signature", shorten)
+    app.connect("autodoc-process-signature", show_defaults)
     app.connect("doctree-read", link_public_names)
     app.connect("doctree-read", use_dashes)
     # Before Sphinx takes links to files for downloads.

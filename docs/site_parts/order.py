@@ -9,6 +9,8 @@ DOCS = Path(__file__).parents[1]
 COPIES = {"../CHANGELOG": "reference/built/changelog"}
 # A line for those who read the pages without the site and its side bar.
 ON_GITHUB = re.compile(r"^\[All pages.*\]\((?:\.\./)*pages\.md\)\n", re.MULTILINE)
+# Words that a reader looks for and that the text of a page does not say in this way.
+WORDS = re.compile(r"^<!-- search: (.+?) -->\n", re.MULTILINE)
 CARD = re.compile(
     r"^## \[(.+?)\]\((.+?)\.md\)\n\n!\[(.+?)\]\((.+?)\)\n\n(.+?)\n(?=\n(?:#|\[)|\Z)", re.MULTILINE | re.DOTALL
 )
@@ -54,7 +56,15 @@ def landing(text: str) -> str:
     cards = list(CARD.finditer(text))
     head, tail = text[: cards[0].start()], text[cards[-1].end() :]
     grid = "\n".join(map(_card, cards))
-    return f"{head}`````{{grid}} 1 2 2 3\n:gutter: 3\n\n{grid}`````\n{tail}"
+    return f"{head}`````{{grid}} 1 1 2 2\n:gutter: 3\n:class-container: landing\n\n{grid}`````\n{tail}"
+
+
+def indexed(text: str) -> str:
+    """A page whose words to search for are entries of the index, below its title."""
+    words = [word.strip() for line in WORDS.findall(text) for word in line.split(",")]
+    title, rest = WORDS.sub("", text).split("\n", 1)
+    entries = "".join(f"\n```{{index}} single: ! {word}\n```\n" for word in words)
+    return f"{title}\n{entries}{rest}" if words else text
 
 
 def _card(found: re.Match[str]) -> str:

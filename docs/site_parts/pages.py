@@ -172,6 +172,12 @@ def escaped(text: str) -> str:
     return "".join(part for pair in zip(plain, [*code, ""], strict=True) for part in pair)
 
 
+def signature(subject: Any, text: str) -> str:
+    """A signature with the defaults that each call makes anew, which dataclasses hide."""
+    defaults = {item.name: item.default for item in documented.parameters(subject)} if "<factory>" in text else {}
+    return re.sub(r"(\w+)=<factory>", lambda found: f"{found[1]}={defaults[found[1]]}", text)
+
+
 def fields(subject: Any, docstring: str) -> list[str]:
     """A docstring as lines of reStructuredText, each parameter with its type and default."""
     text, found = documented.sections(docstring)

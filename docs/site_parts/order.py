@@ -67,8 +67,8 @@ def indexed(text: str) -> str:
     return f"{title}\n{entries}{rest}" if words else text
 
 
-def _card(found: re.Match[str]) -> str:
-    title, page, alt, picture, text = found.groups()
+def _card(section: re.Match[str]) -> str:
+    title, page, alt, picture, text = section.groups()
     options = f":link: {page}\n:link-type: doc\n:img-top: {picture}\n:img-alt: {alt}\n"
     return f"````{{grid-item-card}} {title}\n{options}\n{text}\n````\n"
 

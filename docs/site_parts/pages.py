@@ -175,7 +175,7 @@ def escaped(text: str) -> str:
 def signature(subject: Any, text: str) -> str:
     """A signature with the defaults that each call makes anew, which dataclasses hide."""
     defaults = {item.name: item.default for item in documented.parameters(subject)} if "<factory>" in text else {}
-    return re.sub(r"(\w+)=<factory>", lambda found: f"{found[1]}={defaults[found[1]]}", text)
+    return re.sub(r"(\w+)=<factory>", lambda match: f"{match[1]}={defaults[match[1]]}", text)
 
 
 def fields(subject: Any, docstring: str) -> list[str]:

@@ -166,7 +166,7 @@ def test_pages_below_others_and_captions_become_tables_of_contents():
 def test_the_first_page_has_six_cards_and_no_other_links():
     text = order.ON_GITHUB.sub("", (ROOT / "docs" / "index.md").read_text())
     cards = re.findall(
-        r"^````{grid-item-card} .*\n((?::[a-z-]+: .*\n)+)\n(.+?)\n````\n", order.landing(text), re.M | re.S
+        r"^````{grid-item-card} .*\n((?::[a-z-]+: .*\n)+)\n((?:.+\n)+)````\n", order.landing(text), re.MULTILINE
     )
     assert len(cards) == 6
     for options, paragraph in cards:
@@ -174,7 +174,7 @@ def test_the_first_page_has_six_cards_and_no_other_links():
         assert found.keys() == {"link", "link-type", "img-top", "img-alt"}
         assert (ROOT / "docs" / f"{found['link']}.md").exists()
         assert (ROOT / "docs" / found["img-top"]).exists()
-        assert "\n\n" not in paragraph
+        assert len(paragraph.split()) > 15
     assert re.findall(r"(?<!!)\[[^\]]+\]\(", order.landing(text)) == []
 
 

@@ -2,6 +2,7 @@
 """Pages of the reference that the build of the site writes: public names, keys of the scene file, the help of the command."""
 
 import argparse
+import ast
 import inspect
 import operator
 import os
@@ -173,9 +174,19 @@ def escaped(text: str) -> str:
 
 
 def signature(subject: Any, text: str) -> str:
-    """A signature with the defaults that each call makes anew, which dataclasses hide."""
-    defaults = {item.name: item.default for item in documented.parameters(subject)} if "<factory>" in text else {}
-    return re.sub(r"(\w+)=<factory>", lambda match: f"{match[1]}={defaults[match[1]]}", text)
+    """A signature with the defaults that dataclasses hide; "..." stands for one that is no Python code."""
+    defaults = {item.name: item.default or "..." for item in documented.parameters(subject)} if "<" in text else {}
+    return re.sub(
+        r"(\w+)=<(?:factory|[\w.]+ object at \w+)>", lambda match: f"{match[1]}={_code(defaults[match[1]])}", text
+    )
+
+
+def _code(default: str) -> str:
+    try:
+        ast.parse(default, mode="eval")
+    except SyntaxError:
+        return "..."
+    return default
 
 
 def fields(subject: Any, docstring: str) -> list[str]:

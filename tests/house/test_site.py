@@ -193,6 +193,8 @@ def test_a_signature_shows_what_each_call_makes_anew():
 
     assert pages.signature(Fleet, "(members=1, terms=<factory>)") == "(members=1, terms=[1.0, 2.0])"
     assert pages.signature(lw.solve, "(fleet, h=None)") == "(fleet, h=None)"
+    assert pages.signature(lw.laws.number, "(default=<x.y object at 0x7f>)") == "(default=...)"
+    assert "Estimates" not in pages.signature(lw.Result, "(statistics=<factory>, jacobian=<factory>)")
 
 
 class Page(html.parser.HTMLParser):

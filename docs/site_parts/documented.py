@@ -143,8 +143,6 @@ def _default(item: inspect.Parameter, fields: dict[str, Any]) -> str | None:
     if item.name in fields and fields[item.name].default_factory is not dataclasses.MISSING:
         value = fields[item.name].default_factory()
         return f"{type(value).__name__}()" if dataclasses.is_dataclass(value) else repr(value)
-    return (
-        None
-        if item.default in (item.empty, dataclasses.MISSING)
-        else getattr(item.default, "__name__", repr(item.default))
-    )
+    if item.default is item.empty or item.default is dataclasses.MISSING:
+        return None
+    return getattr(item.default, "__name__", repr(item.default))

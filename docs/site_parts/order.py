@@ -63,7 +63,7 @@ def indexed(text: str) -> str:
     """A page whose words to search for are entries of the index, below its title."""
     words = [word.strip() for line in WORDS.findall(text) for word in line.split(",")]
     title, rest = WORDS.sub("", text).split("\n", 1)
-    entries = "".join(f"\n```{{index}} single: ! {word}\n```\n" for word in words)
+    entries = "".join(f"\n```{{index}} ! {word}\n```\n" for word in words)
     return f"{title}\n{entries}{rest}" if words else text
 
 

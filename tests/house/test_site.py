@@ -180,7 +180,7 @@ def test_the_first_page_has_six_cards_and_no_other_links():
 
 def test_words_to_search_for_become_entries_of_the_index():
     text = "# Title\n\nText.\n\n<!-- search: lawn mower, survey -->\n"
-    first, second = "```{index} single: ! lawn mower\n```\n", "```{index} single: ! survey\n```\n"
+    first, second = "```{index} ! lawn mower\n```\n", "```{index} ! survey\n```\n"
     assert order.indexed(text) == f"# Title\n\n{first}\n{second}\nText.\n\n"
     assert order.indexed("# Title\n\nText.\n") == "# Title\n\nText.\n"
 

@@ -16,14 +16,15 @@ from sphinx.application import Sphinx
 DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS), str(DOCS.parent), str(DOCS.parent / "kernels")]
 
-from site_parts import equations, pages, sources  # noqa: E402
+from site_parts import equations, order, pages, sources  # noqa: E402
 
 import lgvi_warp as lw  # noqa: E402
 
 project = "lgvi_warp"
 version = release = lw.__version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton", "sphinx_design"]
-exclude_patterns = ["index.md"]
+# The side bar is this page.
+exclude_patterns = ["pages.md"]
 html_theme = "furo"
 html_static_path = ["site_parts/static"]
 html_css_files = ["site.css", "equations.css"]
@@ -60,18 +61,24 @@ highlight_language = "none"
 smartquotes = False
 
 DOORS = "|".join(name for name in lw.__all__ if inspect.ismodule(getattr(lw, name)))
-# Page -> the pages below it: Markdown pages have no table of contents of their own.
-BELOW = {
+PAGES = (DOCS / "pages.md").read_text()
+# Page -> the pages below it: those of pages.md, and those that the build writes.
+BELOW = order.below(PAGES) | {
     "guide/terms/README": [f"/guide/terms/{page.stem}" for page in sorted(DOCS.glob("guide/terms/[a-z]*.md"))],
     "reference/api": [f"/reference/built/{pages.slug(title)}" for title in pages.groups()],
+    "start/scene_file": ["Key by key </reference/built/scene_file_keys>"],
+    "start/cli": ["The command's own help </reference/built/command_help>"],
 }
 
 
 def fit_to_site(app: Sphinx, name: str, content: list[str]) -> None:
-    """Append the table of contents of a page that has pages below it, and link to the site's copy of the changelog."""
-    content[0] = content[0].replace("](../../CHANGELOG.md)", "](../reference/built/changelog.md)")
-    if name in BELOW:
-        content[0] += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(BELOW[name]) + "\n```\n"
+    """Lay out the first page, add index terms and tables of contents, and link to the site's copy of the changelog."""
+    content[0] = order.ON_GITHUB.sub("", content[0])
+    if name == app.config.root_doc:
+        content[0] = order.landing(content[0]) + order.side_bar(PAGES)
+    copy = "../" * name.count("/") + "reference/built/changelog.md"
+    content[0] = order.indexed(re.sub(r"\]\((?:\.\./)+CHANGELOG\.md\)", f"]({copy})", content[0]))
+    content[0] += order.contents(BELOW.get(name, []))
 
 
 def document(app: Sphinx, what: str, name: str, subject: Any, options: Any, lines: list[str]) -> None:
@@ -79,11 +86,11 @@ def document(app: Sphinx, what: str, name: str, subject: Any, options: Any, line
     lines[:] = pages.fields(subject, "\n".join(lines))
 
 
-def shorten(
+def show_defaults(
     app: Sphinx, what: str, name: str, subject: Any, options: Any, signature: str | None, result: str | None
 ) -> Any:
-    """Leave out of a signature what a call of the class makes anew; the list of parameters has it."""
-    return (signature.replace("<factory>", "..."), result) if signature else None
+    """Show every default in a signature."""
+    return (pages.signature(subject, signature), result) if signature else None
 
 
 def link_public_names(app: Sphinx, tree: nodes.document) -> None:
@@ -116,7 +123,7 @@ def setup(app: Sphinx) -> None:
     pages.write(DOCS / "reference" / "built")
     app.connect("source-read", fit_to_site)
     app.connect("autodoc-process-docstring", document)
-    app.connect("autodoc-process-signature", shorten)
+    app.connect("autodoc-process-signature", show_defaults)
     app.connect("doctree-read", link_public_names)
     app.connect("doctree-read", use_dashes)
     # Before Sphinx takes links to files for downloads.

@@ -112,7 +112,10 @@ def methods(kind: type) -> list[str]:
     own = [base for base in kind.__mro__ if base not in public]
     found = {name: member for owner in own for name, member in vars(owner).items() if name not in hidden}
     return [
-        name for name, member in found.items() if not name.startswith("_") and _is_method(member) and member.__doc__
+        name
+        for name, member in found.items()
+        # `dir` leaves out what only the package itself calls.
+        if not name.startswith("_") and name in dir(kind) and _is_method(member) and member.__doc__
     ]
 
 
@@ -140,4 +143,6 @@ def _default(item: inspect.Parameter, fields: dict[str, Any]) -> str | None:
     if item.name in fields and fields[item.name].default_factory is not dataclasses.MISSING:
         value = fields[item.name].default_factory()
         return f"{type(value).__name__}()" if dataclasses.is_dataclass(value) else repr(value)
-    return None if item.default is item.empty else getattr(item.default, "__name__", repr(item.default))
+    if item.default is item.empty or item.default is dataclasses.MISSING:
+        return None
+    return getattr(item.default, "__name__", repr(item.default))

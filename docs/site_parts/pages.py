@@ -2,6 +2,7 @@
 """Pages of the reference that the build of the site writes: public names, keys of the scene file, the help of the command."""
 
 import argparse
+import ast
 import inspect
 import operator
 import os
@@ -170,6 +171,22 @@ def escaped(text: str) -> str:
     ]
     code = [f"\\ ``{first or second}``\\ " for first, second in zip(parts[1::3], parts[2::3], strict=True)]
     return "".join(part for pair in zip(plain, [*code, ""], strict=True) for part in pair)
+
+
+def signature(subject: Any, text: str) -> str:
+    """A signature with the defaults that dataclasses hide; "..." stands for one that is no Python code."""
+    defaults = {item.name: item.default or "..." for item in documented.parameters(subject)} if "<" in text else {}
+    return re.sub(
+        r"(\w+)=<(?:factory|[\w.]+ object at \w+)>", lambda match: f"{match[1]}={_code(defaults[match[1]])}", text
+    )
+
+
+def _code(default: str) -> str:
+    try:
+        ast.parse(default, mode="eval")
+    except SyntaxError:
+        return "..."
+    return default
 
 
 def fields(subject: Any, docstring: str) -> list[str]:

@@ -52,7 +52,7 @@ def test_six_questions_are_answered_where_the_page_says():
     page = (ROOT / "docs" / "develop" / "site.md").read_text().partition("## What a stranger asks")[2]
     rows = re.findall(r'^\| .*\? \| "(.*)" \| "(.*)" \|$', page, re.MULTILINE)
     assert len(rows) == 6
-    readme, first = ((ROOT / name).read_text() for name in ("README.md", "docs/index.rst"))
+    readme, first = ((ROOT / name).read_text() for name in ("README.md", "docs/index.md"))
     assert [words for words, _ in rows if words not in readme] == []
     assert [words for _, words in rows if words not in first] == []
 

@@ -25,7 +25,7 @@ from tests.support.public import PATHS, WHOLE
 
 sys.path.append(str(ROOT / "docs"))
 
-from site_parts import documented, pages
+from site_parts import documented, order, pages
 
 NAMES = [name for names in pages.groups().values() for name in names]
 
@@ -133,12 +133,68 @@ def test_each_verb_has_its_help():
     assert sorted(verbs) == sorted(VERBS.keys() - {"plan"})  # the old name of predict
 
 
-def test_every_page_is_in_the_table_of_contents():
-    listed = set(re.findall(r"^   ([\w/]+)$", (ROOT / "docs" / "index.rst").read_text(), re.MULTILINE))
+def test_every_page_is_in_the_table_of_contents_once():
+    text = (ROOT / "docs" / "pages.md").read_text()
+    listed = [page for rows in order.captions(text).values() for _, _, page in rows]
+    assert sorted(set(listed)) == sorted(listed)
+    shown = order.side_bar(text) + "".join(order.contents(entries) for entries in order.below(text).values())
+    assert sorted(re.findall(r" </([\w/]+)>$", shown, re.MULTILINE)) == sorted(listed)
     sources = [page for kind in ("*.md", "*.ipynb") for page in (ROOT / "docs").rglob(kind)]
     written = {str(page.relative_to(ROOT / "docs").with_suffix("")) for page in sources}
     below = {name for name in written if re.match("guide/terms/[a-z]|reference/built/", name)}
-    assert {name for name in listed if "/built/" not in name} == written - below - {"index"}
+    assert {name for name in listed if "/built/" not in name} == written - below - {"index", "pages"}
+
+
+def test_notebooks_are_beside_the_guides_of_their_topic():
+    captions = order.captions((ROOT / "docs" / "pages.md").read_text())
+    assert len(captions) == 10
+    with_notebooks = {
+        caption: sum(page.startswith("notebooks/") for _, _, page in rows) for caption, rows in captions.items()
+    }
+    assert sum(with_notebooks.values()) == len(list((ROOT / "docs" / "notebooks").glob("*.ipynb")))
+    assert all(count < len(captions[caption]) / 2 for caption, count in with_notebooks.items())
+
+
+def test_pages_below_others_and_captions_become_tables_of_contents():
+    text = "# All\n\n## One\n\n* [A](a.md)\n  * [B](x/b.md)\n* [C](../CHANGELOG.md)\n\n## Two\n\n* [D](d.ipynb)\n"
+    assert order.below(text) == {"a": ["B </x/b>"]}
+    tables = re.findall(r"```{toctree}\n:hidden:\n:caption: (\w+)\n\n(.*?)\n```\n", order.side_bar(text), re.DOTALL)
+    assert tables == [("One", "A </a>\nC </reference/built/changelog>"), ("Two", "D </d>")]
+    assert order.contents([]) == ""
+
+
+def test_the_first_page_has_six_cards_and_no_other_links():
+    text = order.ON_GITHUB.sub("", (ROOT / "docs" / "index.md").read_text())
+    cards = re.findall(
+        r"^````{grid-item-card} .*\n((?::[a-z-]+: .*\n)+)\n((?:.+\n)+)````\n", order.landing(text), re.MULTILINE
+    )
+    assert len(cards) == 6
+    for options, paragraph in cards:
+        found = dict(re.findall(r"^:([a-z-]+): (.+)$", options, re.MULTILINE))
+        assert found.keys() == {"link", "link-type", "img-top", "img-alt"}
+        assert (ROOT / "docs" / f"{found['link']}.md").exists()
+        assert (ROOT / "docs" / found["img-top"]).exists()
+        assert len(paragraph.split()) > 15
+    assert re.findall(r"(?<!!)\[[^\]]+\]\(", order.landing(text)) == []
+
+
+def test_words_to_search_for_become_entries_of_the_index():
+    text = "# Title\n\nText.\n\n<!-- search: lawn mower, survey -->\n"
+    first, second = "```{index} ! lawn mower\n```\n", "```{index} ! survey\n```\n"
+    assert order.indexed(text) == f"# Title\n\n{first}\n{second}\nText.\n\n"
+    assert order.indexed("# Title\n\nText.\n") == "# Title\n\nText.\n"
+
+
+def test_a_signature_shows_what_each_call_makes_anew():
+    @dataclasses.dataclass
+    class Fleet:
+        members: int = 1
+        terms: list = dataclasses.field(default_factory=lambda: [1.0, 2.0])
+
+    assert pages.signature(Fleet, "(members=1, terms=<factory>)") == "(members=1, terms=[1.0, 2.0])"
+    assert pages.signature(lw.solve, "(fleet, h=None)") == "(fleet, h=None)"
+    assert pages.signature(lw.laws.number, "(default=<x.y object at 0x7f>)") == "(default=...)"
+    assert "Estimates" not in pages.signature(lw.Result, "(statistics=<factory>, jacobian=<factory>)")
 
 
 class Page(html.parser.HTMLParser):
@@ -209,7 +265,7 @@ def test_the_site_is_built_without_warnings_and_its_links_lead_somewhere(built):
 @pytest.mark.slow
 def test_pages_say_their_version_and_where_to_edit_them(built):
     source = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["urls"]["Source"]
-    for name in ("index.rst", "guide/your_vehicle.md", "theory/water.md"):
+    for name in ("index.md", "guide/your_vehicle.md", "theory/water.md"):
         page = (built[1] / name).with_suffix(".html").read_text()
         assert f'href="{source}/edit/main/docs/{name}"' in page
         assert re.search(rf'version {re.escape(lw.__version__)} · <a href="[./]*/0\.0\.1/">', page)
@@ -217,10 +273,23 @@ def test_pages_say_their_version_and_where_to_edit_them(built):
 
 
 @pytest.mark.slow
-def test_the_first_page_has_four_cards_with_pictures_and_links(built):
+def test_the_first_page_has_six_cards_with_pictures_and_links(built):
     page = (built[1] / "index.html").read_text()
     cards = re.split(r'class="sd-card sd-', page)[1:]
-    assert len(cards) == 4
+    assert len(cards) == 6
     for card in cards:
         assert re.search(r'<img alt="[^"]+"', card)
-        assert re.search(r'class="sd-stretched-link[^>]*href="guide/\w+\.html"', card)
+        assert re.search(r'class="sd-stretched-link[^>]*href="(guide|develop)/\w+\.html"', card)
+
+
+@pytest.mark.slow
+def test_signatures_show_defaults(built):
+    def signature(page, name):
+        text = (built[1] / "reference" / "built" / f"{page}.html").read_text()
+        entry = re.search(rf'<dt [^>]*id="lgvi_warp\.{re.escape(name)}">(.*?)</dt>', text, re.DOTALL)
+        return "".join(re.sub(r"<[^>]+>", "", entry[1]).split())
+
+    assert "h=None,t1=None" in signature("run", "solve")
+    assert "relative_error=0.1,by='chains'" in signature("ask", "rare_event")
+    assert "linear=(0.0,0.0,0.0,0.0,0.0,0.0)" in signature("terms", "terms.Drag")
+    assert "environment=Environment()" in signature("describe", "Scene")

@@ -8,7 +8,8 @@ var Scorer = {
     if (title.toLowerCase().includes(subject)) score += 2;
     if (kind === "title") score += 3;
     if (docName.startsWith("guide/terms/")) return score + 4;
-    if (/^(guide|theory|controllers)\//.test(docName)) return score + 5;
+    if (/^(start|guide|controllers)\//.test(docName)) return score + 5;
+    if (docName.startsWith("theory/")) return score + 3;
     return score;
   },
   objNameMatch: 11,

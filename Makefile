@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Processes that tests start load the bytecode that others left.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run quick test test-core test-long coverage mutants lint docs gallery pictures bench bench-peers bench-loops clean
+.PHONY: run quick test test-core test-long coverage mutants lint docs notebooks gallery pictures bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -45,9 +45,14 @@ lint: $(VENV)/.dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The documentation site, without network: build/site/index.html.
+# The documentation site, without network: build/site/index.html. The notebooks are executed, and their outputs compared.
 docs: $(VENV)/.dev
+	$(BIN)/python docs/site_parts/notebooks.py --compare
 	$(BIN)/sphinx-build -W --keep-going -q docs build/site
+
+# The outputs of the notebooks; ONLY="ocean margins": of these alone.
+notebooks: $(VENV)/.dev
+	$(BIN)/python docs/site_parts/notebooks.py $(ONLY)
 
 # The pictures of examples/01 to 12 and docs/gallery.md; ONLY="02 07": of these alone.
 gallery: $(VENV)/.dev

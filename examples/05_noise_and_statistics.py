@@ -27,12 +27,10 @@ statistics = [
 
 if __name__ == "__main__":
     result = lw.solve(fleet, h=0.05, t1=120.0, save=lw.SaveAt(every=2.0), keep="none", statistics=statistics)
-    mean, share = result.statistics["mean position"], result.statistics["deeper than 32 m"]
+    mean, p = result.statistics["mean position"], result.statistics["deeper than 32 m"]
     print(result.status.counts(), "samples kept:", len(result.samples))
     for axis, value, half_width in zip(("north", "east", "down"), mean.value[-1], mean.half_width[-1], strict=True):
         print(f"mean {axis} after 120 s: {value:.2f} m, 95 % interval +- {half_width:.2f} m")
-    print(
-        f"deeper than 32 m: {share.value[-1, 0]:.1%}, 95 % interval {share.lower[-1, 0]:.1%} to {share.upper[-1, 0]:.1%}"
-    )
+    print(f"deeper than 32 m: {p.value[-1, 0]:.1%}, 95 % interval {p.lower[-1, 0]:.1%} to {p.upper[-1, 0]:.1%}")
     lw.plots.statistics(result, path="05_noise_and_statistics.png")
     print("05_noise_and_statistics.png")

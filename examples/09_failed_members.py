@@ -17,11 +17,10 @@ fleet = lw.Ensemble(scene, members=400, seed=1, vary={"start.angular_velocity": 
 
 
 def plot(rates, failed, path):
-    """Rates of turn at the start of those that failed and of the others."""
+    """Rates of turn at the start: bars of all members, the part in front of those that failed."""
     figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     axes = figure.subplots()
     bins = np.linspace(0.0, rates.max(), 30)
-    # A bar is of all; its upper part is of those that did not fail.
     axes.hist(rates, bins, color="#0072B2", label=f"ok ({np.sum(~failed)})")
     axes.hist(rates[failed], bins, color="#D55E00", hatch="///", label=f"failed ({np.sum(failed)})")
     axes.set(

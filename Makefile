@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Processes that tests start load the bytecode that others left.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run quick test test-core test-long coverage mutants lint dist docs gallery pictures bench bench-peers bench-loops clean
+.PHONY: run quick test test-core test-long coverage mutants lint dist docs notebooks gallery pictures bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -52,9 +52,14 @@ dist: $(VENV)/.dev
 	$(BIN)/python -m tests.house.test_dist dist
 	$(BIN)/uv tool run twine check --strict dist/*
 
-# The documentation site, without network: build/site/index.html.
+# The documentation site, without network: build/site/index.html. The notebooks are executed, and their outputs compared.
 docs: $(VENV)/.dev
+	$(BIN)/python docs/site_parts/notebooks.py --compare
 	$(BIN)/sphinx-build -W --keep-going -q docs build/site
+
+# The outputs of the notebooks; ONLY="ocean margins": of these alone.
+notebooks: $(VENV)/.dev
+	$(BIN)/python docs/site_parts/notebooks.py $(ONLY)
 
 # The pictures of examples/01 to 12 and docs/gallery.md; ONLY="02 07": of these alone.
 gallery: $(VENV)/.dev

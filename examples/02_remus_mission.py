@@ -6,6 +6,7 @@ the current differs from vehicle to vehicle by up to a third of their speed.
 """
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import lgvi_warp as lw
 
@@ -47,13 +48,11 @@ if __name__ == "__main__":
     print(
         f"off the legs: {np.median(distance[late]):.1f} m in the median, {np.quantile(distance[late], 0.95):.1f} m in 95 %"
     )
-
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12.0, 6.0), layout="constrained")
-    above, depth = figure.subplots(1, 2)
-    lw.plots.plan_view(result, ax=above)
-    above.plot(POINTS[:, 1], POINTS[:, 0], "o:", color="black")
-    lw.plots.fan(result, "depth", ax=depth)
+    figure = Figure(figsize=(12.0, 7.0), layout="constrained")
+    above, depth = figure.subplots(1, 2, width_ratios=[1.0, 1.3])
+    lw.plots.plan_view(result, 25, ax=above)
+    above.plot(POINTS[:, 1], POINTS[:, 0], "o:", color="black", zorder=5, label="waypoints")
+    above.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=3, frameon=False)
+    lw.plots.fan(result, "depth", ax=depth).set_title("Depth of 200 members")
     figure.savefig("02_remus_mission.png", dpi=100)
     print("02_remus_mission.png")

@@ -46,7 +46,7 @@ if __name__ == "__main__":
     print(f"and hangs slack {np.mean(newtons == 0.0):.1%} of the time")
     figure = Figure(figsize=(12.0, 5.5), layout="constrained")
     left, right = figure.subplots(1, 2)
-    lw.plots.phase(result, ("position[0]", "depth"), ax=left)
+    lw.plots.phase(result, ("position[0]", "depth"), 2, ax=left).set_title("2 of 300 buoys, seen from the east")
     lw.plots.fan(result, lw.statistics.Quantity("pull of the mooring", pull, "N"), ax=right)
     figure.savefig("04_waves_and_a_tether.png", dpi=100)
     print("04_waves_and_a_tether.png")

@@ -15,9 +15,10 @@ scene = lw.Scene.named(
 )
 vary = {
     "vehicle.buoyancy": lw.distributions.Normal(std=0.5),  # N
-    "wrench.force": lw.distributions.Normal(std=[0.1, 0.0, 0.0]),  # N: thrust
-    "current.velocity": lw.distributions.Normal(std=[0.05, 0.05, 0.0]),  # m/s
-    "start.velocity": lw.distributions.Normal(std=[0.1, 0.0, 0.0]),  # m/s
+    "wrench.force[0]": lw.distributions.Normal(std=0.1),  # N: thrust
+    "current.velocity[0]": lw.distributions.Normal(std=0.05),  # m/s: to the north
+    "current.velocity[1]": lw.distributions.Normal(std=0.05),  # m/s: to the east
+    "start.velocity[0]": lw.distributions.Normal(std=0.1),  # m/s: ahead
 }
 
 if __name__ == "__main__":

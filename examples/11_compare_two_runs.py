@@ -44,5 +44,9 @@ if __name__ == "__main__":
     gain = errors["proportional"] - errors["with an integral"]
     half_width = 1.96 * gain.std(ddof=1) / np.sqrt(len(gain))
     print(f"the integral brings each vehicle {gain.mean():.2f} m nearer, 95 % interval +- {half_width:.2f} m")
-    lw.plots.compare(runs, "depth", path="11_compare_two_runs.png")
+    axes = lw.plots.compare(runs, "depth")
+    axes.axhline(WANTED, color="black", linestyle=":")
+    axes.annotate("wanted", (0.0, WANTED), xytext=(0, -12), textcoords="offset points")
+    axes.set_title(f"The integral brings each vehicle {gain.mean():.2f} ± {half_width:.2f} m nearer (95 % interval)")
+    axes.figure.savefig("11_compare_two_runs.png", dpi=100)
     print("11_compare_two_runs.png")

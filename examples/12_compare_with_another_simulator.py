@@ -58,7 +58,12 @@ if __name__ == "__main__":
         order = np.log2(errors[:-1] / errors[1:])
         print(f"{method}: {errors[-1]:.1e} m apart with {STEPS[-1]} s; orders {', '.join(f'{p:.2f}' for p in order)}")
         axes.loglog(STEPS, errors, look, label=method)
-    axes.set(xlabel="step [s]", ylabel="difference of position after 20 s [m]", title="lgvi_warp against SciPy")
+    axes.set(
+        xlabel="step [s], logarithmic", ylabel="difference of position after 20 s [m]", title="lgvi_warp against SciPy"
+    )
+    axes.set_xticks(STEPS, STEPS)
+    axes.minorticks_off()
+    axes.grid(True, alpha=0.3)
     axes.legend()
     figure.savefig("12_compare_with_another_simulator.png", dpi=100)
     print("12_compare_with_another_simulator.png")

@@ -216,9 +216,9 @@ def part(progress: Callable[[float], None], begin: float, end: float) -> Callabl
 
 def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -> SaveAt | None:
     """The samples that quantities need, where the user does not say which to keep."""
-    if save is not None or not of:
-        return save
     fields = ordered(name for each in of for name in each.fields)
+    if save is not None or not of:
+        return replace(save, fields=ordered((*save.fields, *fields))) if isinstance(save, SaveAt) else save
     paths = [each.label for each in of if each.over_path]
     of_samples = [each.label for each in of if isinstance(each, MetricQuantity) and each.of_samples]
     every = scene.run.save_every

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.control.signals import SIGNALS
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.physics.fields import dims_of
 from lgvi_warp.results import member_fields
@@ -169,6 +170,10 @@ def parameter_units(scene: Any) -> dict[str, str]:
     known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
     for term in (*scene.parts, *([scene.controller] if scene.controller else [])):
         known |= {f"{term.key}.{word_of(item)}": unit(item) for item in dataclasses.fields(term)}
+        # Numbers of a sensor are in the unit of what it reads.
+        of = SIGNALS.get(f"measured_{getattr(term, 'of', '')}")
+        known |= {name: word.replace("unit", of.field.unit, 1) for name, word in known.items()
+                  if of and word and word.startswith("unit") and name.startswith(f"{term.key}.")}  # fmt: skip
     units = {name: known.get(name) or "1" for name in scene.parameters()}
     return units | {f"start.{item.name}": unit(item) or "1" for item in dataclasses.fields(Start)}
 

@@ -193,6 +193,21 @@ def test_stores_exports_and_pictures_have_it(tmp_path):
     np.testing.assert_array_equal(again.navigation_error[0], half.navigation_error[-1])
 
 
+def test_samples_that_are_asked_for_bring_what_the_quantity_reads():
+    save = lw.SaveAt(every=10.0)
+    run = lw.prepare(fleet(4), of="max(norm(measured_position - position))", **RUN, save=save)
+    np.testing.assert_allclose(run(), D * 2.0 * np.abs(np.sin(0.5 * biases(fleet(4)))), rtol=1e-9)
+    found = lw.worst_case(scene(), {"compass.bias": (-0.1, 0.05)}, f"max({ERROR})", **RUN, save=save, budget=64)
+    assert found.answer.startswith(f"The largest max({ERROR}) found is ")
+    assert "compass.bias -0.1 rad (its lower bound)" in found.answer
+
+
+def test_a_part_of_the_distance_is_refused_where_a_run_goes_on():
+    half = lw.solve(fleet(4), **RUN | {"t1": 50.0}, save=GOES_ON)
+    with pytest.raises(lw.SceneError, match=r"navigation.of = 'percent': .* goes on from another"):
+        lw.solve(fleet(4), **RUN, start=half.final, statistics=[lw.metrics.NavigationError("percent")])
+
+
 def test_the_page_and_the_command_know_the_names(tmp_path, capsys):
     (text,) = blocks("docs/guide/how_far_off.md", "toml")
     path, way, to = tmp_path / "budget.toml", 900.0, ["--out", str(tmp_path / "out"), "--json", "-q"]

@@ -78,7 +78,7 @@ def test_failing_members_fail_again(answer):
 def test_the_answer_says_what_it_is(answer):
     text = str(answer)
     assert text.endswith(answer.answer)
-    for word in ("95 % interval", "Probability of position[0] above", "weights of members", "plain       would take",
+    for word in ("95 % interval", "Probability of position[0] above", "weights of members", "at random   ",
                  "likeliest", "moved       ", " its mean"):  # fmt: skip
         assert word in text
     for again in (pickle.loads(pickle.dumps(answer)), copy.copy(answer), copy.deepcopy(answer)):

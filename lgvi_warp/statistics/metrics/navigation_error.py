@@ -31,12 +31,13 @@ class NavigationError(Metric):
     manufacturers state the error of logs and inertial systems. It is NaN for a member that does not move.
 
     Args:
-        of: "end", the default: at the last tick under way [m]; "largest": over all ticks [m]; "percent": at the end, as a
-            part of the distance run [%].
+        of: "end", the default: at the last tick under way [m]; "largest": over all ticks of this run [m]; "percent": at the
+            end, as a part of the distance run [%], not for a run that goes on from another.
         horizontal: Whether the length is that of the north and east components alone; by default False.
 
     Raises:
-        SceneError: where `of` is none of these; and as a run begins, where nothing estimates the position.
+        SceneError: where `of` is none of these; and as a run begins, where nothing estimates the position, or where "percent"
+            is asked of a run that goes on.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -62,6 +63,9 @@ class NavigationError(Metric):
             raise refusal("navigation.of", self.of, "is not known", closest(str(self.of), UNITS))
 
         def numbers(samples: Fields, members: Members) -> np.ndarray:
+            if self.of == "percent" and getattr(members, "final", None) is not None:
+                fault = "is of the distance from the start of the mission on, and this run goes on from another"
+                raise refusal("navigation.of", self.of, fault, 'give "end", or run the mission as one run')
             error, place = (samples[name].astype(np.float64, copy=False) for name in FIELDS)
             size = np.linalg.norm(error[..., :2] if self.horizontal else error, axis=-1, keepdims=True)
             return np.concatenate([size, place], axis=-1)

@@ -32,6 +32,7 @@ OVER_TIME = {"max": reductions.MAXIMUM, "min": reductions.MINIMUM, "mean": reduc
 # The length of a vector: of all of it, or of its first two components, which of one in inertial axes are north and east.
 LENGTHS = {"norm": slice(None), "horizontal": slice(2)}
 FUNCTIONS = (*OVER_TIME, *LENGTHS)
+INERTIAL = {"position", "velocity_inertial", "measured_position", "navigation_error", "reference_position"}
 
 
 @dataclass(frozen=True)
@@ -143,18 +144,24 @@ def _parsed(key: str, of: str, text: str) -> Functional:
         meaning = _difference(key, of, [_parsed(key, of, operand) for operand in operands])
     elif re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
         meaning = named(key, of, inner)
-    elif re.fullmatch(r"\w+(\[\d+\])?(\.\w+)+(\[[\d,]+\])?", inner):
+    elif re.fullmatch(r"\w+(\.\w+|\[\d+\])*\.\w+(\[[\d,]+\])?", inner):
         meaning = of_number(key, of, inner)
     else:
         form = 'write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"'
         raise refusal(key, of, "is no quantity", f"{form}, of {', '.join(KNOWN)}")
     base = Functional(text.replace("-", " - "), meaning, tuple(reversed(names)))
-    if "horizontal" in base.functions and (base.functions[0] != "horizontal" or meaning.size != 3):
-        raise refusal(key, of, "has a horizontal length of what is no vector", "write horizontal(navigation_error)")
+    if "horizontal" in base.functions and (base.functions[0] != "horizontal" or not _inertial(meaning)):
+        problem = "has a horizontal length of what is no vector in inertial axes"
+        raise refusal(key, of, problem, "write horizontal(navigation_error) or horizontal(velocity_inertial)")
     if entry is not None and (base.size == 1 or entry >= base.size):
         fault = f"{outer} has {base.size} component{'s' * (base.size > 1)}"
         raise refusal(key, of, fault, f"give one of them from 0, or {outer} alone")
     return replace(base, entry=entry)
+
+
+def _inertial(meaning: Quantity) -> bool:
+    """Whether a quantity is a vector in inertial axes, whose first components are north and east, or a difference of such."""
+    return meaning.size == 3 and not {part.partition("[")[0] for part in meaning.name.split(" - ")} - INERTIAL
 
 
 def _nested(text: str) -> tuple[list[str], str]:
@@ -186,23 +193,21 @@ def _difference(key: str, of: str, operands: Sequence[Functional]) -> Quantity:
             raise refusal(key, of, f"{operand.label} looks over the path, and has no difference", remedy)
     first, *others = parts = [operand.as_quantity() for operand in operands]
     for other in others:
-        if other.size != first.size or (other.unit != first.unit and other.unit and first.unit):
-            told = (f"{part.name} has {part.size} x [{part.unit or '1'}]" for part in (first, other))
+        if other.size != first.size or other.unit != first.unit or not other.unit:
+            told = (f"{part.name} has {part.size} x [{part.unit or 'unknown unit'}]" for part in (first, other))
             raise refusal(key, of, " and ".join(told), "give quantities of one unit and size")
-
-    unit = next((part.unit for part in parts if part.unit), "")
 
     def function(samples: Fields, members: Members) -> np.ndarray:
         values = first(samples, members).astype(np.float64, copy=False)
         for other in others:
             values = values - other(samples, members)
-        if unit == "rad":
+        if first.unit == "rad":
             values -= 2.0 * np.pi * np.rint(values / (2.0 * np.pi))
         return values.transpose(0, 2, 1)
 
     name, *labels = (" - ".join(each) for each in zip(*((part.name, *part.labels) for part in parts), strict=True))
     fields = ordered(field for part in parts for field in part.fields)
-    return Quantity(name, function, unit, fields, tuple(labels), needs_limit=True)
+    return Quantity(name, function, first.unit, fields, tuple(labels), needs_limit=True)
 
 
 def quantity(key: str, of: Any) -> Quantity:

@@ -15,14 +15,16 @@ import numpy as np
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results, settle
+from lgvi_warp.control.base import ControlLaw, Guidance, MeasuringPart
 from lgvi_warp.control.signals import CHANNELS, SIGNALS, ordered
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, TABLE, Field
+from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.floor import altitude_over
+from lgvi_warp.physics.vehicle import UNITS
 
 if TYPE_CHECKING:
-    from lgvi_warp.physics.terms.base import Term
     from lgvi_warp.sampling.members import Members
     from lgvi_warp.statistics.values.samples import Fields
 
@@ -200,10 +202,14 @@ def of_number(key: str, of: str, text: str) -> Quantity:
     assert match is not None
     name, index = match[1], match[2] or ""
     place = tuple(int(i) for i in index[1:-1].split(",") if i)
+    if "[" in name:
+        raise refusal(key, of, "names a part by its place", "name it by its own name, as in 'heading_pid.kp'")
 
     def function(samples: Fields, members: Members) -> np.ndarray:
         starts = getattr(members, "starts", {})
         if name not in (*members.parameters, *starts):
+            if name.startswith("start."):
+                raise refusal(key, of, "does not vary", "vary it, or give a quantity at the start, as in 'depth at 0'")
             raise refusal(key, of, "is no number of this scene", closest(name, (*members.parameters, *starts)))
         values = members.parameters[name] if name in members.parameters else starts[name]
         shape = values.shape[1:]
@@ -213,7 +219,20 @@ def of_number(key: str, of: str, text: str) -> Quantity:
             raise refusal(key, of, f"is no single number: {name} has shape {shape}", remedy)
         return np.broadcast_to(values[(slice(None), *place)], (len(samples.time), members.count))
 
-    return Quantity(name + index, function, fields=("position",), needs_limit=True)
+    return Quantity(name + index, function, unit_of_number(name), ("position",), needs_limit=True)
+
+
+def unit_of_number(name: str) -> str:
+    """The unit of a number of the vehicle, the start, or a term or part without a name of its own; "" where none is known."""
+    owner, _, word = name.rpartition(".")
+    if owner == "start" and word in TABLE:
+        return TABLE[word].unit
+    sections = {"vehicle": UNITS, "environment": {"gravity": "m/s2", "water_density": "kg/m3"}}
+    found = sections.get(owner, {}).get(word, "")
+    for kinds in (Term.kinds, MeasuringPart.kinds, Guidance.kinds, ControlLaw.kinds) if owner not in sections else ():
+        if owner in kinds:
+            found = next((item.metadata["unit"] for item in kinds[owner].number_fields() if item.name == word), found)
+    return "" if found == "unit" or "," in found else found
 
 
 def component(base: Quantity, i: int) -> Quantity:

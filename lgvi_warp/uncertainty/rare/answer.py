@@ -21,7 +21,7 @@ MOST_MOVED = 6
 ESTIMATORS = {
     "importance": "weights of members drawn about the failing ones of chains",
     "subset": "subset simulation",
-    "plain": "plain sampling",
+    "plain": "plain sampling by Sobol points, or at random with many numbers",
     "splitting": "splitting in time",
 }
 
@@ -123,7 +123,7 @@ class RareEvent(Saved):
         lines = [
             f"by          {ESTIMATORS[self.estimator]}, to {100.0 * self.relative_error:.2g} % of the probability",
             f"members     {members}; {duration_text(self.seconds)}",
-            f"plain       would take {self.plain_members:,.3g} members for this error, {duration_text(self.plain_seconds)}",
+            f"at random   {self.plain_members:,.3g} members would have this error, {duration_text(self.plain_seconds)}",
         ]
         lines += [f"            {name}: {chance.probability:.3g} ({chance.lower:.3g} to {chance.upper:.3g})"
                   for name, chance in self.by_condition.items() if name != "any"]  # fmt: skip

@@ -99,7 +99,8 @@ class Indices(Saved):
 
     def _amount(self, q: int, value: float, half: float) -> str:
         """The amount that a factor explains of a quantity."""
-        return f"{percent(value, 3)} +- {100.0 * half:.2g} % of its variance"
+        # No factor explains more than all: the estimate may.
+        return f"{percent(min(value, 1.0), 3)} +- {100.0 * half:.2g} % of its variance"
 
     def _report(self) -> list[str]:
         """A table for each quantity."""
@@ -221,7 +222,8 @@ class SobolIndices(Indices):
         return {"second": second, "second_confidence": half}
 
     def _amount(self, q: int, value: float, half: float) -> str:
-        return f"{super()._amount(q, value, half)}, with interactions"
+        amount = super()._amount(q, value, half)
+        return amount if len(self.factors) == 1 else f"{amount}, with interactions"
 
     def _pairs(self) -> list[tuple[int, int, int]]:
         d = 0 if self.second is None else len(self.factors)

@@ -143,6 +143,10 @@ def test_the_factor_that_explains_most_and_the_next():
     )
 
 
+def test_no_factor_explains_more_than_all():
+    assert sobol([1.04], [0.1]).answer == "depth depends most on f0 (100 +- 10 % of its variance)."
+
+
 def test_factors_that_overlap_are_not_told_apart():
     # 0.3 + 0.1 reaches 0.5 - 0.1, and 0.29 + 0.1 does not.
     both = sobol([0.29, 0.3, 0.5], [0.1, 0.1, 0.1]).answer

@@ -50,8 +50,8 @@ REFUSED = {
     "depth - speed": "depth has 1 x [m] and speed has 1 x [m/s]; give quantities of one unit and size",
     "position - depth": "position has 3 x [m] and depth has 1 x [m]; give quantities of one unit and size",
     "depth - deph": "is not known; did you mean 'depth'?",
-    "horizontal(depth)": "has a horizontal length of what is no vector; write horizontal(navigation_error)",
-    "horizontal(max(position))": "has a horizontal length of what is no vector; write horizontal(navigation_error)",
+    "horizontal(depth)": "has a horizontal length of what is no vector in inertial axes; write horizontal(navigation_error)",
+    "horizontal(max(position))": "has a horizontal length of what is no vector in inertial axes; write horizontal(navigation_error)",
 }  # fmt: skip
 
 

@@ -58,14 +58,14 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
 
 
 def behind_another(name: str, door: str) -> str:
-    """Suggest the class that another door has by this name; "" where there is none, or this door has one."""
+    """Suggest what other doors have by this name; "" where there is none, or this door has it."""
     package = door.partition(".")[0]
     top = import_module(package).__all__
-    # Doors begin with a small letter, as functions do, and are modules of the package.
-    doors = [f"{package}.{each}" for each in top if find_spec(f"{package}.{each}")] if name[:1].isupper() else []
-    for other in (door, package, *doors):
-        for known in import_module(other).__all__:
-            if known.casefold() == name.casefold():
-                place = other.replace(package, "lw", 1)
-                return "" if other == door else f"did you mean '{place}.{known}'?"
-    return ""
+    # Who asks for a module of a room is not looking for a door.
+    others = () if find_spec(f"{package}.{name}") else (each for each in top if find_spec(f"{package}.{each}"))
+    doors = dict.fromkeys([door, package, *(f"{package}.{each}" for each in others)])
+    found = {
+        other: known for other in doors for known in import_module(other).__all__ if known.casefold() == name.casefold()
+    }
+    places = [f"'{other.replace(package, 'lw', 1)}.{known}'" for other, known in found.items()]
+    return "" if door in found or not places else f"did you mean {' or '.join(places)}?"

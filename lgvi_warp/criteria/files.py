@@ -19,6 +19,7 @@ from lgvi_warp.common.arguments import explained, path_of
 from lgvi_warp.common.errors import among
 from lgvi_warp.common.files import write_text
 from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_json
+from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.tables import write_csv
 
 # Study -> pattern of the names of the files that hold what it found; `study_files` has those of extensions too.
@@ -194,7 +195,7 @@ class Saved(ABC):
         """Read it from the JSON file that `save` wrote.
 
         Args:
-            path: of the file.
+            path: of the file, or of the folder with it.
 
         Returns:
             What the study found.
@@ -203,6 +204,8 @@ class Saved(ABC):
             OSError: where the file cannot be read.
             SceneError: where it is no regular file, is damaged, or of another version.
         """
+        if Path(path).is_dir() and hasattr(cls, "study"):
+            path = inside(Path(path), f"{cls.study}.json")
         with of_study(path):
             found = cls.from_dict(file_json(path))
             list(found.rows()), found.to_json(), str(found)  # what cannot be shown is refused here

@@ -91,7 +91,9 @@ def test_errors_are_those_of_the_exact_solution(size, n, dtype):
 @pytest.mark.slow
 def test_moments_before_forces():
     first = (1.0, 1.0, 1.0, 10.0, 10.0, 10.0)
-    error, best, length, *_ = compared(BoundedLeastSquares(to="thrusters", priorities=first), 3000, 2.0, "float64", first)
+    error, best, length, *_ = compared(
+        BoundedLeastSquares(to="thrusters", priorities=first), 3000, 2.0, "float64", first
+    )
     # The inverse of the polynomial is good to 1e-8 of the largest thrust.
     assert (error <= 1.0001 * best + 1e-7 * length).all()
     moments = []

@@ -253,7 +253,7 @@ class _Costs:
         starts = {name: np.tile(value, (k * n,) + (1,) * value.ndim) for name, value in self._starts.items()}
         for (name, target), column in zip(self._found.items(), np.repeat(candidates, n, axis=0).T, strict=True):
             if target.name in starts:
-                starts[target.name][(slice(None), *(target.index or ()))] = column
+                starts[target.name][(..., *(target.index or ()))] = column
             else:
                 parameters[name] = column
         for name, values in starts.items():

@@ -217,7 +217,7 @@ def of_number(key: str, of: str, text: str) -> Quantity:
             first, last = (",".join(str(i) for i in entry) for entry in ([0] * len(shape), [n - 1 for n in shape]))
             remedy = f"give '{name}[{first}]' to '{name}[{last}]'" if shape else f"give {name!r}"
             raise refusal(key, of, f"is no single number: {name} has shape {shape}", remedy)
-        return np.broadcast_to(values[(slice(None), *place)], (len(samples.time), members.count))
+        return np.broadcast_to(values[(..., *place)], (len(samples.time), members.count))
 
     return Quantity(name + index, function, unit_of_number(name), ("position",), needs_limit=True)
 

@@ -64,7 +64,7 @@ def test_public_names_that_are_nearly_right(door, word, name):
 @pytest.mark.parametrize(
     ("place", "word", "name"),
     [("", "Drag", "lw.terms.Drag"), ("", "HeadingPID", "lw.control.HeadingPID"),
-     ("control", "Thrusters", "lw.terms.Thrusters"),
+     ("control", "Thrusters", "lw.terms.Thrusters"), ("", "footprint", "lw.plots.footprint' or 'lw.studies.footprint"),
      ("terms", "Controller", "lw.Controller")],
 )  # fmt: skip
 def test_public_names_behind_another_door(place, word, name):

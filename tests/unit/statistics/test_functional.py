@@ -51,7 +51,7 @@ REFUSED = {
     "position - depth": "position has 3 x [m] and depth has 1 x [m]; give quantities of one unit and size",
     "depth - deph": "is not known; did you mean 'depth'?",
     "horizontal(depth)": "has a horizontal length of what is no vector in inertial axes; write horizontal(navigation_error)",
-    "horizontal(max(position))": "has a horizontal length of what is no vector in inertial axes; write horizontal(navigation_error)",
+    "horizontal(max(position))": "has a horizontal length of what is no vector in inertial axes",
 }  # fmt: skip
 
 

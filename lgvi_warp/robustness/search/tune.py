@@ -253,7 +253,8 @@ class _Costs:
         starts = {name: np.tile(value, (k * n,) + (1,) * value.ndim) for name, value in self._starts.items()}
         for (name, target), column in zip(self._found.items(), np.repeat(candidates, n, axis=0).T, strict=True):
             if target.name in starts:
-                starts[target.name][(..., *(target.index or ()))] = column
+                entry: Any = (..., *(target.index or ()))
+                starts[target.name][entry] = column
             else:
                 parameters[name] = column
         for name, values in starts.items():

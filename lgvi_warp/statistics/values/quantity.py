@@ -202,6 +202,7 @@ def of_number(key: str, of: str, text: str) -> Quantity:
     assert match is not None
     name, index = match[1], match[2] or ""
     place = tuple(int(i) for i in index[1:-1].split(",") if i)
+    entry: Any = (..., *place)
     if "[" in name:
         raise refusal(key, of, "names a part by its place", "name it by its own name, as in 'heading_pid.kp'")
 
@@ -214,10 +215,10 @@ def of_number(key: str, of: str, text: str) -> Quantity:
         values = members.parameters[name] if name in members.parameters else starts[name]
         shape = values.shape[1:]
         if len(place) != len(shape) or any(i >= most for i, most in zip(place, shape, strict=True)):
-            first, last = (",".join(str(i) for i in entry) for entry in ([0] * len(shape), [n - 1 for n in shape]))
+            first, last = (",".join(str(i) for i in corner) for corner in ([0] * len(shape), [n - 1 for n in shape]))
             remedy = f"give '{name}[{first}]' to '{name}[{last}]'" if shape else f"give {name!r}"
             raise refusal(key, of, f"is no single number: {name} has shape {shape}", remedy)
-        return np.broadcast_to(values[(..., *place)], (len(samples.time), members.count))
+        return np.broadcast_to(values[entry], (len(samples.time), members.count))
 
     return Quantity(name + index, function, unit_of_number(name), ("position",), needs_limit=True)
 

@@ -468,10 +468,10 @@ class RareSearch:
             spread = math.hypot(probability * spread, beside * its_spread) / (probability + beside)
             probability, degrees = probability + beside, min(degrees, 15.0)
         if seen is not None and beyond(seen, probability, spread):
-            self.notes.append(
-                f"a second look for other failure modes gives {seen.probability:.2e}: the interval reaches to it"
-            )
-            bounds = probability, min(1.0, seen.probability * math.exp(2.0 * seen.spread))
+            text = f"chains give {probability:.2e}, and a second look for other failure modes {seen.probability:.2e}"
+            self.notes.append(f"{text}, which is the answer; the failing members are those of the chains")
+            bounds = probability * math.exp(-2.0 * spread), min(1.0, seen.probability * math.exp(2.0 * seen.spread))
+            probability, spread, degrees = seen.probability, seen.spread, min(degrees, 15.0)
         return self._answer_of(
             "subset", (probability, spread, degrees), members, [r for each in runs.values() for r in each], bounds
         )

@@ -94,7 +94,8 @@ def test_the_likeliest_hit_of_the_floor_is_run_again(tmp_path):
     command = [sys.executable, ROOT / "examples" / "estimates" / "autopilot_hits_the_floor.py", picture]
     run = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path)
     *told, again, recording, last = run.stdout.splitlines()
-    assert 1e-6 < float(told[0].split()[1].rstrip(",")) < 3e-5
+    (answer,) = (line for line in told if line.startswith("Probability of "))
+    assert 1e-6 < float(answer.rpartition(" (95 %")[0].rpartition(": ")[2]) < 3e-5
     assert again.startswith("again: {'floor': 1}, after ")
     assert recording == str(picture.with_suffix(".rrd"))
     assert picture.with_suffix(".rrd").stat().st_size > 10_000

@@ -82,6 +82,19 @@ def test_intervals_of_few_members_hold_the_area(n):
     assert all(each.high > each.low for each in found)
 
 
+@pytest.mark.parametrize("n, bias", [(200, 0.107), (1_000, 0.033), (10_000, 0.005)])
+def test_an_edge_widens_the_outermost_region(n, bias):
+    """A uniform disc: the bias of the page on footprints."""
+    found = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        angle, away = rng.uniform(0.0, 2.0 * np.pi, n), np.sqrt(rng.random(n))
+        found.append(footprint(np.stack([away * np.cos(angle), away * np.sin(angle)], axis=1)).regions)
+    outermost, inner = (np.mean([regions[k].area for regions in found]) / (SHARES[k] * math.pi) for k in (3, 1))
+    assert outermost == pytest.approx(1.0 + bias, abs=max(0.3 * bias, 0.003))
+    assert inner == pytest.approx(1.0, abs=0.02)
+
+
 def test_a_region_holds_its_share_of_new_members():
     """Whatever the distribution: here a ring, whose region has a hole."""
     rng = np.random.default_rng(5)
@@ -400,4 +413,9 @@ def test_the_picture_shows_the_numbers():
     texts = [text.get_text() for text in axes.get_legend().get_texts()]
     says(texts, "depth of the floor", "1,000 of 1,500 members", "centre", *shown)
     assert len([item for item in axes.collections if hasattr(item, "levels")]) == 2
+    # A member far away leaves the view on the regions.
+    places = drawn(math.inf, 500, 3)
+    places[0] = 1e6, 3e5
+    axes = lw.plots.footprint(footprint(places))
+    assert np.abs([axes.get_xlim(), axes.get_ylim()]).max() < 100.0
     says(refused(lw.plots.footprint, found, 1.0), "at = 1.0", "footprint at end")

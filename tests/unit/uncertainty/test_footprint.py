@@ -231,7 +231,7 @@ def test_members_far_away_that_are_a_share_of_their_own_have_no_bounded_area():
 
 @pytest.mark.parametrize("share", [0.85, 0.97])
 def test_a_small_cluster_far_away_is_in_the_region_of_its_share(share):
-    """As two clusters; that of 3 % is beyond the region of 95 %."""
+    """The region of 95 % has both clusters; it leaves out one of 3 %."""
     n, sizes = 10_000, np.array([1.0, 2.0])
     rng = np.random.default_rng(7)
     second = rng.random(n) > share

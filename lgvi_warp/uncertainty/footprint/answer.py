@@ -10,8 +10,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.common.summaries import plural
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
-from lgvi_warp.uncertainty.footprint.density import Polygon
+from lgvi_warp.uncertainty.footprint.density import MAIN, Polygon, enclosed
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,20 @@ class Region:
         """The area with its interval in words, as "112 m2 (107 to 118)"."""
         return _area_text(self.area, self.low, self.high)
 
+    @property
+    def scattered(self) -> bool:
+        """Several parts, for which the circle is far too large."""
+        return len(self.polygons) > 1 and math.pi * self.radius**2 > WIDE * self.area
+
+    @property
+    def largest(self) -> tuple[np.ndarray, float]:
+        """Centroid (2,) of the outline of the largest part, and the radius about it that holds this part [m]."""
+        ring = max(self.polygons, key=lambda rings: enclosed([rings]))[0]
+        away = ring - ring[0]
+        parts = away[:-1, 1] * away[1:, 0] - away[1:, 1] * away[:-1, 0]
+        centre = ring[0] + parts @ (away[:-1] + away[1:]) / (3.0 * parts.sum())
+        return centre, float(np.hypot(*(ring - centre).T).max())
+
 
 @dataclass(frozen=True, eq=False)
 class Footprint(Saved):
@@ -54,8 +69,9 @@ class Footprint(Saved):
         at: "end", the name of an event or outcome, as "floor", or a time [s] as text.
         members: Number of members that have such a place.
         lacking: Number of members that have none, by outcome, as {"ok": 700, "non_finite": 3}.
-        centre: Mean of the places (2,), north and east of the origin [m].
-        covariance: Their covariance (2, 2) [m2].
+        centre: Mean of the places (2,), north and east of the origin [m]. Up to 5 % of the members that lie far away are left
+            out, and counted in a message.
+        covariance: Covariance of the same members (2, 2) [m2].
         regions: The regions of 50, 90, 95 and 99 %, as far as the members suffice for them.
         growth: For an eighth, a quarter, half and all of the members: number, area of the 95 % region and its interval [m2].
         origin: Latitude and longitude of the axes' origin [deg]; None where the scene has none.
@@ -95,15 +111,18 @@ class Footprint(Saved):
             failed = before or self.at == "end"
             who = f"{self.members:,} members that {'did not fail' if failed else are}"
             share, are = f"{share} of the {who}", are if failed else "do so"
-        place = place_text(self.centre, region.radius or 1.0)
-        within = f"within {number_text(region.radius, region.radius)} m of" if region.radius > 0.0 else "at"
-        return f"{before}{share} {are} {within} {place}."
+        centre, radius = region.largest if region.scattered else (self.centre, region.radius)
+        within = f"within {number_text(radius, radius)} m of" if radius > 0.0 else "at"
+        if region.scattered:
+            total = number_text(region.area, region.area)
+            within = f"in {len(region.polygons)} areas, {total} m2 in total, the largest {within}"
+        return f"{before}{share} {are} {within} {place_text(centre, radius or 1.0)}."
 
     def _report(self) -> Iterator[str]:
-        lines = [f"footprint   {self.members:,} members, at {self.at}{' s' * (time_of(self.at) is not None)}"]
+        lines = [f"footprint   {plural(self.members, 'member')}, at {self.at}{' s' * (time_of(self.at) is not None)}"]
         if self.lacking:
             counts = ", ".join(f"{name} {count:,}" for name, count in self.lacking.items())
-            lines.append(f"left out    {sum(self.lacking.values()):,} members without such a place: {counts}")
+            lines.append(f"left out    {plural(sum(self.lacking.values()), 'member')} without such a place: {counts}")
         for each in self.regions:
             size = number_text(each.radius, each.radius)
             lines.append(
@@ -111,9 +130,11 @@ class Footprint(Saved):
                 f"{f' in {len(each.polygons)} parts' * (len(each.polygons) > 1)}; within {size} m of the centre; "
                 f"ellipse {number_text(each.ellipse_area, each.ellipse_area)} m2"
             )
-        if len(self.growth) > 1:
+        growth = [each for each in self.growth if math.isfinite(each[1]) and (each[2] > 0.0 or math.isfinite(each[3]))]
+        if len(growth) > 1:
             lines += [
-                f"growth      {self.main.percent} of {n:,} members: {_area_text(*areas)}" for n, *areas in self.growth
+                f"growth      {self.main.percent} of {plural(n, 'member')}: {_area_text(*areas)}"
+                for n, *areas in growth
             ]
         return iter([*lines, *(f"note        {text}" for text in self.messages)])
 
@@ -141,8 +162,8 @@ class Footprint(Saved):
                    "north": float(self.centre[0]), "east": float(self.centre[1])}  # fmt: skip
 
 
-# Share of the region that the answer is about.
-MAIN = 0.95
+# Of a region in several parts: a circle so many times as large tells little.
+WIDE = 2.0
 
 
 def _region(entry: Mapping[str, Any]) -> Region:
@@ -165,6 +186,10 @@ def _area_text(area: float, low: float, high: float) -> str:
     """An area with its interval in words."""
     if math.isnan(area):
         return "no area"
+    if not math.isfinite(area):
+        return f"at least {number_text(low, low)} m2" if 0.0 < low < area else "too few members for an area"
+    if low == 0.0 and not math.isfinite(high):
+        return f"{number_text(area, area)} m2 (too few members for an interval)"
     upper = f"to {number_text(high, high)}" if math.isfinite(high) else "or more"
     return f"{number_text(area, area)} m2 ({number_text(low, low)} {upper})"
 

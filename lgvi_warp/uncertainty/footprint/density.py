@@ -9,7 +9,7 @@ Journal of the American Statistical Association 108). Of several bandwidths each
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -34,6 +34,14 @@ POINT = 1e-6
 GAIN = 0.97
 # A level below this part of the largest density is round-off.
 LEAST_LEVEL = 1e-9
+# Members beyond so many standard deviations of the middle ones are far away.
+FAR = 30.0
+# The middle ones are this share of the members; so many steps find them, by at most so many members.
+MIDDLE, STEPS, ENOUGH = 0.75, 8, 10_000
+# Share of the region that the answer is about.
+MAIN = 0.95
+# Places whose spread across is below this part of that along lie on a line.
+THIN = 1e-6
 # The interval of an area.
 CONFIDENCE = 0.95
 
@@ -181,7 +189,7 @@ class Smoothed(NamedTuple):
         polygons = [
             tuple(grid.frame.back(grid.low + grid.cell * ring).round(digits) for ring in rings) for rings in parts or ()
         ]
-        area, low, high = (math.inf if each is None else grid.area * _area(each) for each in (parts, fewer, more))
+        area, low, high = (math.inf if each is None else grid.area * enclosed(each) for each in (parts, fewer, more))
         return Outline(area, low, high, tuple(polygons))
 
     def parts(self, level: float) -> list[list[np.ndarray]] | None:
@@ -201,9 +209,9 @@ class Smoothed(NamedTuple):
         return [[points[a:b, ::-1] + [i, j] for a, b in pairwise(offsets)] for points, offsets in traced]
 
 
-def _area(polygons: list[list[np.ndarray]]) -> float:
+def enclosed(polygons: Iterable[Iterable[np.ndarray]]) -> float:
     """Sum the areas of polygons: rings of holes run the other way round."""
-    rings = (ring for polygon in polygons for ring in polygon)
+    rings = (ring - ring[0] for polygon in polygons for ring in polygon)
     return sum(0.5 * float(np.sum(r[:-1, 1] * r[1:, 0] - r[1:, 1] * r[:-1, 0])) for r in rings)
 
 
@@ -213,9 +221,10 @@ def regions(
     """Find the regions of shares that the members suffice for.
 
     places: North and east (n, 2) [m], not all on a line. weights: (n,). growing: One of the shares.
+    covariance: Of the members (2, 2) [m2], without those far away.
     Returns: The regions; by number of members the region of the share `growing`; whether the grid resolves all clusters.
     """
-    scott = COARSEST * effective(weights) ** (-1.0 / 6.0)
+    scott, least = COARSEST * effective(weights) ** (-1.0 / 6.0), POINT**2 * np.trace(covariance)
     quarters = np.quantile(Whitening(places, covariance, math.inf).of(places), [0.25, 0.75], axis=0)
     # Of heavy tails the quartiles tell the width of the middle, as in Silverman's rule.
     frame = Whitening(places, covariance, scott * float(np.clip(np.diff(quarters, axis=0).min() / 1.349, 2.0**-5, 1.0)))
@@ -239,7 +248,7 @@ def regions(
             covariance, widest = frame.root @ frame.root.T, COARSEST * smoothed.h * grid.cell
         else:
             covariance, widest, pooled, former, best = within, scott, True, best, {}
-        if np.linalg.eigvalsh(covariance)[0] <= POINT**2 * np.var(places, axis=0).sum():
+        if np.linalg.eigvalsh(covariance)[0] <= least:
             resolved = False
             break
         frame = Whitening(places, covariance, widest)
@@ -254,6 +263,55 @@ def regions(
             grid = DensityGrid(places[some], weights[some], chosen.grid.frame, chosen.grid.size, chosen.grid)
             grown[len(some)] = grid.smoothed(chosen.h * part ** (1.0 / 6.0)).region(growing)
     return levels, grown | {len(places): levels[shares.index(growing)]}, resolved
+
+
+def moments(places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean (2,) and unbiased covariance (2, 2) of places."""
+    centre, count = np.average(places, axis=0, weights=weights), effective(weights)
+    away = places - centre
+    return centre, (away.T * weights) @ away / weights.sum() * (count / max(count - 1.0, 1.0))
+
+
+def spread(covariance: np.ndarray) -> tuple[float, float]:
+    """Standard deviations along and across a cloud of places."""
+    across, along = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), 0.0)).tolist()
+    return along, across
+
+
+def near(places: np.ndarray, weights: np.ndarray, least: float) -> np.ndarray:
+    """Mask (n,) of the members that are not far from the middle ones; all where these are on a line, or too few.
+
+    The middle ones minimise the determinant of their covariance (concentration steps of Rousseeuw & Van Driessen 1999, A fast
+    algorithm for the minimum covariance determinant estimator, Technometrics 41).
+
+    least: A smaller spread is round-off [m].
+    """
+    everyone = np.ones(len(places), bool)
+    some = slice(None, None, -(-len(places) // ENOUGH))
+    drawn, weight = places[some], weights[some]
+    if effective(weight) < least_members(MAIN):
+        return everyone
+    centre, inverse = np.median(drawn, axis=0), np.eye(2)
+    for step in range(STEPS + 1):
+        squared = _squared(drawn - centre, inverse)
+        order = np.argsort(squared)
+        held = np.cumsum(weight[order]) / weight.sum()
+        if step == STEPS:
+            break
+        inner = order[: np.searchsorted(held, MIDDLE) + 1]
+        centre, covariance = moments(drawn[inner], weight[inner])
+        along, across = spread(covariance)
+        if across <= max(least, THIN * along):
+            return everyone
+        inverse = np.linalg.inv(covariance)
+    # The median tells the standard deviation, as of a normal distribution.
+    variance = squared[order[np.searchsorted(held, 0.5)]] / (2.0 * math.log(2.0))
+    return _squared(places - centre, inverse) <= FAR**2 * variance
+
+
+def _squared(away: np.ndarray, inverse: np.ndarray) -> np.ndarray:
+    """Squared distances (n,) in terms of a covariance."""
+    return np.einsum("ij,ij->i", away @ inverse, away)
 
 
 def effective(weights: np.ndarray) -> float:

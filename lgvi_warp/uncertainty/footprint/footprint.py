@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,19 @@ from lgvi_warp.physics.terms.events import from_list
 from lgvi_warp.results.outcomes import answer_of
 from lgvi_warp.results.quantities import quantities
 from lgvi_warp.statistics.ends import outcomes
-from lgvi_warp.uncertainty.footprint.answer import MAIN, Footprint, Region, time_of
-from lgvi_warp.uncertainty.footprint.density import Outline, effective, least_members, regions
+from lgvi_warp.uncertainty.footprint.answer import Footprint, Region, time_of
+from lgvi_warp.uncertainty.footprint.density import (
+    FAR,
+    MAIN,
+    THIN,
+    Outline,
+    effective,
+    least_members,
+    moments,
+    near,
+    regions,
+    spread,
+)
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
@@ -27,8 +39,6 @@ if TYPE_CHECKING:
 SHARES = (0.5, 0.9, MAIN, 0.99)
 # Most places that the answer holds, for pictures.
 MOST_PLACES = 1000
-# Places whose spread across is below this part of that along lie on a line.
-THIN = 1e-6
 # The answer of a run names circles from this radius on [m].
 LEAST_CIRCLE = 0.01
 # Spread below so many units in the last place of the coordinates is round-off.
@@ -89,23 +99,36 @@ def _footprint(result: Result, at: str | float, outlined: bool = True) -> Footpr
     if not counted.any():
         raise refusal("at", word, f"no member has a place then ({summaries.counted(lacking)})", "see result.status")
     places, weights = positions[counted, :2].astype(np.float64), weights[counted]
-    centre, count = np.average(places, axis=0, weights=weights), effective(weights)
+    count, round_off = effective(weights), ROUND_OFF * np.finfo(positions.dtype).eps * np.abs(places).max(axis=1)
+    held = near(places, weights, float(np.median(round_off)))
+    # The frame of the regions is that of the near members. Too many far ones are no outliers, but a part of the cloud.
+    centre, covariance = frame = moments(places[held], weights[held])
+    outliers = 0.0 < weights[~held].sum() <= (1.0 - MAIN) * weights.sum()
+    if not outliers:
+        centre, covariance = moments(places, weights)
     away = places - centre
-    covariance = (away.T * weights) @ away / weights.sum() * (count / max(count - 1.0, 1.0))
-    along, across = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[::-1], 0.0))
-    round_off = ROUND_OFF * float(np.finfo(positions.dtype).eps * np.abs(places).max())
+    along, across = spread(frame[1])
+    round_off, ellipse = float(round_off[held].max()), math.prod(spread(covariance))
     shares = [share for share in SHARES if count >= least_members(share) - 1e-9]
     messages = [
         f"a region of {share:.0%} needs {least_members(share)} members" for share in SHARES if share not in shares
     ]
+    if outliers:
+        far = summaries.plural(int(np.count_nonzero(~held)), "member")
+        verb = "lies" if far == "1 member" else "lie"
+        messages.append(
+            f"{far} {verb} more than {FAR:g} standard deviations away: centre, covariance and ellipse are of the others"
+        )
     levels, growth = [Outline(np.nan, np.nan, np.nan, ())] * len(shares), dict[int, Outline]()
     if along <= round_off:
-        away, messages = 0.0 * away, [*messages, "all members are at one point: a region has no area"]
+        away, ellipse, messages = 0.0 * away, 0.0, [*messages, "all members are at one point: a region has no area"]
     elif len(places) < 3 or across <= max(round_off, THIN * along):
-        messages.append("the members are on a line: a region has no area")
+        where = "at two points" if len(np.unique(places, axis=0)) == 2 else "on a line"
+        ellipse = 0.0
+        messages.append(f"the members are {where}: a region has no area")
     elif outlined:
         main = max(share for share in shares if share <= MAIN)
-        levels, growth, resolved = regions(places, weights, covariance, shares, main)
+        levels, growth, resolved = regions(places, weights, frame[1], shares, main)
         if not resolved:
             messages.append("clusters are finer than the grid resolves: their regions are smaller than these")
     # The circle holds its share of new members, as the region does.
@@ -113,7 +136,7 @@ def _footprint(result: Result, at: str | float, outlined: bool = True) -> Footpr
     order = np.argsort(distance)
     held = np.cumsum(weights[order]) / weights.sum() * count / (count + 1.0)
     circles = np.interp(shares, held, distance[order])
-    ellipses = -2.0 * np.pi * np.log1p(-np.array(shares)) * along * across
+    ellipses = -2.0 * np.pi * np.log1p(-np.array(shares)) * ellipse
     environment = result.provenance.get("scene", {}).get("environment", {})
     drawn = np.random.default_rng(0).permutation(len(places))[:MOST_PLACES]
     return Footprint(
@@ -150,7 +173,8 @@ def _positions(result: Result, word: str, at: Any) -> tuple[np.ndarray, np.ndarr
         events = from_list(result.provenance["scene"].get("events", ()))
         known = outcomes([event.key for event in events], [event.status for event in events])
         if word not in known:
-            raise refusal("at", at, 'is neither "end", a time nor an outcome of this scene', closest(word, known))
+            forms = ("end", "a time [s], as 12.5", *known)
+            raise refusal("at", at, 'is neither "end", a time nor an outcome of this scene', closest(word, forms))
     positions = _row(result, row)
     if when is None and word != "end":
         # Only that row: a run in a store may be larger than the memory.

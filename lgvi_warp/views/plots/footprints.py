@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.uncertainty.footprint.answer import Footprint, number_text
+from lgvi_warp.uncertainty.footprint.density import FAR
 from lgvi_warp.uncertainty.footprint.footprint import footprint as footprint_of
 from lgvi_warp.views.plots.canvas import COLORS, STYLES, TINTS, legend_below, panel, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
@@ -82,7 +84,11 @@ def draw_footprint(axes: Any, answer: Footprint) -> None:
     axes.update_datalim([(east - region.radius, north - region.radius), (east + region.radius, north + region.radius)])
     some = len(answer.places) < answer.members
     who = f"{len(answer.places):,} of {answer.members:,} members" if some else f"{answer.members:,} members"
+    shown, away = axes.dataLim.frozen(), np.hypot(*(answer.places - answer.centre).T)
     axes.scatter(*answer.places.T[::-1], s=4, color="black", alpha=0.5, linewidths=0, label=who)
+    # Members far away would make all others a dot.
+    axes.dataLim.set(shown)
+    axes.update_datalim(answer.places[away <= max(region.radius, FAR * math.sqrt(max(lengths[-1], 0.0)))][:, ::-1])
     axes.scatter(*middle, s=70, marker="+", color=COLORS[1], linewidths=1.8, zorder=4, label="centre")
     axes.set(xlabel="east [m]", ylabel="north [m]")
     axes.grid(True, alpha=0.3)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.others.exporting.areas import _cut
 from tests.support.exported import DEGREES, by_geodesic
 from tests.support.made import made
 from tests.support.refusals import refused, says
@@ -101,6 +102,43 @@ def test_a_region_across_the_antimeridian_is_cut(tmp_path):
         assert area == pytest.approx(region.area, rel=1e-5)
 
 
+@pytest.mark.parametrize("longitude", [180.0, 179.9995, -179.9995, 179.9991])
+def test_a_hole_across_the_antimeridian_is_no_part_of_the_region(longitude, tmp_path):
+    """An annulus of 100 m, cut through or beside its hole."""
+    rng = np.random.default_rng(3)
+    angle, away = rng.uniform(0.0, 2.0 * np.pi, 3_000), 100.0 + 3.0 * rng.standard_normal(3_000)
+    answer = footprint(np.stack([away * np.cos(angle), away * np.sin(angle)], axis=1), [10.0, longitude])
+    shapes = geometries(answer, tmp_path / "cut.geojson")
+    for region in answer.regions:
+        shape = shapes[region.share]
+        assert shape.is_valid, shapely.is_valid_reason(shape)
+        assert {abs(shape.bounds[0]), abs(shape.bounds[2])} == {180.0}
+        assert abs(GEOD.geometry_area_perimeter(shape)[0]) == pytest.approx(region.area, rel=1e-5)
+        assert all(shapely.is_ccw(part.exterior) for part in shape.geoms)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_half_of_any_polygon_is_that_of_shapely(seed):
+    """Unions of boxes without other boxes: concave, with holes, some with points or edges on the meridian itself."""
+    rng = np.random.default_rng(seed)
+    corners = np.round(rng.uniform(0.0, [3.0, 3.0, 2.0, 2.0], (40, 4)), 1)
+    boxes = shapely.box(*corners[:, :2].T, *(corners[:, :2] + corners[:, 2:]).T)
+    shape = shapely.union_all(boxes[:25]).difference(shapely.union_all(boxes[25:])).buffer(-0.0125, join_style="mitre")
+    shift = 180.0 - round(float(rng.uniform(1.0, 4.0)), 1) + rng.choice([0.0, 0.0125, -0.0125])
+    for part in shapely.get_parts(shapely.transform(shape, lambda points: np.add(points, (shift, 0.0)).round(4))):
+        polygon = shapely.orient_polygons(part)
+        cut = shapely.MultiPolygon(
+            [
+                (rings[0], rings[1:])
+                for rings in _cut([np.array(ring.coords) for ring in (polygon.exterior, *polygon.interiors)])
+            ]
+        )
+        assert cut.is_valid, shapely.is_valid_reason(cut)
+        west = shapely.MultiPolygon([part for part in cut.geoms if part.bounds[0] > 0.0])
+        assert west.symmetric_difference(part.intersection(shapely.box(170.0, -10.0, 180.0, 10.0))).area < 1e-9
+        assert cut.area == pytest.approx(part.area, rel=1e-9)
+
+
 def test_what_no_map_can_hold_is_refused(answer, tmp_path):
     nowhere = footprint(ring(), None)
     says(refused(lw.export, nowhere, tmp_path / "a.kml"), "origin", "is not known", "--origin=LAT,LON")
@@ -121,4 +159,5 @@ def test_a_point_is_a_place_without_regions(tmp_path):
     assert all(shapes[share] is None for share in shapes if share)
     marks = ElementTree.parse(lw.export(answer, tmp_path / "point.kml")).getroot().findall(".//k:Placemark", SPACE)
     assert len(marks) == 4
+    assert not any(len(each) == 0 for mark in marks for each in mark.iterfind("k:MultiGeometry", SPACE))
     assert math.isnan(answer.main.area)

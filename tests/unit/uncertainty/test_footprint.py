@@ -4,6 +4,7 @@
 import dataclasses
 import json
 import math
+import re
 import time
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from lgvi_warp.cli.command import main
 from lgvi_warp.common.status import Status
 from lgvi_warp.uncertainty.footprint.answer import number_text, place_text
 from lgvi_warp.uncertainty.footprint.density import GAIN, DensityGrid, Whitening
+from lgvi_warp.uncertainty.footprint.footprint import run_answer
 from tests.support.made import made
 from tests.support.refusals import refused, says
 
@@ -78,6 +80,19 @@ def test_intervals_of_few_members_hold_the_area(n):
     found = [footprint(drawn(math.inf, n, seed)).regions[1] for seed in range(30)]
     assert binom.cdf(sum(each.low < area(math.inf, 0.9) < each.high for each in found), 30, 0.95) > 1e-3
     assert all(each.high > each.low for each in found)
+
+
+@pytest.mark.parametrize("n, bias", [(200, 0.107), (1_000, 0.033), (10_000, 0.005)])
+def test_an_edge_widens_the_outermost_region(n, bias):
+    """A uniform disc: the bias of the page on footprints."""
+    found = []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        angle, away = rng.uniform(0.0, 2.0 * np.pi, n), np.sqrt(rng.random(n))
+        found.append(footprint(np.stack([away * np.cos(angle), away * np.sin(angle)], axis=1)).regions)
+    outermost, inner = (np.mean([regions[k].area for regions in found]) / (SHARES[k] * math.pi) for k in (3, 1))
+    assert outermost == pytest.approx(1.0 + bias, abs=max(0.3 * bias, 0.003))
+    assert inner == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_region_holds_its_share_of_new_members():
@@ -180,7 +195,75 @@ def test_weights_count():
     assert contains_xy(shape, *places[at].T).mean() == pytest.approx(0.9, abs=4.0 * math.sqrt(0.09 / 1_500))
 
 
-@pytest.mark.parametrize("n, shares", [(1, [0.5]), (2, [0.5]), (8, [0.5]), (9, [0.5, 0.9]),
+@pytest.mark.parametrize("far, messages", [
+    ([(1e5, 3e4)], ["1 member lies"]), ([(1e9, 0.0)], ["1 member lies"]), ([(40.0, -40.0)], ["1 member lies"]),
+    ([(1e6, 3e5), (-1e4, 1e4), (0.0, 200.0)], ["3 members lie"]),
+    ([(1e4 * k * k, 1e5 * k) for k in range(1, 31)], ["30 members lie"]),
+    ([(5.0, 5.0)], []),
+])  # fmt: skip
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_few_members_far_away_change_little(far, messages, dtype):
+    places = drawn(math.inf, 1_000, 6)
+    alone = footprint(places)
+    places[: len(far)] = far
+    found = footprint(places, dtype=dtype)
+    # The others are fewer, so that their share is larger, and their region.
+    outside = 1.0 - 0.95 * 1_000 / (1_000 - len(far))
+    ratio = math.log(outside) / math.log(0.05)
+    assert found.main.area == pytest.approx(ratio * alone.main.area, rel=0.05 + 2e-3 * len(far))
+    assert found.main.radius == pytest.approx(math.sqrt(ratio) * alone.main.radius, rel=0.05 + 2e-3 * len(far))
+    np.testing.assert_allclose(found.centre, alone.centre, atol=0.05)
+    assert found.main.ellipse_area == pytest.approx(alone.main.ellipse_area, rel=0.05)
+    # The last line of the run has the same circle.
+    assert run_answer(run_to(places, dtype=dtype)).endswith(found.answer)
+    assert len(found.messages) == len(messages)
+    says(" ".join(found.messages), *(f"{words} more than 30 standard deviations away" for words in messages))
+
+
+def test_members_far_away_that_are_a_share_of_their_own_have_no_bounded_area():
+    places = drawn(math.inf, 1_000, 6)
+    places[:80] *= 1e6
+    found = footprint(places)
+    assert found.regions[1].area == pytest.approx(area(math.inf, 0.9 / 0.92), rel=0.15)
+    assert found.main.area == math.inf
+    says(str(found), "95 %        too few members for an area")
+
+
+@pytest.mark.parametrize("share", [0.85, 0.97])
+def test_a_small_cluster_far_away_is_in_the_region_of_its_share(share):
+    """The region of 95 % has both clusters; it leaves out one of 3 %."""
+    n, sizes = 10_000, np.array([1.0, 2.0])
+    rng = np.random.default_rng(7)
+    second = rng.random(n) > share
+    places = rng.standard_normal((n, 2)) * np.where(second, *sizes[::-1])[:, None] + second[:, None] * [0.0, 3_000.0]
+    found = footprint(places)
+    if share == 0.97:
+        assert found.main.area == pytest.approx(-2.0 * math.pi * math.log(1.0 - 0.95 / share), rel=0.05)
+        says(found.answer, "95 % end within 2.")
+    else:
+        level = 0.05 / (2.0 * np.pi * (sizes**2).sum())
+        logs = np.log(np.array([share, 1.0 - share]) / (2.0 * np.pi * sizes**2 * level))
+        assert found.main.area == pytest.approx((2.0 * np.pi * logs * sizes**2).sum(), rel=0.075)
+
+
+def test_of_several_parts_the_answer_names_the_largest():
+    rng = np.random.default_rng(2)
+    places = rng.standard_normal((2_000, 2)) * np.where(np.arange(2_000) < 800, 1.0, 2.0)[:, None]
+    places[:800] += [100.0, -30.0]
+    found = footprint(places)
+    number = r"([\d.]+)"
+    words = (
+        rf"95 % end in 2 areas, {number} m2 in total, the largest within {number} m of a point {number} m .*origin\."
+    )
+    total, radius, north = map(float, re.fullmatch(words, found.answer).groups())
+    assert total == pytest.approx(found.main.area, rel=5e-3)
+    # Closed form as above: half the squared radius of the large one in its own units.
+    log = math.log(0.6 / 4.0 / (0.05 / 5.0))
+    assert radius == pytest.approx(2.0 * math.sqrt(2.0 * log), rel=0.15)
+    assert north < 0.3
+
+
+@pytest.mark.parametrize("n, shares", [(1, [0.5]), (2, [0.5]), (3, [0.5]), (8, [0.5]), (9, [0.5, 0.9]),
                                        (18, [0.5, 0.9]), (19, [0.5, 0.9, 0.95]), (98, [0.5, 0.9, 0.95]),
                                        (99, [0.5, 0.9, 0.95, 0.99])])  # fmt: skip
 def test_few_members_have_few_regions(n, shares):
@@ -193,6 +276,9 @@ def test_few_members_have_few_regions(n, shares):
         assert found.main.share < 0.95 or not math.isfinite(found.main.high)
     assert not any(region.low == region.high for region in found.regions)
     says(str(found), found.answer)
+    assert not re.search(r"\binf\b|\(0\.00 or more|\b1 members", str(found))
+    if n == 3:
+        says(str(found), "m2 (too few members for an interval)")
 
 
 def test_places_without_an_area():
@@ -202,8 +288,11 @@ def test_places_without_an_area():
     # 95 % of 102 places between members from the middle: 4.85 m, in steps of 0.1 m.
     assert line.main.radius == pytest.approx(4.85, abs=0.1)
     rounded = footprint(1e5 + 1e-3 * drawn(math.inf, 50, 1).astype(np.float32), dtype=np.float32)
-    for found, words in ((spot, "at one point"), (line, "on a line"), (rounded, "at one point")):
-        says(str(found), words, "no area")
+    two = footprint(np.repeat([[1.0, 2.0], [3.0, 4.0]], 20, axis=0))
+    nearly = footprint(np.array([3.0, -4.0]) + 1e-15 * drawn(math.inf, 50, 1))
+    for found, words in ((spot, "at one point"), (line, "on a line"), (rounded, "at one point"), (two, "at two points"),
+                         (nearly, "at one point")):  # fmt: skip
+        says(str(found), words, "no area", "ellipse 0.00 m2")
         assert all(math.isnan(each) for region in found.regions for each in (region.area, region.low, region.high))
         assert not any(region.polygons for region in found.regions)
         again = lw.studies.Footprint.from_dict(json.loads(found.to_json()))
@@ -245,7 +334,12 @@ def test_what_cannot_be_is_refused():
     places = drawn(math.inf, 30, 1)
     result = run_to(places)
     says(refused(lw.studies.footprint, result, 0.7), "at = 0.7", "no time of a sample", "give 0 or 1", "at=[0.7]")
-    says(refused(lw.studies.footprint, result, "flor"), "at = 'flor'", 'neither "end", a time nor an outcome', "known:")
+    says(
+        refused(lw.studies.footprint, result, "flor"),
+        "at = 'flor'",
+        'neither "end", a time nor an outcome',
+        "known: end, a time [s], as 12.5, ",
+    )
     says(refused(lw.studies.footprint, result, None), "at = None")
     says(refused(lw.studies.footprint, result.position), "result", "lw.solve")
     bare = dataclasses.replace(result, samples={})
@@ -319,4 +413,9 @@ def test_the_picture_shows_the_numbers():
     texts = [text.get_text() for text in axes.get_legend().get_texts()]
     says(texts, "depth of the floor", "1,000 of 1,500 members", "centre", *shown)
     assert len([item for item in axes.collections if hasattr(item, "levels")]) == 2
+    # A member far away leaves the view on the regions.
+    places = drawn(math.inf, 500, 3)
+    places[0] = 1e6, 3e5
+    axes = lw.plots.footprint(footprint(places))
+    assert np.abs([axes.get_xlim(), axes.get_ylim()]).max() < 100.0
     says(refused(lw.plots.footprint, found, 1.0), "at = 1.0", "footprint at end")

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Rings (k, 2) of longitudes and latitudes [deg]: the outer one counterclockwise, then those of holes, clockwise.
 Rings = list[np.ndarray]
+# A point on the antimeridian counts as so far to the east of it [deg].
+ON_LIMIT = 1e-12
 
 
 def areas(footprint: Footprint, plane: LocalPlane) -> Iterator[tuple[Region, list[Rings]]]:
@@ -43,22 +45,55 @@ def _on_map(polygon: tuple[np.ndarray, ...], plane: LocalPlane) -> Rings:
 def _cut(rings: Rings) -> list[Rings]:
     """Divide a polygon at the antimeridian (RFC 7946, 3.1.9)."""
     first, last = (math.floor((end + 180.0) / 360.0) for end in (rings[0][:, 0].min(), rings[0][:, 0].max()))
-    parts = []
-    for turn in range(first, last + 1):
-        middle = 360.0 * turn
-        sides = [_beyond(_beyond(ring, 180.0 - middle), 180.0 + middle, -1.0) for ring in rings]
-        parts.append([side - [middle, 0.0] for side in sides if len(side) > 3])
-    return parts
+    return [
+        [ring - [360.0 * turn, 0.0] for ring in part]
+        for turn in range(first, last + 1)
+        for east in _beyond(rings, 360.0 * turn - 180.0, 1.0)
+        for part in _beyond(east, 360.0 * turn + 180.0, -1.0)
+    ]
 
 
-def _beyond(ring: np.ndarray, limit: float, sign: float = 1.0) -> np.ndarray:
-    """Keep the part of a ring where sign * longitude + limit is not negative (Sutherland & Hodgman 1974)."""
-    inside = sign * ring[:, 0] + limit
-    if (inside >= 0.0).all():
-        return ring
-    kept = []
-    for a, b, of_a, of_b in zip(ring[:-1], ring[1:], inside[:-1], inside[1:], strict=True):
-        kept += [a] if of_a >= 0.0 else []
-        # On the antimeridian itself, whatever the rounding.
-        kept += [np.array([-sign * limit, a[1] + (b[1] - a[1]) * of_a / (of_a - of_b)])] if of_a * of_b < 0.0 else []
-    return np.array([*kept, *kept[:1]]).reshape(-1, 2)
+def _beyond(polygon: Rings, limit: float, sign: float) -> list[Rings]:
+    """Keep the parts of a polygon where sign * (longitude - limit) is positive.
+
+    Along the limit, going north or south, its rings by turns enter this half and leave it. So the end of each chain of kept
+    points is joined to the start of the same rank, and holes that reach the limit become a part of the outer rings.
+    """
+    chains: list[np.ndarray] = []
+    whole: Rings = []
+    for ring in polygon:
+        inside = sign * (ring[:-1, 0] - limit)
+        inside[inside == 0.0] = sign * ON_LIMIT
+        if (inside > 0.0).all():
+            whole.append(ring)
+        elif (inside > 0.0).any():
+            begin = int(np.flatnonzero((inside > 0.0) & (np.roll(inside, 1) < 0.0))[0])
+            points, inside = np.roll(ring[:-1], -begin, axis=0), np.roll(inside, -begin)
+            before, earlier = np.roll(points, 1, axis=0), np.roll(inside, 1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                crossings = before + (points - before) * (earlier / (earlier - inside))[:, None]
+            crossings[:, 0] = limit  # whatever the rounding
+            turns = np.flatnonzero((inside > 0.0) != (earlier > 0.0))
+            chains += [np.vstack([crossings[a], points[a:b], crossings[b]]) for a, b in turns.reshape(-1, 2)]
+    if not chains:
+        return [whole] if whole else []
+    starts, ends = (np.argsort([chain[end, 1] for chain in chains]) for end in (0, -1))
+    following = dict(zip(ends.tolist(), starts.tolist(), strict=True))
+    outer = []
+    while following:
+        k, loop = next(iter(following)), []
+        while k in following:
+            loop.append(chains[k])
+            k = following.pop(k)
+        outer.append(np.vstack([*loop, loop[0][:1]]))
+    outer = [ring for ring in outer if np.ptp(ring[:, 0]) > 0.0]
+    return [[ring, *(hole for hole in whole if _holds(ring, hole[0]))] for ring in outer]
+
+
+def _holds(ring: np.ndarray, place: np.ndarray) -> bool:
+    """Tell whether a place is within a ring: a ray to the east crosses it an odd number of times."""
+    a, b = ring[:-1], ring[1:]
+    across = (a[:, 1] > place[1]) != (b[:, 1] > place[1])
+    a, b = a[across], b[across]
+    east = a[:, 0] + (b[:, 0] - a[:, 0]) * (place[1] - a[:, 1]) / (b[:, 1] - a[:, 1])
+    return bool(np.count_nonzero(east > place[0]) % 2)

@@ -96,7 +96,8 @@ def write_regions(footprint: Footprint, plane: LocalPlane, target: Path, report:
             style = ET.SubElement(placemark, "Style")
             for name, color in STYLE.items():
                 _text(ET.SubElement(style, name), "color", color)
-            several = ET.SubElement(placemark, "MultiGeometry")
+            several = ET.Element("MultiGeometry")
+            placemark.extend([several] if polygons else [])
             for rings in polygons:
                 polygon = ET.SubElement(several, "Polygon")
                 for i, ring in enumerate(rings):

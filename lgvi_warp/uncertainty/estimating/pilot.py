@@ -116,7 +116,7 @@ class Pilot:
             return mean_of(parts, lambda z: (z - mean) ** 2) + (UNSEEN * least) ** 2 / members
 
     def reach(self, setting: Setting) -> float:
-        """Range of numbers that no member of the pilot has, by a look and by probes far out: of means, and of parts of them."""
+        """Range of numbers that no member of the pilot has, by a look and by probes: of means, and of parts of them."""
         if self.target.unbounded and setting not in self.reaches:
             at, known = self.solved(setting, self.first), normals(self._design("estimate pilot", FIRST))
             z = self.target.contributions(self.y(setting, self.grid(setting), FIRST), at)
@@ -319,7 +319,8 @@ def _first_look(pilot: Pilot, setting: Setting) -> None:
             return
     if not hits and pilot.target.unbounded:
         return  # which is refused with the error that it asks for
-    problem = f"was {'other than 0' if pilot.target.unbounded else 'seen'} {hits:.0f} times among {members:,} members of the pilot, too seldom to fix their number"
+    hit = "other than 0" if pilot.target.unbounded else "seen"
+    problem = f"was {hit} {hits:.0f} times among {members:,} members of the pilot, too seldom to fix their number"
     remedy = "use lw.rare_event, which finds rare events, or give error= in place of relative_error="
     raise refusal("of", pilot.runs.question.label, problem, remedy)
 

@@ -139,13 +139,13 @@ class Pilot:
         except SceneError:
             return np.empty(0), points[:0]
 
-    def _probed(self, setting: Setting, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers (m,) and normals (m, d) of probes, as far out as members are not refused, as of a mass below 0."""
+    def _probed(self, setting: Setting, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers (m,) and normals (m, d) of probes of members (n, d), as far out as none is refused."""
         for distance in FAR if self.runs.dimensions else ():
-            far = probes(self.runs.seed, known, distance)
+            far = probes(self.runs.seed, members, distance)
             with contextlib.suppress(SceneError):
                 return self.runs(setting, self.grid(setting), cube(far), np.arange(len(far)) % FIRST), far
-        return np.empty(0), known[:0]
+        return np.empty(0), members[:0]
 
     @property
     def first(self) -> int:

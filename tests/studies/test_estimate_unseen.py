@@ -69,6 +69,16 @@ def jumping(share):
     return resting(north=NORMAL(std=1.0)), lambda r: place(r) + 20.0 * (place(r) > c), 20.0 * share, {}
 
 
+def banded(share, effect):
+    """A part of the members, in the middle of what varies, has a number that is larger by an effect."""
+    fleet = resting(north=NORMAL(std=1.0), east=lw.distributions.Uniform(low=0.0, high=1.0))
+
+    def number(result):
+        return place(result) + effect * (np.abs(result.position[-1][:, 1] - 0.37) < 0.5 * share)
+
+    return fleet, number, share * effect, {}
+
+
 def mixed(share):
     """A rare branch of a Choice is 20 m farther."""
     odd = lw.distributions.Choice([0.0, 20.0], weights=[1.0 - share, share])
@@ -93,6 +103,7 @@ CASES = {
     "1 % jump": (lambda: jumping(0.01), (0.05, 0.2)),
     "5 % jump": (lambda: jumping(0.05), (0.1, 0.5)),
     "10 % jump": (lambda: jumping(0.1), (0.2, 1.0)),
+    "1 % in the middle": (lambda: banded(0.01, 100.0), (0.3, 1.0)),
     "1 % mixed": (lambda: mixed(0.01), (0.05, 0.2)),
     "5 % mixed": (lambda: mixed(0.05), (0.05, 0.2)),
     "10 % mixed": (lambda: mixed(0.1), (0.05, 0.5)),
@@ -120,6 +131,35 @@ def test_a_few_seeds_hold(name):
 def test_intervals_hold(name, place_of_error):
     """At least 35 of 40 intervals of 95 % hold in 98 of 100 tries."""
     assert count_held(name, CASES[name][1][place_of_error], range(40)) >= 35
+
+
+@pytest.mark.parametrize(("error", "seeds", "least"), [(1.0, 40, 37), (0.3, 20, 19)])
+def test_members_in_the_middle_that_are_odd_are_seen(error, seeds, least):
+    """By probes far out alone, 29 of 40 and 17 of 20 intervals held."""
+    assert count_held("1 % in the middle", error, range(seeds)) >= least
+
+
+def test_a_share_that_was_not_seen_is_told():
+    """1 in 1,000 whose effect is 1,000: the interval holds, or a message tells that so few members were not seen."""
+    fleet, of, truth, _ = banded(0.001, 1000.0)
+    held = 0
+    for seed in range(20):
+        found = lw.estimate(fleet, of, 0.5, seed=seed, **STILL)
+        held += found.interval[0] <= truth <= found.interval[1]
+        again = lw.estimate(fleet, of, recipe=found.recipe)
+        for message in (" ".join(found.messages), " ".join(again.messages), str(found)):
+            says(message, "Members rarer than 1 in ", "may not have been seen")
+    assert held >= 14
+
+
+def test_the_effect_of_unseen_members_is_bounded_for_a_probability():
+    found = lw.estimate(resting(north=NORMAL(std=1.0)), "position[0] above 1", 0.1, **STILL)
+    assert not any("rarer" in message for message in found.messages)
+
+
+def test_a_look_is_small_where_members_cost_much():
+    found = lw.estimate(resting(north=NORMAL(std=1.0)), "position[0]", 0.2, t1=100.0, h=0.01, method="rk4", threads=1)
+    assert found.recipe["looked"] == 512
 
 
 def test_a_regression_of_few_members_is_not_exact():
@@ -162,6 +202,16 @@ def test_a_relative_error_of_a_rare_condition(probability):
         found = lw.estimate(fleet, above, relative_error=0.2, seed=seed, **STILL)
         apart.append(found.value / probability - 1.0)
         assert found.interval[0] > 0.0
+    assert np.sqrt(np.mean(np.square(apart))) < 0.4
+
+
+@pytest.mark.parametrize("share", [0.01, 0.001])
+def test_a_relative_error_of_a_share_that_is_written_as_a_mean(share):
+    """The pilot goes on until members have a number other than 0, as it does for a condition."""
+    fleet, limit, apart = resting(north=NORMAL(std=1.0)), stats.norm.isf(share), []
+    for seed in range(4 if share < 0.01 else 12):
+        found = lw.estimate(fleet, lambda r: (place(r) > limit).astype(float), relative_error=0.2, seed=seed, **STILL)
+        apart.append(found.value / share - 1.0)
     assert np.sqrt(np.mean(np.square(apart))) < 0.4
 
 

@@ -267,6 +267,7 @@ def told(
         "t1": content["t1"], "error": chosen.error, "setting": top.to_dict(), "grid": pilot.grid(top),
         "levels": [level.to_dict() for level in levels], "rounds": [list(each) for each in rounds],
         "bias": [chosen.bias.value, chosen.bias.half], "reference": chosen.reference, "plain_members": members,
+        "looked": pilot.looked.get(top, 0),
     }  # fmt: skip
     cost = runs.measured_cost(top, pilot.grid(top))
     own_seconds = None
@@ -290,7 +291,7 @@ def replayed(runs: Runs, target: Sought, recipe: Mapping[str, Any], content: Map
 
 def answer_of(
     runs: Runs, target: Sought, recipe: Mapping[str, Any], levels: Sequence[Level], part: MeanEstimate,
-    content: Mapping[str, Any], **more: Any,
+    content: Mapping[str, Any], messages: tuple[str, ...] = (), **more: Any,
 ) -> Estimated:  # fmt: skip
     """The answer by a recipe and the members that were run by it."""
     top, bias = Setting.from_dict(recipe["setting"]), Bias(*recipe["bias"])
@@ -298,6 +299,10 @@ def answer_of(
     for level in levels:
         name = str(level.fine) + (f" less {level.coarse}" if level.coarse else "")
         members[name] = members.get(name, 0) + sum(map(len, level.y))
+    if target.unbounded and levels:
+        seen = recipe.get("looked", 0) + max(sum(map(len, level.y)) for level in levels if not level.stratum)
+        messages += (f"Members rarer than 1 in {seen // 3:,} may not have been seen ({seen:,} were run). The interval "
+                     "does not include their effect.",)  # fmt: skip
     low, high = biases.interval(part.value, part.half_width(0.95), bias)
     if target.kind == "probability":
         low, high = within(part, low, high, bias, sum(members.values()))
@@ -310,7 +315,7 @@ def answer_of(
         setting=str(top), settings=top.options(), reference=recipe["reference"], estimator=recipe["estimator"],
         members=members or {str(top): 1}, seconds=runs.seconds,
         plain_seconds=recipe["plain_members"] * runs.measured_cost(top, recipe["grid"]), recipe=recipe,
-        provenance=dict(content) | {"settings": top.options()}, **more,
+        provenance=dict(content) | {"settings": top.options()}, messages=messages, **more,
     )  # fmt: skip
 
 

@@ -75,8 +75,9 @@ def estimate(
     Choices follow counted costs: steps times the evaluations of forces of each. One seed gives one answer, to the bit, on any
     number of threads. `found.recipe` holds what was chosen, so that the same members can be run again later.
 
-    No answer is surer than the effect of members that so few others do not show: of n, up to 3 / n may be odd. How odd, probes
-    far out in what varies tell, beside the spread. Rare branches of a Choice are strata of their own.
+    No answer is surer than the effect of members that so few others do not show: of n, up to 3 / n may be odd. How odd, the
+    spread, 512 to 2,048 members all over what varies, and probes far out tell. A message of a mean names the share that may
+    not have been seen. Rare branches of a Choice are strata of their own.
 
     Args:
         fleet: the ensemble, or a Scene with one. Its distributions are drawn from anew; members and sampling do not matter.

@@ -7,6 +7,7 @@ plain Monte Carlo is predicted to cost.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from lgvi_warp.uncertainty.estimating.choice import Observed
 from lgvi_warp.uncertainty.estimating.estimators import REPLICATES, UNSEEN, plain, tail_index
 from lgvi_warp.uncertainty.estimating.levels import CALL, Runs, Setting, cube, design, normals
 from lgvi_warp.uncertainty.estimating.target import Solved, Sought, Weighted, mean_of
-from lgvi_warp.uncertainty.estimating.unseen import FAR, probes, reach_of
+from lgvi_warp.uncertainty.estimating.unseen import FAR, MOST_STRATA, probes, reach_of
 
 # Members of the first stage, and how many stages there are, each of four times the members of the one before.
 FIRST, STAGES = 64, (64, 256, 1024)
@@ -30,6 +31,9 @@ FIRST, STAGES = 64, (64, 256, 1024)
 TAIL_STAGES, HIT_STAGES = (4096, 16384), (4096, 16384, 65536)
 # Members of each rare stratum, enough for two of each replicate; and the indices of noise that a stratum has.
 OF_STRATUM, STRATUM_INDICES = 32, 2**20
+# Members all over the cube that are looked at for odd ones: the fewest, and the most where these cost at most this part of the
+# pilot so far.
+LOOKED, LOOK_SHARE = (512, 2048), 0.25
 # MeanEstimate of plain Monte Carlo's predicted cost that the pilot may take.
 SHARE = 0.1
 # Where plain Monte Carlo needs at most so many members, a pilot is not worth its cost.
@@ -70,6 +74,7 @@ class Pilot:
     least: int = 0
     numbers: dict[tuple[Setting, float | None, int], np.ndarray] = field(default_factory=dict)
     reaches: dict[Setting, float] = field(default_factory=dict)
+    looked: dict[Setting, int] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
 
     def grid(self, setting: Setting) -> float | None:
@@ -111,24 +116,36 @@ class Pilot:
             return mean_of(parts, lambda z: (z - mean) ** 2) + (UNSEEN * least) ** 2 / members
 
     def reach(self, setting: Setting) -> float:
-        """Range of numbers that no member of the pilot has, by probes far out: of means, and of parts of them."""
-        if self.target.kind not in ("mean", "cvar") or not self.runs.dimensions:
-            return 0.0
-        if setting not in self.reaches:
-            self.reaches[setting] = self._reach(setting, self.grid(setting), self.solved(setting, self.first))
-        return self.reaches[setting]
+        """Range of numbers that no member of the pilot has, by a look and by probes: of means, and of parts of them."""
+        if self.target.unbounded and setting not in self.reaches:
+            at, known = self.solved(setting, self.first), normals(self._design("estimate pilot", FIRST))
+            z = self.target.contributions(self.y(setting, self.grid(setting), FIRST), at)
+            others = [self._look(setting), self._probed(setting, known)]
+            found = [reach_of(z, known, self.target.contributions(y, at), each) for y, each in others if len(y)]
+            self.reaches[setting], self.looked[setting] = max(found, default=0.0), len(others[0][0])
+        return self.reaches.get(setting, 0.0)
 
-    def _reach(self, setting: Setting, grid: float | None, at: Solved) -> float:
-        known = normals(design(self.runs.seed, self.name(), self.runs.dimensions, 0, FIRST))
-        z = self.target.contributions(self.y(setting, grid, FIRST), at)
-        for distance in FAR:
-            far = probes(self.runs.seed, known, distance)
-            try:
-                beyond = self.runs(setting, grid, cube(far), np.arange(len(far)) % FIRST)
-            except SceneError:
-                continue  # so far out members are refused, as of a mass below 0
-            return reach_of(z, known, self.target.contributions(beyond, at), far)
-        return 0.0
+    def _design(self, name: str, members: int) -> np.ndarray:
+        return design(self.runs.seed, name, self.runs.dimensions, 0, members)
+
+    def _look(self, setting: Setting) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers (m,) and normals (m, d) of members all over the cube, which cost a part of the pilot so far."""
+        cost, (fewest, most) = self.runs.cost(setting, self.grid(setting)), LOOKED
+        seconds = max(LOOK_SHARE * self.runs.counted, self.most_seconds(setting, self.first))
+        members = int(np.clip(seconds / cost, fewest, most)) // REPLICATES * REPLICATES
+        points, indices = self._design("estimate look", members), (MOST_STRATA + 1) * STRATUM_INDICES
+        try:
+            return self.runs(setting, self.grid(setting), points, indices + np.arange(members)), normals(points)
+        except SceneError:
+            return np.empty(0), points[:0]
+
+    def _probed(self, setting: Setting, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers (m,) and normals (m, d) of probes of members (n, d), as far out as none is refused."""
+        for distance in FAR if self.runs.dimensions else ():
+            far = probes(self.runs.seed, members, distance)
+            with contextlib.suppress(SceneError):
+                return self.runs(setting, self.grid(setting), cube(far), np.arange(len(far)) % FIRST), far
+        return np.empty(0), members[:0]
 
     @property
     def first(self) -> int:
@@ -149,7 +166,7 @@ class Pilot:
         """Number of members that plain Monte Carlo needs; unseen: with those that few members do not show."""
         error, variance = self.asked(self.solved(setting, members)), self.variance(setting, members)
         if not error * error > 0.0:
-            return math.inf if variance > 0.0 else 1.0
+            return math.inf if variance > 0.0 or self.relative else 1.0
         # n for which variance / n + (extra / n)^2 is the square of the error.
         extra = UNSEEN * self.reach(setting) if unseen else 0.0
         with np.errstate(over="ignore", invalid="ignore"):
@@ -181,7 +198,7 @@ class Pilot:
 
     def check_tail(self, setting: Setting, y: np.ndarray) -> None:
         """Refuse a mean whose variance seems infinite, unless it was asked for all the same; SceneError."""
-        if self.target.kind not in ("mean", "cvar") or len(y) < KNOWN or tail_index(y) >= HEAVY:
+        if not self.target.unbounded or len(y) < KNOWN or tail_index(y) >= HEAVY:
             return
         y = self.y(setting, self.grid(setting), max(len(y), SURE)) if len(y) < SURE else y
         index = max(tail_index(y, part) for part in PARTS)
@@ -283,22 +300,27 @@ def runs_at(pilot: Pilot, setting: Setting, ladder: Ladder) -> bool:
     if np.isnan(y).any():
         ladder.refused[str(setting)] = f"{int(np.isnan(y).sum())} of {len(y)} members fail, or have no finite number"
         return False
-    if pilot.target.kind in ("mean", "cvar") and np.isinf(y).any():
+    if pilot.target.unbounded and np.isinf(y).any():
         problem = f"is infinite for {int(np.isinf(y).sum())} of {len(y)} members, so that its mean is"
         raise refusal("of", pilot.runs.question.label, problem, "ask for a quantile or a probability")
     return True
 
 
 def _first_look(pilot: Pilot, setting: Setting) -> None:
-    """Take more members at the coarsest step where a probability's hits are few and its error is relative."""
-    if not (pilot.relative and pilot.target.kind == "probability"):
+    """Take more members at the coarsest step where few have a number other than 0 and the error is relative."""
+    varies = pilot.runs.dimensions or pilot.noise != "none"
+    if not (pilot.relative and varies) or pilot.target.kind == "quantile":
         return
     for members in (*STAGES, *HIT_STAGES):
-        hits = members * pilot.solved(setting, members).value
+        samples = pilot.samples(setting, pilot.grid(setting), members)
+        hits = members * mean_of(samples, lambda y: pilot.target.counted(y) != 0.0)
         if hits >= HITS:
             pilot.least = max(pilot.least, members)
             return
-    problem = f"was seen {hits:.0f} times among {members:,} members of the pilot, too seldom to fix their number"
+    if not hits and pilot.target.unbounded:
+        return  # which is refused with the error that it asks for
+    hit = "other than 0" if pilot.target.unbounded else "seen"
+    problem = f"was {hit} {hits:.0f} times among {members:,} members of the pilot, too seldom to fix their number"
     remedy = "use lw.rare_event, which finds rare events, or give error= in place of relative_error="
     raise refusal("of", pilot.runs.question.label, problem, remedy)
 

@@ -73,6 +73,11 @@ class Sought:
         return np.where(np.isnan(y), np.nan, holds)
 
     @property
+    def unbounded(self) -> bool:
+        """Whether one member may change the value by any amount, as it may change a mean."""
+        return self.kind in ("mean", "cvar")
+
+    @property
     def tail(self) -> float:
         """The part of the members that tells the value: 1, but of a quantile the nearer tail, of a cvar a fourth of it."""
         # Numbers in a tail are skewed: of a mean of the worst members four times as many are needed.

@@ -54,7 +54,8 @@ ODD_ARRAYS = [
     ("indices", np.array([0, 1, 2, 2**40]), "whole numbers"), ("indices", np.array([0.0, 1.0, 2.0, 3.0]), "whole numbers"),
     ("indices", "x", "whole numbers"), ("lanes.state", np.zeros((4, 18)), "not a rotation"),
     ("lanes.state", np.zeros(4), "rows"), ("lanes.still", np.zeros((3, 1)), "rows"),
-    ("lanes.state", np.eye(3).reshape(1, 9)[[0] * 4, :5], "lanes.state"), ("states.position", np.full((4, 3), np.nan), "finite"),
+    ("lanes.state", np.eye(3).reshape(1, 9)[[0] * 4, :5], "lanes.state"),
+    ("states.position", np.full((4, 3), np.nan), "finite"),
 ]  # fmt: skip
 ODD_NUMBERS = [
     ("seed", -1), ("seed", 1.5), ("seed", "x"), ("seed", True), ("steps", -2), ("steps", 2.5), ("steps", 3), ("time", np.nan),

@@ -446,6 +446,12 @@ def test_a_vehicle_that_something_else_drives_ahead_is_told_no_speed():
     assert not [text for text in looped([PATH], [DEPTH, HEADING], [TO_FINS], name="remus_100") if "wanted" in text]
 
 
+@pytest.mark.parametrize(("speed", "told"), [({"speed": 5.0}, 1), ({}, 0)])
+def test_a_speed_that_a_vehicle_without_a_propeller_is_asked_for_is_told(speed, told):
+    texts = looped([SET(heading=0.3, **speed)], [HEADING], [TO_FINS], name="remus_100")
+    assert [text.startswith(f"set_point.speed: {NO_LAW.format('speed')}") for text in texts] == [True] * told
+
+
 @pytest.mark.parametrize("push", [{"command": [100.0]}, {"times": [0.0, 9.0], "command_schedule": [[0.0], [100.0]]}])
 def test_a_propeller_with_a_command_or_a_schedule_of_its_own_is_driven(push):
     table = lw.Scene.named("lauv").to_dict()

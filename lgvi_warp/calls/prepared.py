@@ -296,10 +296,13 @@ def members_at(scene: Any, final: Final, parameters: Any = None) -> Ensemble:
 
     parameters: (n, ...) by name, in place of those that they had; entries of a number by their own names.
     """
-    n, of_scene, had = final.members, scene.parameters(), dict(final.parameters)
+    n, of_scene, had, faults = final.members, scene.parameters(), dict(final.parameters), Faults()
+    for name in (name for name, value in of_scene.items() if name in had and had[name].shape[1:] != np.shape(value)):
+        problem = f"has shape {had[name].shape[1:]} of each member, and {np.shape(of_scene[name])} in this scene"
+        faults.add(f"final.parameters.{name}", had[name], problem, "go on in the scene of the run before")
+    faults.raise_if_any()
     numbers = {name: np.array(np.broadcast_to(had[name], (n, *np.shape(value)))) for name, value in of_scene.items()
                if name in had and not np.array_equal(np.broadcast_to(value, had[name].shape), had[name])}  # fmt: skip
-    faults = Faults()
     columns = {} if parameters is None else columns_by_name(faults, "parameters", parameters) or {}
     faults.raise_if_any()
     for name, column in columns.items():

@@ -15,6 +15,7 @@ from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.result import Result
+from lgvi_warp.runs.measured_error import telling_error
 from lgvi_warp.runs.measured_width import with_best_width
 from lgvi_warp.runs.request import Request, ensemble_of
 from lgvi_warp.runs.tangents import check, run_with_tangents
@@ -140,6 +141,7 @@ def solve(
     try:
         if names:
             return run_with_tangents(request, plan, names, callback(progress))
+        plan = telling_error(plan)
         if store is None:
             report, final = callback(progress), request.keeps_final
             return request.run(plan, progress=report, partial=True, on_block=on_block, final=final)

@@ -20,12 +20,12 @@ def check_arguments(verb: Any) -> None:
 
 @as_verb(
     "check",
-    "say whether a scene can run, and which of its numbers look wrong; nothing runs",
+    "say whether a scene can run, and which of its numbers look wrong; at most one member runs",
     check_arguments,
     reads=True,
 )
 def check(chosen: argparse.Namespace) -> int:
-    """Run the verb check: print what is odd about a scene, without running it."""
+    """Run the verb check: print what is odd about a scene; at most one of its members runs."""
     from lgvi_warp.scene import plausibility
     from lgvi_warp.scene.ensemble import Ensemble
 
@@ -44,7 +44,8 @@ def check(chosen: argparse.Namespace) -> int:
 
 def _settings(ensemble: Any) -> tuple[str, tuple[str, ...], str]:
     """The run in a few words, remarks on its settings, and the choice of its method. Raises SceneError as a run would."""
-    from lgvi_warp.runs.default_method import cost
+    from lgvi_warp.runs.default_method import DAMPED, cost
+    from lgvi_warp.runs.measured_error import measured_error
     from lgvi_warp.runs.request import Request
     from lgvi_warp.runs.step_error import rates
 
@@ -57,6 +58,6 @@ def _settings(ensemble: Any) -> tuple[str, tuple[str, ...], str]:
     method = replace(run.method_of(), iterations=None) if run.iterations == "auto" else None
     plan = Request(ensemble, method).plan()
     name, reason, h = plan.method.name, plan.method.reason, plan.grid.h
-    text = cost(plan.method, rates(ensemble), h) if reason else ""
+    text = cost(plan.method, rates(ensemble), h, measured_error(plan)) if reason and name in DAMPED else ""
     choice = f"{name}, chosen {reason}" + (f": {text}" if text else "") if reason else ""
     return f"{members}, {name}, step {h:g} s, {plan.grid.steps:,} steps", plan.grid.messages, choice

@@ -6,7 +6,7 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -277,20 +277,20 @@ class Controller(Documented):
     def unread(self, terms: Sequence[Term]) -> tuple[tuple[Part, str], ...]:
         """(guidance, quantity) for each wanted quantity that no law reads, in its own or in other words.
 
-        A speed is left out where no actuator could make it: a vehicle that something else drives.
+        Where something else drives the vehicle, and no actuator could make a speed, one that a guidance must have is left out.
 
         Args:
             terms: The terms of the scene.
         """
         read = set(WISHES if self.callback is not None else ()).union(*(law.needs for law in self.laws))
-        if not self.undriven(terms) and not any(np.any(np.abs(part.reach()[0]) > SPANNED) for part in self.allocation):
-            read |= {"speed"}
+        able = self.undriven(terms) or any(np.any(np.abs(part.reach()[0]) > SPANNED) for part in self.allocation)
         found: dict[str, Part] = {}
         for part in self.guidance:
             wanted = [wish for wish in READ_BY if wish in part.wanted]
             for wish in wanted:
                 covered = wish not in PLAIN_WISHES and any(other in PLAIN_WISHES for other in wanted)
-                if not (covered or READ_BY[wish] & read):
+                forced = wish == "speed" and not able and not _chosen(part, wish)
+                if not (covered or forced or READ_BY[wish] & read):
                     found[wish] = part
         return tuple((part, wish) for wish, part in found.items())
 
@@ -470,3 +470,9 @@ def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
 def _is_whole(name: str, value: float, h: float) -> bool:
     """Whether a period, of one step at least, or a delay is a whole number of steps [s]."""
     return (name == "delay" or value >= 0.5 * h) and whole_steps(value, h) is not None
+
+
+def _chosen(part: Part, name: str) -> bool:
+    """Whether a part has a number that it need not have."""
+    optional = any(item.name == name and item.default is None for item in fields(part))
+    return optional and getattr(part, name) is not None

@@ -83,6 +83,8 @@ def _same_numbers(plan: Plan, final: Final) -> bool:
     now = plan.ensemble.parameters(0, plan.ensemble.members)
     if now.keys() != final.parameters.keys():
         return False
+    if any(before.shape[1:] != now[name].shape[1:] for name, before in final.parameters.items()):
+        return False
     return all(np.array_equal(np.broadcast_to(before, now[name].shape) if len(before) == 1 else before,
                               np.broadcast_to(now[name], before.shape) if len(before) > 1 else now[name])
                for name, before in final.parameters.items())  # fmt: skip

@@ -120,18 +120,22 @@ class Plan:
         plan = replace(self.for_members(ensemble), grid=grid, launches=replace(self.launches, grid=grid), shared=shared)
         return begun(plan)
 
-    def subplan(self, indices: Sequence[int], fields: Sequence[str]) -> Plan:
+    def subplan(self, indices: Sequence[int], fields: Sequence[str], grid: TimeGrid | None = None) -> Plan:
         """The plan for some of the members, with all choices made for the whole ensemble.
 
         The members' bits are therefore those of the whole run, unless steps are adaptive (see `with_neighbours`).
+
+        grid: other steps and samples, of this process alone; default None: those of the plan.
         """
+        grid = grid or self.grid
         layout = replace(self.layout, fields=ordered(fields))
         return replace(
             self,
             ensemble=self.ensemble.subset(indices),
             fields=layout.fields,
             layout=layout,
-            launches=_launches(self.grid, self.method, self.spec, layout, False, self.launches.looks),
+            grid=grid,
+            launches=_launches(grid, self.method, self.spec, layout, False, self.launches.looks),
             shared=_shared(self.ensemble, self.shared.user_axes),
             free_packets=[],
             parent=(self, indices, fields),

@@ -13,7 +13,7 @@ from lgvi_warp.engine.going_on import known_settings
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.drawn import DrawnParameters
-from lgvi_warp.sampling.final import NUMBERS, PREFIX, Final
+from lgvi_warp.sampling.final import NUMBERS, PREFIX, SUM, Final
 
 
 def final_of(
@@ -40,7 +40,8 @@ def final_of(
 
 def to_file(final: Final) -> tuple[dict[str, np.ndarray], str]:
     """An end as arrays and a text, without states, status and parameters, which are the result's."""
-    arrays = {name: rows for name, rows in final.to_arrays().items() if not name.startswith(f"{PREFIX}states.")}
+    left_out = f"{PREFIX}states.", f"{PREFIX}{SUM}"
+    arrays = {name: rows for name, rows in final.to_arrays().items() if not name.startswith(left_out)}
     return arrays, json.dumps({name: getattr(final, name) for name in NUMBERS})
 
 

@@ -108,24 +108,30 @@ def messages(method: Method, rates: Rates, h: float, t1: float) -> tuple[str, ..
     return (f"{text}; {remedy}, or ask for an error: lw.suggest, --error",)
 
 
-def cost(method: Method, rates: Rates, h: float) -> str:
+def cost(method: Method, rates: Rates, h: float, measured: tuple[float, float] | None = None) -> str:
     """Tell how far a method for damped scenes is off, and what it costs beside the cheapest one, and that would lose.
 
     h: Step [s].
+    measured: the method's error over the length of the path [1] and the time that it was measured in [s]; default None: by
+        its rates.
     Returns: A text; "" for a method that is not chosen by its error.
     """
     if method.name not in DAMPED:
         return ""
 
-    def text(each: Method) -> str:
-        error = path_error(each, rates, h, AHEAD) if stable(each, h_rates(rates, h), 1.0) else math.inf
+    def text(error: float) -> str:
         return f"off by about {100.0 * error:.1g} % of the path" if error < 1.0 else "unstable or off by the path"
 
-    cheap, own = Method(next(iter(DAMPED))), f"{text(method)} by its rates"
+    def estimated(each: Method) -> str:
+        return text(path_error(each, rates, h, AHEAD) if stable(each, h_rates(rates, h), 1.0) else math.inf)
+
+    cheap, own = Method(next(iter(DAMPED))), f"{estimated(method)} by its rates"
+    if measured is not None:
+        own = f"{text(measured[0])} in {measured[1]:.3g} s, by a run of the first member at half the step"
     if method.linearly_implicit or method.name == cheap.name or method.tableau is None or cheap.tableau is None:
         return own
     times = len(method.tableau.b) / len(cheap.tableau.b)
-    return f"{own}; a step costs {times:.2g} times one of {cheap.name}, which would be {text(cheap)}"
+    return f"{own}; a step costs {times:.2g} times one of {cheap.name}, which by its rates would be {estimated(cheap)}"
 
 
 def best_error(method: Method, rates: Rates, h: float, t1: float) -> float:

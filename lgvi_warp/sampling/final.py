@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -19,6 +20,8 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.notation import ORTHOGONAL
 
+# Of a state as the kernel has it: attitude, position, and momenta.
+NUMBERS_OF_STATE = 18
 # Most that an attitude of a run may have drifted from the rotations, |R^T R - I|.
 MOST_DRIFT = 0.1
 
@@ -42,7 +45,7 @@ class Final(Summarized):
         seed: Seed of the ensemble.
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
         lanes: Rows (n, rows) by name as the kernel has them: its state, what is remembered, and outcomes.
-        settings: What `lanes` depends on: method, step, number type and laws.
+        settings: What `lanes` depends on: method, step, number type and laws; empty where members go on from `states`.
 
     Methods:
         part: Select members.
@@ -152,7 +155,7 @@ class Final(Summarized):
         _check_rotations(faults, arrays.get("attitude"))
         faults.raise_if_any()
         lanes = {name: rows for name, rows in self.lanes.items() if name not in EXACT}
-        return replace(self, states={**self.states, **arrays}, lanes=lanes)
+        return replace(self, states={**self.states, **arrays}, lanes=lanes, settings={})
 
     def to_arrays(self) -> dict[str, np.ndarray]:
         """Write what `from_arrays` reads, but for numbers and parameters, as arrays.
@@ -162,6 +165,7 @@ class Final(Summarized):
         """
         parts = {"states": self.states, "lanes": self.lanes}
         arrays = {f"{PREFIX}{kind}.{name}": rows for kind, each in parts.items() for name, rows in each.items()}
+        arrays |= {f"{PREFIX}{SUM}{name.removeprefix(PREFIX)}": _sums(rows) for name, rows in arrays.items()}
         arrays |= {f"{PREFIX}status": self.status, f"{PREFIX}indices": self.indices}
         whole = {name: rows.astype(np.int64) for name, rows in arrays.items() if rows.dtype.kind in "iu"}
         return arrays | whole
@@ -200,8 +204,14 @@ class Final(Summarized):
         known = {name: numbers[name] for name in NUMBERS}
         end = cls(
             **known, states=states, lanes=lanes, status=own["status"], indices=own["indices"], parameters=parameters
-        )
-        return end.checked()
+        ).checked()
+        # What goes on from its rows alone would leave other states without effect.
+        for name in (name for name in own if f"{SUM}{name}" in own and "state" in lanes):
+            if not np.array_equal(_sums(own[name]), own[f"{SUM}{name}"]):
+                remedy = "give what Final.to_arrays wrote, and change states by final.changed(...)"
+                faults.add(name, own[name], "is not what its run ended with", remedy)
+        faults.raise_if_any()
+        return end
 
     def checked(self) -> Final:
         """The end itself, after a check of what a file could hold.
@@ -236,17 +246,41 @@ class Final(Summarized):
         for name, rows in self.lanes.items():
             if np.ndim(rows) != 2 or len(rows) != n or np.asarray(rows).dtype.kind not in "fiu":
                 faults.add(f"lanes.{name}", np.shape(rows), f"is not the shape of rows of {n} members", remedy)
+        for name, values in self.parameters.items():
+            rows = np.asarray(None if ragged(values) else values)
+            if rows.dtype.kind not in "fiub" or rows.ndim == 0 or len(rows) not in (1, n):
+                faults.add(
+                    f"parameters.{name}", values, f"is no array of numbers of {n} members, or of one for all", remedy
+                )
+        rows = np.asarray(self.lanes.get("state", np.zeros((max(n, 0), NUMBERS_OF_STATE))))
         if not isinstance(self.settings, Mapping):
             faults.add("settings", self.settings, "is no mapping", remedy)
+        elif self.settings and "state" not in self.lanes:
+            faults.add("lanes.state", "...", "is missing", f"{remedy}, or final.changed() to go on from the states")
+        elif not faults and rows.shape[1] < NUMBERS_OF_STATE:
+            faults.add(
+                "lanes.state", rows.shape, f"is not the shape of {NUMBERS_OF_STATE} numbers or more a member", remedy
+            )
         faults.raise_if_any()
+        # Without checks a run goes on with members that are not finite.
+        running = (np.asarray(codes) == Status.OK) & np.isfinite(rows).all(axis=1)
+        for name, values in self.states.items():
+            if not np.isfinite(values[running]).all():
+                faults.add(f"states.{name}", values, "is not finite, and its members go on", remedy)
         # Runge-Kutta methods and float32 let attitudes drift, about which their runs warn.
         keeps = self.settings.get("dtype") == "float64" and not str(self.settings.get("method")).startswith("rk")
-        rows = self.lanes.get("state", np.zeros((n, 0)))
-        for R in (self.states.get("attitude"), rows[:, :9].reshape(n, 3, 3) if rows.shape[1] > 9 else None):
+        for R in (self.states.get("attitude"), rows[:, :9].reshape(n, 3, 3) if "state" in self.lanes else None):
             exact = keeps and R is not None and R.dtype == np.float64
             _check_rotations(faults, R, np.asarray(codes) == Status.OK, ORTHOGONAL if exact else MOST_DRIFT)
         faults.raise_if_any()
         return self
+
+
+def _sums(rows: Any) -> np.ndarray:
+    """A sum (n,) of each member's numbers (n, ...) that changes with each of them."""
+    numbers = np.ascontiguousarray(rows, dtype=np.float64)
+    bits = numbers.view(np.int64).reshape(len(numbers), math.prod(numbers.shape[1:]))
+    return np.asarray((bits * (2 * np.arange(bits.shape[1]) + 3) ** 7).sum(axis=1))
 
 
 def _whole_numbers(faults: Faults, key: str, values: Any, remedy: str) -> np.ndarray | None:
@@ -318,3 +352,5 @@ MEMORY = "memory of "
 # What files say of an end beside arrays, and the prefix of these.
 NUMBERS = ("time", "step", "steps", "seed", "settings")
 PREFIX = "final."
+# Of an array's sums in a file.
+SUM = "sum of "

@@ -26,7 +26,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.oddities import Oddities, OddityCheck, gathered
 from lgvi_warp.scene.slices import over_members
-from lgvi_warp.scene.term_limits import CURRENTS, doppler, hull_length, sizes, steepness, strips
+from lgvi_warp.scene.term_limits import CURRENTS, doppler, hull_length, sizes, steepness, strips, thrusts
 
 Numbers = Mapping[str, np.ndarray]
 
@@ -231,7 +231,7 @@ def _far_away(key: str, distance: np.ndarray) -> OddityCheck:
 # Checks of every member before a run.
 OF_NUMBERS = (
     waypoints, net_weight, density, currents, fin_angles, depths, inertia, hulls, actuators, driving, remarks,
-    steepness, doppler, strips, sizes,
+    steepness, doppler, strips, thrusts, sizes,
 )  # fmt: skip
 
 

@@ -13,8 +13,10 @@ import numpy as np
 
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.actuators import UNLIMITED
+from lgvi_warp.physics.terms.base import own as own_numbers
 from lgvi_warp.physics.terms.base import word_of
 from lgvi_warp.physics.terms.strips import StripTerm
+from lgvi_warp.physics.terms.thrusters import Thrusters
 from lgvi_warp.physics.terms.waves import components
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.oddities import OddityCheck
@@ -139,6 +141,32 @@ def _text(size: np.ndarray, unit: str, most: np.ndarray, why: str) -> Callable[[
     return lambda i: f"{size[i]:.4g} {unit} is beyond {most[i]:.3g}: {why}"
 
 
+PUSH = "a thruster that makes {:.3g} N is beyond {:.3g} N, a hundred times the weight: a unit?"
+
+
+def thrusts(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
+    """Look for thrusters whose thrust is beyond a hundred times the weight: at their limit, or at held commands."""
+    for term in scene.terms:
+        if not isinstance(term, Thrusters):
+            continue
+        numbers = own_numbers(term, p)
+        most = _forces(scene, p)
+        command = np.where(numbers["limit"] < UNLIMITED, numbers["limit"], 0.0)
+        if term.driver is None:
+            held = numbers["command"] if term.holds else np.abs(numbers["command_schedule"]).max(axis=1)
+            command = np.maximum(command, np.abs(held))
+        size = np.max(
+            [np.abs(term._thrusts(numbers, term._beyond(numbers, sign * command))).max(axis=1) for sign in (1.0, -1.0)],
+            axis=0,
+        )
+        size, most = np.broadcast_arrays(size, most)
+
+        def text(i: int, size: Any = size, most: Any = most) -> str:
+            return PUSH.format(size[i], most[i])
+
+        yield f"{term.key}.coefficient", size > most * (1.0 + 1e-9), text
+
+
 # Steepness k a at which waves break (Stokes 1880, in deep water).
 BREAKS = 0.44
 STEEP = "a steepness k a of {:.3g} is beyond {:g}, at which waves break: a period or an amplitude?"
@@ -148,12 +176,20 @@ STRIPS = "its strips have {:.3g} times {}, {:.3g} {}: a unit, or another vehicle
 
 
 def steepness(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for waves that would break; of many components by the root of the sum of their squares."""
+    """Look for waves that would break; of many components by the root of the sum of their squares.
+
+    Components of one period and heading are one wave, whose amplitude is the sum of theirs with their phases.
+    """
     for term in scene.terms:
         if term.type == "waves" and np.all(p["environment.gravity"] > 0.0):
             numbers = {name: p[f"{term.key}.{name}"] for name in ("amplitudes", "periods", "phases", "headings_deg")}
-            k = components(numbers, p["environment.gravity"])[2]
-            steep = np.sqrt(np.square(k * numbers["amplitudes"]).sum(axis=1))
+            k, phase = (components(numbers, p["environment.gravity"])[i] for i in (2, 4))
+            slopes, square = k * numbers["amplitudes"] * np.exp(1j * phase), np.zeros(1)
+            for j in range(slopes.shape[1]):
+                turned = np.cos(np.radians(numbers["headings_deg"] - numbers["headings_deg"][:, j : j + 1]))
+                same = (numbers["periods"] == numbers["periods"][:, j : j + 1]) & (turned > 1.0 - 1e-12)
+                square = square + (slopes[:, j] * np.conj((same * slopes).sum(axis=1))).real
+            steep = np.sqrt(np.maximum(square, 0.0))
             yield f"{term.key}.amplitudes", steep > BREAKS, lambda i, steep=steep: STEEP.format(steep[i], BREAKS)  # type: ignore[misc]
 
 

@@ -2,6 +2,7 @@
 """The method that a run takes for which no one names one: by what acts, by the step, and told."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from lgvi_warp.methods import limits
 from lgvi_warp.reference.terms import View
 from lgvi_warp.results.provenance import messages, provenance
 from lgvi_warp.runs import default_method, step_error
+from lgvi_warp.runs.measured_error import measured_error
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.settings import RunSettings
 from lgvi_warp.store.create import create
@@ -332,6 +334,47 @@ def test_remus_in_a_turn_is_off_by_millimetres_at_a_coarse_step():
     assert cheap > 20.0 * taken
 
 
+REMUS_IN_A_CURRENT = """
+[vehicle]
+name = "remus_100"
+[start]
+position = [0, 0, 20.0]
+velocity = [1.5, 0, 0]
+[[terms]]
+type = "current"
+velocity = [0, 0.3, 0]
+[run]
+step = 0.5
+duration = 30.0
+"""
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("h", [0.5, 0.375, 0.3, 0.25, 0.05])
+def test_check_and_a_run_state_the_error_that_a_run_has(h, tmp_path, capsys):
+    """Near the limit of rk8 the rates at the start tell a thousandth of it; far from it a run measures nothing."""
+    file, command = tmp_path / "turn.toml", {"control_fins.command": [0.0698, 0.0]}
+    file.write_text(REMUS_IN_A_CURRENT)
+    fleet = lw.Ensemble.from_scene(lw.Scene.load(file, command))
+    steps = round(30.0 / h)
+    (true,) = measured(fleet, 30.0, make_plan(fleet, h=h, t1=30.0).method.name, [steps])
+    assert main(["check", str(file), "--set", "control_fins.command=[0.0698,0.0]", "--step", str(h)]) == 0
+    stated = float(re.search(r"off by about (\S+) % of the path in 30 s", capsys.readouterr().out)[1]) / 100.0
+    assert stated == pytest.approx(true, rel=0.6)
+    told = lw.solve(fleet, h=h, t1=30.0).messages
+    assert [text.startswith(f"step h = {h:g} s: rk8 is off by about ") for text in told] == [True] * (true > 0.001)
+    assert lw.solve(fleet, "rk8", h=h, t1=30.0).messages == ()
+
+
+@pytest.mark.kernel
+def test_an_error_is_measured_in_a_bounded_number_of_steps():
+    fleet, _ = turning_remus()
+    assert measured_error(make_plan(fleet, h=0.25, t1=500.0), 2000)[1] == 166.5
+    first = lw.solve(fleet, h=0.25, t1=1.0)
+    assert measured_error(make_plan(fleet.going_on(first.final), h=0.25, t1=2.0)) is None
+
+
+@pytest.mark.kernel
 def test_check_says_what_the_choice_costs(tmp_path, capsys):
     file = tmp_path / "scene.toml"
     file.write_text('[vehicle]\nname = "remus_100"\n[start]\nposition = [0, 0, 20]\nvelocity = [1.5, 0, 0]\n'
@@ -339,9 +382,11 @@ def test_check_says_what_the_choice_costs(tmp_path, capsys):
     assert main(["check", str(file)]) == 0
     (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("method"))
     assert "rk8, chosen since the scene is damped and the step long: off by about" in line
-    assert line.endswith("a step costs 3 times one of rk4, which would be off by about 0.8 % of the path")
+    assert line.endswith("a step costs 3 times one of rk4, which by its rates would be off by about 0.8 % of the path")
     assert main(["check", str(file), "--step", "0.05"]) == 0
-    assert "rk4, chosen since the scene is damped: off by about 0.001 % of the path" in capsys.readouterr().out
+    assert (
+        "rk4, chosen since the scene is damped: off by about 5e-05 % of the path in 5 s, by" in capsys.readouterr().out
+    )
     assert main(["check", str(file), "--method", "rk4"]) == 0
     assert "\nmethod" not in capsys.readouterr().out
 

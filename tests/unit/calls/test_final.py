@@ -54,6 +54,8 @@ ODD_ARRAYS = [
     ("indices", np.array([0, 1, 2, 2**40]), "whole numbers"), ("indices", np.array([0.0, 1.0, 2.0, 3.0]), "whole numbers"),
     ("indices", "x", "whole numbers"), ("lanes.state", np.zeros((4, 18)), "not a rotation"),
     ("lanes.state", np.zeros(4), "rows"), ("lanes.still", np.zeros((3, 1)), "rows"),
+    ("lanes.state", np.eye(3).reshape(1, 9)[[0] * 4, :5], "lanes.state"),
+    ("states.position", np.full((4, 3), np.nan), "finite"),
 ]  # fmt: skip
 ODD_NUMBERS = [
     ("seed", -1), ("seed", 1.5), ("seed", "x"), ("seed", True), ("steps", -2), ("steps", 2.5), ("steps", 3), ("time", np.nan),
@@ -72,6 +74,71 @@ def test_arrays_that_no_run_ends_with_are_refused(name, value, text, result):
 def test_numbers_that_no_run_ends_with_are_refused(name, value, result):
     with pytest.raises(lw.SceneError, match=r"final\."):
         again(result.final, **{name: value})
+
+
+@pytest.mark.parametrize(
+    "value", [None, "x", np.zeros(3), np.zeros((2, 1)), np.array([{}] * 4), np.array(1.0), [[1.0], [1.0, 2.0]]]
+)
+def test_parameters_that_no_members_have_are_refused(value, result):
+    arrays, numbers, parameters = parts_of(result.final)
+    with pytest.raises(lw.SceneError, match=r"final.parameters.vehicle.mass.*give") as told:
+        type(result.final).from_arrays(arrays, numbers, parameters | {"vehicle.mass": value})
+    assert str(told.value).count("final.") == 1
+
+
+def test_parameters_of_another_shape_are_others(fleet, result):
+    """As of a scene with other terms: a run goes on with its own numbers; one that takes the end's refuses them."""
+    arrays, numbers, parameters = parts_of(result.final)
+    end = type(result.final).from_arrays(arrays, numbers, parameters | {"vehicle.inertia": np.ones((4, 5))})
+    assert lw.solve(fleet, "psi_s", **ARGUMENTS, start=end).status.failed.sum() == 0
+    with pytest.raises(lw.SceneError, match=r"vehicle.inertia.*shape"):
+        lw.prepare(fleet.scene, method="psi_s", of="depth", **ARGUMENTS).states(end)
+
+
+@pytest.mark.parametrize(("name", "change"), [("position", [100.0, 0.0, 0.0]), ("velocity", [0.0, 0.1, 0.0]),
+                                              ("angular_velocity", [0.0, 0.0, 0.1])])  # fmt: skip
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_states_that_are_not_those_of_the_lanes_are_refused(name, change, dtype, fleet):
+    """A run that goes on exactly takes the lanes, and so the states would have no effect."""
+    settings = {"dtype": dtype, **ARGUMENTS}
+    final = lw.solve(fleet, "psi_s", **settings | {"t1": 0.2}).final
+    whole = lw.solve(fleet, "psi_s", **settings).position[-1]
+    np.testing.assert_array_equal(lw.solve(fleet, "psi_s", **settings, start=again(final)).position[-1], whole)
+    with pytest.raises(lw.SceneError, match=rf"final.states.{name}.*final.changed"):
+        again(final, {f"final.states.{name}": final.states[name] + np.array(change, final.states[name].dtype)})
+    moved = final.changed(**{name: final.states[name] + np.array(change)})
+    assert not np.array_equal(lw.solve(fleet, "psi_s", **settings, start=again(moved)).position[-1], whole)
+
+
+def test_an_attitude_that_is_not_that_of_the_lanes_is_refused(fleet):
+    final = lw.solve(fleet, "rk4", **ARGUMENTS | {"t1": 0.2}).final
+    assert lw.solve(fleet, "rk4", **ARGUMENTS, start=again(final)).status.failed.sum() == 0
+    with pytest.raises(lw.SceneError, match=r"final.states.attitude.*final.changed"):
+        again(final, {"final.states.attitude": 1.001 * final.attitude})
+    with pytest.raises(lw.SceneError, match=r"final.lanes.state.*final.changed"):
+        again(final, {"final.lanes.state": final.lanes["state"] + 1e-3})
+
+
+@pytest.mark.parametrize("name", ["remus_100", "bluerov2_heavy", "rexrov"])
+def test_states_of_vehicles_in_other_axes_and_moving_water_are_those_of_their_lanes(name):
+    water = [
+        lw.terms.Current(velocity=[0.1, 0.2, 0.0]),
+        lw.terms.Waves(amplitudes=[0.2], periods=[4.0], headings_deg=[30.0]),
+    ]
+    scene = lw.Scene.named(name, start={"position": [0.0, 0.0, 9.0], "velocity": [1.0, 0.1, 0.0]})
+    for terms in (scene.terms, [*scene.terms, *water]):
+        moved = dataclasses.replace(scene, terms=list(terms))
+        end = again(lw.solve(moved, h=0.05, t1=0.2).final)
+        whole = lw.solve(moved, h=0.05, t1=0.4).position[-1]
+        np.testing.assert_array_equal(lw.solve(moved, h=0.05, t1=0.4, start=end).position[-1], whole)
+
+
+def test_lanes_that_are_missing_are_told(result):
+    arrays, numbers, parameters = parts_of(result.final)
+    del arrays["final.lanes.state"]
+    with pytest.raises(lw.SceneError, match=r"final.lanes.state.*missing.*final.changed"):
+        type(result.final).from_arrays(arrays, numbers, parameters)
+    assert again(result.final.changed()).settings == {}
 
 
 def test_what_is_missing_is_told(result):

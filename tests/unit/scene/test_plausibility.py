@@ -446,6 +446,12 @@ def test_a_vehicle_that_something_else_drives_ahead_is_told_no_speed():
     assert not [text for text in looped([PATH], [DEPTH, HEADING], [TO_FINS], name="remus_100") if "wanted" in text]
 
 
+@pytest.mark.parametrize(("speed", "told"), [({"speed": 5.0}, 1), ({}, 0)])
+def test_a_speed_that_a_vehicle_without_a_propeller_is_asked_for_is_told(speed, told):
+    texts = looped([SET(heading=0.3, **speed)], [HEADING], [TO_FINS], name="remus_100")
+    assert [text.startswith(f"set_point.speed: {NO_LAW.format('speed')}") for text in texts] == [True] * told
+
+
 @pytest.mark.parametrize("push", [{"command": [100.0]}, {"times": [0.0, 9.0], "command_schedule": [[0.0], [100.0]]}])
 def test_a_propeller_with_a_command_or_a_schedule_of_its_own_is_driven(push):
     table = lw.Scene.named("lauv").to_dict()
@@ -466,3 +472,36 @@ def loops_of(folder):
 def test_of_shipped_scenes_no_loop_leaves_anything_unread(path):
     controller, terms = (scene := lw.Scene.load(path)).controller, scene.terms
     assert (controller.unread(terms), controller.idle, controller.undriven(terms)) == ((), (), ())
+
+
+WAVES_TOGETHER = [
+    ([0.0] * 10, [30.0] * 10, 1.342), ([0.0] * 10, [30.0, 390.0] * 5, 1.342), ([0.0, np.pi] * 5, [30.0] * 10, 0.0),
+    ([0.0] * 10, [36.0 * i for i in range(10)], 0.424),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("phases", "headings", "steep"), WAVES_TOGETHER)
+def test_components_of_one_period_and_heading_are_one_wave(phases, headings, steep):
+    """Ten waves of 0.3 m are one of 3 m where they go together, and none where they cancel."""
+    sea = lw.terms.Waves(amplitudes=[0.3] * 10, periods=[3.0] * 10, phases=phases, headings_deg=headings)
+    scene = lw.Scene.named("torpedo", terms=[sea], start={"position": [0.0, 0.0, 20.0]})
+    found = [text for text in said(scene) if "steepness" in text]
+    assert bool(found) == (steep > 0.44)
+    assert all(f"k a of {steep:.3g} " in text for text in found)
+
+
+HELD = [{"command": [0.5]}, {"limit": [1.0]}, {"times": [0.0, 9.0], "command_schedule": [[0.0], [-0.5]]}]
+
+
+@pytest.mark.parametrize("numbers", HELD)
+def test_a_thrust_far_beyond_the_weight_is_said(numbers):
+    def found(coefficient):
+        term = lw.terms.Thrusters(
+            position=[[0.0] * 3], direction=[[1.0, 0.0, 0.0]], coefficient=[coefficient], **numbers
+        )
+        scene = lw.Scene.named("torpedo", terms=[term], start={"position": [0.0, 0.0, 20.0]})
+        return [text for text in said(scene) if text.startswith("thrusters.coefficient")]
+
+    (text,) = found(1e7)
+    assert "a hundred times the weight" in text
+    assert found(10.0) == []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.extensions.others.exporting.areas import _cut
+from lgvi_warp.extensions.others.exporting.areas import divided
 from tests.support.exported import DEGREES, by_geodesic
 from tests.support.made import made
 from tests.support.refusals import refused, says
@@ -130,7 +130,7 @@ def test_half_of_any_polygon_is_that_of_shapely(seed):
         cut = shapely.MultiPolygon(
             [
                 (rings[0], rings[1:])
-                for rings in _cut([np.array(ring.coords) for ring in (polygon.exterior, *polygon.interiors)])
+                for rings in divided([np.array(ring.coords) for ring in (polygon.exterior, *polygon.interiors)])
             ]
         )
         assert cut.is_valid, shapely.is_valid_reason(cut)

@@ -25,7 +25,7 @@ def areas(footprint: Footprint, plane: LocalPlane) -> Iterator[tuple[Region, lis
     """Give the regions with their polygons, the largest first, so that no region hides a smaller one."""
     for region in sorted(footprint.regions, key=lambda region: -region.share):
         polygons = [_on_map(polygon, plane) for polygon in region.polygons]
-        yield region, [part for rings in polygons for part in _cut(rings)]
+        yield region, [part for rings in polygons for part in divided(rings)]
 
 
 def _on_map(polygon: tuple[np.ndarray, ...], plane: LocalPlane) -> Rings:
@@ -42,7 +42,7 @@ def _on_map(polygon: tuple[np.ndarray, ...], plane: LocalPlane) -> Rings:
     return rings
 
 
-def _cut(rings: Rings) -> list[Rings]:
+def divided(rings: Rings) -> list[Rings]:
     """Divide a polygon at the antimeridian (RFC 7946, 3.1.9)."""
     first, last = (math.floor((end + 180.0) / 360.0) for end in (rings[0][:, 0].min(), rings[0][:, 0].max()))
     return [

@@ -446,10 +446,10 @@ def test_a_vehicle_that_something_else_drives_ahead_is_told_no_speed():
     assert not [text for text in looped([PATH], [DEPTH, HEADING], [TO_FINS], name="remus_100") if "wanted" in text]
 
 
-@pytest.mark.parametrize(("speed", "told"), [({"speed": 5.0}, 1), ({}, 0)])
-def test_a_speed_that_a_vehicle_without_a_propeller_is_asked_for_is_told(speed, told):
+@pytest.mark.parametrize(("speed", "count"), [({"speed": 5.0}, 1), ({}, 0)])
+def test_a_speed_that_a_vehicle_without_a_propeller_is_asked_for_is_told(speed, count):
     texts = looped([SET(heading=0.3, **speed)], [HEADING], [TO_FINS], name="remus_100")
-    assert [text.startswith(f"set_point.speed: {NO_LAW.format('speed')}") for text in texts] == [True] * told
+    assert [text.startswith(f"set_point.speed: {NO_LAW.format('speed')}") for text in texts] == [True] * count
 
 
 @pytest.mark.parametrize("push", [{"command": [100.0]}, {"times": [0.0, 9.0], "command_schedule": [[0.0], [100.0]]}])
@@ -495,13 +495,13 @@ HELD = [{"command": [0.5]}, {"limit": [1.0]}, {"times": [0.0, 9.0], "command_sch
 
 @pytest.mark.parametrize("numbers", HELD)
 def test_a_thrust_far_beyond_the_weight_is_said(numbers):
-    def found(coefficient):
+    def messages_for(coefficient):
         term = lw.terms.Thrusters(
             position=[[0.0] * 3], direction=[[1.0, 0.0, 0.0]], coefficient=[coefficient], **numbers
         )
         scene = lw.Scene.named("torpedo", terms=[term], start={"position": [0.0, 0.0, 20.0]})
         return [text for text in said(scene) if text.startswith("thrusters.coefficient")]
 
-    (text,) = found(1e7)
+    (text,) = messages_for(1e7)
     assert "a hundred times the weight" in text
-    assert found(10.0) == []
+    assert messages_for(10.0) == []

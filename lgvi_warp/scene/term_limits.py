@@ -155,11 +155,7 @@ def thrusts(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
         if term.driver is None:
             held = numbers["command"] if term.holds else np.abs(numbers["command_schedule"]).max(axis=1)
             command = np.maximum(command, np.abs(held))
-        size = np.max(
-            [np.abs(term._thrusts(numbers, term._beyond(numbers, sign * command))).max(axis=1) for sign in (1.0, -1.0)],
-            axis=0,
-        )
-        size, most = np.broadcast_arrays(size, most)
+        size, most = np.broadcast_arrays(term.largest_thrust(numbers, command), most)
 
         def text(i: int, size: Any = size, most: Any = most) -> str:
             return PUSH.format(size[i], most[i])

@@ -224,6 +224,19 @@ class Thrusters(Commanded):
         numbers = {name: value[None] for name, value in self.parameters().items()}
         return self._thrusts(numbers, self._beyond(numbers, np.atleast_2d(command))).reshape(command.shape)
 
+    def largest_thrust(self, numbers: Numbers, command: np.ndarray) -> np.ndarray:
+        """Largest size of the steady thrusts of any thruster at commands of either sign.
+
+        Args:
+            numbers: The term's numbers by field.
+            command: Sizes of the commands (n, units) [unit].
+
+        Returns:
+            Sizes (n,) [N].
+        """
+        both = [np.abs(self._thrusts(numbers, self._beyond(numbers, sign * command))) for sign in (1.0, -1.0)]
+        return np.asarray(np.maximum(*both).max(axis=1))
+
     def _beyond(self, numbers: Numbers, command: np.ndarray) -> np.ndarray:
         """Commands (n, units) within their limits, less the dead band."""
         u = np.clip(command, -numbers["limit"], numbers["limit"])

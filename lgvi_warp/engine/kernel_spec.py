@@ -14,7 +14,7 @@ from lgvi_warp.engine.sample_layout import SampleLayout
 from lgvi_warp.engine.step_warnings import watched
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
-from lgvi_warp.physics.terms.wrench import JUMP_EARLY
+from lgvi_warp.physics.terms.base import JUMP_EARLY
 
 COMPENSATED = "float32_compensated"
 

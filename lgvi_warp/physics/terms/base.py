@@ -801,6 +801,9 @@ def side_by_side(*parts: np.ndarray) -> np.ndarray:
 
 # 1 / distance of a jump between knots: steeper than any step resolves, and within float32.
 STEEP = 1e20
+# The part of a step by which a schedule jumps early: whatever the round-off, stages at the end of a step, which are earlier
+# still, come before a jump there, and those at the beginning of the next step after it.
+JUMP_EARLY = 2.0**-31
 
 
 AnyTerm = TypeVar("AnyTerm", bound=Term)

@@ -11,12 +11,9 @@ import numpy as np
 from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import ragged
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, side_by_side
+from lgvi_warp.physics.terms.base import JUMP_EARLY, Numbers, Packed, PackingContext, Term, knots, number, side_by_side
 
 SHAPES = ("linear", "steps")
-# The part of a step by which a schedule jumps early: whatever the round-off, stages at the end of a step, which are earlier
-# still, come before a jump there, and those at the beginning of the next step after it.
-JUMP_EARLY = 2.0**-31
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

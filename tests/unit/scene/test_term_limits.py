@@ -58,7 +58,7 @@ HULL_VOLUME = np.pi / 4.0 * 0.8 * 2.0 * (0.01 + 0.02 + 0.04) / 3.0
 # A scene of a number, what is usual, what is odd, and words of the message.
 ODD = {
     "steep waves": (lambda a: waves([a]), 0.43 / K, 0.45 / K, "waves.amplitudes", "0.45", "break"),
-    "steep sea": (lambda a: waves([a, a], (8.0, 8.0 + 1e-9)), 0.43 / K / 2**0.5, 0.45 / K / 2**0.5, "waves.amplitudes", "break"),
+    "steep sea": (lambda a: waves([a, a], (8.0, 8.0 + 1e-9)), 0.304 / K, 0.318 / K, "waves.amplitudes", "break"),
     "strips": (lambda f: scene(type="cross_flow", drag_coefficient=1.0, stations=[-0.8, 0.0, 0.8],
                                diameters=[0.1 * f, 0.2 * f, 0.1 * f]),
                (2.9 * WATER / HULL_VOLUME) ** 0.5, (10.0 * WATER / HULL_VOLUME) ** 0.5, "cross_flow.diameters", "10 times"),

@@ -218,7 +218,11 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
     """The samples that quantities need, where the user does not say which to keep."""
     fields = ordered(name for each in of for name in each.fields)
     if save is not None or not of:
-        return replace(save, fields=ordered((*save.fields, *fields))) if isinstance(save, SaveAt) else save
+        if not isinstance(save, SaveAt):
+            return save
+        # Of a function of a Result nobody knows what it reads: the user chose.
+        named = [name for each in of if not each.is_function for name in each.fields]
+        return replace(save, fields=ordered((*save.fields, *named)))
     paths = [each.label for each in of if each.over_path]
     of_samples = [each.label for each in of if isinstance(each, MetricQuantity) and each.of_samples]
     every = scene.run.save_every

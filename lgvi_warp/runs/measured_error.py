@@ -37,6 +37,8 @@ def measured_error(plan: Plan, most: int = MOST_STEPS) -> tuple[float, float] | 
     fleet, choice = plan.ensemble, plan.kernel_choice
     if fleet.final is not None or fleet.given is not None or fleet.copies is not None or choice.has_callback:
         return None
+    if any(getattr(module, "NOISE", False) for _, module in choice.laws):  # whose path is another at half the step
+        return None
     h, steps = plan.grid.h, min(plan.grid.steps, most // 3)
     every = max(1, -(-steps // INTERVALS))
     t0 = plan.grid.first * h

@@ -367,6 +367,18 @@ def test_check_and_a_run_state_the_error_that_a_run_has(h, tmp_path, capsys):
 
 
 @pytest.mark.kernel
+@pytest.mark.parametrize("step", [{}, {"noise_step": 0.5}])
+def test_the_path_of_noise_is_no_error(step):
+    """Half the step draws other noise: the difference is not taken for an error."""
+    noise = lw.terms.WrenchNoise(force=[1.0] * 3, torque=[0.1] * 3, **step)
+    scene = lw.Scene.named(
+        "remus_100", start={"position": [0.0, 0.0, 20.0], "velocity": [1.5, 0.0, 0.0]}, terms=[noise]
+    )
+    assert measured_error(make_plan(lw.Ensemble(scene, 4), h=0.5, t1=5.0)) is None
+    assert lw.solve(lw.Ensemble(scene, 4), h=0.5, t1=5.0).messages == ()
+
+
+@pytest.mark.kernel
 def test_an_error_is_measured_in_a_bounded_number_of_steps():
     fleet, _ = turning_remus()
     assert measured_error(make_plan(fleet, h=0.25, t1=500.0), 2000)[1] == 166.5

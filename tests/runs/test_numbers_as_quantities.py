@@ -92,3 +92,14 @@ def test_what_names_no_number_is_told_with_the_remedy(fleet, of, words):
     with pytest.raises(lw.SceneError) as refused:
         lw.uq.evaluate(fleet, of, **RUN)
     assert not [word for word in words if word not in str(refused.value)], refused.value
+
+
+def test_a_function_of_a_result_has_the_samples_that_the_user_chose(fleet):
+    kept = []
+
+    def north(result):
+        kept.append(tuple(result.samples))
+        return result.position[-1, :, 0]
+
+    lw.uq.evaluate(fleet, north, save=lw.SaveAt(fields=("position",)), **RUN)
+    assert set(kept) == {("position",)}

@@ -108,6 +108,19 @@ def test_a_mode_that_is_not_drawn_is_within_the_error():
     assert all(each.spread > 0.01 for each in found)
 
 
+def test_the_second_look_answers_where_chains_alone_pass_a_mode_by():
+    """Modes along diagonals of six numbers, which weights refuse: the chains have 0.055 of the truth."""
+    p, first = 2e-5, np.ones(6) / math.sqrt(6.0)
+    second = first * np.tile([1.0, -1.0], 3)
+    near, far = -ndtri(0.95 * p), -ndtri(0.05 * p)
+    found = searched(lambda u: np.maximum(u @ first - near, (u @ second - far) / 1000.0), 6, seed=5)
+    low, high = found.interval()
+    assert found.estimator == "subset"
+    assert any("second look" in note and "which is the answer" in note for note in found.notes)
+    assert low <= p <= high
+    assert abs(math.log(found.probability / p)) < 3.0 * found.spread < 2.0
+
+
 @pytest.mark.slow
 def test_a_small_error_that_is_asked_has_a_larger_second_look():
     found = searched(lambda u: u.sum(axis=1) / math.sqrt(2.0) + ndtri(1e-5), 2, relative_error=0.01, seed=4)

@@ -119,4 +119,6 @@ def _as_parts(h: float, times: Sequence[float]) -> list[Fraction] | None:
     parts = [Fraction(t / end).limit_denominator(finest) for t in times]
     if any(abs(t - end * part) > h * slack(ratio, t, end) for t, part in zip(times, parts, strict=True)):
         return None
-    return [Fraction(end) * part for part in (Fraction(h / end), *parts)]
+    # A quotient beyond the range of float64 is none.
+    own = h / end if 0.0 < h / end < math.inf else Fraction(h) / Fraction(end)
+    return [Fraction(end) * part for part in (Fraction(own), *parts)]

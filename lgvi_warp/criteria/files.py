@@ -204,8 +204,9 @@ class Saved(ABC):
             OSError: where the file cannot be read.
             SceneError: where it is no regular file, is damaged, or of another version.
         """
-        if (folder := path_of("path", path)).is_dir() and hasattr(cls, "study"):
-            path = inside(folder, f"{cls.study}.json")
+        own = f"{cls.study}.json" if hasattr(cls, "study") else ""
+        if own and (folder := path_of("path", path)).is_dir() and folder.name != own:
+            path = inside(folder, own)
         with of_study(path):
             found = cls.from_dict(file_json(path))
             list(found.rows()), found.to_json(), str(found)  # what cannot be shown is refused here

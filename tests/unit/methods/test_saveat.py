@@ -172,3 +172,11 @@ def test_a_run_over_a_period_goes_on_to_the_bit():
     for result, rows in ((first, slice(0, 21)), (second, slice(20, 41))):
         np.testing.assert_array_equal(result.time, whole.time[rows])
         np.testing.assert_array_equal(result.position, whole.position[rows])
+
+
+@pytest.mark.parametrize(
+    ("h", "t1", "fault"), [(0.05, 5e-324, "shrink"), (1e308, 0.5, "shrink"), (5e-324, 150.0, "needs")]
+)
+def test_times_whose_quotient_no_number_holds_are_refused(h, t1, fault):
+    with pytest.raises(lw.SceneError, match=fault):
+        time_grid(h, t1, lw.SaveAt())

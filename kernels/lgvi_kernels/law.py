@@ -58,7 +58,6 @@ from lgvi_kernels.lanes.view import (
     gather1,
     gather3,
     heading_error,
-    make_pursuit,
     ramp,
     remember,
     remembered,

@@ -118,10 +118,10 @@ def turned_by(c: Any, s: Any, x: Any):
     """(cos, sin) of an angle x more than that of which c and s are, to 2 eps for |x| <= SMALL_TURN."""
     z = x * x
     # sin x, and 1 - cos x, by their series.
-    sine_x = x.dtype(1.0 / 120.0) * ones(x) - x.dtype(1.0 / 5040.0) * z
-    sine_x = x + (x * z) * (z * sine_x - x.dtype(1.0 / 6.0) * ones(x))
-    less = x.dtype(1.0 / 720.0) * ones(x) - x.dtype(1.0 / 40320.0) * z
-    less = z * (x.dtype(0.5) * ones(x) + z * (z * less - x.dtype(1.0 / 24.0) * ones(x)))
+    sine_x = x.dtype(wp.static(1.0 / 120.0)) * ones(x) - x.dtype(wp.static(1.0 / 5040.0)) * z
+    sine_x = x + (x * z) * (z * sine_x - x.dtype(wp.static(1.0 / 6.0)) * ones(x))
+    less = x.dtype(wp.static(1.0 / 720.0)) * ones(x) - x.dtype(wp.static(1.0 / 40320.0)) * z
+    less = z * (x.dtype(0.5) * ones(x) + z * (z * less - x.dtype(wp.static(1.0 / 24.0)) * ones(x)))
     return c - (c * less + s * sine_x), s + (c * sine_x - s * less)
 
 

@@ -117,7 +117,7 @@ def made(features):
 
     @wp.func
     def kept(view: Any, p: Any, i: int):
-        """What the wrench of fin i needs at this time: cosine and sine of its angle, or straight_up_and_back."""
+        """Cosine and sine of the angle of fin i, or straight_up_and_back: its wrench at this time follows from them."""
         if wp.static(straight):
             return straight_up_and_back(view, p, i)
         else:
@@ -154,27 +154,27 @@ def made(features):
         far = -most
         for i in range(wp.static(count) if wp.static(count > 0) else p.count):
             at = first_kept(p, i)
-            far = greatest(far, absolute(place(view, p, i) - remembered(view, at + 4)) - most)
+            turn = place(view, p, i) - remembered(view, at + 4)
+            far = greatest(far, absolute(turn) - most)
+            c, s = turned_by(remembered(view, at + 2), remembered(view, at + 3), turn)
+            remember(view, at, c)
+            remember(view, at + 1, s)
         if any_positive(far):
-            for i in range(wp.static(count) if wp.static(count > 0) else p.count):
-                a, b = kept(view, p, i)
-                remember(view, first_kept(p, i), a)
-                remember(view, first_kept(p, i) + 1, b)
-        else:
-            for i in range(wp.static(count) if wp.static(count > 0) else p.count):
+            # Lanes that have turned little keep their bits, whatever their neighbours do.
+            for i in range(p.count):
                 at = first_kept(p, i)
-                turn = place(view, p, i) - remembered(view, at + 4)
-                c, s = turned_by(remembered(view, at + 2), remembered(view, at + 3), turn)
-                remember(view, at, c)
-                remember(view, at + 1, s)
+                own = absolute(place(view, p, i) - remembered(view, at + 4)) - most
+                a, b = kept(view, p, i)
+                remember(view, at, positive(own, a, remembered(view, at)))
+                remember(view, at + 1, positive(own, b, remembered(view, at + 1)))
         return w
 
-    def make_one(entries):
+    def make_add(entries):
         """(w, view, p, i, a, b) -> w and the wrench of fin i with these entries; a, b: what is kept of it."""
         flow, add_wrench = make_fin(*entries)
 
         @wp.func
-        def one(w: Any, view: Any, p: Any, i: int, a: Any, b: Any):
+        def add_fin(w: Any, view: Any, p: Any, i: int, a: Any, b: Any):
             at = p.first + wp.static(rows) * i
             ahead, aside = flow(view, at)
             if wp.static(straight):
@@ -183,35 +183,37 @@ def made(features):
                 l, d = turned_lift_and_drag(view, p, at, ahead, aside, a, b)  # noqa: E741
                 return add_wrench(w, view, at, l * aside - d * ahead, -(l * ahead) - d * aside)
 
-        return one
+        return add_fin
 
     def make_push(kept_before):
         """The wrench of all fins; kept_before: what it needs at this time is kept."""
 
         def make_alone(i, entries):
-            one = make_one(entries)
+            add_fin = make_add(entries)
 
             @wp.func
             def alone(w: Any, view: Any, p: Any):
                 if wp.static(kept_before):
                     at = first_kept(p, wp.static(i))
-                    return one(w, view, p, wp.static(i), remembered(view, at), remembered(view, at + 1))
+                    return add_fin(w, view, p, wp.static(i), remembered(view, at), remembered(view, at + 1))
                 else:
                     a, b = kept(view, p, wp.static(i))
-                    return one(w, view, p, wp.static(i), a, b)
+                    return add_fin(w, view, p, wp.static(i), a, b)
 
             return alone
 
-        one = make_one(fins.WHOLE)
+        add_fin = make_add(fins.WHOLE)
 
         @wp.func
         def in_turn(w: Any, view: Any, p: Any):
             for i in range(p.count):
                 if wp.static(kept_before):
-                    w = one(w, view, p, i, remembered(view, first_kept(p, i)), remembered(view, first_kept(p, i) + 1))
+                    w = add_fin(
+                        w, view, p, i, remembered(view, first_kept(p, i)), remembered(view, first_kept(p, i) + 1)
+                    )
                 else:
                     a, b = kept(view, p, i)
-                    w = one(w, view, p, i, a, b)
+                    w = add_fin(w, view, p, i, a, b)
             return w
 
         each = in_turn

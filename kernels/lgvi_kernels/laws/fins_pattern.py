@@ -13,22 +13,22 @@ from lgvi_kernels.laws.fins import ROWS, lift_and_drag, make_fin
 from lgvi_kernels.laws.patterns import make_unrolled, patterns_of
 
 
-def make_one(i, entries):
+def make_add(i, entries):
     """(w, view, p) -> w and the wrench of fin i."""
     flow, add_wrench = make_fin(*entries)
 
     @wp.func
-    def one(w: Any, view: Any, p: Any):
+    def add_fin(w: Any, view: Any, p: Any):
         at = p.first + wp.static(ROWS * i)
         along, across = flow(view, at)
         lift, drag = lift_and_drag(view, at, along, across)
         return add_wrench(w, view, at, lift * across - drag * along, -(lift * along) - drag * across)
 
-    return one
+    return add_fin
 
 
 @functools.cache
 def made(words):
     """The law with these entries of each fin's twists (see fins.make_fin)."""
-    push = make_unrolled([make_one(i, entries) for i, entries in enumerate(patterns_of(words, "cn"))])
+    push = make_unrolled([make_add(i, entries) for i, entries in enumerate(patterns_of(words, "cn"))])
     return device(__name__, words, params=fins.params, damping=fins.damping, push=push)

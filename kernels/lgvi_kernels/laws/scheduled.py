@@ -149,7 +149,7 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
 
     @wp.func
     def place(view: Any, p: Any, i: int):
-        """Where channel i is; of those that do not move after look_up."""
+        """The place of channel i, after look_up."""
         n = ones(view.b.x)
         if wp.static(moves):
             n = remembered(view, p.memory + i)

@@ -64,18 +64,18 @@ def made(features):
                 first += i * (1 + 3 * p.size)
             return factor * curve(view, p, first, n), n
 
-        def make_one(i, add_twist):
+        def make_add(i, add_twist):
             """The part of thruster i, whose wrench of a unit of thrust has few numbers."""
 
             @wp.func
-            def one(w: Any, view: Any, p: Any):
+            def add_thruster(w: Any, view: Any, p: Any):
                 thrust, n = thrust_of(view, p, wp.static(i))
                 return add_twist(w, view, p.first + wp.static(rows * i), thrust)
 
-            return one
+            return add_thruster
 
         if patterns:
-            return make_unrolled([make_one(i, make_twist(*entries)) for i, entries in enumerate(patterns)])
+            return make_unrolled([make_add(i, make_twist(*entries)) for i, entries in enumerate(patterns)])
 
         @wp.func
         def summed(w: Any, view: Any, p: Any):

@@ -222,7 +222,23 @@ def make_stage(moves, push, node, timed, recall, early=0.0):
     return at_node
 
 
-def make_stages(Rates, rates, ys, kept, settle, anew):
+def make_settled(stages, settle, anew):
+    """The stages of a step, or a whole step, for which laws keep what they need at its start. settle, anew: of make_settle."""
+    if settle is None:
+        return stages
+
+    @wp.func
+    def settled_stages(x: Any, c: Any, h: Any):
+        if x.settled == 0:
+            settle(x, c, h)
+        elif wp.static(anew is not None):
+            anew(x, c, h)
+        return stages(x, c, h)
+
+    return settled_stages
+
+
+def make_stages(Rates, rates, ys, kept):
     """One function (x, constants, h) -> the slopes of all stages.
 
     docs/theory/runge_kutta.md, (K2).
@@ -236,11 +252,6 @@ def make_stages(Rates, rates, ys, kept, settle, anew):
     @wp.func
     def stages(x: Any, constants: Any, h: Any):
         k = Slopes()
-        if wp.static(settle is not None):
-            if x.settled == 0:
-                settle(x, constants, h)
-            elif wp.static(anew is not None):
-                anew(x, constants, h)
         if wp.static(kept):
             copy_memory(constants, 0, 1)
         k.k0 = rates(x, constants, h)
@@ -362,6 +373,7 @@ def make_explicit(spec, types, everything, velocities, slope):
     settle, anew, later = (make_settle(View, Wrench, spec.laws, role) for role in ("settle", ANEW, "settle_later"))
     if method.kind == "munthe_kaas":
         step = make_munthe_kaas(rates, move, turned, timed, make_recall(View, follow, later, 0.0, 0.5), spec.accounted)
+        step = make_settled(step, settle, anew)
         return make_ride(step, carried, carried.depart) if carried else step
     a, c = method.a, method.c
     # An estimate of one number more asks for the slope at the end of the step, whose row of `a` is b.
@@ -376,7 +388,8 @@ def make_explicit(spec, types, everything, velocities, slope):
     if method.implicit:
         stages = make_implicit_stages(spec, rates, states, velocities, slope)
     else:
-        stages = make_stages(Rates, rates, states, kept, settle, anew)
+        stages = make_stages(Rates, rates, states, kept)
+    stages = make_settled(stages, settle, anew)
     if carried and carried.depart:
         stages = make_departing(stages, carried.depart)
     finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)

@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_kernels.laws.scheduled import IN_USE
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import STEEP, Numbers, Packed, Term, side_by_side
@@ -19,6 +18,8 @@ from lgvi_warp.physics.terms.wrench import at_start, commands
 FAST, UNLIMITED = 1e20, 1e6
 # A time [s] after all others, and within float32.
 FOREVER = 1e30
+# Rows to work with of the piece of a schedule in use, beside two of each channel: IN_USE in lgvi_kernels/laws/scheduled.py.
+PIECE_ROWS = 4
 # Fields of a schedule of commands, which stands in place of `command`.
 SCHEDULE = ("times", "command_schedule")
 
@@ -138,7 +139,7 @@ def packed_following(
     count = channels.shape[1]
     rows = [channels.reshape(len(channels), -1)]
     values = {"count": count, "alike": int(np.all(lag == lag[:, :1])), **(words or {})}
-    work += 0 if term.driver is not None else IN_USE + 2 * count
+    work += 0 if term.driver is not None else PIECE_ROWS + 2 * count
     values |= {} if work else {"work": 0}
     places = np.zeros((1, count))
     if term.driver is not None:

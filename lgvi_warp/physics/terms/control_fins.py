@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_kernels.laws.control_fins_with import KEPT
 from lgvi_warp.common import declared
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, refusal
@@ -23,6 +22,9 @@ from lgvi_warp.physics.terms.actuators import (
 )
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of
 from lgvi_warp.physics.terms.fins import Fins, fin_rows, unit_directions
+
+# Rows to work with of each fin: two for damping, and KEPT in lgvi_kernels/laws/control_fins_with.py.
+WORK_ROWS = 7
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -175,4 +177,4 @@ class ControlFins(Commanded, Fins):
         if self.lift_angles is not None:
             angles, lifts = numbers["lift_angles"], numbers["lift_coefficients"]
             table, size = knots(angles, lifts[..., None]), angles.shape[1] - 1
-        return packed_following(self, numbers, blocks, table, size, (2 + KEPT) * self.channels, start=context.time)
+        return packed_following(self, numbers, blocks, table, size, WORK_ROWS * self.channels, start=context.time)

@@ -50,7 +50,7 @@ def make_in_parts(spec):
         """
         stages = lead_h.shape[0] - 1
         x = start
-        x.settled = 0
+        x.prepared = 0
         x.alarm = Alarm()
         if wp.static(paced):
             x.alarm.code = ones(among) - among

@@ -229,7 +229,7 @@ def make_settled(stages, settle, anew):
 
     @wp.func
     def settled_stages(x: Any, c: Any, h: Any):
-        if x.settled == 0:
+        if x.prepared == 0:
             settle(x, c, h)
         elif wp.static(anew is not None):
             anew(x, c, h)
@@ -306,7 +306,7 @@ def make_fixed(stages, finish, push, timed, recall, used=None, settles=False):
         if wp.static(recall is not None):
             x = recall(x, c, h)
         if wp.static(settles):
-            x.settled = 1
+            x.prepared = 1
         return x
 
     return step

@@ -216,9 +216,9 @@ class Thrusters(Commanded):
         return "" if self.pushes_steadily or self.propels or self.channels > MOST_UNROLLED else self.device_in(True)
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
-        # Of the wrench of each thruster about the user's origin, in his axes.
-        position, direction = repeated(numbers["position"], numbers["direction"])
-        rows = np.concatenate([direction, np.cross(position, direction)], axis=-1)
+        # Of the wrench of each thruster in the user's axes, wherever it is: so positions may vary with the same device code.
+        acts = numbers["direction"] != 0.0
+        rows = np.concatenate([acts, acts[..., [1, 0, 0]] | acts[..., [2, 2, 1]]], axis=-1)
         curves, _ = self.curve_rows(numbers)
         words = () if self._plain(numbers, parted(curves)[1] if self.shape == "polynomial" else True) else ("sided",)
         return words + tuple(f"{i}f{j}" for i in range(self.channels) for j in range(6) if np.any(rows[:, i, j]))

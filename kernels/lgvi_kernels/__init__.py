@@ -34,12 +34,12 @@ def built_in(folder, name):
 
     A name with points is the path of a module elsewhere: that of an extension.
     Of "thrusters_with:driven,table" it is what that module's `made` returns for the features ("driven", "table"), of "imu:"
-    for none.
+    for none; a second colon parts features as a comma does.
     """
     name, chooses, features = name.partition(":")
     path = name if "." in name else f"{__name__}.{folder}.{name}"
     module = import_module(path) if all(map(str.isidentifier, path.split("."))) and is_module(path) else None
-    return module.made(tuple(filter(None, features.split(",")))) if module and chooses else module
+    return module.made(tuple(filter(None, features.replace(":", ",").split(",")))) if module and chooses else module
 
 
 def is_module(path):

@@ -29,6 +29,7 @@ from lgvi_kernels.lanes.arithmetic import (
     whole,
 )
 from lgvi_kernels.lanes.functions import (
+    SMALL_TURN,
     arctangent2,
     clamp,
     cosine,
@@ -44,6 +45,7 @@ from lgvi_kernels.lanes.functions import (
     root,
     rounded,
     sine,
+    turned_by,
 )
 from lgvi_kernels.lanes.noise import normals_over, wandered
 from lgvi_kernels.lanes.state import struct
@@ -56,7 +58,6 @@ from lgvi_kernels.lanes.view import (
     gather1,
     gather3,
     heading_error,
-    make_pursuit,
     ramp,
     remember,
     remembered,

@@ -115,6 +115,7 @@ def make_stopped(spec):
             used, low = account_of(c, 0)
         if wp.static(watched):
             begun = at_step(good, k, h)
+            begun.prepared = 0
             part, still = arrival(begun, x, landed, code, c, k, h, stage_h, lead_h, opening)
             for j in range(wp.static(width)):
                 if code[j] >= real(wp.static(float(FIRST))):

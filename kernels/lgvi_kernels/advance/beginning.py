@@ -43,10 +43,15 @@ def make_constants(spec):
         c.memory = memory
         c.packet = i
         c.entry = i % table.shape[0]
+        c.last_memory = memory.shape[1] // 4
         if wp.static(watched):
             c.events = events[i % events.shape[0]]
         if wp.static(controlled):
             c.loop = monitor.loop[i % monitor.loop.shape[0]]
+            # Before them the bus and the spare rows, behind them those of the controller's parts.
+            c.first_memory = monitor.spare + monitor.part_rows
+            if monitor.parts > 0:
+                c.last_memory = monitor.parts
         if wp.static(accounted):
             c.account = monitor.account
         if wp.static(dragged):

@@ -205,7 +205,8 @@ def make_method(spec):
         return to_body(view, flow(Flow(), view, c.params).velocity)
 
     if spec.explicit is not None:
-        wrenches = superpose(laws, "push"), superpose(laws, "matrix")
+        wrenches = superpose(laws, "settled_push"), superpose(laws, "matrix")
+        law = superpose(laws, "settled_law")
         rest = superpose_loads(laws, without_push=True)
         resistance = damping if loads is None else make_resistance(damping, loads, Wrench)
         acting = (View, Wrench, Flow, Damping, law, *wrenches, resistance, flow, water_wrench, shifted, velocities)

@@ -50,6 +50,7 @@ def make_in_parts(spec):
         """
         stages = lead_h.shape[0] - 1
         x = start
+        x.prepared = 0
         x.alarm = Alarm()
         if wp.static(paced):
             x.alarm.code = ones(among) - among

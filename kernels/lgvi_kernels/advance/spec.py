@@ -180,6 +180,9 @@ def make_types(spec):
         memory=wp.array2d(dtype=Lane),
         packet=wp.int32,
         entry=wp.int32,
+        # The rows of the laws' memory, without those of a controller: from the first one to before the last one.
+        first_memory=wp.int32,
+        last_memory=wp.int32,
         **({"events": Events} if spec.events else {}),
         **({"drag": DragFlow} if spec.dragged else {}),
         **({"loop": Loop} if spec.control else {}),

@@ -101,6 +101,7 @@ def make_stepping(spec):
         """The steps k to k + n: the loop that takes the time, apart from all else, which would spoil its schedule."""
         # Copies of what lies behind the references: only such can the loop keep in registers.
         y = x
+        y.prepared = 0
         own = c
         limits = monitor
         for j in range(n):
@@ -135,6 +136,7 @@ def make_held(types, real, one_step, feed):
         while at < k + n:
             m = wp.min(k + n - at, limits.every - at % limits.every)
             y = x
+            y.prepared = 0
             for j in range(m):
                 y = one_step(y, own, limits, at + j, h, stage_h, lead_h, first_h, opening)
             x = y

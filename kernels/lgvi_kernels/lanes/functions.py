@@ -109,6 +109,22 @@ def _declare_normals(width, real):
         return vec3(quarter(four, 0), quarter(four, 1), quarter(four, 2))
 
 
+# The largest angle of `turned_by` [rad].
+SMALL_TURN = 0.0625
+
+
+@wp.func
+def turned_by(c: Any, s: Any, x: Any):
+    """(cos, sin) of an angle x more than that of which c and s are, to 2 eps for |x| <= SMALL_TURN."""
+    z = x * x
+    # sin x, and 1 - cos x, by their series.
+    sine_x = x.dtype(wp.static(1.0 / 120.0)) * ones(x) - x.dtype(wp.static(1.0 / 5040.0)) * z
+    sine_x = x + (x * z) * (z * sine_x - x.dtype(wp.static(1.0 / 6.0)) * ones(x))
+    less = x.dtype(wp.static(1.0 / 720.0)) * ones(x) - x.dtype(wp.static(1.0 / 40320.0)) * z
+    less = z * (x.dtype(0.5) * ones(x) + z * (z * less - x.dtype(wp.static(1.0 / 24.0)) * ones(x)))
+    return c - (c * less + s * sine_x), s + (c * sine_x - s * less)
+
+
 @wp.func
 def hyperbolic_tangent(a: Any):
     """tanh a, to 4 eps: 1 - e^-x = x decay(x) has no cancellation, and tanh a = (1 - e^-x) / (1 + e^-x) with x = 2 |a|."""

@@ -38,11 +38,13 @@ def state_struct(width, real, compensated=False):
 
     time [s] and step are those of the sub-map in turn; they are kept only where a law looks at them.
     pace: of a packet that chooses its steps (see pace_struct).
+    prepared: 1 where laws have kept what they need at this time (see maps/explicit.py).
     compensated: each vector has a low part, for the digits that it cannot hold (see sums).
     """
     Lane3, Alarm = lane3(width, real), alarm_struct(width, real)
     rows = {"R0": Lane3, "R1": Lane3, "R2": Lane3}
     fields = {"b": Lane3, **rows, "p": Lane3, "pi": Lane3, "alarm": Alarm, "time": wp.float64, "step": wp.int32}
+    fields["prepared"] = wp.int32
     if compensated:
         return struct("CompensatedState", **fields, **{f"{name}_low": Lane3 for name in ("b", *rows, "p", "pi")})
     return struct("State", **fields, pace=pace_struct(real))

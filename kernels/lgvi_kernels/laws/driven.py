@@ -12,18 +12,18 @@ from lgvi_kernels.law import *
 class Driven(NamedTuple):
     """Functions of an actuator.
 
-    params: the struct of its numbers; place: (view, p, i) -> where channel i is; evolve, follow, report: roles of its law.
-    look_up, found: (view, p), then (view, p, i) as place, for a law that needs all channels; None where place costs no more.
-    commanded: (view, p, i, t) -> the command of a schedule; None behind a controller.
+    params: the struct of its numbers; behind: (p) -> the first row to work with that is the law's own. place: (view, p, i) ->
+    where channel i is; look_up: (view, p), called before places are read, or None where none is needed. evolve, follow,
+    report: roles of its law. commanded: (view, p, i, t) -> the command of a schedule; None behind a controller.
     """
 
     params: Any
+    behind: Any
     place: Any
-    evolve: Any
-    follow: Any
-    report: Any
+    evolve: Any = None
+    follow: Any = None
+    report: Any = None
     look_up: Any = None
-    found: Any = None
     commanded: Any = None
 
 
@@ -52,12 +52,12 @@ def approached(n: Any, u: Any, length: Any, lag: Any, rate: Any):
     return u - positive(gap, gap_left, -gap_left)
 
 
-def make_driven(name, rows, limit, lag, rate, features, words=()):
+def make_driven(name, rows, limit, lag, rate, features, words=(), count=0):
     """The functions of an actuator with `rows` rows a channel; limit, lag and rate: places of 1 / lag and of two limits.
 
     features: "lag" where some channel lags, "rate" where the rate of some is limited; with neither it is where it is
     commanded. Rows that all channels share follow from `first + shared` on; `size` says how many there are of a kind.
-    words: further whole numbers that the actuator's law reads.
+    words: further whole numbers that the actuator's law reads. count: of channels, where the code is written out for each.
     """
     lags, limited = "lag" in features, "rate" in features
     moves = lags or limited
@@ -65,8 +65,12 @@ def make_driven(name, rows, limit, lag, rate, features, words=()):
     def params(width, real, commands):
         """Params: commands, see lanes/tick.py; first rows of the table, the memory, the report; count; alike: one lag."""
         places = {"first": wp.int32, "memory": wp.int32, "work": wp.int32, "report": wp.int32}
-        places |= dict.fromkeys(("count", "moving", "alike", "shared", "size", *words), wp.int32)
+        places |= dict.fromkeys(("count", "alike", "shared", "size", *words), wp.int32)
         return struct(name, commands=commands, **places)
+
+    @wp.func
+    def behind(p: Any):
+        return p.work
 
     @wp.func
     def wanted(view: Any, p: Any, i: int):
@@ -84,26 +88,31 @@ def make_driven(name, rows, limit, lag, rate, features, words=()):
         return n
 
     @wp.func
+    def step_to(view: Any, p: Any, i: int, time: Any, remaining: Any):
+        """Let channel i follow its command over a time; remaining: the part of a gap that is left, where all are alike."""
+        at = p.first + wp.static(rows) * i
+        n = remembered(view, p.memory + i)
+        u = wanted(view, p, i)
+        if wp.static(lags and limited):
+            n = approached(n, u, time, row1(view, at + wp.static(lag)), row1(view, at + wp.static(rate)))
+        elif wp.static(limited):
+            most = time * row1(view, at + wp.static(rate))
+            n = n + clamp(u - n, -most, most)
+        else:
+            if p.alike == 0:
+                remaining = left_after(time, row1(view, at + wp.static(lag)))
+            n = u + remaining * (n - u)
+        remember(view, p.memory + i, n)
+
+    @wp.func
     def move(state: Any, view: Any, p: Any, length: Any):
         if wp.static(moves):
             time = length * ones(view.b.x)
             remaining = time
             if wp.static(not limited):
                 remaining = left_after(time, row1(view, p.first + wp.static(lag)))
-            for i in range(p.count):
-                at = p.first + wp.static(rows) * i
-                n = remembered(view, p.memory + i)
-                u = wanted(view, p, i)
-                if wp.static(lags and limited):
-                    n = approached(n, u, time, row1(view, at + wp.static(lag)), row1(view, at + wp.static(rate)))
-                elif wp.static(limited):
-                    most = time * row1(view, at + wp.static(rate))
-                    n = n + clamp(u - n, -most, most)
-                else:
-                    if p.alike == 0:
-                        remaining = left_after(time, row1(view, at + wp.static(lag)))
-                    n = u + remaining * (n - u)
-                remember(view, p.memory + i, n)
+            for i in range(wp.static(count) if wp.static(count > 0) else p.count):
+                step_to(view, p, i, time, remaining)
         return state
 
     @wp.func
@@ -120,4 +129,4 @@ def make_driven(name, rows, limit, lag, rate, features, words=()):
             remember(view, p.report + i, place(view, p, i))
         return state
 
-    return Driven(params, place, evolve, follow, report)
+    return Driven(params, behind, place, evolve, follow, report)

@@ -6,6 +6,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.law import *
+from lgvi_kernels.laws.patterns import make_along, make_twist
 
 # Rows of one fin: the twists that measure the speed along its chord c and normal n (6 and 6, each also the wrench of a unit
 # force), then rho A / 2 times lift slope, drag coefficient and added drag coefficient; and as MATRICES say.
@@ -29,6 +30,14 @@ def speed_along(view: Any, row: int):
 
 
 @wp.func
+def add_twist(w: Any, view: Any, row: int, size: Any):
+    """w plus the wrench in six rows times a size."""
+    w.force = w.force + size * row3(view, row)
+    w.torque = w.torque + size * row3(view, row + 3)
+    return w
+
+
+@wp.func
 def lift_and_drag(view: Any, at: int, along: Any, across: Any):
     """(l, d) of a fin whose wrench is -l (along n - across c) - d (along c + across n).
 
@@ -45,16 +54,6 @@ def note_lift_and_drag(view: Any, at: int, along: Any, across: Any, noted: int):
     lift, drag = lift_and_drag(view, at, along, across)
     remember(view, noted, lift)
     remember(view, noted + 1, drag)
-
-
-@wp.func
-def push_fin(w: Any, view: Any, at: int, along: Any, across: Any, lift: Any, drag: Any):
-    """w and the wrench of one fin; along and across: the flow along its chord and its normal where it is not turned."""
-    chordwise = lift * across - drag * along
-    normal = -(lift * along) - drag * across
-    w.force = w.force + chordwise * row3(view, at) + normal * row3(view, at + 6)
-    w.torque = w.torque + chordwise * row3(view, at + 3) + normal * row3(view, at + 9)
-    return w
 
 
 @wp.func
@@ -128,13 +127,38 @@ def damping(D: Any, view: Any, p: Any):
     return add_fins(D, view, p.first, wp.static(ROWS), p.count, p.work)
 
 
+WHOLE = (frozenset(range(6)), frozenset(range(6)))
+
+
+def make_fin(chord, normal):
+    """(flow, add_wrench) of a fin in whose twists these entries are not 0: of its chord, and of its normal.
+
+    flow: (view, at) -> the flow along chord and normal; add_wrench: (w, view, at, chordwise, across) -> w and such a force.
+    """
+    whole = (chord, normal) == WHOLE
+    along_chord, along_normal = (speed_along if whole else make_along(entries) for entries in (chord, normal))
+    add_chord, add_normal = (add_twist if whole else make_twist(entries) for entries in (chord, normal))
+
+    @wp.func
+    def flow(view: Any, at: int):
+        return along_chord(view, at), along_normal(view, at + 6)
+
+    @wp.func
+    def add_wrench(w: Any, view: Any, at: int, chordwise: Any, across: Any):
+        return add_normal(add_chord(w, view, at, chordwise), view, at + 6, across)
+
+    return flow, add_wrench
+
+
+whole_flow, add_whole_wrench = make_fin(*WHOLE)
+
+
 @wp.func
 def push(w: Any, view: Any, p: Any):
     """w and the wrench of each fin."""
     for i in range(p.count):
         at = p.first + wp.static(ROWS) * i
-        along = speed_along(view, at)
-        across = speed_along(view, at + 6)
+        along, across = whole_flow(view, at)
         lift, drag = lift_and_drag(view, at, along, across)
-        w = push_fin(w, view, at, along, across, lift, drag)
+        w = add_whole_wrench(w, view, at, lift * across - drag * along, -(lift * along) - drag * across)
     return w

@@ -92,6 +92,39 @@ def make_twist(entries):
     return twist
 
 
+def pattern_words(words):
+    """Words such as "1f4": entry 4 of what "f" names, of unit 1 of an actuator."""
+    return [word for word in words if word[0].isdigit()]
+
+
+def patterns_of(words, kinds):
+    """Unit by unit of an actuator its entries of each kind, as pattern_words name them; none where no word does."""
+    named = [(int(word[:-2]), word[-2], int(word[-1])) for word in pattern_words(words)]
+    units = range(1 + max((unit for unit, _, _ in named), default=-1))
+    return [tuple(frozenset(j for u, k, j in named if (u, k) == (unit, kind)) for kind in kinds) for unit in units]
+
+
+def make_unrolled(functions):
+    """(w, view, p) -> w after all these functions of the same arguments, the first one first; w where there is none."""
+    if not functions:
+
+        @wp.func
+        def unchanged(w: Any, view: Any, p: Any):
+            return w
+
+        return unchanged
+    *before, last = functions
+    if not before:
+        return last
+    rest = make_unrolled(before)
+
+    @wp.func
+    def unrolled(w: Any, view: Any, p: Any):
+        return last(rest(w, view, p), view, p)
+
+    return unrolled
+
+
 # Every entry of a matrix.
 FULL = tuple((i, j) for i in range(6) for j in range(6))
 less_whole = make_less(FULL)

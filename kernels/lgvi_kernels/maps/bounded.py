@@ -26,6 +26,10 @@ ROLES = (
     "carried_inertia",
     "carried_momentum",
     "depart",
+    "settle",
+    "settle_later",
+    "settled_law",
+    "settled_push",
     "power",
 )
 

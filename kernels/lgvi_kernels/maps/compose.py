@@ -14,6 +14,10 @@ from lgvi_kernels.maps.bounded import bounds_struct
 
 # The end of a role that only laws play which a controller drives.
 OF_ACTUATORS = " of actuators"
+# The begin of a role that a law may play from what its `settle` has kept at this time, in place of the whole role.
+SETTLED = "settled_"
+# What a law keeps at the end of a step no longer holds at the start of the next one if it follows from the time alone.
+ANEW = "settle anew"
 
 
 def plays(law, role):
@@ -25,6 +29,12 @@ def plays(law, role):
     """
     if role.endswith(OF_ACTUATORS):
         return plays(law, role.removesuffix(OF_ACTUATORS)) if hasattr(law, "report") else None
+    if role == ANEW:
+        return None if hasattr(law, "follow") else getattr(law, "settle", None)
+    if role == "settle_later":
+        return getattr(law, role, None) or plays(law, "settle")
+    if role.startswith(SETTLED):
+        return getattr(law, role, None) or plays(law, role.removeprefix(SETTLED))
     if role == "matrix":
         return None if hasattr(law, "push") else getattr(law, "damping", None)
     if role in ("potential", "force"):
@@ -87,7 +97,7 @@ def superpose(laws, role):
     """
     if not any(plays(law, role) for law in laws):
         return None
-    if any(getattr(law, "SEES", False) and hasattr(law, role) for law in laws):
+    if any(_sees(law, role) for law in laws):
         return _handing_on(_superpose_seeing(laws, role))
     function, rest = plays(laws[0], role), superpose(laws[1:], role)
     if function is None:
@@ -112,6 +122,11 @@ def superpose(laws, role):
     return total
 
 
+def _sees(law, role):
+    """Whether a law looks at the water in this role."""
+    return getattr(law, "SEES", False) and hasattr(law, role.removeprefix(SETTLED))
+
+
 def _handing_on(nested):
     """(sum, view, params) -> sum of laws of which some look at the water, for which they also get the params of all laws."""
 
@@ -127,7 +142,7 @@ def _superpose_seeing(laws, role):
     if not any(plays(law, role) for law in laws):
         return None
     function, rest = plays(laws[0], role), _superpose_seeing(laws[1:], role)
-    seeing = getattr(laws[0], "SEES", False) and hasattr(laws[0], role)
+    seeing = _sees(laws[0], role)
 
     @wp.func
     def total(w: Any, view: Any, p: Any, sea: Any):

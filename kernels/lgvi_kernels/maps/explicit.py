@@ -19,7 +19,7 @@ from lgvi_kernels.lanes.state import damping_struct, struct, view_struct, wrench
 from lgvi_kernels.laws.drag import make_resistance
 from lgvi_kernels.maps.accounting import make_power_at, spend, with_power
 from lgvi_kernels.maps.carried import make_carried, make_carried_rates, make_departing, make_ride
-from lgvi_kernels.maps.compose import plays, superpose
+from lgvi_kernels.maps.compose import ANEW, plays, superpose
 from lgvi_kernels.maps.dissipation import make_implicit
 from lgvi_kernels.maps.linearly_implicit import make_damped, make_damped_stages, make_factor
 from lgvi_kernels.maps.munthe_kaas import make_act, make_munthe_kaas, make_turned
@@ -158,30 +158,49 @@ def copy_memory(c: Any, source: int, target: int):
     """Copy the laws' memory: place 0 is in use, place 1 keeps that of the step's start."""
     # Half of the array is a backup, and half of the rest is what is kept.
     rows = c.memory.shape[1] // 4
-    for j in range(rows):
+    for j in range(c.first_memory, c.last_memory):
         c.memory[c.packet, target * rows + j] = c.memory[c.packet, source * rows + j]
 
 
-def make_recall(View, follow, before, node):
+def make_recall(View, follow, settle, before, node):
     """(x, constants, h) -> x: advance what laws remember from the node of the last stage to this one, where x is.
 
-    follow: the functions of all laws with this role. None where they are None, or no time passes.
+    follow, settle: functions of all laws with this role, or None (see make_settle). None where both are, or no time passes.
     """
     back = node < before
     part = node if back else node - before
-    if follow is None or part == 0.0:
+    if (follow is None and settle is None) or part == 0.0:
         return None
 
     @wp.func
     def recall(x: Any, c: Any, h: Any):
-        if wp.static(back):
-            copy_memory(c, 1, 0)
-        view = look(View(), x, c, h.dtype(wp.static(part)) * h)
-        # The view stands for the sum that folded laws hand on (see compose.superpose): these add nothing to it.
-        view = follow(view, view, c.params)
+        if wp.static(follow is not None):
+            if wp.static(back):
+                copy_memory(c, 1, 0)
+            view = look(View(), x, c, h.dtype(wp.static(part)) * h)
+            # The view stands for the sum that folded laws hand on (see compose.superpose): these add nothing to it.
+            view = follow(view, view, c.params)
+        if wp.static(settle is not None):
+            settle(x, c, h)
         return x
 
     return recall
+
+
+def make_settle(View, Wrench, laws, role):
+    """(x, constants, h): let laws keep what they need at this time, for all stages of it. None where no law does.
+
+    role: "settle", at the start of a step; "settle anew", where the step before has done so; "settle_later", within it.
+    """
+    settle = superpose(laws, role)
+    if settle is None:
+        return None
+
+    @wp.func
+    def settled(x: Any, c: Any, h: Any):
+        nothing = settle(Wrench(), look(View(), x, c, h), c.params)  # noqa: F841 (nothing is added)
+
+    return settled
 
 
 def make_stage(moves, push, node, timed, recall, early=0.0):
@@ -201,6 +220,22 @@ def make_stage(moves, push, node, timed, recall, early=0.0):
         return y
 
     return at_node
+
+
+def make_settled(stages, settle, anew):
+    """The stages of a step, or a whole step, for which laws keep what they need at its start. settle, anew: of make_settle."""
+    if settle is None:
+        return stages
+
+    @wp.func
+    def settled_stages(x: Any, c: Any, h: Any):
+        if x.prepared == 0:
+            settle(x, c, h)
+        elif wp.static(anew is not None):
+            anew(x, c, h)
+        return stages(x, c, h)
+
+    return settled_stages
 
 
 def make_stages(Rates, rates, ys, kept):
@@ -249,7 +284,7 @@ def make_stages(Rates, rates, ys, kept):
     return stages
 
 
-def make_fixed(stages, finish, push, timed, recall, used=None):
+def make_fixed(stages, finish, push, timed, recall, used=None, settles=False):
     """One step of length h. push, recall: as in make_stage; used: (energy, slopes, h) -> energy plus that of the step.
 
     docs/theory/runge_kutta.md, (K3).
@@ -270,6 +305,8 @@ def make_fixed(stages, finish, push, timed, recall, used=None):
             x.time = x.time + wp.float64(h)
         if wp.static(recall is not None):
             x = recall(x, c, h)
+        if wp.static(settles):
+            x.prepared = 1
         return x
 
     return step
@@ -333,14 +370,16 @@ def make_explicit(spec, types, everything, velocities, slope):
     if roles * len(method.b) > MOST_INLINED:
         rates = make_called(rates, types.State, types.Constants, real)
     follow = superpose(spec.laws, "follow") if spec.memory else None
+    settle, anew, later = (make_settle(View, Wrench, spec.laws, role) for role in ("settle", ANEW, "settle_later"))
     if method.kind == "munthe_kaas":
-        step = make_munthe_kaas(rates, move, turned, timed, make_recall(View, follow, 0.0, 0.5), spec.accounted)
+        step = make_munthe_kaas(rates, move, turned, timed, make_recall(View, follow, later, 0.0, 0.5), spec.accounted)
+        step = make_settled(step, settle, anew)
         return make_ride(step, carried, carried.depart) if carried else step
     a, c = method.a, method.c
     # An estimate of one number more asks for the slope at the end of the step, whose row of `a` is b.
     if method.adaptive and len(method.errors[0]) > len(a):
         a, c = (*a, method.b), (*c, 1.0)
-    *recalls, last = (make_recall(View, follow, before, node) for before, node in zip((0.0, *c), (*c, 1.0)))
+    *recalls, last = (make_recall(View, follow, later, before, node) for before, node in zip((0.0, *c), (*c, 1.0)))
     states = [
         make_stage(make_moves(move, row, complete), push, node, timed, recall, method.early if node == 1.0 else 0.0)
         for row, node, recall in zip(a, c, recalls)
@@ -350,12 +389,13 @@ def make_explicit(spec, types, everything, velocities, slope):
         stages = make_implicit_stages(spec, rates, states, velocities, slope)
     else:
         stages = make_stages(Rates, rates, states, kept)
+    stages = make_settled(stages, settle, anew)
     if carried and carried.depart:
         stages = make_departing(stages, carried.depart)
     finish = make_moves(move, method.b + (0.0,) * (len(a) - len(method.b)), complete)
     used = make_moves(with_power, method.b, None) if spec.accounted else None
     if not method.adaptive:
-        step = make_fixed(stages, finish, push, timed, last, used)
+        step = make_fixed(stages, finish, push, timed, last, used, settle is not None)
         return make_ride(step, carried) if carried else step
     errors = make_errors(Rates, [make_moves(along, row, None) for row in method.errors])
     step = make_adaptive(

@@ -18,6 +18,8 @@ from lgvi_warp.physics.terms.wrench import at_start, commands
 FAST, UNLIMITED = 1e20, 1e6
 # A time [s] after all others, and within float32.
 FOREVER = 1e30
+# Rows to work with of the piece of a schedule in use, beside two of each channel: IN_USE in lgvi_kernels/laws/scheduled.py.
+PIECE_ROWS = 4
 # Fields of a schedule of commands, which stands in place of `command`.
 SCHEDULE = ("times", "command_schedule")
 
@@ -122,7 +124,8 @@ def packed_following(
 
     numbers: (m, ...) by field: `limit`, where it has them `time_constant` and `rate_limit`, and if not driven the schedule.
     blocks: Other rows of each channel, (m, channels, rows). shared: Rows behind those of all channels, (m, rows).
-    words: Further whole numbers of the device struct. start: When members start [s].
+    work: Rows to work with that the device code has of its own. words: Further whole numbers of the device struct.
+    start: When members start [s].
     Returns: Rows of each channel: the blocks, limit, 1 / lag and limit of the rate; its schedule; the shared rows; and the
         memory of places, where they move: 0 of a driven actuator, else the command at the start.
     """
@@ -135,7 +138,8 @@ def packed_following(
     channels = side_by_side(blocks, *(value[..., None] for value in (limit, lag, rate)))
     count = channels.shape[1]
     rows = [channels.reshape(len(channels), -1)]
-    values = {"count": count, "moving": int(term.memory), "alike": int(np.all(lag == lag[:, :1])), **(words or {})}
+    values = {"count": count, "alike": int(np.all(lag == lag[:, :1])), **(words or {})}
+    work += 0 if term.driver is not None else PIECE_ROWS + 2 * count
     values |= {} if work else {"work": 0}
     places = np.zeros((1, count))
     if term.driver is not None:

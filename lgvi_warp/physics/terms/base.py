@@ -72,6 +72,10 @@ class PackingContext:
         return own(term, self.parameters)
 
 
+# Units of an actuator, at most, whose code is written out one by one; of more it is one loop.
+MOST_UNROLLED = 12
+
+
 class Packed(NamedTuple):
     """A term's numbers as its device code reads them; the leading dimension n is 1 where all members share them.
 

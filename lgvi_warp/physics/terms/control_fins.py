@@ -20,9 +20,11 @@ from lgvi_warp.physics.terms.actuators import (
     refuse_idle,
     refuse_unread,
 )
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of
 from lgvi_warp.physics.terms.fins import Fins, fin_rows, unit_directions
-from lgvi_warp.physics.terms.wrench import at_start, commands
+
+# Rows to work with of each fin: two for damping, and KEPT in lgvi_kernels/laws/control_fins_with.py.
+WORK_ROWS = 7
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,7 +62,7 @@ class ControlFins(Commanded, Fins):
     """
 
     type: ClassVar[str] = "control_fins"
-    device: ClassVar[str] = "control_fins"
+    device: ClassVar[str] = "fins"
 
     lift_slope: Any = number(("n",), "1/rad", None, least=0.0)
     lift_angles: Any = number(("a",), "rad", None, least=0.0, rising=True, optional=True)
@@ -119,18 +121,13 @@ class ControlFins(Commanded, Fins):
 
     def device_in(self, aligned: bool) -> str:
         driven = self.driver is not None
-        features = (
-            {"driven": driven}
-            | (motion(self) if driven else {"lag": self.time_constant is not None})
-            | {
-                "lift": self.lift_angles is not None,
-                "straight": not self.flow_angle,
-            }
-        )
-        chosen = [name for name, present in features.items() if present]
-        if self.stands and not (features["lift"] or features["straight"]):
+        # Members may bring in a limited rate where the scene has a lag.
+        motions = motion(self) if driven else {"lag": self.time_constant is not None, "rate": True}
+        kinds = {"lift": self.lift_angles is not None, "straight": not self.flow_angle}
+        if self.stands and not any(kinds.values()):
             return "fins"
-        return f"control_fins_with:{','.join(chosen)}" if chosen else "control_fins"
+        features = {"driven": driven} | {name: acts and self.memory for name, acts in motions.items()} | kinds
+        return f"control_fins_with:{','.join(name for name, present in features.items() if present)}"
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         # In addition, raises SceneError for members' numbers that would have no effect.
@@ -156,11 +153,13 @@ class ControlFins(Commanded, Fins):
 
     @property
     def pattern_device(self) -> str:  # type: ignore[override]
-        """Device code of fixed fins, where they stand and are of no other kind."""
-        return Fins.pattern_device if self.device_in(True) == "fins" else ""
+        """Device code of few fins, which leaves out zeros."""
+        device = self.device_in(True)
+        return Fins.pattern_device if device == "fins" else device
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
-        return super().entries(self._turned(numbers))
+        # Of fins that turn, in the axes that do not turn with them.
+        return super().entries(self._turned(numbers) if self.device_in(True) == "fins" else numbers)
 
     def _turned(self, numbers: Numbers) -> Numbers:
         """The numbers of fins that stand: fixed fins, whose chords and normals are turned by the commands."""
@@ -170,23 +169,12 @@ class ControlFins(Commanded, Fins):
         return {**numbers, "chord": c * chord + s * normal, "normal": c * normal - s * chord}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # The device rows: those of each fin, then the command table of each fin.
+        # The device rows: those of each fin, then the pieces of their commands, then a table of lift.
         if self.device_in(context.aligned) == "fins":
             return super().packed(self._turned(numbers), context)
-        if self.device_in(context.aligned) != "control_fins":
-            blocks = fin_rows(numbers, context, matrices=self.flow_angle)
-            table, size = None, 0
-            if self.lift_angles is not None:
-                angles, lifts = numbers["lift_angles"], numbers["lift_coefficients"]
-                table, size = knots(angles, lifts[..., None]), angles.shape[1] - 1
-            return packed_following(self, numbers, blocks, table, size, 2 * self.channels, start=context.time)
-        fins = side_by_side(fin_rows(numbers, context), numbers["limit"][..., None], numbers["rate_limit"][..., None])
-        times, schedule = commands(numbers)
-        count = schedule.shape[2]
-        tables = [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
-        rows = side_by_side(fins.reshape(len(fins), -1), *tables)
-        values = {"count": count, "knots": times.shape[1] - 1, "limited": int(self.memory), "memory": 0}
-        if not self.memory:
-            return Packed(values, rows, work=2 * count)
-        start = np.clip(at_start(times, schedule, context.time), -numbers["limit"], numbers["limit"])
-        return Packed(values, rows, start, 2 * count)
+        blocks = fin_rows(numbers, context, matrices=self.flow_angle)
+        table, size = None, 0
+        if self.lift_angles is not None:
+            angles, lifts = numbers["lift_angles"], numbers["lift_coefficients"]
+            table, size = knots(angles, lifts[..., None]), angles.shape[1] - 1
+        return packed_following(self, numbers, blocks, table, size, WORK_ROWS * self.channels, start=context.time)

@@ -11,7 +11,16 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.base import (
+    MOST_UNROLLED,
+    Numbers,
+    Packed,
+    PackingContext,
+    Term,
+    number,
+    rows_of,
+    side_by_side,
+)
 
 # Below this sine of the angle between them, chord and normal count as parallel.
 PARALLEL = 1e-6
@@ -80,10 +89,11 @@ class Fins(Term):
         return np.asarray(np.einsum("nk,nki,nkj->nij", size, rows, rows))
 
     def entries(self, numbers: Numbers) -> tuple[str, ...]:
-        # Of the twists in the user's axes and about his origin.
-        twists = zip("cn", unit_directions(numbers), strict=True)
-        found = {kind: _twist(numbers["position"], direction) for kind, direction in twists}
-        return tuple(f"{kind}{i}" for kind, rows in found.items() for i in range(6) if np.any(rows[..., i]))
+        # Of the twists in the user's axes and about his origin; none of many fins, whose code is a loop.
+        found = {kind: _twist(numbers["position"], direction)
+                 for kind, direction in zip("cn", unit_directions(numbers), strict=True)}  # fmt: skip
+        return tuple(f"{fin}{kind}{i}" for kind, rows in found.items() for fin in range(rows.shape[1]) for i in range(6)
+                     if rows.shape[1] <= MOST_UNROLLED and np.any(rows[:, fin, i]))  # fmt: skip
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         rows = fin_rows(numbers, context)

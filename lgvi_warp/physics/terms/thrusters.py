@@ -18,7 +18,16 @@ from lgvi_warp.physics.terms.actuators import (
     refuse_idle,
     refuse_unread,
 )
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.base import (
+    MOST_UNROLLED,
+    Numbers,
+    Packed,
+    PackingContext,
+    knots,
+    number,
+    rows_of,
+    side_by_side,
+)
 from lgvi_warp.physics.terms.thrust_curves import (
     SQUARE,
     parted,
@@ -202,6 +211,24 @@ class Thrusters(Commanded):
         return f"thrusters_with:{','.join(name for name, present in features.items() if present)}"
 
     @property
+    def pattern_device(self) -> str:  # type: ignore[override]
+        """Device code that leaves out zeros of the wrenches of thrusters without propellers, of which there are few."""
+        return "" if self.pushes_steadily or self.propels or self.channels > MOST_UNROLLED else self.device_in(True)
+
+    def entries(self, numbers: Numbers) -> tuple[str, ...]:
+        # Of the wrench of each thruster in the user's axes, wherever it is: so positions may vary with the same device code.
+        acts = numbers["direction"] != 0.0
+        rows = np.concatenate([acts, acts[..., [1, 0, 0]] | acts[..., [2, 2, 1]]], axis=-1)
+        curves, _ = self.curve_rows(numbers)
+        words = () if self._plain(numbers, parted(curves)[1] if self.shape == "polynomial" else True) else ("sided",)
+        return words + tuple(f"{i}f{j}" for i in range(self.channels) for j in range(6) if np.any(rows[:, i, j]))
+
+    def _plain(self, numbers: Numbers, odd: bool) -> bool:
+        """Whether in all members both sides are alike, and there is no dead band; odd: whether the curves are."""
+        alike = np.all(numbers["coefficient"] == numbers["coefficient_astern"])
+        return bool(odd and alike and not np.any(numbers["dead_band"]))
+
+    @property
     def powers(self) -> int:
         """Number of powers that the longer of both polynomials has."""
         return max(len(self.polynomial), len(self.polynomial_astern))
@@ -350,17 +377,14 @@ class Thrusters(Commanded):
         odd = True
         if self.shape == "polynomial":
             curves, odd = parted(curves)
-        alike = np.all(numbers["coefficient"] == numbers["coefficient_astern"]) and not np.any(numbers["dead_band"])
-        words = {"plain": int(odd and alike)}
+        words = {"plain": int(self._plain(numbers, odd))}
         shared = curves
         if self.powered:
             watts, intervals = thruster_power.rows(self, numbers)
             shared = side_by_side(curves, watts)
             words |= {"power": curves.shape[1], "power_size": intervals}
-        # Where nothing is remembered, commands are looked up in rows to work with.
-        work = 0 if self.memory or self.driver is not None else self.channels
         each = side_by_side(force, torque, *blocks)
-        return packed_following(self, numbers, each, shared, size, work, words, context.time)
+        return packed_following(self, numbers, each, shared, size, 6, words, context.time)
 
     def _packed_push(
         self, numbers: Numbers, context: PackingContext, direction: np.ndarray, arms: np.ndarray

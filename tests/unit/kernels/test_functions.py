@@ -19,7 +19,7 @@ from lgvi_kernels.lanes.flags import CPU_FLAGS
 pytestmark = pytest.mark.kernel
 
 NAMES = ("root", "exponential", "sine", "cosine", "logarithm", "decay", "greatest", "clamp", "arctangent2",
-         "hyperbolic_tangent", "neg", "fused", "about_inverse_root")  # fmt: skip
+         "hyperbolic_tangent", "neg", "fused", "about_inverse_root", "turned_cosine", "turned_sine")  # fmt: skip
 FORMATS = {"float64": (wp.float64, np.float64), "float32": (wp.float32, np.float32)}
 THOROUGH = [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")]
 LARGEST = {"float64": 700.0, "float32": 87.0}
@@ -58,6 +58,9 @@ def kernel(width, name):
         out[10, i] = v.x + (v.y + v.y) + (v.z + v.z + v.z + v.z)
         out[11, i] = lm.fused(x, a[1, i], a[2, i])
         out[12, i] = lm.about_inverse_root(x)
+        c, s = lm.turned_by(x, a[1, i], a[2, i])
+        out[13, i] = c
+        out[14, i] = s
 
     return evaluate
 
@@ -238,3 +241,17 @@ def test_every_width_gives_the_same_bits(name, widths):
 
 def test_every_type_was_tested():
     assert {FORMATS[name][0] for name in FORMATS} == set(REALS)
+
+
+@pytest.mark.parametrize(("width", "name"), THOROUGH)
+def test_a_small_turn(width, name):
+    rng, dtype = np.random.default_rng(5), FORMATS[name][1]
+    angles = rng.uniform(-np.pi, np.pi, 20_000)
+    turns = rng.uniform(-lm.SMALL_TURN, lm.SMALL_TURN, 20_000).astype(dtype)
+    turns[:3] = 0.0, lm.SMALL_TURN, -lm.SMALL_TURN
+    c, s = np.cos(angles).astype(dtype), np.sin(angles).astype(dtype)
+    found, x = evaluate(width, name, c, s, turns), turns.astype(np.longdouble)
+    exact = {"turned_cosine": c * np.cos(x) - s * np.sin(x), "turned_sine": s * np.cos(x) + c * np.sin(x)}
+    for function, values in exact.items():
+        # Two products and sums of numbers of at most 1, and the next terms of the series, 1e-17 and less.
+        assert np.abs(found[function] - values).max() < 2.0 * np.finfo(dtype).eps

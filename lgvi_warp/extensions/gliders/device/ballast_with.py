@@ -22,6 +22,7 @@ POWERED_ROWS, INVERSE, TALLY = 8, 4, 2
 def make_work(following):
     """The roles evolve and follow, which also account p dV / efficiency where a volume rises."""
     evolve, follow, place, commanded = following.evolve, following.follow, following.place, following.commanded
+    look_up = following.look_up
     straight = commanded is not None and evolve is None
 
     @wp.func
@@ -62,6 +63,8 @@ def make_work(following):
         """The work since the last look, with the mean of the pressures at both."""
         if wp.static(follow is not None):
             state = follow(state, view, p)
+        if wp.static(look_up is not None):
+            look_up(view, p)
         for i in range(p.count):
             volume = place(view, p, i)
             account(view, p, i, volume, volume - volume)
@@ -77,7 +80,6 @@ def made(features):
     words, rows = (("account_row", "tally"), POWERED_ROWS) if powered else ((), ROWS)
     following = make(f"Ballast_{'_'.join(features)}", rows, rows - 3, rows - 2, rows - 1, features, words)
     place, look_up = following.place, following.look_up
-    found = following.found or place
 
     @wp.func
     def ballast_law(w: Any, view: Any, p: Any):
@@ -88,7 +90,7 @@ def made(features):
         lever = vec3(lift, lift, lift)
         for i in range(p.count):
             at = p.first + wp.static(rows) * i
-            volume = found(view, p, i)
+            volume = place(view, p, i)
             lift = lift + volume * row1(view, at)
             lever = lever + volume * row3(view, at + 1)
         w.force = w.force - lift * view.down

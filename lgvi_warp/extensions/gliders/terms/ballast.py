@@ -161,12 +161,7 @@ class Ballast(Commanded):
         blocks = side_by_side(each, each * points)
         if self.powered:
             return self._with_work(numbers, side_by_side(blocks, 1.0 / numbers["efficiency"][..., None]), context)
-        return packed_following(self, numbers, blocks, work=self._work, start=context.time)
-
-    @property
-    def _work(self) -> int:
-        # Where no places are remembered, commands are looked up in rows to work with.
-        return 0 if super().memory or self.driver is not None else self.channels
+        return packed_following(self, numbers, blocks, start=context.time)
 
     def _with_work(self, numbers: Numbers, blocks: Array, context: PackingContext) -> Packed:
         """The same with a memory of the volumes at the last look, and of pressures: -1 before the first."""
@@ -176,7 +171,7 @@ class Ballast(Commanded):
             start = np.clip(start, -numbers["limit"], numbers["limit"])
         # Where the account lies is filled in with the rows of the memory.
         words = {"account_row": -1, "tally": self.channels if plain.memory else 0}
-        packed = packed_following(plain, numbers, blocks, work=self._work, words=words, start=context.time)
+        packed = packed_following(plain, numbers, blocks, words=words, start=context.time)
         tally = np.stack(np.broadcast_arrays(start, -1.0), axis=-1).reshape(len(start), -1)
         return packed._replace(memory=tally if packed.memory is None else side_by_side(packed.memory, tally))
 

@@ -59,13 +59,17 @@ def measured_error(plan: Plan, most: int = MOST_STEPS) -> tuple[float, float] | 
 
 def telling_error(plan: Plan) -> Plan:
     """The plan with a message where its method was chosen, its step is near the limit of damping, and the error is large."""
-    name, h = plan.method.name, plan.grid.h
-    if not plan.method.reason or name not in DAMPED or any(text.startswith("step h =") for text in plan.grid.messages):
-        return plan
-    drag, limit = h_rates(rates(plan.ensemble), h)["drag"], drag_limit(name)
+    said = any(text.startswith("step h =") for text in plan.grid.messages)
+    return plan if not plan.method.reason or plan.method.name not in DAMPED or said else _near_the_limit(plan)
+
+
+def _near_the_limit(plan: Plan) -> Plan:
+    """The same for a method of DAMPED that was chosen."""
+    name = plan.method.name
+    drag, limit = h_rates(rates(plan.ensemble), plan.grid.h)["drag"], drag_limit(name)
     measured = measured_error(plan, FEW_STEPS) if NEAR * limit < drag < math.inf else None
     if measured is None or measured[0] <= CHEAPER:
         return plan
     how = f"off by about {100.0 * measured[0]:.2g} % of the path" if measured[0] < 1.0 else "off by more than the path"
-    text = f"step h = {h:g} s: {name} is {how} in {measured[1]:.3g} s, by a run of the first member at half the step"
+    text = f"step h = {plan.grid.h:g} s: {name} is {how} in {measured[1]:.3g} s, by a run of the first member at half the step"
     return replace(plan, grid=plan.grid.telling(f"{text}; shorten the step, or ask for an error: lw.suggest, --error"))

@@ -511,7 +511,7 @@ def test_tether_energy_has_no_slope(name):
     assert abs(E[3000:].mean() - E[:3000].mean()) < 0.05 * np.abs(E).max()
     assert np.abs(E[-600:]).max() < 1.5 * np.abs(E[:600]).max()
     # A bounded error, and of order 2: that of half the step is a quarter.
-    ratio = np.abs(E).max() / np.abs(energies(name, with_coupling(0.6), 0.05, 2000)).max()
+    ratio = np.abs(E[:1000]).max() / np.abs(energies(name, with_coupling(0.6), 0.05, 2000)).max()
     assert ratio == pytest.approx(4.0, rel=0.35)
 
 

@@ -176,7 +176,7 @@ def test_a_sweep(case, line, tmp_path):
 
 def test_what_methods_cost_and_where_they_hold(case, line):
     text = line(
-        "tradeoff", "one.toml", "--of", "position", "--methods", "psi_x,rk4", "--duration", "1", "--seconds", "2"
+        "tradeoff", "one.toml", "--of", "position", "--methods", "psi_x,rk4", "--duration", "1", "--seconds", "10"
     )
     assert re.match(r"For position (the cheapest is|\w+ float\d+ at .* is the cheapest and the most accurate) ", text)
     text = line("stability", "one.toml", "--duration", "1", "--methods", "psi_x,rk4", "--points", "4")

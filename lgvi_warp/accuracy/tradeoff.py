@@ -251,7 +251,7 @@ def tradeoff(
     Args:
         fleet: the ensemble, or a Scene with one.
         t1: end time [s]. Default: run.duration of the scene.
-        of: quantity that decides how far the reference is good enough: any that statistics know ("position", "attitude",
+        of: quantity by whose error the reference is accepted: any that statistics know ("position", "attitude",
             "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position, attitude,
             velocity, angular_velocity and energy are measured as well. Default "position".
         methods: names of the methods to try; each has a setting measured, or is named in `missing`. Default: all that the

@@ -97,7 +97,7 @@ def checked_indices(indices: Any, members: int | None = None) -> np.ndarray:
 
 
 def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members: int | None = None) -> np.ndarray:
-    """Standard normals that the counters give: what a call draws that is not given its draws.
+    """Standard normals of the random number generator: those that a call uses if it is not given its draws.
 
     run(X, lw.uq.draws_of(run, indices)) has the bits of a call with these indices of the same run prepared without
     draws="given" (but for the last digit with `rkmk4` in float32, and with width=1). So what is to be changed may start from

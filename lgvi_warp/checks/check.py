@@ -57,7 +57,7 @@ SEES_VELOCITIES = (*MOVING, "power")
 def check_law(
     term: Term, *, scene: Scene | None = None, samples: int = 64, seed: int = 0, step: float = 1e-5
 ) -> LawReport:
-    """Check a term's device code against its host code, at random views.
+    """Check a term's device code against its host code, at random states.
 
     Each new law costs the compilation of one small kernel. The checks, each made where the law has the role:
 

@@ -143,7 +143,7 @@ class Argument:
         # What only points to another function is said here.
         text = SHARED[self.option]["help"] if re.match("[Aa]s of", self.text) else self.text
         ways = [form.remedy] * (form.metavar not in "NX") + ["may be given several times"] * form.many
-        text = "; ".join([re.sub(r"(?<!\.)\.$", "", text), *ways]) if any(ways) else text
+        text = "; ".join([re.sub(r"(?<!\.)\.$", "", text), *filter(None, ways)]) if any(ways) else text
         settings: dict[str, Any] = {"help": only + text.replace("%", "%%"), "required": self.required}
         if form is FLAG:
             parser.add_argument(self.option, action=argparse.BooleanOptionalAction, **settings)

@@ -29,21 +29,21 @@ RESULT, PART = "result.npz", "result_part.npz"
 def run_arguments(verb: Any) -> None:
     """Add the arguments of the verb run."""
     add_shared(verb, "scene")
-    fleet = verb.add_argument_group("what runs")
+    fleet = verb.add_argument_group("scene and fleet")
     add_shared(fleet, "--duration --members --seed --set")
     fleet.add_argument("--start", metavar="DIR", type=Path,
-                       help="go on from the end of the run in this folder, store or result.npz")  # fmt: skip
+                       help="continue from the end of the run in this folder, store or result.npz")  # fmt: skip
     _how(verb.add_argument_group("method, step and precision"))
-    _solves(verb.add_argument_group("solves and checks"))
+    _solves(verb.add_argument_group("solvers and checks"))
     files = verb.add_argument_group("files")
     add_shared(files, "--out --keep", out=FOLDER.format("runs/NAME of the scene"))
     _stored(files)
-    live = verb.add_argument_group("a look while it runs")
+    live = verb.add_argument_group("live view")
     live.add_argument("--live", action="store_true",
-                      help="show members in the rerun viewer as they are done, then the whole run")  # fmt: skip
+                      help="show members in the rerun viewer as they finish, then the whole run")  # fmt: skip
     live.add_argument("--viewer", metavar="ADDRESS",
-                      help="with --live: a viewer that is open (default: one on this machine, or a new one)")  # fmt: skip
-    machine = verb.add_argument_group("the machine")
+                      help="with --live: address of an open viewer (default: one on this machine, or a new one)")  # fmt: skip
+    machine = verb.add_argument_group("machine")
     add_shared(machine, EXECUTOR, threads=WORKERS)
     machine.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
     machine.add_argument("--device", metavar="D", help="where kernels run: cpu (default), the only one")
@@ -60,19 +60,19 @@ def _how(group: Any) -> None:
     add = group.add_argument
     add("--error", metavar="E", type=float,
         help="choose the cheapest method, step and precision that keep this error, and check it after the run")  # fmt: skip
-    add("--of", help=f"what --error is of (default: position [m]); {OF}")
-    add("--rtol", metavar="R", help="with --atol, rk5, rk5_ck and rk8 choose their own steps: relative error of each")
-    add("--atol", metavar="A", help="with --rtol: absolute error of each step")
+    add("--of", help=f"quantity that --error bounds (default: position [m]): {OF}")
+    add("--rtol", metavar="R", help="relative error of each step; with --atol, for rk5, rk5_ck and rk8, which then choose their steps")
+    add("--atol", metavar="A", help="absolute error of each step; with --rtol")
 
 
 def _solves(group: Any) -> None:
     """Add what is solved and checked in each step of a run."""
     add = group.add_argument
-    add("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
-    add("--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)')
+    add("--solver", help="solver of the implicit rotation, equation (24): quartic, cayley, newton or moser_veselov")
+    add("--iterations", metavar="N", help='iterations of every solve: a number, or "auto" (default: to the tolerance)')
     add("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
-    add("--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)")
-    add("--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step")
+    add("--checks", help="none, safe (default: statuses) or all (also warnings that arise during the run)")
+    add("--on-failure", help="a member that fails: freeze (default) stops it, raise ends with exit code 1, substep divides its step")
 
 
 def _stored(group: Any) -> None:
@@ -88,7 +88,7 @@ def _stored(group: Any) -> None:
     existing = group.add_mutually_exclusive_group()
     add_shared(existing, "--overwrite")
     existing.add_argument("--resume", action="store_true",
-                          help="go on with a run.zarr that is there, if it is this run")  # fmt: skip
+                          help="continue an existing run.zarr of the same run")  # fmt: skip
 
 
 @as_verb("run", "run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary", run_arguments)
@@ -260,10 +260,10 @@ def import_in_background(load: Callable[[str], Any] = importlib.import_module) -
 def resume_arguments(verb: Any) -> None:
     """Add the arguments of the verb resume."""
     add_shared(verb, f"dir {EXECUTOR}", threads=WORKERS)
-    verb.add_argument("--force", action="store_true", help="even on another machine or with other versions")
+    verb.add_argument("--force", action="store_true", help="continue even on another machine or with other versions")
 
 
-@as_verb("resume", "go on with a run that was stopped, and mend what is damaged of it", resume_arguments)
+@as_verb("resume", "continue an interrupted run, and repair its damaged blocks", resume_arguments)
 def resume(chosen: argparse.Namespace, *, simulate: Part = None, finish: Callable[..., list[str]] = report) -> int:
     """Run the verb resume: finish a stored run that was stopped, and mend what is damaged of it.
 

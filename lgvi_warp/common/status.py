@@ -125,9 +125,9 @@ class StatusArray(np.ndarray):
 
 
 class Warnings(IntFlag):
-    """Signs that step, precision, a controller's iterations, a member's numbers or the water do not suit its motion, as bits.
+    """Warnings of a member, as bits: step, precision, iterations, numbers or water do not suit its motion.
 
-    A warning stops nothing. Of two warnings, the higher bit is the more serious.
+    A warning does not stop a run. Of two warnings, the higher bit is the more serious.
 
     Examples:
         >>> import lgvi_warp as lw

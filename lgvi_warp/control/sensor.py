@@ -37,7 +37,7 @@ RANGE = "range"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sensor(MeasuringPart):
-    """A sensor of one thing: truth + bias + walk + noise, rounded to the quantum; new at some ticks, late, and lost at times.
+    """Sensor of one quantity: truth + bias + random walk + noise, rounded; with a rate, a latency and lost readings.
 
     The numbers are in the unit of what is measured: m, rad, m/s or rad/s; of a 3-vector each is one number, which stands for
     all axes, or three. An attitude is turned by the errors as a rotation vector of the body's axes, and the quantum is that of

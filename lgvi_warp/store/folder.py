@@ -47,7 +47,7 @@ class Folder:
         provenance: Scene, ensemble, settings, versions and machine of the run.
         recipe: Settings of its plan.
         shared: Parameters that all members have in common.
-        messages: What the user should know.
+        messages: Remarks on how far the result can be relied on.
         layout: Its arrays.
         found: Blocks that this process found finished.
         ran: Blocks that this process ran.

@@ -10,7 +10,7 @@ import pytest
 import lgvi_warp as lw
 from tests.support.bridges import example
 
-pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'lgvi-warp[fmu]'")
+pytest.importorskip("fmpy", reason="FMPy is not installed: pip install '.[fmu]'")
 if shutil.which("cc") is None:
     pytest.skip("no C compiler, cc, is on the path: no FMU can be made", allow_module_level=True)
 

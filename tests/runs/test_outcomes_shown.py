@@ -438,7 +438,7 @@ def test_a_plain_installation_runs(scene_file, capsys, monkeypatch, absent, file
     code, said, errors = run(scene_file, capsys)
     assert code == 0
     assert "not written" not in errors
-    assert f"note        {words}to have pictures: pip install 'lgvi-warp[viz]'\n" in said
+    assert f"note        {words}to have pictures: {install('viz')}\n" in said
     assert sorted(path.name for path in (scene_file.parent / "out").iterdir()) == files
 
 

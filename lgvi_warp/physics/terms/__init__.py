@@ -27,7 +27,7 @@ IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
 def register(kind: type[AnyTerm]) -> type[AnyTerm]:
-    """Check that scene files know a user's term, event or part of a controller by its `type`; a decorator of the class.
+    """Register a user's term, event or part of a controller under its `type`, for scene files; a decorator of the class.
 
     A class is known as soon as it is made, if its `type` is not taken; this function says so where it is.
 

@@ -234,7 +234,7 @@ def margins(
     method: str | Method | None = None,
     h: float | None = None,
 ) -> Margins:
-    """Find how much gain and delay the loop of each member bears.
+    """Compute the gain and delay margins of each member's loop.
 
     A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
     vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at its

@@ -33,7 +33,7 @@ from lgvi_warp.statistics.base import Statistic
 
 @dataclass(frozen=True)
 class Tuned(Saved):
-    """The numbers with the least risk that a search found.
+    """Tuned numbers: those of least risk that a search found.
 
     Attributes:
         parameters: the numbers by name.
@@ -130,7 +130,7 @@ def tune_gains(
     progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> Tuned:
-    """Search numbers, such as gains, for which the risk of a fleet is least.
+    """Tune numbers, such as gains, to minimise the risk over a fleet.
 
     Every candidate meets the same members, with the same noise: a generation is an ensemble of candidates times members. Then
     it is tried on fresh ones.

@@ -118,7 +118,7 @@ def worst_case(
     progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> WorstCase:
-    """Search numbers within bounds for the member whose quantity is worst.
+    """Search for the worst case of a quantity within bounds of the scene's numbers.
 
     Differential evolution, in which a generation is an ensemble, several times from other places; then the corners, where they
     are few; then a walk from the worst place. What is left of the budget goes to Sobol points over the whole box, and to walks

@@ -100,7 +100,7 @@ def sobol(
 
 
 def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, failed: str = "refuse") -> SobolIndices:
-    """Estimate Sobol indices from outputs that are already there.
+    """Estimate Sobol indices from existing outputs.
 
     Args:
         fleet: the ensemble that was run, with Saltelli's design.
@@ -170,7 +170,7 @@ def morris(
     failed: str = "refuse",
     **settings: Any,
 ) -> MorrisEffects:
-    """Screen for the factors that matter at all, by Morris' elementary effects on few members.
+    """Screen for the factors that matter, by Morris' elementary effects on few members.
 
     Args:
         scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
@@ -209,7 +209,7 @@ def morris(
 def morris_of(
     fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, resamples: int = 100, failed: str = "refuse"
 ) -> MorrisEffects:
-    """Compute elementary effects from outputs that are already there.
+    """Compute elementary effects from existing outputs.
 
     Args:
         fleet: the ensemble that was run, with Morris' design.

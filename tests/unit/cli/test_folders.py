@@ -245,7 +245,7 @@ def test_a_run_is_exported_and_reported(tmp_path, capsys):
 
 def test_files_that_were_written_and_why_not(tmp_path):
     written = Written()
-    from lgvi_warp.common.errors import MissingExtra
+    from lgvi_warp.common.errors import MissingExtra, install
 
     for name, study in (("a", Study(tmp_path / "a")), ("b", Study(ValueError("odd"))), ("c", Study(lw_error("nothing"))),
                         ("d", Study(MissingExtra("plots", "matplotlib", "viz"))), ("e", Study(ImportError("broken"))),
@@ -255,7 +255,7 @@ def test_files_that_were_written_and_why_not(tmp_path):
     assert written.files == [tmp_path / "a"]
     assert written.empty == [f"{tmp_path}/c was not written: nothing"]
     assert written.faults == [f"{tmp_path}/{name}" for name in ("b was not written: odd", "e was not written: broken")]
-    libraries = "not made without matplotlib and pandas; to have pictures: pip install 'lgvi-warp[viz,io]'"
+    libraries = f"not made without matplotlib and pandas; to have pictures: {install('viz,io')}"
     assert written.note_lines() == [f"note        d, f, g: {libraries}"]
     assert Written().note_lines() == []
     with pytest.raises(KeyError):

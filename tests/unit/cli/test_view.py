@@ -70,4 +70,4 @@ def test_a_disk_that_is_full_while_recording_is_one_line_and_leaves_no_file(tmp_
 def test_no_rerun_is_one_line_with_the_remedy(folder, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
     assert main(["view", str(folder), "--out", str(tmp_path / "a.rrd")]) == 2
-    assert "pip install 'lgvi-warp[viz]'" in capsys.readouterr().err
+    assert "pip install '.[viz]'" in capsys.readouterr().err

@@ -47,7 +47,7 @@ def _sensor(default: str = "") -> Any:
 class ErrorStateFilter(MeasuringPart):
     """An error-state Kalman filter of 15 states: position, velocity, attitude, biases of accelerometers and gyroscopes.
 
-    It stands after the sensors that it names. These hand their readings to it alone, and it replaces the measured position,
+    List it after the sensors that it names. These hand their readings to it alone, and it replaces the measured position,
     attitude, velocity over ground and angular velocity by its estimate. At each tick it goes on by what the IMU has
     gained; then it takes each new reading, number by number in Joseph's form. A delayed fix corrects the position copied
     as the fix was taken, with its covariances (stochastic cloning), one at a time. The filter believes the noises that the

@@ -24,7 +24,7 @@ MOST_NAMED = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Assimilated(Summarized, Saved):
-    """Members that followed what was measured, after each measurement.
+    """Members after each measurement that they assimilated: means, spreads, innovations, learned numbers.
 
     Attributes:
         time: Times of the measurements (k,) [s].
@@ -46,7 +46,7 @@ class Assimilated(Summarized, Saved):
             `run.states(final, parameters=parameters)` takes them.
         weights: Weights of the members at the end, (n,), with the sum 1.
         method: Name of the filter.
-        messages: What the user should know.
+        messages: Remarks on how far the result can be relied on.
         provenance: Scene, ensemble, settings, versions and machine.
         units: Units of the learned numbers by name.
     """

@@ -64,7 +64,7 @@ def assimilate(
     threads: int | None = None,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Assimilated:
-    """Let the members of a fleet follow what was measured, and learn numbers of the scene on the way.
+    """Assimilate measurements: correct the members of a fleet by measured series, and estimate numbers of the scene.
 
     The members are the knowledge before the first measurement: their starts and numbers vary as far as these are not known.
     They run to each time of the series, and a filter brings them to the values measured there. What actuators and controllers

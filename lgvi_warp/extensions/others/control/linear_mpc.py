@@ -46,7 +46,7 @@ class Condensed(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearMPC(ControlLaw):
-    """Inputs that are best over a horizon by a linear model and within their limits (Rawlings, Mayne & Diehl 2017, chapter 1).
+    """Linear model predictive control: optimal inputs over a horizon, within limits (Rawlings, Mayne & Diehl 2017, ch. 1).
 
     With x' = A x + B u + d from tick to tick, the inputs of the next `horizon` periods make the sum of (x - x_s)^T Q (x - x_s)
     + (u - u_s)^T R (u - u_s), and (x - x_s)^T P (x - x_s) at the end, least, with |u| up to `limit` and its rate up to

@@ -62,7 +62,9 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], w
     if isinstance(result, str | os.PathLike):
         result = open_run(result)
     if not isinstance(result, Result):
-        raise refusal("result", result, "is no result", "give what lw.solve or lw.open_run returned, or a store's path")
+        raise refusal(
+            "result", result, "is not a result", "give what lw.solve or lw.open_run returned, or a store's path"
+        )
     kept = KeptSamples(result, _weights(weights, result.members))
     asked = _checked(kept, from_list(statistics))
     ensemble = result.provenance.get("ensemble", {})

@@ -131,7 +131,7 @@ def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members:
     """
     noise = getattr(run, "noise", None)
     if not isinstance(noise, NoiseOfCalls):
-        raise refusal("run", run, "is no prepared run", "give what lw.prepare returns")
+        raise refusal("run", run, "is not a prepared run", "give what lw.prepare returns")
     if indices is not None and members is not None:
         raise refusal("members", members, "is given beside indices, which say how many", "leave out one of them")
     settings = EnsembleSettings(members, noise.seed if seed is None else seed)

@@ -26,7 +26,7 @@ def info_arguments(verb: Any) -> None:
 
 @as_verb(
     "info",
-    "say what is in a folder that a verb wrote; without one, the machine, versions, the core's peak",
+    "describe a folder that a verb wrote; without one, this machine, versions and the core's peak speed",
     info_arguments,
     reads=True,
 )
@@ -88,7 +88,9 @@ def bench_arguments(verb: Any) -> None:
     verb.add_argument("--steps", type=int, default=1000, help="number of steps (default 1000)")
 
 
-@as_verb("bench", "measure the speed of the kernel on this machine, beside the core's peak", bench_arguments, reads=True)
+@as_verb(
+    "bench", "measure the speed of the kernel on this machine, beside the core's peak", bench_arguments, reads=True
+)
 def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     """Run the verb bench: measure the kernel's speed on this machine."""
     from lgvi_warp.measuring import speed

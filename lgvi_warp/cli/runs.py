@@ -61,7 +61,11 @@ def _how(group: Any) -> None:
     add("--error", metavar="E", type=float,
         help="choose the cheapest method, step and precision that keep this error, and check it after the run")  # fmt: skip
     add("--of", help=f"quantity that --error bounds (default: position [m]): {OF}")
-    add("--rtol", metavar="R", help="relative error of each step; with --atol, for rk5, rk5_ck and rk8, which then choose their steps")
+    add(
+        "--rtol",
+        metavar="R",
+        help="relative error of each step; with --atol, for rk5, rk5_ck and rk8, which then choose their steps",
+    )
     add("--atol", metavar="A", help="absolute error of each step; with --rtol")
 
 
@@ -72,7 +76,10 @@ def _solves(group: Any) -> None:
     add("--iterations", metavar="N", help='iterations of every solve: a number, or "auto" (default: to the tolerance)')
     add("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
     add("--checks", help="none, safe (default: statuses) or all (also warnings that arise during the run)")
-    add("--on-failure", help="a member that fails: freeze (default) stops it, raise ends with exit code 1, substep divides its step")
+    add(
+        "--on-failure",
+        help="a member that fails: freeze (default) stops it, raise ends with exit code 1, substep divides its step",
+    )
 
 
 def _stored(group: Any) -> None:
@@ -80,11 +87,11 @@ def _stored(group: Any) -> None:
     add_shared(
         group,
         "--store --store-dtype",
-        store="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
-        store_dtype="float32: samples of a float64 run take half the room in the store",
+        store="npz (default): result.npz when the run ends; zarr: run.zarr block by block, which resume can continue",
+        store_dtype="float32: store samples of a float64 run in single precision, half the size",
     )
-    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only these blocks, to be merged later "
-                       "(as many of them as there are)")  # fmt: skip
+    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only the blocks A to B - 1, for merge (as many of "
+                       "them as there are)")  # fmt: skip
     existing = group.add_mutually_exclusive_group()
     add_shared(existing, "--overwrite")
     existing.add_argument("--resume", action="store_true",
@@ -294,7 +301,7 @@ def predict_arguments(verb: Any) -> None:
 
 @as_verb(
     "predict",
-    "time, memory and disk that a run would take, from a small one on this machine",
+    "predict time, memory and disk of a run, from a short run on this machine",
     predict_arguments,
     reads=True,
     aliases=("plan",),

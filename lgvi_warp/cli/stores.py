@@ -18,7 +18,9 @@ from lgvi_warp.common.files import place_of
 
 def merge_arguments(verb: Any) -> None:
     """Add the arguments of the verb merge."""
-    verb.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores of run --blocks, or the folders that hold them")
+    verb.add_argument(
+        "dirs", metavar="DIR", type=Path, nargs="+", help="stores of run --blocks, or the folders that hold them"
+    )
     verb.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
     add_shared(verb, "--overwrite")
 
@@ -51,11 +53,13 @@ def export_arguments(verb: Any) -> None:
         "--to",
         metavar="FILE",
         required=True,
-        help="a file name that ends in .csv, .parquet, .nc, .geojson, .kml or .mcap; or netcdf or parquet, for the whole store",
+        help="file name ending in .csv, .parquet, .nc, .geojson, .kml or .mcap; or netcdf or parquet, for the whole store",
     )
     verb.add_argument("--out", metavar="FILE", type=Path,
                       help="with --to netcdf or --to parquet: the file (default: beside the run)")  # fmt: skip
-    verb.add_argument("--members", metavar="LIST", help="members to convert, as 3,17 or 0:100 (default: all that were kept)")
+    verb.add_argument(
+        "--members", metavar="LIST", help="members to convert, as 3,17 or 0:100 (default: all that were kept)"
+    )
     verb.add_argument("--origin", metavar="LAT,LON", help="origin of the axes [deg] (default: that of the scene)")
     verb.add_argument(
         "--start", metavar="DATE", help="date and time at t = 0, as 2026-06-01T00:00:00Z (default: the scene's)"
@@ -87,7 +91,7 @@ def _members(text: str | None) -> slice | list[int] | None:
         return indices(text)
     words = [word.strip() for word in text.split(":")]
     if len(words) > 3 or not all(word.isdigit() for word in words if word) or words[2:] in ([""], ["0"]):
-        raise SceneError([f"--members {text}: is no list of members; write --members 3,17 or --members 0:100"])
+        raise SceneError([f"--members {text}: is not a list of members; write --members 3,17 or --members 0:100"])
     return slice(*(int(word) if word else None for word in words))
 
 
@@ -98,7 +102,7 @@ def _origin(text: str | None) -> list[float] | None:
     try:
         latitude, longitude = map(float, text.split(","))
     except ValueError:
-        raise SceneError([f"--origin {text}: is no place; write --origin=63.44,10.40"]) from None
+        raise SceneError([f"--origin {text}: is not a place; write --origin=63.44,10.40"]) from None
     return [latitude, longitude]
 
 

@@ -43,9 +43,7 @@ SHARED: dict[str, dict[str, Any]] = {
     "--methods": {"metavar": "A,B", "type": lambda text: [name.strip() for name in text.split(",")]},
     "--step": {"metavar": "S", "help": "time step [s]"},
     "--dtype": {"help": "as for run"},
-    "--keep": {
-        "help": "members whose samples are kept: all (default), none, failed, or indices 3,17"
-    },
+    "--keep": {"help": "members whose samples are kept: all (default), none, failed, or indices 3,17"},
     "--threads": {"metavar": "N", "type": int, "help": "threads (default: all cores, one for few members)"},
     "--executor": {"default": "threads", "help": "threads (default), processes or dask"},
     "--scheduler": {"metavar": "ADDRESS", "help": "address of Dask's scheduler (default: a cluster on this machine)"},

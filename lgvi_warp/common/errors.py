@@ -347,7 +347,7 @@ class Faults:
             return None if diagonal is None else np.diag(diagonal)
         if array.shape != (size, size):
             wanted = f"{size} numbers or a symmetric {size}x{size} matrix [{unit}]"
-            problem = f"has shape {array.shape}" if array.size else "is no matrix"
+            problem = f"has shape {array.shape}" if array.size else "is not a matrix"
             self.add(key, value, problem, f"give {wanted}")
             return None
         matrix = self.finite(key, value, (size, size), unit)

@@ -244,7 +244,7 @@ class WarningArray(np.ndarray):
         Returns: bool, shape (n,).
         """
         if not is_whole(warning, 0, np.iinfo(np.uint16).max):
-            raise refusal("warning", warning, "is no warning", "give one of lw.Warnings, or several joined by |")
+            raise refusal("warning", warning, "is not a warning", "give one of lw.Warnings, or several joined by |")
         return (np.asarray(self) & int(warning)) != 0
 
     def worst(self) -> np.ndarray:

@@ -117,7 +117,7 @@ def _check_keys(yaml: Any, faults: Faults, node: Any) -> None:
     first: dict[str, Any] = {}
     for key, _ in node.value:
         if not isinstance(key, yaml.ScalarNode):
-            faults.add(_line(key), "...", "is a key that is no text", "write key: value")
+            faults.add(_line(key), "...", "is a key that is not a text", "write key: value")
         elif _is_merge(key):
             continue
         elif key.value in first:

@@ -373,7 +373,7 @@ def list_of_names(faults: Faults, key: str, names: Any, known: Collection[str]) 
     """Names of a list that are known and occur once; what is wrong with others is noted."""
     listed = items_of(names)
     if not listed:
-        faults.add(key, names, "is no list of names", f"give some of {', '.join(known)}")
+        faults.add(key, names, "is not a list of names", f"give some of {', '.join(known)}")
         return []
     for i, name in enumerate(listed):
         if faults.choice(f"{key}[{i}]", name, known) and among(name, listed[:i]):

@@ -51,7 +51,7 @@ class BoundedLeastSquares(EffortAllocation):
     iterates: ClassVar[bool] = True
 
     priorities: Any = number((6,), "1", (1.0,) * 6, above=0.0)
-    iterations: int = whole(1, "is no number of iterations", "give 1 or more", default=100)
+    iterations: int = whole(1, "is not a number of iterations", "give 1 or more", default=100)
 
     def device_in(self, aligned: bool) -> str:
         return f"bounded_least_squares:{self.curve_word}"

@@ -116,7 +116,7 @@ class Sensor(MeasuringPart):
             value = float(getattr(self, name))
             if value != round(value):
                 near = f"{np.floor(value):g} or {np.ceil(value):g}"
-                faults.add(name, value, "is no whole number of ticks", f"give {near}")
+                faults.add(name, value, "is not a whole number of ticks", f"give {near}")
         if self.place is not None and not among(self.of, OF_A_PLACE):
             remedy = "leave it out" if not among(self.of, [RANGE]) else "give point"
             faults.add("place", self.place, f"has no meaning for a sensor of {self.of}", remedy)

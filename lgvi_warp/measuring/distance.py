@@ -78,7 +78,7 @@ def compared_in(of: Any) -> Distance:
     if isinstance(of, str) and of.strip().startswith(MEAN):
         entry = compared_in(of.strip().removeprefix(MEAN))
         if entry.name == "attitude" or entry.mean:
-            problem = "is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"
+            problem = "is not a mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"
             raise SceneError([f"of = {of!r}: {problem}"])
         inner = entry.functional or functional("of", entry.name)
         return replace(entry, name=MEAN + entry.name, functional=inner, mean=True)

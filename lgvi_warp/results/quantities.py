@@ -334,7 +334,7 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
                 function = functional("of", request)
                 results.append(OfResult(function.label, function, not isinstance(request, str)))
         else:
-            faults.add("of", request, "is no quantity", REMEDY)
+            faults.add("of", request, "is not a quantity", REMEDY)
     metrics = [result.label for result in results if isinstance(result, MetricQuantity)]
     for name in sorted({name for name in metrics if metrics.count(name) > 1}):
         faults.add("of", name, "is the name of another metric", 'give it a name of its own: name="..."')

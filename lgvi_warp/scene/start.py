@@ -77,7 +77,7 @@ class Environment:
             object.__setattr__(self, "start", self.start.isoformat())
         if self.start is not None and _moment(self.start) is None:
             remedy = 'write it as "2026-06-01T00:00:00Z"'
-            faults.add("start", self.start, "is no date and time", remedy)
+            faults.add("start", self.start, "is not a date and time", remedy)
         faults.raise_if_any()
 
     @property

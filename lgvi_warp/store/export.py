@@ -155,7 +155,7 @@ def _ending(to: Any) -> str:
     ending = Path(to).suffix.lower() if isinstance(to, str | os.PathLike) else ""
     if ending not in (known := [*WRITERS, *extensions.words("exporters")]):
         remedy = f"give a name that ends in {', '.join(known)}, or a word of {', '.join(FORMATS)}"
-        raise refusal("to", to, "is no file of a known kind", remedy)
+        raise refusal("to", to, "is not a file of a known kind", remedy)
     return ending
 
 

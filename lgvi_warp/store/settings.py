@@ -62,7 +62,7 @@ class Store:
     def __post_init__(self) -> None:
         faults = Faults("store.")
         if not isinstance(self.path, str | os.PathLike) or self.whole.suffix != ".zarr":
-            faults.add("path", self.path, "is no folder of a store", 'end its name in .zarr: "runs/x/run.zarr"')
+            faults.add("path", self.path, "is not a folder of a store", 'end its name in .zarr: "runs/x/run.zarr"')
         read(self, faults)
         with faults.including():
             for name in () if self.fields is None else listed("fields", self.fields, "names of fields"):

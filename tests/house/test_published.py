@@ -64,7 +64,7 @@ def test_the_pages_install_it_from_where_it_is(page):
 
 
 def test_messages_and_pages_install_extras_from_where_they_are():
-    assert errors.PUBLISHED == CONFIGURATION["tool"]["lgvi_warp"]["published"]
+    assert CONFIGURATION["tool"]["lgvi_warp"]["published"] == errors.PUBLISHED
     home = Path(errors.__file__)
     files = [path for folder in ("docs", "lgvi_warp", "examples") for path in (ROOT / folder).rglob("*")]
     texts = {path: path.read_text() for path in files if path.suffix in (".md", ".py", ".ipynb") and path != home}

@@ -13,6 +13,7 @@ import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.cli import report
 from lgvi_warp.common import status
+from lgvi_warp.common.errors import install
 from lgvi_warp.common.status import Status, StatusArray, failed, stopped
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.results import outcomes

@@ -21,7 +21,7 @@ def put_in_place(root: Element, given: Any) -> None:
     """Put models in the place of <include> elements whose <name>, <uri>, or its last part, is in a map of paths or texts."""
     if not (isinstance(given, Mapping) and all(isinstance(each, str | os.PathLike) for each in given.values())):
         raise refusal(
-            "include", given, "is no map of files", "give include={'tethys': 'model.sdf'}: a path or text by name"
+            "include", given, "is not a map of files", "give include={'tethys': 'model.sdf'}: a path or text by name"
         )
     files = {name: parse_xml(source, f"include {name!r}") for name, source in given.items()}
     used: set[str] = set()

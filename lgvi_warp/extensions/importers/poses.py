@@ -170,5 +170,5 @@ class Poses:
         except KeyError:
             outside = name in ("world", "__root__")
             remedy = "name a frame of it" if outside else closest(name, [*scope.named, "__model__"])
-            self.faults.add("relative_to", name, f"is no frame of the model {scope.model.get('name')!r}", remedy)
+            self.faults.add("relative_to", name, f"is not a frame of the model {scope.model.get('name')!r}", remedy)
             return scope, "__model__"

@@ -133,7 +133,7 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
     faults = Faults()
     chance = faults.number("level", level)
     if chance is not None and not 0.0 < chance < 1.0:
-        faults.add("level", level, "is no probability between 0 and 1", "give 0.95, say")
+        faults.add("level", level, "is not a probability between 0 and 1", "give 0.95, say")
     faults.raise_if_any()
     missing = [name for name in NEEDED if name not in result.samples]
     if missing:

@@ -350,7 +350,7 @@ def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: floa
     if controller is None:
         faults.add("controller", None, "is not in the scene, and margins are those of a loop", "give [controller]")
     elif loop is not None and loop not in (keys := [law.key for law in controller.laws]):
-        faults.add("loop", loop, "is no law of the controller", closest(loop, keys))
+        faults.add("loop", loop, "is not a law of the controller", closest(loop, keys))
     elif not faults and seconds < LEAST_TICKS * controller.period:
         least = LEAST_TICKS * controller.period
         faults.add(

@@ -175,7 +175,7 @@ def tune_gains(
     measure = risk_of(faults, risk)
     box = _checked_box(faults, ensemble, over, budget)
     if fresh is not None and (not isinstance(fresh, int) or fresh < 0):
-        faults.add("fresh", fresh, "is no number of members", "give a whole number, 0 for none")
+        faults.add("fresh", fresh, "is not a number of members", "give a whole number, 0 for none")
     if ensemble.weights(0, 1) is not None:
         faults.add("fleet", "...", "has members with weights, and a risk counts them alike", "leave the weights out")
     faults.raise_if_any()

@@ -197,7 +197,7 @@ class Sweep(SweepTable):
         limited = [name for name, (_, below) in self.conditions.limits.items() if np.isfinite(below)]
         by = by or next(iter([*limited, *self.metrics]))
         if by not in self.metrics:
-            raise refusal("by", by, "is no metric of this sweep", closest(str(by), self.metrics))
+            raise refusal("by", by, "is not a metric of this sweep", closest(str(by), self.metrics))
         places: list[tuple[float, float, int, int]] = []
         for cell in (cell for name in ((case,) if case else self.cases) for cell in self.cells_of(name)):
             record = self.record(cell)

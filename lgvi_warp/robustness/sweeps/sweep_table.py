@@ -105,9 +105,9 @@ class SweepTable:
         for name, value in (at or {}).items():
             axes = self.setup.axes
             if name not in axes:
-                raise refusal("at", name, "is no axis of the grid", closest(name, tuple(axes)))
+                raise refusal("at", name, "is not an axis of the grid", closest(name, tuple(axes)))
             if value not in axes[name]:
-                raise refusal(f'at["{name}"]', value, "is no value of this axis", f"give one of {axes[name]}")
+                raise refusal(f'at["{name}"]', value, "is not a value of this axis", f"give one of {axes[name]}")
         wanted = (at or {}).items()
         return [cell for cell in self.cells if cell.case.name == case and wanted <= cell.point.items()]
 

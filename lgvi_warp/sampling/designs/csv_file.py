@@ -121,7 +121,7 @@ def _faults_of_line(
     for name, cell in zip(chosen, cells, strict=True):
         number = _number(cell)
         if number is None:
-            description = f"{cell!r}, which is no number," if cell.strip() else "no number"
+            description = f"{cell!r}, which is not a number," if cell.strip() else "no number"
         elif not math.isfinite(number):
             description = f"{cell.strip()}, which is not finite,"
         else:

@@ -148,10 +148,10 @@ def _parsed(key: str, of: str, text: str) -> Functional:
         meaning = of_number(key, of, inner)
     else:
         form = 'write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"'
-        raise refusal(key, of, "is no quantity", f"{form}, of {', '.join(KNOWN)}")
+        raise refusal(key, of, "is not a quantity", f"{form}, of {', '.join(KNOWN)}")
     base = Functional(text.replace("-", " - "), meaning, tuple(reversed(names)))
     if "horizontal" in base.functions and (base.functions[0] != "horizontal" or not _inertial(meaning)):
-        problem = "has a horizontal length of what is no vector in inertial axes"
+        problem = "has a horizontal length of what is not a vector in inertial axes"
         raise refusal(key, of, problem, "write horizontal(navigation_error) or horizontal(velocity_inertial)")
     if entry is not None and (base.size == 1 or entry >= base.size):
         fault = f"{outer} has {base.size} component{'s' * (base.size > 1)}"
@@ -226,7 +226,7 @@ def quantity(key: str, of: Any) -> Quantity:
                 raise refusal(f"{key}[{i}]", item, fault, "ask for it alone")
         return joined(parts)
     remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
-    raise refusal(key, of, "is no quantity", remedy)
+    raise refusal(key, of, "is not a quantity", remedy)
 
 
 def over_path(quantity: Quantity) -> Functional | None:

@@ -68,8 +68,8 @@ def estimate(
 ) -> Estimated:
     """Estimate a mean, probability or quantile to a requested accuracy at the lowest cost.
 
-    A pilot runs few members at several steps. It estimates the bias of each, and what plain Monte Carlo, Sobol points, regression
-    and levels (paired differences of fine and coarse settings) would cost. The cheapest is run with numbers of members that
+    A pilot runs few members at several steps. It estimates the bias of each, and the cost of plain Monte Carlo, Sobol points,
+    regression and levels (paired differences of fine and coarse settings). The cheapest is run with numbers of members that
     are fixed beforehand.
 
     Choices follow counted costs: steps times the evaluations of forces of each. One seed gives one answer, to the bit, on any
@@ -87,7 +87,8 @@ def estimate(
         error: requested root mean square error, of sampling and bias together, in the unit of the statistic; above 0.
         relative_error: the same as a fraction of the statistic, in place of `error`.
         t1: end time [s]. Default: run.duration of the scene.
-        risk: risk of a quantity or a metric: "mean" (the default), the level of a quantile, such as 0.95, or lw.metrics.CVaR(0.05).
+        risk: risk of a quantity or a metric: "mean" (the default), the level of a quantile, such as 0.95, or
+            lw.metrics.CVaR(0.05).
         cheaper: scenes that cost less and behave alike: numbers that differ, such as {"controller.delay": 0.0}, or Scenes.
             They serve as coarse levels alone. Default none.
         method: fixes the method. Default: the scene's own, and one that suits what acts.
@@ -104,8 +105,8 @@ def estimate(
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Other than with threads, the cost
             is the elapsed time.
         scheduler: address of Dask's scheduler.
-        store: folder for the results of runs: the same call continues from there after an interruption, with the same answer. A
-            folder of other arguments is refused. Default: none.
+        store: folder for the results of runs: the same call continues from there after an interruption, with the same answer.
+            A folder of other arguments is refused. Default: none.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             from 0 to 1.
 
@@ -198,7 +199,7 @@ def recipe_of(recipe: Mapping[str, Any], question: Question, scenes: int) -> tup
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, SceneError):
             raise
-        raise refusal("recipe", recipe, "is no recipe of an answer", remedy) from None
+        raise refusal("recipe", recipe, "is not a recipe of an answer", remedy) from None
     if label != question.label or most >= scenes:
         raise refusal(
             "recipe", label, f"is of another question than {question.label}, or of more cheaper scenes", remedy
@@ -235,7 +236,7 @@ def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
     """The same variation of each cheaper scene; names of what varies that a change fixes stay varied."""
     listed = items_of(cheaper)
     if listed is None:
-        raise refusal("cheaper", cheaper, "is no list of scenes", 'give [{"controller.delay": 0.0}]')
+        raise refusal("cheaper", cheaper, "is not a list of scenes", 'give [{"controller.delay": 0.0}]')
     faults, fleets = Faults(), list[Ensemble]()
     for i, entry in enumerate(listed):
         with faults.including():
@@ -244,7 +245,7 @@ def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
             if isinstance(entry, Ensemble):
                 entry = entry.scene
             if not isinstance(entry, Scene):
-                raise refusal(f"cheaper[{i}]", entry, "is no scene", 'give {"controller.delay": 0.0}, or a Scene')
+                raise refusal(f"cheaper[{i}]", entry, "is not a scene", 'give {"controller.delay": 0.0}, or a Scene')
             fleets.append(Ensemble(entry, 1, fleet.seed, fleet.vary))
     faults.raise_if_any()
     return fleets

@@ -92,7 +92,7 @@ def sobol(
     if not faults and samples % replicates:
         near = samples // replicates * replicates
         ways = " or ".join(str(number) for number in (near, near + replicates) if number)
-        faults.add("samples", samples, f"is no multiple of replicates = {replicates}", f"give {ways}")
+        faults.add("samples", samples, f"is not a multiple of replicates = {replicates}", f"give {ways}")
     faults.raise_if_any()
     fleet = designed(scene, vary, seed, design, samples)
     outputs = evaluate(fleet, of, **settings)

@@ -84,7 +84,9 @@ def given_data(
     if isinstance(result, str | os.PathLike):
         result = open_run(result)
     if not isinstance(result, Result):
-        raise refusal("result", result, "is no result", "give what lw.solve or lw.open_run returned, or a store's path")
+        raise refusal(
+            "result", result, "is not a result", "give what lw.solve or lw.open_run returned, or a store's path"
+        )
     interests, inputs = quantities(of), varied(result)
     _check(result, inputs, confidence)
     columns, labels = _values(result, interests)

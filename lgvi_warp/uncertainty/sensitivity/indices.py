@@ -135,7 +135,7 @@ class Indices(Saved):
         """Indices of the analysis that the content names. Raises ValueError where that is not known."""
         kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
         if not kinds:
-            raise ValueError(f"{content['name']!r} is no analysis")
+            raise ValueError(f"{content['name']!r} is not an analysis")
         return kinds[0]._from(content)
 
     @classmethod

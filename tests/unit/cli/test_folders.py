@@ -160,7 +160,7 @@ def test_members_to_view_are_a_list():
     assert view.indices(None) is None
     assert view.indices(" 3, 17") == [3, 17]
     for text in ("3,,4", "-1", "", "3;4"):
-        with pytest.raises(lw.SceneError, match="is no list of members; write --members 3,17"):
+        with pytest.raises(lw.SceneError, match="is not a list of members; write --members 3,17"):
             view.indices(text)
 
 

@@ -114,7 +114,7 @@ SCENES = {
         BODY + "[ensemble]\nmembers = 2147483648\nsampling = {latin_hypercube = {group = 2147483648}}\n",
         ("group", "1048576")),
     "a law of scipy's that is none": (
-        VARY + "'vehicle.mass' = {scipy = {name = '__import__'}}\n", ("__import__", "is no distribution")),
+        VARY + "'vehicle.mass' = {scipy = {name = '__import__'}}\n", ("__import__", "is not a distribution")),
     "a law of the user's": (VARY + "'vehicle.mass' = {own = {law = 'eval'}}\n", ("a file does not hold",)),
     "a table that is a device": (TABLED.replace("table.csv", "/dev/zero"), ("is a device",)),
 }  # fmt: skip
@@ -257,7 +257,7 @@ SET = {
     "run.method=psi_s\npsi": "is not one value",
     "vehicle.mass=" + "9" * 5000: "vehicle.mass",
     "vehicle.mass=" + "[" * 5000 + "]" * 5000: "nested",
-    "=3": "is no NAME=VALUE",
+    "=3": "is not a NAME=VALUE",
 }
 ARGUMENTS = (
     [([*option.split(), value, PAPER], f"{key} = {told}") for option, key, values in OPTIONS for value, told in values.items()]

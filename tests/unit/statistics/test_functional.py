@@ -45,13 +45,13 @@ REFUSED = {
     "median(speed)": "has a function 'median' that is not known; did you mean 'mean'?",
     "max(min(depth))": "looks over the path twice; keep one of max, min, mean, range",
     "max(position)[3]": "max(position) has 3 components; give one of them from 0, or max(position) alone",
-    "max(speed": 'is no quantity; write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"',
+    "max(speed": 'is not a quantity; write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"',
     "max(depth) - depth": "max(depth) looks over the path, and has no difference; give a difference of quantities at",
     "depth - speed": "depth has 1 x [m] and speed has 1 x [m/s]; give quantities of one unit and size",
     "position - depth": "position has 3 x [m] and depth has 1 x [m]; give quantities of one unit and size",
     "depth - deph": "is not known; did you mean 'depth'?",
-    "horizontal(depth)": "has a horizontal length of what is no vector in inertial axes; write horizontal(navigation_error)",
-    "horizontal(max(position))": "has a horizontal length of what is no vector in inertial axes",
+    "horizontal(depth)": "has a horizontal length of what is not a vector in inertial axes; write horizontal(",
+    "horizontal(max(position))": "has a horizontal length of what is not a vector in inertial axes",
 }  # fmt: skip
 
 

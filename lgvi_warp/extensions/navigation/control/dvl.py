@@ -82,7 +82,7 @@ class DVL(MeasuringPart):
     def check(self, faults: Faults) -> None:
         if float(self.every) != round(float(self.every)):
             near = f"{np.floor(self.every):g} or {np.ceil(self.every):g}"
-            faults.add("every", float(self.every), "is no whole number of ticks", f"give {near}")
+            faults.add("every", float(self.every), "is not a whole number of ticks", f"give {near}")
         for first, last in (("least_range", "greatest_range"), ("silent_from", "silent_to")):
             begin, end = float(getattr(self, first)), float(getattr(self, last))
             if np.isfinite(end) and end <= begin:

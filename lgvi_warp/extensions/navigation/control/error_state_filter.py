@@ -147,7 +147,7 @@ class ErrorStateFilter(MeasuringPart):
         what = f"a sensor of {reading}" if reading else f"a part of type {kind.type}"
         if sensor is None:
             remedy = closest(key, before) if before else f"give the scene {what}, above the filter"
-            faults.add(word, key, "is no sensor that stands before the filter", remedy)
+            faults.add(word, key, "is not a sensor that stands before the filter", remedy)
         elif not isinstance(sensor, kind) or (isinstance(sensor, Sensor) and sensor.of != reading):
             faults.add(word, key, f"is not {what}", f"name one that is {what}")
         elif list(self.uses.values()).count(key) > 1:

@@ -147,7 +147,7 @@ class Assimilated(Summarized, Saved):
         faults = Faults()
         chance = faults.number("level", level)
         if chance is not None and not 0.0 < chance < 1.0:
-            faults.add("level", level, "is no probability between 0 and 1", "give 0.95, say")
+            faults.add("level", level, "is not a probability between 0 and 1", "give 0.95, say")
         faults.raise_if_any()
         tests = {}
         for name, apart in self.innovations.items():
@@ -187,5 +187,5 @@ def _packed(rows: np.ndarray) -> dict[str, Any]:
 def _unpacked(content: Mapping[str, Any]) -> np.ndarray:
     dtype = np.dtype(content["dtype"])
     if dtype.kind not in "fiub":
-        raise ValueError(f"{dtype} are no numbers")
+        raise ValueError(f"{dtype} are not numbers")
     return np.frombuffer(base64.b64decode(content["base64"]), dtype).reshape(content["shape"]).copy()

@@ -113,8 +113,8 @@ class LinearMPC(ControlLaw):
     rate_limit: Any = number(("m",), "N/s, N m/s", None, optional=True, above=0.0)
     disturbance_time: Any = number((), "s", 5.0, above=0.0, infinite=True)
     tracked: Sequence[str] | None = None
-    horizon: int = whole(1, "is no number of periods", f"give 1 to {LONGEST}", default=10)
-    iterations: int = whole(1, "is no number of iterations", "give 1 or more", default=50)
+    horizon: int = whole(1, "is not a number of periods", f"give 1 to {LONGEST}", default=10)
+    iterations: int = whole(1, "is not a number of iterations", "give 1 or more", default=50)
     period: float | None = real(None, unit="s", least=1e-9)
 
     def check(self, faults: Faults) -> None:

@@ -90,8 +90,8 @@ def _stored(group: Any) -> None:
         store="npz (default): result.npz when the run ends; zarr: run.zarr block by block, which resume can continue",
         store_dtype="float32: store samples of a float64 run in single precision, half the size",
     )
-    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only the blocks A to B - 1, for merge (as many of "
-                       "them as there are)")  # fmt: skip
+    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only blocks A to B - 1, to be merged later "
+                       "(as many of them as there are)")  # fmt: skip
     existing = group.add_mutually_exclusive_group()
     add_shared(existing, "--overwrite")
     existing.add_argument("--resume", action="store_true",

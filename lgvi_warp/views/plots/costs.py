@@ -25,9 +25,9 @@ Rows = Iterable[Mapping[str, Any]] | str | os.PathLike[str]
 
 @picture
 def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw the cost of a member's step against the number of members, and against the number of threads.
+    """Draw what a member's step costs against the number of members, and against the number of threads.
 
-    A dotted line shows ideal scaling: every thread as fast as one alone.
+    A dotted line says what as many threads would cost if each were as fast as one alone.
 
     Args:
         rows: Rows that `python -m benchmarks run members threads` prints, or a file of them in JSON lines; rows of other
@@ -63,7 +63,7 @@ def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> 
 
 @picture
 def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw the cost of a step with each term alone; a line shows the scene without terms.
+    """Draw what a step costs with each term alone, beside the scene without terms, which is a line.
 
     Args:
         rows: Rows of `lw.bench.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed; of several

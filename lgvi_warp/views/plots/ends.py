@@ -97,7 +97,7 @@ def _first(result: Result, code: Status, when: np.ndarray) -> str:
 def histogram(
     result: Result, of: Any = "depth", at: float | None = None, *, ax: Any = None, path: FilePath | None = None
 ) -> Any:
-    """Draw the histogram of a number of the members at one time, stacked by their outcome by then.
+    """Draw how a number of the members is spread at one time, stacked by what had become of them by then.
 
     Members that ended are counted at their last state. Depths are on the vertical axis, downwards. Without samples a statistic
     lw.statistics.Histogram of the quantity is drawn.

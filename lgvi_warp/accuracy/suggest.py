@@ -306,7 +306,7 @@ def suggestion_of_mean(
         reference_error=best.beyond,
         rivals=tuple((candidate(each), us[each.setting], each.largest) for each in others),
         asked=compared,
-        messages=("of a mean the bias at the end is told, with its 95 % interval, as lw.estimate does",),
+        messages=("for a mean, the bias at the end is reported with its 95 % interval, as by lw.estimate",),
     )
 
 

@@ -121,7 +121,11 @@ class Tradeoff(Saved):
         if not count:
             return f"No setting of a method has a measurement up to {self.t1:g} s."
         if not front:
-            why = f"the reference tells none of their errors in {self.of}" if self.reference_error else "noise acts"
+            why = (
+                f"the reference is too inaccurate for their errors in {self.of}"
+                if self.reference_error
+                else "noise acts"
+            )
             return f"No setting of {count} is the most accurate: {why}."
         if len(front) == 1:
             return f"For {self.of} {self._text(front[0])} is the cheapest and the most accurate setting of {count}."

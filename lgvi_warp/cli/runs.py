@@ -157,7 +157,7 @@ def end_of_run(chosen: argparse.Namespace) -> Any:
     if held is None:
         raise SceneError([f"--start {path}: holds no run; give a folder that lgvi-warp run wrote"])
     if held[0].end is None:
-        raise SceneError([f"--start {path}: did not keep its end; run it again with the samples of all members"])
+        raise SceneError([f"--start {path}: has no final states; run it again with the samples of all members"])
     return held[0].final
 
 

@@ -77,7 +77,7 @@ _TEXT = {
     Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "
     "loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
     Status.ENERGY_GREW: "the total energy grew to more than 100 times the energy available, although no force of the scene "
-    "supplies any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
+    "supplies any: the method is unstable at this step; shorten it (result.warnings names what is too fast)",
     Status.BACKWARD_DRAG: "this composition takes some stages with a negative step, and the drag is too strong to be "
     "integrated backward: their drag number, (back) (l + q|v|) / I, passed 0.5; use the method that is composed, or shorten "
     "the step",

@@ -44,9 +44,9 @@ def parsed(text: str) -> Any:
     except RecursionError:
         raise SceneError([DEEP]) from None
     except yaml.YAMLError as error:
-        raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
+        raise SceneError([f"YAML: {' '.join(str(error).split())}; correct that line"]) from None
     except Exception as error:  # PyYAML passes on what int(), float() and dates raise
-        text = f"YAML: has a value that cannot be read ({type(error).__name__}: {error}); mend it"
+        text = f"YAML: has a value that cannot be read ({type(error).__name__}: {error}); correct it"
         raise SceneError([text]) from None
 
 

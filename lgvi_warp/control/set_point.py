@@ -41,7 +41,7 @@ class SetPoint(Guidance):
 
     def check(self, faults: Faults) -> None:
         if not self.parameters():
-            faults.add("", "", "wants nothing", "give position, depth, heading or speed")
+            faults.add("", "", "sets nothing", "give position, depth, heading or speed")
         if self.position is not None and self.depth is not None:
             faults.add("depth", self.depth, "is given beside position", "keep one of them: position[2] is the depth")
 

@@ -113,7 +113,7 @@ add_signals(
 )
 add_signals(
     Signal(_OF_ITERATIONS, UNCONVERGED),
-    absent=("is told by parts that iterate, which this controller has not", "leave it out"),
+    absent=("is reported by parts that iterate, and this controller has none", "leave it out"),
 )
 add_signals(
     Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""),

@@ -266,7 +266,7 @@ def _of_ends(text: str) -> EndQuantity | None:
         return None
     function = functional("of", name)
     if function.over_path:
-        raise refusal("of", text, "looks over the path, which has no time", f"give {name!r} alone")
+        raise refusal("of", text, "is taken over the whole path, which has no time", f"give {name!r} alone")
     label = f"{function.label} at {end}"
     try:
         when = float(end)

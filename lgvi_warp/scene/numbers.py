@@ -54,7 +54,7 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any], keys: Sequence[str] 
                 f'"{name}"',
                 value,
                 f"is not a number of {target.name}, of shape {array.shape}",
-                "give one that there is",
+                "give an existing one",
             )
             continue
         place[attribute] = array

@@ -250,7 +250,7 @@ class Start:
         chosen = {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
         if (place := chosen.pop("geodetic", None)) is not None:
             if self.converted is None:
-                raise refusal("start.geodetic", place, "is of no scene", "give the start to a scene with an origin")
+                raise refusal("start.geodetic", place, "needs a scene", "give the start to a scene with an origin")
             chosen = {"position": self.converted} | chosen
         alternatives = {"rotation_vector": ATTITUDES, "velocity": VELOCITIES}
         for name in ("position", "rotation_vector", "velocity", "angular_velocity"):

@@ -203,4 +203,4 @@ def _target(name: str, known: Mapping[str, Named]) -> Named:
     if not hint.startswith("did you mean"):  # list the statistics alone, not their components
         estimates = dict.fromkeys(estimate for _, estimate, _ in known.values())
         hint = closest(name, estimates) if known else 'give a mean, such as "mean depth", or statistics'
-    raise refusal("until.statistic", name, "is none of the run's statistics", hint)
+    raise refusal("until.statistic", name, "is not a statistic of the run", hint)

@@ -250,7 +250,7 @@ def test_quantities_of_outcomes_and_times():
     assert found.quantities == ("outcome floor", "outcome surface")
     assert found.mean.sum() <= 1.0
     refused = {"outcome flor": "is not an outcome of this scene; did you mean 'floor'", "depth at flor": "did you mean",
-               "max(depth) at floor": "looks over the path", "depth at -1": "is at no time of a run"}  # fmt: skip
+               "max(depth) at floor": "is taken over the whole path", "depth at -1": "is at no time of a run"}  # fmt: skip
     for text, words in refused.items():
         with pytest.raises(lw.SceneError, match=words):
             lw.uq.sobol(members, text, samples=8, **how)

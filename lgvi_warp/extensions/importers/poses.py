@@ -139,7 +139,7 @@ class Poses:
         if key in self.known:
             return self.known[key]
         if key in chain or len(chain) > LONGEST_CHAIN:
-            self.faults.add(f"{scope.prefix}{name} <pose>", name, "is relative to itself", "mend relative_to")
+            self.faults.add(f"{scope.prefix}{name} <pose>", name, "is relative to itself", "correct relative_to")
             return HERE
         chain = (*chain, key)
         if name == "__model__":

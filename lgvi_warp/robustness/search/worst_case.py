@@ -100,7 +100,8 @@ class WorstCase(Saved):
             return []
         bound = "a lower bound of the largest" if self.worst == "largest" else "an upper bound of the smallest"
         restarts = ", ".join(f"{value:.6g}" for value in self.restarts)
-        seen = f"; a separate peak in {self.unseen:.2g} of the box or more was met with 95 %" if self.points else ""
+        peak = f"; a separate peak in {self.unseen:.2g} of the box or more would be found with probability 95 %"
+        seen = peak if self.points else ""
         return [f"bound       {bound}; restarts: {restarts}{seen}"]
 
 

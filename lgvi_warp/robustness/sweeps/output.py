@@ -138,7 +138,7 @@ class Sweep(SweepTable):
             raise refusal("case", cell.name, "did not ask for its rare failure", "give the case rare = true")
         if answer.found is None:
             raise refusal(
-                "case", cell.name, f"has no rare failure: {answer.refused}", "mend it, or ask for another one"
+                "case", cell.name, f"has no rare failure: {answer.refused}", "correct it, or choose another one"
             )
         return answer.found
 

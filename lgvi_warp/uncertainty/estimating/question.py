@@ -50,7 +50,7 @@ class Question:
         if self.metric.ticks and scene.controller is not None:
             every = None  # a metric comes to every tick by itself
         elif every is None:
-            problem = "looks over the path, and the scene says of no samples"
+            problem = "is taken over the whole path, and the scene keeps no samples"
             raise refusal("of", self.label, problem, "give [run] save_every, the time between them")
         return {"statistics": [self.metric], "save": SaveAt(every=every, fields=("position",))}
 

@@ -156,7 +156,7 @@ def rare_event(
     if found.probability >= 1.0:
         lost = bool(np.isinf(found.limits).all())
         problem = f"happens for each of {found.members:,} members" + (", all of which failed" if lost else "")
-        remedy = "mend what fails" if lost else ASK
+        remedy = "fix the failing members" if lost else ASK
         raise refusal("limit", condition.label, problem, remedy)
     return _told(found, own, others, condition, settings)
 

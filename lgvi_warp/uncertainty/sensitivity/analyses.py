@@ -309,7 +309,7 @@ def salib() -> Callable[..., Any]:
 def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
     """Mask of groups without failure (N,), and messages about the others; FailedMembers where too few have none."""
     if outputs.failed.any() and failed == "refuse":
-        remedy = 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
+        remedy = 'fix the failing members (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
         raise FailedMembers([outputs.text(remedy)])
     whole = np.asarray(~outputs.failed.reshape(-1, group).any(axis=1))
     count, messages = int(whole.sum()), list[str]()

@@ -78,7 +78,7 @@ def test_contents_of_a_folder(tmp_path):
     (alone / "c.zarr").mkdir(parents=True)
     assert contents(alone) == [Content("store", alone / "c.zarr")]
     assert contents(tmp_path / "none.zarr") == [Content("store", tmp_path / "none.zarr")]
-    for name, words in (("none", "is not there"), ("c.zarr/..", "holds nothing that a verb wrote")):
+    for name, words in (("none", "is not there"), ("c.zarr/..", "contains no results of a command")):
         (tmp_path / "empty").mkdir(exist_ok=True)
         place = tmp_path / ("empty" if "nothing" in words else name)
         with pytest.raises(lw.SceneError) as caught:

@@ -292,7 +292,7 @@ def test_worst_cases_in_words():
                                np.array([3.0, 2.5]), 64, None)  # fmt: skip
     assert str(one).splitlines() == ["bound       a lower bound of the largest; restarts: 3, 2.5", one.answer]
     assert "an upper bound of the smallest;" in str(dataclasses.replace(one, worst="smallest"))
-    assert "; a separate peak in 0.0003 of the box or more was met with 95 %\n" in str(
+    assert "; a separate peak in 0.0003 of the box or more would be found with probability 95 %\n" in str(
         dataclasses.replace(one, points=10_000)
     )
     assert (one.unseen, dataclasses.replace(one, points=10_000).unseen) == (1.0, box.least_peak(10_000))

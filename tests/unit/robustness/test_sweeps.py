@@ -313,7 +313,7 @@ def test_members_that_pass_and_that_do_not(answer):
 
 
 @pytest.mark.parametrize(("ask", "words"), [
-    (lambda answer: answer.cells_of("sof"), "case = 'sof': is none of this sweep; did you mean 'soft'"),
+    (lambda answer: answer.cells_of("sof"), "case = 'sof': is not part of this sweep; did you mean 'soft'"),
     (lambda answer: answer.cells_of("soft", {"controller.dela": 0.02}),
      "at = 'controller.dela': is not an axis of the grid; did you mean 'controller.delay'"),
     (lambda answer: answer.cells_of("soft", {"controller.delay": 0.03}),
@@ -321,9 +321,9 @@ def test_members_that_pass_and_that_do_not(answer):
     (lambda answer: answer.cell("soft"),
      "at = None: leaves 2 cells of 'soft'; name one point of the grid: at={'controller.delay': 0.02}"),
     (lambda answer: answer.values("soft", "iae", {"controller.delay": 0.02}),
-     "metric = 'iae': is none of this sweep; did you mean 'iae heading'?"),
+     "metric = 'iae': is not part of this sweep; did you mean 'iae heading'?"),
     (lambda answer: answer.values("soft", "zzz", {"controller.delay": 0.02}),
-     "metric = 'zzz': is none of this sweep; known: overshoot heading, iae heading, time_to_failure"),
+     "metric = 'zzz': is not part of this sweep; known: overshoot heading, iae heading, time_to_failure"),
     (lambda answer: answer.worst(by="iae"), "by = 'iae': is not a metric of this sweep; did you mean 'iae heading'?"),
 ])  # fmt: skip
 def test_what_a_sweep_has_not_is_refused_with_what_it_has(gridded, ask, words):
@@ -333,7 +333,7 @@ def test_what_a_sweep_has_not_is_refused_with_what_it_has(gridded, ask, words):
 
 
 def test_a_refused_case_is_named_where_it_is_asked_for(answer):
-    with pytest.raises(lw.SceneError, match=r"case = 'unknown': was refused: .*; mend it, or ask for another one"):
+    with pytest.raises(lw.SceneError, match=r"case = 'unknown': was refused: .*; correct it, or choose another one"):
         answer.cell("unknown")
     with pytest.raises(lw.SceneError, match="case = 'unknown': was refused; run a member of another one"):
         setup.rerun_members_of(answer.setup, answer.cells[2], [0], None, None)
@@ -541,7 +541,7 @@ def test_lists_replace_and_terms_join():
      "replace.laws = '...': is a list of a controller, which this scene has not; give the whole controller"),
     (SCENE, {"set": {"heading_pid.kq": 1.0}}, "\"heading_pid.kq\" = 1.0: is not a number of this scene; did you mean"),
     (SCENE, {"set": {"drag.linear[9]": 1.0}},
-     '"drag.linear[9]" = 1.0: is not a number of drag.linear, of shape (6,); give one that there is'),
+     '"drag.linear[9]" = 1.0: is not a number of drag.linear, of shape (6,); give an existing one'),
     (SCENE, {"set": {"drag.linear[0]": "a"}}, '"drag.linear[0]" = \'a\': is not a number of drag.linear, of shape (6,)'),
 ])  # fmt: skip
 def test_what_does_not_fit_a_scene_is_refused(scene, change, words):

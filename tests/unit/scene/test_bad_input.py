@@ -253,7 +253,12 @@ def test_a_vehicle(values, words):
 FOSSEN = [
     ({"X_udot": 5.0}, "X_udot = 5.0", "is positive", "write -5"),
     ({"X_u|u|": 5.0}, "X_u|u| = 5.0", "is positive", "write -5"),
-    ({"Y_rdot": -1.0, "N_vdot": -2.0}, "Y_rdot = -1.0", "from its partner N_vdot = -2.0", "mend one or leave it out"),
+    (
+        {"Y_rdot": -1.0, "N_vdot": -2.0},
+        "Y_rdot = -1.0",
+        "from its partner N_vdot = -2.0",
+        "correct one or leave it out",
+    ),
     ({"X_u": -1.0, "Xu": -2.0}, "Xu = -2.0", "given twice", "leave one out"),
     ({"X_udot": -1.0, "Xdu": -1.0}, "Xdu = -1.0", "also as X_udot", "leave one out"),
     ({"Y_uv": -1.0}, "Y_uv = -1.0", "product of two velocities", "ignore="),

@@ -301,11 +301,11 @@ def test_so_many_faults_are_said_and_the_rest_is_counted():
     faults = errors.Faults()
     asked = []
     for i in range(63):
-        faults.add(f"key{i}", i, "is odd", lambda i=i: asked.append(i) or "mend it")
+        faults.add(f"key{i}", i, "is odd", lambda i=i: asked.append(i) or "correct it")
     error = refused(faults.raise_if_any)
     lines = str(error).splitlines()
     assert lines[0] == "63 faults:"
-    assert lines[1] == "  key0 = 0: is odd; mend it"
+    assert lines[1] == "  key0 = 0: is odd; correct it"
     assert lines[-1] == "  and 43 more"
     assert len(lines) == 22
     assert len(error.faults) == 20
@@ -317,7 +317,7 @@ def test_faults_within_faults_are_counted_once():
     inner = lw.SceneError(f"fault {i}" for i in range(50))
     assert (len(inner.faults), inner.more) == (20, 30)
     outer = errors.Faults()
-    outer.add("first", 1, "is odd", "mend it")
+    outer.add("first", 1, "is odd", "correct it")
     for _ in range(2):
         with outer.including():
             raise inner.prefixed("here: ")

@@ -315,8 +315,9 @@ def test_groups_with_failures_are_refused_or_left_out():
     made = outputs.Outputs(values, ("q",), lost, {"OK": 9, "NON_FINITE": 1, "SURFACE": 2}, {})
     with pytest.raises(outputs.FailedMembers) as caught:
         analyses.whole_groups(made, 4, "refuse")
-    assert 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"' in str(
-        caught.value
+    assert (
+        'fix the failing members (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
+        in str(caught.value)
     )
     whole, messages = analyses.whole_groups(made, 4, "drop")
     assert whole.tolist() == [True, False, True]

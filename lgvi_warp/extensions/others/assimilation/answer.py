@@ -91,7 +91,7 @@ class Assimilated(Summarized, Saved):
             rows.append((name, f"{_text(self.mean[name][-1])} +- {_text(self.std[name][-1])}"))
         rows.append(("position", f"{_text(self.mean['position'][-1])} +- {_text(self.std['position'][-1])} m"))
         for name, test in self.consistency().items():
-            text = f"{test.ratio:.2f} of what their spread should be, {test.verdict}"
+            text = f"{test.ratio:.2f} of their expected spread, {test.verdict}"
             rows.append((f"innovations of {name}", text))
         rows.append(("log-likelihood", f"{self.log_likelihood:.2f}"))
         if (self.inflation != 1.0).any():

@@ -181,8 +181,8 @@ def agreement(name: str, content: Content) -> float:
 
 def overview(contents: Mapping[str, Content]) -> str:
     """The table of all comparisons, the best agreement first."""
-    head = ["comparison", "with", "what is known of the numbers", "what stands for it", "published", "computed", "error",
-            "largest error of the page", "within what is known"]  # fmt: skip
+    head = ["comparison", "with", "origin and accuracy of the numbers", "quantity", "published", "computed", "error",
+            "largest error", "rows within uncertainty"]  # fmt: skip
     lines = []
     for name in sorted(contents, key=lambda name: agreement(name, contents[name])):
         module, content = case(name), contents[name]

@@ -122,7 +122,7 @@ def serve(vehicle, door, most=None):
 if __name__ == "__main__":
     text = sys.argv[1] if len(sys.argv) > 1 else "9002"
     if not (text.isdecimal() and 0 < int(text) < 65536):
-        sys.exit(f"port = {text!r}: is no port; give a number from 1 to 65535, such as 9002")
+        sys.exit(f"port = {text!r}: is not a port; give a number from 1 to 65535, such as 9002")
     port = int(text)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as door:
         try:

@@ -51,13 +51,13 @@ class FmuLaw:
 
     def __init__(self, file, period, inputs, outputs, parameters=None):
         if not zipfile.is_zipfile(file):
-            raise ValueError(f"{file}: is no FMU, or not there; give the path of one")
+            raise ValueError(f"{file}: is not an FMU, or not there; give the path of one")
         self.made_of = file, period, inputs, outputs, parameters
         self.version = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         self.period, self.inputs, self.parameters = period, inputs, parameters or {}
         self.description = fmpy.read_model_description(str(file))
         if self.description.coSimulation is None:
-            raise ValueError(f"{file}: is no FMU for co-simulation; export it as one")
+            raise ValueError(f"{file}: is not an FMU for co-simulation; export it as one")
         self.places = {
             v.name: v.valueReference for v in self.description.modelVariables if v.type in ("Real", "Float64")
         }

@@ -150,10 +150,10 @@ def suggest(
     seconds: float = 30.0,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Suggestion:
-    """Find the cheapest method, step and precision that keep an error for every member up to a time.
+    """Find the cheapest method, step and precision that keep a requested error for every member up to a time.
 
-    The search runs a sample of members; its best settings are then checked on up to 1024 members. Their largest errors are
-    carried on to the size of the fleet by a Pareto tail, and steps shortened where that is too large. Where noise acts, all
+    The search runs a sample of members; its best settings are then checked on up to 1024 members. A Pareto tail extrapolates
+    their largest errors to the size of the fleet; the step is shortened where that is too large. Where noise acts, all
     runs of the search see one path of it, drawn every noise_step of the scene or, without one, finer than any step that is
     tried; a run of the setting draws at its own steps.
 
@@ -162,7 +162,7 @@ def suggest(
         error: largest error allowed, over members and path, in the unit of `of`; above 0. Default 1e-3.
         of: quantity that the error is of: any that statistics know, such as "position" [m], "attitude" [rad], "depth" [m],
             "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity; or the mean of a number, such as
-            "mean position[0]", whose bias at the end is told with its interval, as `lw.estimate` does. Default "position".
+            "mean position[0]", whose bias at the end is reported with its interval, as by `lw.estimate`. Default "position".
         t1: end time [s]. Default: run.duration of the scene.
         methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
         members: size of the sample that is searched. Default 128.
@@ -306,7 +306,7 @@ def suggestion_of_mean(
         reference_error=best.beyond,
         rivals=tuple((candidate(each), us[each.setting], each.largest) for each in others),
         asked=compared,
-        messages=("of a mean the bias at the end is told, with its 95 % interval, as lw.estimate does",),
+        messages=("for a mean, the bias at the end is reported with its 95 % interval, as by lw.estimate",),
     )
 
 

@@ -121,7 +121,11 @@ class Tradeoff(Saved):
         if not count:
             return f"No setting of a method has a measurement up to {self.t1:g} s."
         if not front:
-            why = f"the reference tells none of their errors in {self.of}" if self.reference_error else "noise acts"
+            why = (
+                f"the reference is too inaccurate for their errors in {self.of}"
+                if self.reference_error
+                else "noise acts"
+            )
             return f"No setting of {count} is the most accurate: {why}."
         if len(front) == 1:
             return f"For {self.of} {self._text(front[0])} is the cheapest and the most accurate setting of {count}."
@@ -251,7 +255,7 @@ def tradeoff(
     Args:
         fleet: the ensemble, or a Scene with one.
         t1: end time [s]. Default: run.duration of the scene.
-        of: quantity that decides how far the reference is good enough: any that statistics know ("position", "attitude",
+        of: quantity by whose error the reference is accepted: any that statistics know ("position", "attitude",
             "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position, attitude,
             velocity, angular_velocity and energy are measured as well. Default "position".
         methods: names of the methods to try; each has a setting measured, or is named in `missing`. Default: all that the

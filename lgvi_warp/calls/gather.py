@@ -26,7 +26,7 @@ from lgvi_warp.store.open import open_run
 
 
 def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], weights: Any = None) -> Estimates:
-    """Gather statistics of a run that is over, from the samples that it kept: in memory, or in a store block by block.
+    """Gather statistics of a finished run from the samples that it kept: in memory, or in a store block by block.
 
     The estimates are those that the run would have gathered on the way, with the same bits: blocks of members are reduced
     and joined in the same order. Where a store holds rounded samples (Store(dtype="float32") of a run in float64) they are
@@ -62,7 +62,9 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], w
     if isinstance(result, str | os.PathLike):
         result = open_run(result)
     if not isinstance(result, Result):
-        raise refusal("result", result, "is no result", "give what lw.solve or lw.open_run returned, or a store's path")
+        raise refusal(
+            "result", result, "is not a result", "give what lw.solve or lw.open_run returned, or a store's path"
+        )
     kept = KeptSamples(result, _weights(weights, result.members))
     asked = _checked(kept, from_list(statistics))
     ensemble = result.provenance.get("ensemble", {})

@@ -97,7 +97,7 @@ def checked_indices(indices: Any, members: int | None = None) -> np.ndarray:
 
 
 def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members: int | None = None) -> np.ndarray:
-    """Standard normals that the counters give: what a call draws that is not given its draws.
+    """Standard normals of the random number generator: those that a call uses if it is not given its draws.
 
     run(X, lw.uq.draws_of(run, indices)) has the bits of a call with these indices of the same run prepared without
     draws="given" (but for the last digit with `rkmk4` in float32, and with width=1). So what is to be changed may start from
@@ -131,7 +131,7 @@ def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members:
     """
     noise = getattr(run, "noise", None)
     if not isinstance(noise, NoiseOfCalls):
-        raise refusal("run", run, "is no prepared run", "give what lw.prepare returns")
+        raise refusal("run", run, "is not a prepared run", "give what lw.prepare returns")
     if indices is not None and members is not None:
         raise refusal("members", members, "is given beside indices, which say how many", "leave out one of them")
     settings = EnsembleSettings(members, noise.seed if seed is None else seed)

@@ -286,7 +286,7 @@ class Prepared:
         values = found.values
         if found.failed.any():
             if self._refuse:
-                raise FailedMembers([found.text('mend what fails, or take NaN for them: failed="nan"')])
+                raise FailedMembers([found.text('fix the failing members, or take NaN for them: failed="nan"')])
             values = np.where(found.failed[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
 

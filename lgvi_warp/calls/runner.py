@@ -229,7 +229,7 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
     if every is None and of_samples and not paths and scene.controller is not None:
         every = float(scene.controller.period)  # as of a sweep
     if (paths or of_samples) and every is None:
-        problem = f"save = None: is missing, and {[*paths, *of_samples][0]} looks over the path"
+        problem = f"save = None: is missing, and {[*paths, *of_samples][0]} is taken over the whole path"
         raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or run.save_every (--set run.save_every=1.0)"])
     if paths or of_samples or any(each.is_function for each in of):
         return SaveAt(every=every, fields=fields)

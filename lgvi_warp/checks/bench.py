@@ -82,7 +82,7 @@ def of_scene(scene: Any) -> Scene:
     if scene is None:
         return simple_scene()
     if not isinstance(scene, Scene):
-        raise refusal("scene", scene, "is no Scene", "give lw.Scene(...), or leave it out")
+        raise refusal("scene", scene, "is not a Scene", "give lw.Scene(...), or leave it out")
     return scene
 
 

@@ -57,7 +57,7 @@ SEES_VELOCITIES = (*MOVING, "power")
 def check_law(
     term: Term, *, scene: Scene | None = None, samples: int = 64, seed: int = 0, step: float = 1e-5
 ) -> LawReport:
-    """Check a term's device code against its host code, at random views.
+    """Check a term's device code against its host code, at random states.
 
     Each new law costs the compilation of one small kernel. The checks, each made where the law has the role:
 
@@ -97,7 +97,7 @@ def check_law(
         True
     """
     if not isinstance(term, Term):
-        raise SceneError([f"term = {term!r}: is no term; give an object such as lw.terms.Drag(...), not its class"])
+        raise SceneError([f"term = {term!r}: is not a term; give an object such as lw.terms.Drag(...), not its class"])
     term = term.beside_account(True)  # else terms leave their power out
     module = kernel_choice.device_module(term, term.device_in(False), built_in)
     packets = -(-whole_number("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))

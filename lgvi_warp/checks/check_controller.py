@@ -130,7 +130,7 @@ def check_controller(
     """
     if not isinstance(part, Part) or part.section not in SECTIONS:
         remedy = "give an object such as lw.control.HeadingPID(kp=1.0), not its class; lw.laws.check_law checks terms"
-        raise SceneError([f"part = {part!r}: is no part of a controller; {remedy}"])
+        raise SceneError([f"part = {part!r}: is not a part of a controller; {remedy}"])
     if twin is not None:
         roles = [role for role in TWIN_ROLES if callable(getattr(twin, role, None))]
         if not roles or isinstance(twin, type):

@@ -125,7 +125,7 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
     filled = set(packed.values) | {name for name, present in places.items() if present}
     wanted = set(fields or ()) - {"unused"}
     wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]
-    wrong += [f"{name} is no field of params()" for name in sorted(filled - wanted - places.keys())]
+    wrong += [f"{name} is not a field of params()" for name in sorted(filled - wanted - places.keys())]
     return packed, [Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))]
 
 

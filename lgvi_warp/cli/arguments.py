@@ -70,10 +70,13 @@ EPILOG = """examples:
   lgvi-warp info runs/large
   lgvi-warp run example:paper --json -q
 
-exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
-an argument, or what lies in a folder, or a library is missing that the verb needs; 130 interrupted, 143 by SIGTERM, 129 by
-SIGHUP (a second one ends at once). Results go to stdout, progress and faults to stderr. The options of every verb: -q, -v,
---json, --color.
+exit codes:
+  0    done
+  1    members, files or the disk failed; info or merge found an incomplete run
+  2    refused: a scene, an argument or the content of a folder; or a library is missing
+  130  interrupted (143 by SIGTERM, 129 by SIGHUP); a second signal ends the command at once
+
+Results go to stdout, progress and errors to stderr. Every verb takes -q, -v, --json and --color.
 """
 
 DEFAULTS = {"quiet": False, "verbose": False, "json": False, "color": "auto"}

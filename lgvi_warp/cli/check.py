@@ -20,7 +20,7 @@ def check_arguments(verb: Any) -> None:
 
 @as_verb(
     "check",
-    "say whether a scene can run, and which of its numbers look wrong; at most one member runs",
+    "validate a scene file and flag implausible values; at most one member is run",
     check_arguments,
     reads=True,
 )

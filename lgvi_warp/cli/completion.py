@@ -38,10 +38,10 @@ def values() -> dict[str, tuple[str, ...]]:
 
 def completion_arguments(verb: Any) -> None:
     """Add the arguments of the verb completion."""
-    verb.add_argument("shell", metavar="SHELL", choices=SHELLS, help=", ".join(SHELLS))
+    verb.add_argument("shell", metavar="SHELL", choices=SHELLS, help="name of the shell: " + ", ".join(SHELLS))
 
 
-@as_verb("completion", "print what completes the command in a shell", completion_arguments, reads=True)
+@as_verb("completion", "print a script that lets a shell complete the command", completion_arguments, reads=True)
 def completion(chosen: argparse.Namespace) -> int:
     """Run the verb completion: print a script for a shell."""
     try:

@@ -90,7 +90,7 @@ def contents(folder: Path) -> list[Content]:
             inside(folder, content.path.name)
         stores = list(folder.glob("*.zarr"))
         if not studies and not stores:
-            raise SceneError([f"{folder}: holds nothing that a verb wrote; give the folder of a run or of a study"])
+            raise SceneError([f"{folder}: contains no results of a command; give the folder of a run or of a study"])
         if not stores:
             return studies
     from lgvi_warp.store.open import folder_of

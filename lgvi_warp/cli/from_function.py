@@ -86,14 +86,14 @@ def pairs(text: str, read: Callable[[str], Any] = bounds, several: bool = True) 
     return table
 
 
-NUMBER = Form("X", float, "is no number", "give one, as 0.5")
-WHOLE = Form("N", whole, "is no whole number", "give one, as 24")
+NUMBER = Form("X", float, "is not a number", "give one, as 0.5")
+WHOLE = Form("N", whole, "is not a whole number", "give one, as 24")
 COUNTS = Form("N", lambda text: tuple(map(whole, text.split(","))) if "," in text else whole(text), *WHOLE[2:4])
 TEXT = Form("TEXT", str)
 FLAG = Form("", bool)
 GROUPS = Form("NAME=A,B", functools.partial(pairs, read=names, several=False), "names nothing",
               "give NAME=A,B", True)  # fmt: skip
-NUMBERS = Form("NAME=X", functools.partial(pairs, read=float), "is no value", "give NAME=0.1", True)
+NUMBERS = Form("NAME=X", functools.partial(pairs, read=float), "is not a value", "give NAME=0.1", True)
 VALUES = Form("NAME=VALUE", pairs, "names no value", "give NAME=LOW:HIGH, or NAME=LOW:HIGH:log", True)
 # First word of an annotation -> form.
 FORMS = {
@@ -143,7 +143,7 @@ class Argument:
         # What only points to another function is said here.
         text = SHARED[self.option]["help"] if re.match("[Aa]s of", self.text) else self.text
         ways = [form.remedy] * (form.metavar not in "NX") + ["may be given several times"] * form.many
-        text = "; ".join([re.sub(r"(?<!\.)\.$", "", text), *ways]) if any(ways) else text
+        text = "; ".join([re.sub(r"(?<!\.)\.$", "", text), *filter(None, ways)]) if any(ways) else text
         settings: dict[str, Any] = {"help": only + text.replace("%", "%%"), "required": self.required}
         if form is FLAG:
             parser.add_argument(self.option, action=argparse.BooleanOptionalAction, **settings)

@@ -74,12 +74,12 @@ COLUMN = 41
 
 def new_arguments(verb: Any) -> None:
     """Add the arguments of the verb new."""
-    verb.add_argument("scene", metavar="SCENE", type=Path, help="the file, which must not be there yet")
+    verb.add_argument("scene", metavar="SCENE", type=Path, help="the new file")
     verb.add_argument("--vehicle", metavar="NAME", default="remus_100",
-                      help="as list vehicles has it (default remus_100)")  # fmt: skip
+                      help="vehicle, one that `list vehicles` names (default remus_100)")  # fmt: skip
 
 
-@as_verb("new", "write a scene file to begin with, with comments", new_arguments)
+@as_verb("new", "write a commented scene file to start from", new_arguments)
 def new(chosen: argparse.Namespace) -> int:
     """Run the verb new: write a scene file with comments."""
     from lgvi_warp.vehicles.fossen import vehicle_tables
@@ -108,7 +108,7 @@ def list_arguments(verb: Any) -> None:
     verb.add_argument("of", metavar="WHAT", choices=kinds, help="methods, vehicles, terms or laws")
 
 
-@as_verb("list", "names of methods, vehicles, terms, or laws of controllers", list_arguments, reads=True)
+@as_verb("list", "list the names of methods, vehicles, terms, or laws of controllers", list_arguments, reads=True)
 def list_names(chosen: argparse.Namespace) -> int:
     """Run the verb list: names of methods, vehicles, terms, or parts of a controller."""
     entries = {"methods": _methods, "vehicles": _vehicles, "terms": _terms, "laws": _laws}[chosen.of]()

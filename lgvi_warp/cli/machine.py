@@ -26,7 +26,7 @@ def info_arguments(verb: Any) -> None:
 
 @as_verb(
     "info",
-    "say what is in a folder that a verb wrote; without one, the machine, versions, the core's peak",
+    "describe a folder that a verb wrote; without one, this machine, versions and the core's peak speed",
     info_arguments,
     reads=True,
 )
@@ -84,11 +84,13 @@ def machine_lines(document: dict[str, Any], quota: float | None, cores: int, phy
 
 def bench_arguments(verb: Any) -> None:
     """Add the arguments of the verb bench."""
-    verb.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
-    verb.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
+    verb.add_argument("--members", type=int, default=4096, help="number of vehicles (default 4096)")
+    verb.add_argument("--steps", type=int, default=1000, help="number of steps (default 1000)")
 
 
-@as_verb("bench", "speed of the kernel on this machine, beside the core's peak", bench_arguments, reads=True)
+@as_verb(
+    "bench", "measure the speed of the kernel on this machine, beside the core's peak", bench_arguments, reads=True
+)
 def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     """Run the verb bench: measure the kernel's speed on this machine."""
     from lgvi_warp.measuring import speed

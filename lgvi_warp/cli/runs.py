@@ -29,21 +29,21 @@ RESULT, PART = "result.npz", "result_part.npz"
 def run_arguments(verb: Any) -> None:
     """Add the arguments of the verb run."""
     add_shared(verb, "scene")
-    fleet = verb.add_argument_group("what runs")
+    fleet = verb.add_argument_group("scene and fleet")
     add_shared(fleet, "--duration --members --seed --set")
     fleet.add_argument("--start", metavar="DIR", type=Path,
-                       help="go on from the end of the run in this folder, store or result.npz")  # fmt: skip
+                       help="continue from the end of the run in this folder, store or result.npz")  # fmt: skip
     _how(verb.add_argument_group("method, step and precision"))
-    _solves(verb.add_argument_group("solves and checks"))
+    _solves(verb.add_argument_group("solvers and checks"))
     files = verb.add_argument_group("files")
     add_shared(files, "--out --keep", out=FOLDER.format("runs/NAME of the scene"))
     _stored(files)
-    live = verb.add_argument_group("a look while it runs")
+    live = verb.add_argument_group("live view")
     live.add_argument("--live", action="store_true",
-                      help="show members in the rerun viewer as they are done, then the whole run")  # fmt: skip
+                      help="show members in the rerun viewer as they finish, then the whole run")  # fmt: skip
     live.add_argument("--viewer", metavar="ADDRESS",
-                      help="with --live: a viewer that is open (default: one on this machine, or a new one)")  # fmt: skip
-    machine = verb.add_argument_group("the machine")
+                      help="with --live: address of an open viewer (default: one on this machine, or a new one)")  # fmt: skip
+    machine = verb.add_argument_group("machine")
     add_shared(machine, EXECUTOR, threads=WORKERS)
     machine.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
     machine.add_argument("--device", metavar="D", help="where kernels run: cpu (default), the only one")
@@ -60,19 +60,26 @@ def _how(group: Any) -> None:
     add = group.add_argument
     add("--error", metavar="E", type=float,
         help="choose the cheapest method, step and precision that keep this error, and check it after the run")  # fmt: skip
-    add("--of", help=f"what --error is of (default: position [m]); {OF}")
-    add("--rtol", metavar="R", help="with --atol, rk5, rk5_ck and rk8 choose their own steps: relative error of each")
-    add("--atol", metavar="A", help="with --rtol: absolute error of each step")
+    add("--of", help=f"quantity that --error bounds (default: position [m]): {OF}")
+    add(
+        "--rtol",
+        metavar="R",
+        help="relative error of each step; with --atol, for rk5, rk5_ck and rk8, which then choose their steps",
+    )
+    add("--atol", metavar="A", help="absolute error of each step; with --rtol")
 
 
 def _solves(group: Any) -> None:
     """Add what is solved and checked in each step of a run."""
     add = group.add_argument
-    add("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
-    add("--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)')
+    add("--solver", help="solver of the implicit rotation, equation (24): quartic, cayley, newton or moser_veselov")
+    add("--iterations", metavar="N", help='iterations of every solve: a number, or "auto" (default: to the tolerance)')
     add("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
-    add("--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)")
-    add("--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step")
+    add("--checks", help="none, safe (default: statuses) or all (also warnings that arise during the run)")
+    add(
+        "--on-failure",
+        help="a member that fails: freeze (default) stops it, raise ends with exit code 1, substep divides its step",
+    )
 
 
 def _stored(group: Any) -> None:
@@ -80,15 +87,15 @@ def _stored(group: Any) -> None:
     add_shared(
         group,
         "--store --store-dtype",
-        store="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
-        store_dtype="float32: samples of a float64 run take half the room in the store",
+        store="npz (default): result.npz when the run ends; zarr: run.zarr block by block, which resume can continue",
+        store_dtype="float32: store samples of a float64 run in single precision, half the size",
     )
-    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only these blocks, to be merged later "
+    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only blocks A to B - 1, to be merged later "
                        "(as many of them as there are)")  # fmt: skip
     existing = group.add_mutually_exclusive_group()
     add_shared(existing, "--overwrite")
     existing.add_argument("--resume", action="store_true",
-                          help="go on with a run.zarr that is there, if it is this run")  # fmt: skip
+                          help="continue an existing run.zarr of the same run")  # fmt: skip
 
 
 @as_verb("run", "run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary", run_arguments)
@@ -150,7 +157,7 @@ def end_of_run(chosen: argparse.Namespace) -> Any:
     if held is None:
         raise SceneError([f"--start {path}: holds no run; give a folder that lgvi-warp run wrote"])
     if held[0].end is None:
-        raise SceneError([f"--start {path}: did not keep its end; run it again with the samples of all members"])
+        raise SceneError([f"--start {path}: has no final states; run it again with the samples of all members"])
     return held[0].final
 
 
@@ -260,10 +267,10 @@ def import_in_background(load: Callable[[str], Any] = importlib.import_module) -
 def resume_arguments(verb: Any) -> None:
     """Add the arguments of the verb resume."""
     add_shared(verb, f"dir {EXECUTOR}", threads=WORKERS)
-    verb.add_argument("--force", action="store_true", help="even on another machine or with other versions")
+    verb.add_argument("--force", action="store_true", help="continue even on another machine or with other versions")
 
 
-@as_verb("resume", "go on with a run that was stopped, and mend what is damaged of it", resume_arguments)
+@as_verb("resume", "continue an interrupted run, and repair its damaged blocks", resume_arguments)
 def resume(chosen: argparse.Namespace, *, simulate: Part = None, finish: Callable[..., list[str]] = report) -> int:
     """Run the verb resume: finish a stored run that was stopped, and mend what is damaged of it.
 
@@ -294,7 +301,7 @@ def predict_arguments(verb: Any) -> None:
 
 @as_verb(
     "predict",
-    "time, memory and disk that a run would take, from a small one on this machine",
+    "predict time, memory and disk of a run, from a short run on this machine",
     predict_arguments,
     reads=True,
     aliases=("plan",),

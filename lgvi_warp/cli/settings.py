@@ -45,7 +45,7 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
     for text in chosen.set:
         key, equals, value = (word.strip() for word in text.partition("="))
         if not (equals and key):
-            faults.add("--set", text, "is no NAME=VALUE", "write --set vehicle.buoyancy=300")
+            faults.add("--set", text, "is not a NAME=VALUE", "write --set vehicle.buoyancy=300")
         elif key in changes:
             faults.add(f"--set {key}", value, f"is set to {changes[key]} as well", "keep one of them")
         else:
@@ -124,6 +124,6 @@ def block_range(chosen: argparse.Namespace) -> range | None:
         return None
     first, colon, stop = chosen.blocks.partition(":")
     if not (colon and first.isdigit() and stop.isdigit()):
-        fault = "is no range of blocks; write --blocks 0:100 for the first hundred"
+        fault = "is not a range of blocks; write --blocks 0:100 for the first hundred"
         raise SceneError([f"--blocks {chosen.blocks}: {fault}"])
     return range(int(first), int(stop))

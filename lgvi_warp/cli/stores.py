@@ -18,12 +18,14 @@ from lgvi_warp.common.files import place_of
 
 def merge_arguments(verb: Any) -> None:
     """Add the arguments of the verb merge."""
-    verb.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores, or folders with one each")
+    verb.add_argument(
+        "dirs", metavar="DIR", type=Path, nargs="+", help="stores of run --blocks, or the folders that hold them"
+    )
     verb.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
     add_shared(verb, "--overwrite")
 
 
-@as_verb("merge", "put runs of some blocks each (run --blocks) together", merge_arguments)
+@as_verb("merge", "join runs of some blocks each (run --blocks) to one run", merge_arguments)
 def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
     """Run the verb merge: put runs of some blocks each together.
 
@@ -51,19 +53,21 @@ def export_arguments(verb: Any) -> None:
         "--to",
         metavar="FILE",
         required=True,
-        help="a file .csv, .parquet, .nc, .geojson, .kml or .mcap; or netcdf, all that a store holds, or parquet",
+        help="file name ending in .csv, .parquet, .nc, .geojson, .kml or .mcap; or netcdf or parquet, for the whole store",
     )
     verb.add_argument("--out", metavar="FILE", type=Path,
-                      help="the file of --to netcdf and --to parquet (default: beside the run)")  # fmt: skip
-    verb.add_argument("--members", metavar="LIST", help="these members, as 3,17 or 0:100 (default: all that were kept)")
+                      help="with --to netcdf or --to parquet: the file (default: beside the run)")  # fmt: skip
+    verb.add_argument(
+        "--members", metavar="LIST", help="members to convert, as 3,17 or 0:100 (default: all that were kept)"
+    )
     verb.add_argument("--origin", metavar="LAT,LON", help="origin of the axes [deg] (default: that of the scene)")
     verb.add_argument(
         "--start", metavar="DATE", help="date and time at t = 0, as 2026-06-01T00:00:00Z (default: the scene's)"
     )
-    verb.add_argument("--overwrite", action="store_true", help="replace a file that is there")
+    verb.add_argument("--overwrite", action="store_true", help="replace an existing file")
 
 
-@as_verb("export", "write a run as one file of another program", export_arguments)
+@as_verb("export", "convert a run to one file for other programs: table, NetCDF, map or MCAP", export_arguments)
 def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
     """Run the verb export: write a run, or members of it, as one file of another program."""
     from lgvi_warp.store.export import export as write_as
@@ -87,7 +91,7 @@ def _members(text: str | None) -> slice | list[int] | None:
         return indices(text)
     words = [word.strip() for word in text.split(":")]
     if len(words) > 3 or not all(word.isdigit() for word in words if word) or words[2:] in ([""], ["0"]):
-        raise SceneError([f"--members {text}: is no list of members; write --members 3,17 or --members 0:100"])
+        raise SceneError([f"--members {text}: is not a list of members; write --members 3,17 or --members 0:100"])
     return slice(*(int(word) if word else None for word in words))
 
 
@@ -98,7 +102,7 @@ def _origin(text: str | None) -> list[float] | None:
     try:
         latitude, longitude = map(float, text.split(","))
     except ValueError:
-        raise SceneError([f"--origin {text}: is no place; write --origin=63.44,10.40"]) from None
+        raise SceneError([f"--origin {text}: is not a place; write --origin=63.44,10.40"]) from None
     return [latitude, longitude]
 
 
@@ -108,7 +112,7 @@ def report_arguments(verb: Any) -> None:
                       help="folder that run, tradeoff, stability, sensitivity or sweep wrote")  # fmt: skip
     verb.add_argument("--out", metavar="FILE", type=Path,
                       help="the file, replaced if it exists (default: DIR/report.html)")  # fmt: skip
-    verb.add_argument("--open", action="store_true", help="show it in the browser")
+    verb.add_argument("--open", action="store_true", help="open the file in the browser")
 
 
 @as_verb("report", "write one HTML file about a run or studies: report.html", report_arguments)

@@ -34,7 +34,7 @@ def _recipe(path: str) -> Any:
     return content.get("recipe", content) if isinstance(content, dict) else content
 
 
-RISK = Form("R", _risk, "is no risk", "give mean, 0.95, or cvar:0.05")
+RISK = Form("R", _risk, "is not a risk", "give mean, 0.95, or cvar:0.05")
 
 RECIPE = Form("FILE", _recipe, remedy="give the estimate.json of an answer")
 
@@ -68,7 +68,11 @@ rare = as_study("rare", "uncertainty.rare.rare_event:rare_event", about=_with_bo
 
 def _fleet_option(verb: Any) -> None:
     """Add --fleet."""
-    verb.add_argument("--fleet", action="store_true", help="of each member of [ensemble], in place of the scene alone")
+    verb.add_argument(
+        "--fleet",
+        action="store_true",
+        help="derivatives of each member of [ensemble] (default: of the scene without its variation)",
+    )
 
 
 def _fleet(chosen: argparse.Namespace, scene: Any, values: dict[str, Any]) -> Any:
@@ -180,10 +184,12 @@ def sweep_arguments(verb: Any) -> None:
     """Add the arguments of the verb sweep."""
     verb.add_argument("scene", metavar="SWEEP", type=scene_path, help="sweep file (TOML), or example:NAME")
     add_shared(
-        verb, "--out", out="folder for the files; what is finished there is not run again (default: runs/NAME_sweep)"
+        verb,
+        "--out",
+        out="folder for the files; cells that are finished there are not run again (default: runs/NAME_sweep)",
     )
     SWEEP.add(verb)
-    verb.add_argument("--plan", action="store_true", help="say what the sweep would take, and run nothing")
+    verb.add_argument("--plan", action="store_true", help="predict time and memory of the sweep, and run nothing")
     verb.add_argument("--record", metavar="N", type=int, default=0, help="run the N worst members again into recordings "
                       "(default 0)")  # fmt: skip
 

@@ -32,7 +32,7 @@ SHARED: dict[str, dict[str, Any]] = {
     "--out": {"metavar": "DIR", "type": Path},
     "--duration": {"metavar": "S", "help": "end of the run [s]"},
     "--members": {"metavar": "N", "help": "number of vehicles"},
-    "--seed": {"metavar": "N", "help": "seed of what varies"},
+    "--seed": {"metavar": "N", "help": "seed of the random draws"},
     "--set": {
         "metavar": "NAME=VALUE",
         "action": "append",
@@ -43,15 +43,13 @@ SHARED: dict[str, dict[str, Any]] = {
     "--methods": {"metavar": "A,B", "type": lambda text: [name.strip() for name in text.split(",")]},
     "--step": {"metavar": "S", "help": "time step [s]"},
     "--dtype": {"help": "as for run"},
-    "--keep": {
-        "help": "samples of members to keep: all (default), none, failed, or indices 3,17 (statistics are those of the scene)"
-    },
+    "--keep": {"help": "members whose samples are kept: all (default), none, failed, or indices 3,17"},
     "--threads": {"metavar": "N", "type": int, "help": "threads (default: all cores, one for few members)"},
     "--executor": {"default": "threads", "help": "threads (default), processes or dask"},
-    "--scheduler": {"metavar": "ADDRESS", "help": "of Dask; without one, a cluster on this machine"},
+    "--scheduler": {"metavar": "ADDRESS", "help": "address of Dask's scheduler (default: a cluster on this machine)"},
     "--store": {"choices": ["npz", "zarr"], "default": "npz", "help": "as for run"},
     "--store-dtype": {"metavar": "D", "help": "as for run"},
-    "--overwrite": {"action": "store_true", "help": "replace a run.zarr that is there"},
+    "--overwrite": {"action": "store_true", "help": "replace an existing run.zarr"},
 }
 # Arguments of the verbs that write files about a scene's ensemble.
 SCENE = "scene --out --duration --members --seed --set"
@@ -61,8 +59,8 @@ FOLDER = "folder for the files, replaced if they exist (default: {})"
 
 # Options of every verb, which may stand before it too -> what they are without being given.
 COMMON: dict[tuple[str, ...], dict[str, Any]] = {
-    ("-q", "--quiet"): {"action": "store_true", "help": "no progress and no results but those of --json: faults alone"},
-    ("-v", "--verbose"): {"action": "store_true", "help": "also how it was run, and where an error came from"},
+    ("-q", "--quiet"): {"action": "store_true", "help": "print errors only, and the document of --json"},
+    ("-v", "--verbose"): {"action": "store_true", "help": "also print how it was run, and where an error came from"},
     ("--json",): {"action": "store_true", "help": "results as one JSON document (docs/reference/json.md)"},
     ("--color",): {
         "choices": ("auto", "always", "never"),

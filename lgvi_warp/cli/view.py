@@ -19,13 +19,15 @@ from lgvi_warp.common.files import place_of
 def view_arguments(verb: Any) -> None:
     """Add the arguments of the verb view."""
     verb.add_argument("dir", metavar="DIR", type=Path, help="the folder of a run, a store, or a result.npz")
-    verb.add_argument("--members", metavar="LIST", help="draw these members, as 3,17 (default: a fair choice of 1,000)")
-    verb.add_argument("--out", metavar="FILE", type=Path, help="write the recording there, and open no viewer")
+    verb.add_argument(
+        "--members", metavar="LIST", help="members to draw, as 3,17 (default: 1,000 that represent the fleet)"
+    )
+    verb.add_argument("--out", metavar="FILE", type=Path, help="write the recording to this file, and open no viewer")
     movie = "write a moving picture there (.webp, .gif, .png), and open no viewer"
     verb.add_argument("--movie", metavar="FILE", type=Path, help=movie)
 
 
-@as_verb("view", "look at a run in the rerun viewer", view_arguments)
+@as_verb("view", "open a run in the rerun viewer", view_arguments)
 def view(chosen: argparse.Namespace, *, viewer: Part = None, log: Part = None) -> int:
     """Run the verb view: open a run in the rerun viewer, or write its recording."""
     members, content = indices(chosen.members), run_in(chosen.dir)
@@ -66,5 +68,5 @@ def indices(text: str | None) -> list[int] | None:
         return None
     words = [word.strip() for word in text.split(",")]
     if not all(word.isdigit() for word in words):
-        raise SceneError([f"--members {text}: is no list of members; write --members 3,17"])
+        raise SceneError([f"--members {text}: is not a list of members; write --members 3,17"])
     return [int(word) for word in words]

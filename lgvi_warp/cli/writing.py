@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.signals import Ended
-from lgvi_warp.common.errors import MissingExtra, NothingToDraw
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw, install
 from lgvi_warp.common.files import place_of
 
 # Longest delay of a signal that arrives just before the main thread begins to wait [s].
@@ -55,7 +55,7 @@ class Written:
         files, errors = ", ".join(self.missing), self.missing.values()
         extras = ",".join(dict.fromkeys(error.extra for error in errors))
         libraries = " and ".join(dict.fromkeys(error.library for error in errors))
-        remedy = f"to have pictures: pip install 'lgvi-warp[{extras}]'"
+        remedy = f"to have pictures: {install(extras)}"
         return [f"note        {files}: not made without {libraries}; {remedy}"]
 
 

@@ -44,7 +44,7 @@ def path_of(key: str, value: Any) -> Path:
     """Read a path."""
     text = value if isinstance(value, str) else os.fspath(value) if isinstance(value, os.PathLike) else None
     if not isinstance(text, str):
-        raise refusal(key, value, "is no path", PATH)
+        raise refusal(key, value, "is not a path", PATH)
     if "\0" in text or not text:
         raise refusal(key, value, "holds a null character" if text else "is empty", PATH)
     try:
@@ -66,7 +66,7 @@ def whole_number(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int
     """Read a whole number."""
     if not is_whole(value, least, most):
         raise refusal(
-            key, value, f"is no whole number from {least} to {most:,}", whole_remedy(value, f"give one from {least}")
+            key, value, f"is not a whole number from {least} to {most:,}", whole_remedy(value, f"give one from {least}")
         )
     return int(value)
 
@@ -88,7 +88,7 @@ def listed(key: str, value: Any, problem: str) -> list[Any]:
     """Read a list; one text alone stands for a list of it."""
     items = [str(value)] if isinstance(value, str) else items_of(value)
     if items is None:
-        raise refusal(key, value, "is no list", f"give a list of {problem}")
+        raise refusal(key, value, "is not a list", f"give a list of {problem}")
     return items
 
 
@@ -106,7 +106,7 @@ def members_of(key: str, value: Any, count: int | None = None) -> np.ndarray:
         try:
             chosen = np.arange(count)[value]
         except (TypeError, ValueError):
-            raise _no_members(key, value, "is no slice of whole numbers", "give slice(first, stop, step)") from None
+            raise _no_members(key, value, "is not a slice of whole numbers", "give slice(first, stop, step)") from None
     else:
         chosen = _indices(key, plain(value), count)
     if not len(chosen):
@@ -121,7 +121,10 @@ def members_of(key: str, value: Any, count: int | None = None) -> np.ndarray:
 
 def _indices(key: str, value: Any, count: int | None) -> np.ndarray:
     """Read indices, or a mask, of members."""
-    whose = "is no list of members", "give whole numbers from 0, a slice, or a mask with a truth value for each member"
+    whose = (
+        "is not a list of members",
+        "give whole numbers from 0, a slice, or a mask with a truth value for each member",
+    )
     array = np.asarray(None if ragged(value) else value)
     if array.dtype.kind == "O" and array.ndim == 1 and all(is_whole(entry, -(2**63), 2**63 - 1) for entry in array):
         array = array.astype(np.int64)
@@ -150,7 +153,7 @@ def _no_members(key: str, value: Any, problem: str, remedy: str) -> NoSuchMember
 def mapping_of(key: str, value: Any, problem: str) -> Mapping[Any, Any]:
     """Read a mapping."""
     if not isinstance(value, Mapping):
-        raise refusal(key, value, "is no mapping", f"give a dict of {problem}")
+        raise refusal(key, value, "is not a mapping", f"give a dict of {problem}")
     return value
 
 
@@ -172,7 +175,7 @@ def flag(key: str, value: Any) -> bool:
 def function_of(key: str, value: Any) -> Any:
     """Read a function, or None for none."""
     if value is not None and not callable(value):
-        raise refusal(key, value, "is no function", "give a function, or leave it out")
+        raise refusal(key, value, "is not a function", "give a function, or leave it out")
     return value
 
 
@@ -181,7 +184,7 @@ def names_of(key: str, value: Any) -> list[str]:
     names = listed(key, value, "names")
     for name in names:
         if not isinstance(name, str):
-            raise refusal(key, name, "is no name", "give a list of names")
+            raise refusal(key, name, "is not a name", "give a list of names")
     return names
 
 

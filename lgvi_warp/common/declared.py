@@ -76,7 +76,7 @@ def from_table(kind: type[Settings], key: str, table: Any, example: str, **neede
     if isinstance(table, kind):
         return table
     if not isinstance(table, Mapping):
-        raise refusal(key, table, "is no table", example)
+        raise refusal(key, table, "is not a table", example)
     faults = Faults()
     faults.keys(key, table, [item.name for item in dataclasses.fields(kind) if item.init])  # type: ignore[arg-type]
     for name in (name for name in needed if name not in table):

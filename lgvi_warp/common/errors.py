@@ -128,11 +128,20 @@ class NothingToDraw(ValueError):  # noqa: N818
     """A picture would be empty; the message says why."""
 
 
+# Whether the package is on the package index: as pyproject.toml says (tests/house/test_published.py).
+PUBLISHED = False
+
+
+def install(extra: str) -> str:
+    """Command that installs an extra, from the package index or from a clone."""
+    return f"pip install 'lgvi-warp[{extra}]'" if PUBLISHED else f"in the clone of lgvi_warp, pip install '.[{extra}]'"
+
+
 class MissingExtra(ImportError):  # noqa: N818
     """A library of one of the package's extras is not installed."""
 
     def __init__(self, purpose: str, library: str, extra: str):
-        super().__init__(f"{purpose} need {library}: pip install 'lgvi-warp[{extra}]'", name=library)
+        super().__init__(f"{purpose} need {library}: {install(extra)}", name=library)
         self.what, self.library, self.extra = purpose, library, extra
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -338,7 +347,7 @@ class Faults:
             return None if diagonal is None else np.diag(diagonal)
         if array.shape != (size, size):
             wanted = f"{size} numbers or a symmetric {size}x{size} matrix [{unit}]"
-            problem = f"has shape {array.shape}" if array.size else "is no matrix"
+            problem = f"has shape {array.shape}" if array.size else "is not a matrix"
             self.add(key, value, problem, f"give {wanted}")
             return None
         matrix = self.finite(key, value, (size, size), unit)

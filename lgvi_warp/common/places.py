@@ -76,7 +76,9 @@ def check_places(faults: Faults, key: str, places: np.ndarray) -> None:
         wrong = (values < -low) | (values > high)
         if np.any(wrong):
             value = float(np.atleast_1d(values)[np.atleast_1d(wrong)][0])
-            faults.add(key, value, f"is no {word}", f"give {-low:g} to {high:g} [deg]: latitude first, then longitude")
+            faults.add(
+                key, value, f"is not a {word}", f"give {-low:g} to {high:g} [deg]: latitude first, then longitude"
+            )
 
 
 def too_long(distance: Any) -> Any:

@@ -142,7 +142,7 @@ def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
         progress = settings.get("progress")
         if progress is not None and not isinstance(progress, bool) and not callable(progress):
             raise refusal(
-                "progress", progress, "is no function", "give True, or a function of the fraction that is done"
+                "progress", progress, "is not a function", "give True, or a function of the fraction that is done"
             )
         if progress is not True:
             return call(*args, **settings)

@@ -98,7 +98,7 @@ def text_of(content: bytes) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        problem = f"is no text in UTF-8: byte 0x{content[error.start]:02x} at {error.start:,}"
+        problem = f"is not a text in UTF-8: byte 0x{content[error.start]:02x} at {error.start:,}"
         raise UnreadableError(problem, "save it in UTF-8") from None
 
 

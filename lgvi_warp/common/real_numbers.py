@@ -135,7 +135,7 @@ def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
 def whole_remedy(value: Any, remedy: str) -> str:
     """Replacement for a value that is no whole number: of 1e4, which Python and TOML read as a float, 10000."""
     if isinstance(value, float | np.floating) and math.isfinite(value) and value == round(value):
-        return f"write {round(value)}, since a number with a point or an exponent is no whole number here"
+        return f"write {round(value)}, since a number with a point or an exponent is not a whole number here"
     return remedy
 
 

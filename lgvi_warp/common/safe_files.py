@@ -44,7 +44,7 @@ KINDS = {
 
 def kind(mode: int) -> str:
     """Say what a file is that is not a plain one."""
-    return "" if stat.S_ISREG(mode) else KINDS.get(stat.S_IFMT(mode), "is no plain file")
+    return "" if stat.S_ISREG(mode) else KINDS.get(stat.S_IFMT(mode), "is not a plain file")
 
 
 def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
@@ -130,7 +130,9 @@ def read(root: Path, key: str, most: int) -> bytes:
     with opened(root, key) as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
-            raise SceneError([f"{root / key}: has {size:,} bytes, where {most:,} are the most; it is no file of a run"])
+            raise SceneError(
+                [f"{root / key}: has {size:,} bytes, where {most:,} are the most; it is not a file of a run"]
+            )
         return file.read(size)
 
 

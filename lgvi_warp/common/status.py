@@ -77,7 +77,7 @@ _TEXT = {
     Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "
     "loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
     Status.ENERGY_GREW: "the total energy grew to more than 100 times the energy available, although no force of the scene "
-    "supplies any: the method is unstable at this step; shorten it (result.warnings tells what is too fast)",
+    "supplies any: the method is unstable at this step; shorten it (result.warnings names what is too fast)",
     Status.BACKWARD_DRAG: "this composition takes some stages with a negative step, and the drag is too strong to be "
     "integrated backward: their drag number, (back) (l + q|v|) / I, passed 0.5; use the method that is composed, or shorten "
     "the step",
@@ -125,9 +125,9 @@ class StatusArray(np.ndarray):
 
 
 class Warnings(IntFlag):
-    """Signs that step, precision, a controller's iterations, a member's numbers or the water do not suit its motion, as bits.
+    """Warnings of a member, as bits: step, precision, iterations, numbers or water do not suit its motion.
 
-    A warning stops nothing. Of two warnings, the higher bit is the more serious.
+    A warning does not stop a run. Of two warnings, the higher bit is the more serious.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -244,7 +244,7 @@ class WarningArray(np.ndarray):
         Returns: bool, shape (n,).
         """
         if not is_whole(warning, 0, np.iinfo(np.uint16).max):
-            raise refusal("warning", warning, "is no warning", "give one of lw.Warnings, or several joined by |")
+            raise refusal("warning", warning, "is not a warning", "give one of lw.Warnings, or several joined by |")
         return (np.asarray(self) & int(warning)) != 0
 
     def worst(self) -> np.ndarray:

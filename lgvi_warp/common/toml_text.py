@@ -32,7 +32,7 @@ def parsed(text: str, name: str) -> dict[str, Any]:
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SceneError([f"{name} is not TOML: {error}; mend that line"]) from error
+        raise SceneError([f"{name} is not TOML: {error}; correct that line"]) from error
     except RecursionError:
         raise SceneError([_deep(name)]) from None
     except ValueError:  # Python refuses whole numbers of several thousand digits

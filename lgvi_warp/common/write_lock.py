@@ -112,7 +112,7 @@ def _opened(path: Path) -> int:
 
 
 def _no_lock(path: Path) -> SceneError:
-    return SceneError([f"{path}: is no lock of lgvi-warp, but has its name; move it away"])
+    return SceneError([f"{path}: is not a lock of lgvi-warp, but has its name; move it away"])
 
 
 def _locked(descriptor: int, wait: bool) -> bool:

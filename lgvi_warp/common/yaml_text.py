@@ -44,9 +44,9 @@ def parsed(text: str) -> Any:
     except RecursionError:
         raise SceneError([DEEP]) from None
     except yaml.YAMLError as error:
-        raise SceneError([f"YAML: {' '.join(str(error).split())}; mend that line"]) from None
+        raise SceneError([f"YAML: {' '.join(str(error).split())}; correct that line"]) from None
     except Exception as error:  # PyYAML passes on what int(), float() and dates raise
-        text = f"YAML: has a value that cannot be read ({type(error).__name__}: {error}); mend it"
+        text = f"YAML: has a value that cannot be read ({type(error).__name__}: {error}); correct it"
         raise SceneError([text]) from None
 
 
@@ -117,7 +117,7 @@ def _check_keys(yaml: Any, faults: Faults, node: Any) -> None:
     first: dict[str, Any] = {}
     for key, _ in node.value:
         if not isinstance(key, yaml.ScalarNode):
-            faults.add(_line(key), "...", "is a key that is no text", "write key: value")
+            faults.add(_line(key), "...", "is a key that is not a text", "write key: value")
         elif _is_merge(key):
             continue
         elif key.value in first:

@@ -67,7 +67,9 @@ class Altimeter(Sensor):
     def check(self, faults: Faults) -> None:
         super().check(faults)
         if not np.any(self.direction):
-            faults.add("direction", self.direction, "is no direction", "give a vector of body axes, such as [0, 0, 1]")
+            faults.add(
+                "direction", self.direction, "is not a direction", "give a vector of body axes, such as [0, 0, 1]"
+            )
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         bad = super().unphysical(numbers)

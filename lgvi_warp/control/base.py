@@ -253,7 +253,7 @@ def _built_in(section: str, *words: str) -> registry.Kinds:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuringPart(Part):
-    """A sensor or an estimator: changes what the controller takes for the motion.
+    """A sensor or an estimator: changes the measured motion that the controller uses.
 
     Attributes:
         uses: Keys of the sensors that hand their readings to this estimator alone, by what they are to it.
@@ -305,7 +305,7 @@ class MeasuringPart(Part):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Guidance(Part):
-    """A part that says which motion is wanted.
+    """Guidance: sets the wanted motion.
 
     Attributes:
         wanted: The quantities of `gives` for which the user asked.
@@ -373,7 +373,7 @@ def list_of_names(faults: Faults, key: str, names: Any, known: Collection[str]) 
     """Names of a list that are known and occur once; what is wrong with others is noted."""
     listed = items_of(names)
     if not listed:
-        faults.add(key, names, "is no list of names", f"give some of {', '.join(known)}")
+        faults.add(key, names, "is not a list of names", f"give some of {', '.join(known)}")
         return []
     for i, name in enumerate(listed):
         if faults.choice(f"{key}[{i}]", name, known) and among(name, listed[:i]):
@@ -460,7 +460,7 @@ def first_step(time: np.ndarray, h: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Allocation(Part):
-    """A part that turns the demand into the commands of one term.
+    """Allocation: turns the demand into the commands of one term.
 
     Args:
         to: Key of the term that takes the commands.

@@ -20,7 +20,7 @@ WORK = 138
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BoundedLeastSquares(EffortAllocation):
-    """Commands for efforts within their limits whose wrench is nearest to the demand (Johansen & Fossen 2013, section 2.2).
+    """Allocation by bounded least squares: efforts within limits, wrench nearest to the demand (Johansen & Fossen 2013, 2.2).
 
     The error is the sum of (priority times component)^2, moments divided by the mean lever arm of the channels. Where the
     efforts of least error without limits are within the limits, they are taken; they are those of `PseudoInverse` where the
@@ -51,7 +51,7 @@ class BoundedLeastSquares(EffortAllocation):
     iterates: ClassVar[bool] = True
 
     priorities: Any = number((6,), "1", (1.0,) * 6, above=0.0)
-    iterations: int = whole(1, "is no number of iterations", "give 1 or more", default=100)
+    iterations: int = whole(1, "is not a number of iterations", "give 1 or more", default=100)
 
     def device_in(self, aligned: bool) -> str:
         return f"bounded_least_squares:{self.curve_word}"

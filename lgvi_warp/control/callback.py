@@ -64,7 +64,7 @@ class Callback(ControlLaw):
 
     def check(self, faults: Faults) -> None:
         if not callable(self.function):
-            faults.add("function", self.function, PROBLEM if self.function is None else "is no function", REMEDY)
+            faults.add("function", self.function, PROBLEM if self.function is None else "is not a function", REMEDY)
         check_version(faults, self.version)
 
     def to_dict(self) -> dict[str, Any]:

@@ -12,10 +12,10 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ComplementaryFilter(MeasuringPart):
-    """The attitude from measured rates in the short run, and from a measured attitude in the long run.
+    """Complementary filter of the attitude: measured rates at high frequency, a measured attitude at low frequency.
 
     R <- R exp(T (Omega_old + Omega) / 2), T the period; then R <- R exp((1 - exp(-T / time_constant)) e), e the rotation
-    vector from R to the measured attitude. It starts at the first measured attitude, and stands after the sensors that it
+    vector from R to the measured attitude. It starts at the first measured attitude, and is listed after the sensors that it
     uses. Mahony, Hamel & Pflimlin, IEEE Trans. Automatic Control 53 (2008); here without an estimate of the rates' bias.
 
     Args:

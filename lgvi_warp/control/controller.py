@@ -352,7 +352,7 @@ class Controller(Documented):
         for part in parts:
             if part.to not in able:
                 remedy = closest(part.to, able) if able else ACTUATOR
-                faults.add("allocation.to", part.to, "is no term that takes commands", remedy)
+                faults.add("allocation.to", part.to, "is not a term that takes commands", remedy)
             elif able[part.to].own_commands:
                 problem = "has commands of its own"
                 faults.add("allocation.to", part.to, problem, f"leave {part.to}.command and its schedule out")
@@ -371,7 +371,7 @@ class Controller(Documented):
                 faults.add(f"{part.key}.of", part.of, problem, "vary the sensor's own numbers, or leave the fault out")
             elif part.of not in counts:
                 remedy = closest(part.of, counts)
-                faults.add(f"{part.key}.of", part.of, "is no actuator and no sensor of this controller", remedy)
+                faults.add(f"{part.key}.of", part.of, "is not an actuator and no sensor of this controller", remedy)
             elif not 0 <= part.channel < count:
                 remedy = f"give 0 to {count - 1}" if count > 1 else "give 0"
                 faults.add(key, part.channel, f"is beyond the {count} of {part.of}", remedy)
@@ -402,7 +402,7 @@ class Controller(Documented):
                 continue
             low = int(value / h + ROUND_OFF)
             near = " or ".join(f"{max(i, 1) * h:.9g}" for i in sorted({max(low, 1), low + 1}))
-            problem, remedy = f"is no whole number of steps of {h:.9g} s", f"give {near} s, or another step"
+            problem, remedy = f"is not a whole number of steps of {h:.9g} s", f"give {near} s, or another step"
             if asked is not None:
                 problem += f", which the end of the run and its sample times have made of {asked:.9g} s"
                 if _is_whole(name, value, asked):
@@ -462,7 +462,7 @@ def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
             elif isinstance(entry, base):
                 parts.append(entry)
             else:
-                faults.add(where, entry, "is no part of this list", f"give one of {', '.join(known)}")
+                faults.add(where, entry, "is not a part of this list", f"give one of {', '.join(known)}")
     faults.raise_if_any()
     return tuple(parts)
 

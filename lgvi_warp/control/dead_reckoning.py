@@ -18,9 +18,9 @@ DEPTHS = ("reckoned", "measured")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DeadReckoning(MeasuringPart):
-    """The position from measured attitude and velocity, from the position that is measured at the first tick.
+    """Dead reckoning: position from measured attitude and velocity, starting at the position of the first tick.
 
-    It stands after the sensors that it uses. Without a sensor of the position it starts at the true one.
+    List it after the sensors that it uses. Without a sensor of the position it starts at the true one.
 
     Args:
         rule: "trapezoid", the default, takes the mean of the velocities at both ticks; "euler" that of the last tick.

@@ -18,10 +18,10 @@ WIDEST = 1.5
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Docking(Guidance):
-    """Into a dock along its centre line, slower and slower, and round again where the vehicle is outside the funnel.
+    """Approach a dock along its centre line at decreasing speed, and start again if the vehicle is outside the funnel.
 
     With e the way to starboard off the centre line and D the look-ahead, the wanted heading is the dock's less
-    atan((e + kappa J) / D), where J gains D e / (D^2 + (e + kappa J)^2) a second, as of `Waypoints` with "ilos". The pace over
+    atan((e + kappa J) / D), where dJ/dt = D e / (D^2 + (e + kappa J)^2), as in `Waypoints` with "ilos". The pace over
     ground falls from `speed`, `slowing` before the dock, to `contact_speed` at it, evenly with the distance. The funnel has
     the radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is outside within `judged` of
     the dock goes round: to the place `offset` to starboard of where the line begins, `approach` before the dock, and from

@@ -45,7 +45,7 @@ class Fault(Sending):
     type: ClassVar[str] = "fault"
 
     of: str = text("is not a text", "give the name of an actuator or of a sensor", "")
-    channel: int = checked(_is_int, "is no whole number", "give the number of a channel, from 0", 0)
+    channel: int = checked(_is_int, "is not a whole number", "give the number of a channel, from 0", 0)
     time: Any = number((), "s", 0.0, least=0.0, infinite=True)
     gain: Any = number((), "1", 0.0)
     offset: Any = number((), "unit", 0.0)

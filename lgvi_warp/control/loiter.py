@@ -15,7 +15,7 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Loiter(Guidance):
-    """Round a circle about a place, for as long as the run lasts (Beard & McLain 2012, 10.2).
+    """Circle a point for as long as the run lasts (Beard & McLain 2012, 10.2).
 
     With d the distance from the centre on the map, the wanted heading is that of the circle's tangent, turned towards the
     circle by atan((d - radius) / look_ahead); its rate on the circle, speed / radius, is wanted too. Wanted position and
@@ -25,7 +25,7 @@ class Loiter(Guidance):
         center: The place, (3,) [m], inertial axes; its third number is the depth.
         radius: Radius of the circle [m].
         speed: Wanted speed ahead through the water [m/s].
-        look_ahead: How far ahead the circle is met [m]; some lengths of the vehicle.
+        look_ahead: Look-ahead distance along the tangent [m]; some lengths of the vehicle.
         clockwise: Whether clockwise as seen from above; by default True.
 
     Examples:

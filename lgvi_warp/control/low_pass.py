@@ -13,7 +13,7 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LowPass(MeasuringPart):
-    """A low-pass filter of the first order over one thing that is measured, exact for readings that are held over a period.
+    """First-order low-pass filter of one measured quantity, exact for readings that are held over a period.
 
     x <- x + (1 - exp(-T / time_constant)) (measured - x), T the period; it starts at the first reading. The difference of two
     headings is within half a turn; an attitude goes the same part of the turn to the measured one.

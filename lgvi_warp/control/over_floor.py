@@ -16,10 +16,10 @@ from lgvi_warp.physics.terms.floor import Floor
 def chosen(faults: Faults, where: str, name: Any, able: Sequence[Term], what: str, remedy: str) -> Any:
     """The one of some things that a name says, or the only one for ""; None after adding a fault to `where`."""
     keys = [thing.key for thing in able]
+    article = "an" if what[0] in "aeiou" else "a"
     if name and name not in keys:
-        faults.add(where, name, f"is no {what} of the scene", closest(str(name), keys) if keys else remedy)
+        faults.add(where, name, f"is not {article} {what} of the scene", closest(str(name), keys) if keys else remedy)
     elif not name and len(able) != 1:
-        article = "an" if what[0] in "aeiou" else "a"
         problem = f"does not say which of {len(able)} {what}s" if able else f"needs {article} {what}"
         faults.add(where, name, problem, f"name one: {', '.join(keys)}" if able else remedy)
     else:

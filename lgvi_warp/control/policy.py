@@ -51,7 +51,7 @@ PLACES = {name: (place, wish) for place, (name, wish) in enumerate(_places())}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Policy(ControlLaw):
-    """A perceptron that was trained elsewhere: y = f(W y + b) layer by layer, the last of them times `scale` the demand.
+    """A trained perceptron (multilayer network): y = f(W y + b) layer by layer; the demand is `scale` times the last layer.
 
     The file holds weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes them, uncompressed; nothing
     in it is executed. Inputs are, of what is wanted less what is measured, "depth_error", "heading_error" [m, rad],

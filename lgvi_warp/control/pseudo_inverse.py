@@ -17,7 +17,7 @@ MOST_LOST = 4
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PseudoInverse(EffortAllocation):
-    """Commands for the efforts t of least sum of weight t^2 whose wrench B t is nearest to the demand (Fossen 2021, 11.2).
+    """Allocation by a weighted pseudo-inverse: least sum of weight t^2, wrench B t nearest to the demand (Fossen 2021, 11.2).
 
     t = W^-1 B^T (B W^-1 B^T)^+ w. Components for which no law asks do not count. Effort is thrust of thrusters, by the
     inverse of their curve; angle of fins, whose effect B is that at `speed`; force or moment of a control_wrench. Thrust is

@@ -37,7 +37,7 @@ RANGE = "range"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sensor(MeasuringPart):
-    """A sensor of one thing: truth + bias + walk + noise, rounded to the quantum; new at some ticks, late, and lost at times.
+    """Sensor of one quantity: truth + bias + random walk + noise, rounded; with a rate, a latency and lost readings.
 
     The numbers are in the unit of what is measured: m, rad, m/s or rad/s; of a 3-vector each is one number, which stands for
     all axes, or three. An attitude is turned by the errors as a rotation vector of the body's axes, and the quantum is that of
@@ -116,7 +116,7 @@ class Sensor(MeasuringPart):
             value = float(getattr(self, name))
             if value != round(value):
                 near = f"{np.floor(value):g} or {np.ceil(value):g}"
-                faults.add(name, value, "is no whole number of ticks", f"give {near}")
+                faults.add(name, value, "is not a whole number of ticks", f"give {near}")
         if self.place is not None and not among(self.of, OF_A_PLACE):
             remedy = "leave it out" if not among(self.of, [RANGE]) else "give point"
             faults.add("place", self.place, f"has no meaning for a sensor of {self.of}", remedy)

@@ -15,7 +15,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetPoint(Guidance):
-    """A place, a heading and a speed that are wanted all the time. What is not given stays as guidance before it wants it.
+    """Constant set-point: a place, a heading, a speed. What is not given is left to the guidance before it.
 
     Args:
         position: Wanted position, (3,) [m], inertial axes.
@@ -41,7 +41,7 @@ class SetPoint(Guidance):
 
     def check(self, faults: Faults) -> None:
         if not self.parameters():
-            faults.add("", "", "wants nothing", "give position, depth, heading or speed")
+            faults.add("", "", "sets nothing", "give position, depth, heading or speed")
         if self.position is not None and self.depth is not None:
             faults.add("depth", self.depth, "is given beside position", "keep one of them: position[2] is the depth")
 

@@ -113,7 +113,7 @@ add_signals(
 )
 add_signals(
     Signal(_OF_ITERATIONS, UNCONVERGED),
-    absent=("is told by parts that iterate, which this controller has not", "leave it out"),
+    absent=("is reported by parts that iterate, and this controller has none", "leave it out"),
 )
 add_signals(
     Signal(Field(ENERGY_USED, (), "J", "energy used since the start"), ""),
@@ -199,7 +199,7 @@ def check_names(faults: Faults, key: str, names: Any) -> tuple[str, ...]:
     """Read a list of names of samples, and add a fault for each that no sample has."""
     read = items_of(names)
     if read is None:
-        faults.add(key, names, "is no list of names", 'give one, such as ["position", "attitude"]')
+        faults.add(key, names, "is not a list of names", 'give one, such as ["position", "attitude"]')
     for name in read or ():
         faults.choice(key, name, SAVED)
     return tuple(read or ())

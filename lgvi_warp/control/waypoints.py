@@ -28,7 +28,7 @@ OF_POINTS = ("times", *CIRCLES)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Waypoints(Guidance):
-    """A way from point to point in straight legs, whose heading is found by line of sight (Fossen 2021, 12.3-12.5).
+    """Waypoints joined by straight legs; the heading follows by line of sight (Fossen 2021, 12.3-12.5).
 
     With y the way to starboard off the leg and D the look-ahead, the wanted heading is the leg's less
     "los": atan(y / D);

@@ -37,7 +37,7 @@ class CVaR:
         faults = Faults("CVaR.")
         share = faults.number("share", self.share)
         if share is not None and not 0.0 < share <= 1.0:
-            faults.add("share", self.share, "is no part", "give a number in (0, 1], such as 0.05")
+            faults.add("share", self.share, "is not a part", "give a number in (0, 1], such as 0.05")
         faults.raise_if_any()
 
     def __call__(self, costs: np.ndarray) -> np.ndarray:
@@ -75,5 +75,5 @@ def risk_of(faults: Faults, risk: Any) -> Any:
         quantile = functools.partial(np.quantile, q=risk, axis=1, method="inverted_cdf")
         return _Risk(f"{100.0 * risk:g} % quantile", quantile)
     if not (isinstance(risk, str) and risk == "mean"):
-        faults.add("risk", brief(risk), "is no risk", 'give "mean", a level such as 0.95, or lw.metrics.CVaR(0.05)')
+        faults.add("risk", brief(risk), "is not a risk", 'give "mean", a level such as 0.95, or lw.metrics.CVaR(0.05)')
     return _Risk("mean", lambda costs: costs.mean(axis=1))

@@ -86,7 +86,7 @@ def success_of(conditions: Any, metrics: Sequence[str]) -> Success:
         conditions = conditions.to_dict()
     if not isinstance(conditions, Mapping):
         remedy = 'write [success] and "overshoot depth" = { below = 1.0 } below'
-        raise refusal("success", conditions, "is no table", remedy)
+        raise refusal("success", conditions, "is not a table", remedy)
     faults = Faults("success.")
     words = conditions.get("status", OK)
     statuses = tuple(items_of(words) or (words,))
@@ -99,9 +99,11 @@ def success_of(conditions: Any, metrics: Sequence[str]) -> Success:
             continue
         if name not in metrics:
             remedy = closest(name, metrics) if metrics else "give metrics=[...]"
-            faults.add(f'"{name}"', "...", "is no metric of this sweep", remedy)
+            faults.add(f'"{name}"', "...", "is not a metric of this sweep", remedy)
         elif not isinstance(table, Mapping) or not table or not table.keys() <= {"above", "below"}:
-            faults.add(f'"{name}"', table, "is no condition", "write { below = 1.0 } or { above = 0.0, below = 1.0 }")
+            faults.add(
+                f'"{name}"', table, "is not a condition", "write { below = 1.0 } or { above = 0.0, below = 1.0 }"
+            )
         else:
             ends = [faults.number(f'"{name}".{word}', table[word], "unit of the metric") if word in table else end
                     for word, end in (("above", -np.inf), ("below", np.inf))]  # fmt: skip

@@ -339,7 +339,7 @@ def _no_water(view: Any, point: Any, sea: Any) -> Any:
 def _check_seeing(faults: Faults, term: Term, functions: Any, page: str) -> None:
     """Add a fault unless a law that looks at the water makes the functions that the kernel asks for."""
     if not isinstance(functions, dict) or "load" not in functions or set(functions) - set(SEEING):
-        faults.add(f"{term.key}.seeing", functions, "is no dict with load, and push if you like", page)
+        faults.add(f"{term.key}.seeing", functions, "is not a dict with load, and push if you like", page)
         return
     for role, function in functions.items():
         _check_function(faults, term, role, function, SEEING[role])

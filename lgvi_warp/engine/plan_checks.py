@@ -72,7 +72,7 @@ def check_noise_steps(choice: KernelChoice, grid: TimeGrid) -> None:
         noise_step, draws = float(term.noise_step), term.draws(h)
         if whole_steps(h, noise_step) != draws:
             multiple = round(spacing / noise_step)
-            problem = f"is no whole multiple of {term.key}.noise_step = {noise_step:.9g} s"
+            problem = f"is not a whole multiple of {term.key}.noise_step = {noise_step:.9g} s"
             if multiple < 1 or whole_steps(spacing, noise_step) is None:
                 remedy = f"give a noise_step that divides the {spacing:.9g} s between samples"
             else:

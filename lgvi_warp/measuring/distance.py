@@ -78,7 +78,7 @@ def compared_in(of: Any) -> Distance:
     if isinstance(of, str) and of.strip().startswith(MEAN):
         entry = compared_in(of.strip().removeprefix(MEAN))
         if entry.name == "attitude" or entry.mean:
-            problem = "is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"
+            problem = "is not a mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"
             raise SceneError([f"of = {of!r}: {problem}"])
         inner = entry.functional or functional("of", entry.name)
         return replace(entry, name=MEAN + entry.name, functional=inner, mean=True)
@@ -86,7 +86,7 @@ def compared_in(of: Any) -> Distance:
         raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
     parsed = functional("of", of)
     if parsed.over_path:
-        problem = "looks over the path, and errors are of a quantity at each time"
+        problem = "is taken over the whole path, and errors are of a quantity at each time"
         remedy = f"give {parsed.inner.name!r}, whose largest error over the path is reported"
         raise SceneError([f"of = {parsed.label!r}: {problem}; {remedy}"])
     return Distance(parsed.label, parsed.unit or "1", parsed)

@@ -30,7 +30,7 @@ def term_cost(
     members: int = 64,
     rounds: int = 5,
 ) -> list[dict[str, Any]]:
-    """Measure what a step costs without terms, with each term of a scene alone, and with all of them.
+    """Measure the cost of a step without terms, with each term of a scene alone, and with all of them.
 
     The scenes take turns. Costs are processor time of the thread that runs the kernel, the least of several readings. What
     steers the vehicle, and what ends a run, is left out. Each kernel is compiled once, which takes some seconds.

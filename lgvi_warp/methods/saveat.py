@@ -103,7 +103,7 @@ class TimeGrid:
         step, first, faults = of_step(self.h), whole_steps(t0, self.h), Faults()
         if first is None or first < 0:
             near = max(0, round(t0 / self.h)) * self.h
-            faults.add("t0", t0, f"is no whole number of steps of {self.h:.9g} s", f"give {near:.9g}")
+            faults.add("t0", t0, f"is not a whole number of steps of {self.h:.9g} s", f"give {near:.9g}")
         elif first + self.steps >= 2**31 - 1:
             faults.add("t0", t0, "is too many steps from t = 0", "at most 2,147,483,646 can be counted")
         faults.raise_if_any()

@@ -28,7 +28,7 @@ class Stream(NamedTuple):
 
 @dataclass(frozen=True)
 class NoiseDraws:
-    """Standard normals that one stream of a noisy term, or of a sensor, takes of a run.
+    """Standard normal draws that one stream of a noisy term, or of a sensor, uses in a run.
 
     Attributes:
         of: key of the term or of the sensor.
@@ -58,7 +58,7 @@ class NoiseDraws:
 
     @property
     def columns(self) -> slice:
-        """Their columns of xi."""
+        """Columns of these draws in xi."""
         return slice(self.column, self.column + self.numbers)
 
     @property

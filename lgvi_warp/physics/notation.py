@@ -23,7 +23,7 @@ ORTHOGONAL = 1e-9
 
 
 def repeated(*arrays: np.ndarray) -> list[np.ndarray]:
-    """Repeat what all members share, so that all arrays have as many rows.
+    """Repeat shared rows, so that all arrays have the same number of rows.
 
     Args:
         arrays: Arrays (1 or n, ...).

@@ -67,7 +67,7 @@ def repeated(*arrays: np.ndarray) -> list[np.ndarray]:
         if not faults and (not array.ndim or len(array) not in (1, most)):
             faults.add(f"arrays[{i}]", array, f"has shape {array.shape}", f"give 1 row, or {most} as others have")
     if not arrays:
-        faults.add("arrays", arrays, "are none", "give one or more")
+        faults.add("arrays", arrays, "is empty", "give one or more")
     faults.raise_if_any()
     return notation.repeated(*read)
 

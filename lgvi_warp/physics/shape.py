@@ -39,7 +39,7 @@ class Shape:
                 object.__setattr__(self, name, size)
         elif not isinstance(self.mesh, str) or not self.mesh.lower().endswith(".glb"):
             faults.add(
-                "mesh", self.mesh, "is no name of a .glb file", "give a binary glTF file, or length and diameter"
+                "mesh", self.mesh, "is not a name of a .glb file", "give a binary glTF file, or length and diameter"
             )
         elif self.length is not None or self.diameter is not None:
             faults.add("mesh", self.mesh, "stands beside a length or a diameter", REMEDY)

@@ -98,7 +98,7 @@ class Vehicle(Summarized):
     inertia_tolerance: float = real(0.0, unit="1", least=0.0)
     warnings: Sequence[str] = checked(_are_texts, "is not a list of texts", 'give ["..."], or leave it out', ())
     shape: Any = None
-    title: str | None = text("is no text", 'give title = "my glider", or leave it out', None)
+    title: str | None = text("is not a text", 'give title = "my glider", or leave it out', None)
 
     def __post_init__(self) -> None:
         faults = Faults("vehicle.")

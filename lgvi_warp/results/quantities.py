@@ -266,7 +266,7 @@ def _of_ends(text: str) -> EndQuantity | None:
         return None
     function = functional("of", name)
     if function.over_path:
-        raise refusal("of", text, "looks over the path, which has no time", f"give {name!r} alone")
+        raise refusal("of", text, "is taken over the whole path, which has no time", f"give {name!r} alone")
     label = f"{function.label} at {end}"
     try:
         when = float(end)
@@ -334,7 +334,7 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
                 function = functional("of", request)
                 results.append(OfResult(function.label, function, not isinstance(request, str)))
         else:
-            faults.add("of", request, "is no quantity", REMEDY)
+            faults.add("of", request, "is not a quantity", REMEDY)
     metrics = [result.label for result in results if isinstance(result, MetricQuantity)]
     for name in sorted({name for name in metrics if metrics.count(name) > 1}):
         faults.add("of", name, "is the name of another metric", 'give it a name of its own: name="..."')

@@ -91,7 +91,7 @@ class Result(Summarized):
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
         starts: Numbers of the start that varied, by name, (n, ...): "start.position", "start.euler_deg", ...
         weights: What each member counts for in statistics, (n,), of mean 1 (see lw.designs.Table); None: all alike.
-        messages: What the user should know.
+        messages: Remarks on how far the result can be relied on.
         provenance: Scene, ensemble with its seed, settings, versions and machine.
         terms: The scene's terms.
         statistics: Estimates of the statistics gathered during the run, by name.

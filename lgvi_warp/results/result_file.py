@@ -55,7 +55,7 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
             raise ValueError(f"{name[:100]!r} has the type {array.dtype} and shape {array.shape}")
     texts = {name: parsed(str(content[name])) for name in TEXTS[:2]}
     if not isinstance(texts["messages"], list) or not all(isinstance(item, str) for item in texts["messages"]):
-        raise ValueError("its messages are no texts")
+        raise ValueError("its messages are not texts")
     _provenance(texts["provenance"])
     _final(content)
     texts["tangents"] = _tangents(content)
@@ -66,7 +66,7 @@ def _tangents(content: Mapping[str, np.ndarray]) -> tuple[str, ...]:
     """The names of the numbers of the derivatives. Raises ValueError."""
     names = parsed(str(content["tangents"])) if "tangents" in content else []
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise ValueError("its tangents are no names")
+        raise ValueError("its tangents are not names")
     if any(content[name].shape[-1] != len(names) for name in content if name.startswith("jacobian/")):
         raise ValueError(f"it has derivatives by other numbers than {len(names)}")
     return tuple(names)

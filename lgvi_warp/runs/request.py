@@ -114,7 +114,7 @@ class Request:
         end = "give the end in seconds: solve(..., t1=150.0) or [run] duration"
         t1 = _seconds(faults, "t1", self.t1, run.duration, end)
         if self.save is not None and not isinstance(self.save, SaveAt):
-            faults.add("save", self.save, "is no SaveAt", "give lw.SaveAt(every=1.0) or lw.SaveAt(at=[...])")
+            faults.add("save", self.save, "is not a SaveAt", "give lw.SaveAt(every=1.0) or lw.SaveAt(at=[...])")
         faults.raise_if_any()
         key = "run.save_fields" if self.save is None else "save.fields"
         check_signals(faults, key, self.saved, self.fleet.scene)

@@ -85,7 +85,9 @@ def check(request: Request, tangents: Any, store: Any, start: Any, on_block: Any
 def _names(faults: Faults, tangents: Any) -> tuple[str, ...]:
     listed = [tangents] if isinstance(tangents, str) else items_of(tangents)
     if not listed or not all(isinstance(name, str) for name in listed):
-        faults.add("tangents", tangents, "is no list of names", 'give tangents=["vehicle.mass", "start.velocity[0]"]')
+        faults.add(
+            "tangents", tangents, "is not a list of names", 'give tangents=["vehicle.mass", "start.velocity[0]"]'
+        )
         return ()
     return tuple(", ".join(target.label for target in targets(name)) for name in listed)
 
@@ -207,7 +209,7 @@ def _of_members(ended: np.ndarray, jacobian: dict[str, np.ndarray], members: int
         unknown |= ~np.isfinite(slopes).all(axis=(0, *range(2, slopes.ndim)))
     if (unknown & ~ended).any():
         texts.append(
-            f"tangents: {(unknown & ~ended).sum():,} of {members:,} members have derivatives that are no numbers: they come "
+            f"tangents: {(unknown & ~ended).sum():,} of {members:,} members have derivatives that are not numbers: they come "
             "to a point where something that acts has none"
         )
     return texts

@@ -226,7 +226,7 @@ class Final(Summarized):
         time, step = faults.number("time", self.time, "s", 0.0), faults.positive("step", self.step)
         for name in ("steps", "seed"):
             if not is_whole(getattr(self, name), 0):
-                faults.add(name, getattr(self, name), "is no whole number from 0", remedy)
+                faults.add(name, getattr(self, name), "is not a whole number from 0", remedy)
         if not faults and whole_steps(time or 0.0, step or 1.0) != self.steps:
             faults.add("time", self.time, f"is not that of {self.steps} steps of {self.step:.9g} s", remedy)
         codes = _whole_numbers(faults, "status", self.status, remedy)
@@ -242,7 +242,7 @@ class Final(Summarized):
             if faults.choice("states", name, FIELDS) and (
                 np.shape(rows) != shape or np.asarray(rows).dtype.kind != "f"
             ):
-                faults.add(f"states.{name}", rows, f"is no array of shape {shape}", remedy)
+                faults.add(f"states.{name}", rows, f"is not an array of shape {shape}", remedy)
         for name, rows in self.lanes.items():
             if np.ndim(rows) != 2 or len(rows) != n or np.asarray(rows).dtype.kind not in "fiu":
                 faults.add(f"lanes.{name}", np.shape(rows), f"is not the shape of rows of {n} members", remedy)
@@ -250,11 +250,14 @@ class Final(Summarized):
             rows = np.asarray(None if ragged(values) else values)
             if rows.dtype.kind not in "fiub" or rows.ndim == 0 or len(rows) not in (1, n):
                 faults.add(
-                    f"parameters.{name}", values, f"is no array of numbers of {n} members, or of one for all", remedy
+                    f"parameters.{name}",
+                    values,
+                    f"is not an array of numbers of {n} members, or of one for all",
+                    remedy,
                 )
         rows = np.asarray(self.lanes.get("state", np.zeros((max(n, 0), NUMBERS_OF_STATE))))
         if not isinstance(self.settings, Mapping):
-            faults.add("settings", self.settings, "is no mapping", remedy)
+            faults.add("settings", self.settings, "is not a mapping", remedy)
         elif self.settings and "state" not in self.lanes:
             faults.add("lanes.state", "...", "is missing", f"{remedy}, or final.changed() to go on from the states")
         elif not faults and rows.shape[1] < NUMBERS_OF_STATE:
@@ -288,7 +291,7 @@ def _whole_numbers(faults: Faults, key: str, values: Any, remedy: str) -> np.nda
     array = np.asarray(None if ragged(values) else values)
     if array.ndim == 1 and array.dtype.kind in "iu":
         return array
-    faults.add(key, values, "is no list of whole numbers", remedy)
+    faults.add(key, values, "is not a list of whole numbers", remedy)
     return None
 
 

@@ -260,7 +260,7 @@ def _column(tables: Faults, key: str, column: Any, known: Mapping[str, np.ndarra
     values = explicit_parameter(tables, name, column, shape)
     attitudes = target.name == variations.ATTITUDE and values.shape == shape
     if attitudes and not notation.rotations(values).all():
-        tables.add(f'"{key}"', "...", "holds a matrix that is no rotation to 1e-9", "give R^T R = I, det R = 1")
+        tables.add(f'"{key}"', "...", "holds a matrix that is not a rotation to 1e-9", "give R^T R = I, det R = 1")
     return target, values
 
 

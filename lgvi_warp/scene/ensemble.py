@@ -110,7 +110,7 @@ class Ensemble(Summarized, Documented):
     ):
         faults = Faults()
         if not isinstance(scene, SceneLike):
-            faults.add("scene", scene, "is no Scene", "give lw.Scene(...) or lw.Scene.load(path)")
+            faults.add("scene", scene, "is not a Scene", "give lw.Scene(...) or lw.Scene.load(path)")
         if vary is not None and not (isinstance(vary, Mapping) and all(_is_name(name) for name in vary)):
             faults.add(
                 "vary",

@@ -148,7 +148,7 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
     Keys beside the name replace the vehicle's own values. A term of the same name or type replaces the vehicle's term.
     """
     if not isinstance(content, Mapping):
-        raise refusal("scene", content, "is no table", "give tables by section name, as of a scene file")
+        raise refusal("scene", content, "is not a table", "give tables by section name, as of a scene file")
     table = content.get("vehicle")
     if not isinstance(table, Mapping) or "name" not in table:
         return content

@@ -34,7 +34,7 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any], keys: Sequence[str] 
         target, *others = variations.targets(by_key(scene, name))
         key, _, attribute = target.name.rpartition(".")
         if others or target.name not in known:
-            problem = "is no number of this scene" + " and no key of its file" * bool(keys)
+            problem = "is not a number of this scene" + " and no key of its file" * bool(keys)
             faults.add(f'"{name}"', value, problem, closest(target.name, dict.fromkeys((*known, *keys))))
             continue
         taken.append((name, (target,)))
@@ -51,7 +51,10 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any], keys: Sequence[str] 
                 array[target.index[::-1]] = value
         except (IndexError, ValueError, TypeError):
             faults.add(
-                f'"{name}"', value, f"is no number of {target.name}, of shape {array.shape}", "give one that there is"
+                f'"{name}"',
+                value,
+                f"is not a number of {target.name}, of shape {array.shape}",
+                "give an existing one",
             )
             continue
         place[attribute] = array

@@ -183,7 +183,7 @@ def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
         for key in keys:
             yield key, np.array([True]), lambda i, text=text: text  # type: ignore[misc]
     missing = controller.unspanned
-    text = f"actuators cannot make {', '.join(missing)} as the laws ask: what is left is told back to them as not delivered"
+    text = f"actuators cannot make {', '.join(missing)} as the laws ask: the rest is reported to them as not delivered"
     yield "controller.allocation", np.array([bool(missing)]), lambda i: text
 
 

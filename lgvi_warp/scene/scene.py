@@ -113,7 +113,7 @@ class Scene(Summarized):
             if not isinstance(getattr(self, name), kind):
                 # Settings of a run have no public class: they are arguments of solve, or a table of a scene file.
                 remedy = RUN_REMEDY if name == "run" else f"give lw.{kind.__name__}(...)"
-                faults.add(name, getattr(self, name), f"is no {kind.__name__}", remedy)
+                faults.add(name, getattr(self, name), f"is not of type {kind.__name__}", remedy)
         if sound and isinstance(self.vehicle, Vehicle) and isinstance(self.environment, Environment):
             with faults.including():
                 self._connect()

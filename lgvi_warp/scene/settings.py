@@ -27,7 +27,7 @@ MOST_MEMBERS = 2**31
 KEEP = ("all", "none", "failed")
 # Where kernels run, and what is said of any other place.
 DEVICES = ("cpu",)
-NO_DEVICE = "is no device of a run: runs are on CPU cores", 'leave it out, or give "cpu"'
+NO_DEVICE = "is not a device of a run: runs are on CPU cores", 'leave it out, or give "cpu"'
 
 
 def check_device(device: Any) -> None:

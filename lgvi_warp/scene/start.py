@@ -77,7 +77,7 @@ class Environment:
             object.__setattr__(self, "start", self.start.isoformat())
         if self.start is not None and _moment(self.start) is None:
             remedy = 'write it as "2026-06-01T00:00:00Z"'
-            faults.add("start", self.start, "is no date and time", remedy)
+            faults.add("start", self.start, "is not a date and time", remedy)
         faults.raise_if_any()
 
     @property
@@ -250,7 +250,7 @@ class Start:
         chosen = {name: getattr(self, name) for name in NAMES if getattr(self, name) is not None}
         if (place := chosen.pop("geodetic", None)) is not None:
             if self.converted is None:
-                raise refusal("start.geodetic", place, "is of no scene", "give the start to a scene with an origin")
+                raise refusal("start.geodetic", place, "needs a scene", "give the start to a scene with an origin")
             chosen = {"position": self.converted} | chosen
         alternatives = {"rotation_vector": ATTITUDES, "velocity": VELOCITIES}
         for name in ("position", "rotation_vector", "velocity", "angular_velocity"):

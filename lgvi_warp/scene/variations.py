@@ -52,7 +52,7 @@ class Target:
 def targets(key: str) -> tuple[Target, ...]:
     """Read the targets that a key names."""
     if not isinstance(key, str):
-        raise refusal("vary", key, "is no name of a quantity", 'give names such as "vehicle.mass"')
+        raise refusal("vary", key, "is not a name of a quantity", 'give names such as "vehicle.mass"')
     if len(key) > LONGEST_KEY:
         return (Target(key),)
     listed = []
@@ -182,7 +182,7 @@ def known_target(
             faults.add(f'"{key}"', distribution, "varies an entry of a rotation", ROTATIONS)
             return False
         if len(target.index) != len(shape) or any(i >= n for i, n in zip(target.index, shape, strict=True)):
-            problem = f"is no entry of {target.name}, of shape {shape}"
+            problem = f"is not an entry of {target.name}, of shape {shape}"
             form = f"give {len(shape)} numbers from 0" if shape else f'write "{target.name}"'
             faults.add(f'"{key}"', distribution, problem, form)
             return False
@@ -250,7 +250,7 @@ def _no_such_matrices(target: Target, values: np.ndarray) -> tuple[str, str] | N
     """Return what is wrong with matrices (k, d, d) to choose from, and the remedy; None if they fit the target."""
     if target.name == ATTITUDE and not notation.rotations(values).all():
         which = int(np.argmin(notation.rotations(values)))
-        return f"holds a matrix that is no rotation to 1e-9 (number {which + 1})", "give R^T R = I, det R = 1"
+        return f"holds a matrix that is not a rotation to 1e-9 (number {which + 1})", "give R^T R = I, det R = 1"
     if target.name not in MATRICES or target.index is not None:
         return None
     skew = np.abs(values - np.swapaxes(values, 1, 2)).max() > 1e-9 * np.abs(values).max()

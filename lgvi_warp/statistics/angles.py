@@ -158,7 +158,7 @@ class MeanAttitude(Statistic):
 
     def check(self, faults: Faults) -> None:
         if not among(self.of, ("attitude",)):
-            faults.add("of", self.of, "is no attitude", 'leave it out, or give "attitude"')
+            faults.add("of", self.of, "is not an attitude", 'leave it out, or give "attitude"')
 
     @property
     def key(self) -> str:

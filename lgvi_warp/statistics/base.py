@@ -155,7 +155,7 @@ class Statistic(Documented):
         if self.name is not None and not isinstance(self.name, str):
             faults.add("name", self.name, "is not a text", "give a text, or leave it out")
         if self.at is not None and (not isinstance(self.at, str) or not self.at):
-            faults.add("at", self.at, "is no outcome", 'give "floor", the name of an event, or "stopped"')
+            faults.add("at", self.at, "is not an outcome", 'give "floor", the name of an event, or "stopped"')
         elif self.at is not None and not self.of_numbers:
             fault = "is one moment, and this statistic is of all times"
             faults.add("at", self.at, fault, "leave it out, or ask for a mean")
@@ -359,7 +359,7 @@ def from_list(entries: Any, key: str = "statistics", *, unique_names: bool = Tru
     listed = items_of(entries)
     if listed is None:
         example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.statistics.Mean("position")]'
-        raise refusal(key, entries, "is no list", example)
+        raise refusal(key, entries, "is not a list", example)
     faults, statistics = Faults(), list[Statistic]()
     for i, entry in enumerate(listed):
         with faults.including():
@@ -381,7 +381,7 @@ def from_table(where: str, entry: Any) -> Statistic:
     if isinstance(entry, Statistic):
         return entry
     if not isinstance(entry, Mapping):
-        raise refusal(where, entry, "is no statistic", 'write type = "mean", or give lw.statistics.Mean("position")')
+        raise refusal(where, entry, "is not a statistic", 'write type = "mean", or give lw.statistics.Mean("position")')
     word = entry.get("type", "")
     kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None:

@@ -82,7 +82,7 @@ class Histogram(Counted):
         if self.edges is None:
             limits, bins = np.array([0.0, 1.0]) if run else faults.finite("limits", self.limits, (2,)), self.bins
             if bins is None or not is_whole(bins, 1):
-                faults.add("bins", bins, "is no whole number above 0", whole_remedy(bins, "give 50"))
+                faults.add("bins", bins, "is not a whole number above 0", whole_remedy(bins, "give 50"))
                 return
             object.__setattr__(self, "bins", int(bins))
             edges = None if limits is None else np.linspace(limits[0], limits[1], int(bins) + 1)
@@ -160,7 +160,9 @@ class Condition(Statistic):
             if getattr(self, name) is not None:
                 limit = faults.finite(name, getattr(self, name))
                 if limit is not None and (limit.ndim > 1 or limit.size not in fits):
-                    faults.add(name, getattr(self, name), "is no number", "give one number, or one for each component")
+                    faults.add(
+                        name, getattr(self, name), "is not a number", "give one number, or one for each component"
+                    )
                 elif limit is not None:
                     limits.append(limit)
         if len(limits) == 2 and not np.all(limits[0] < limits[1]):

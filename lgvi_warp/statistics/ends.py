@@ -58,5 +58,5 @@ def check_outcomes(key: str, outcomes: Sequence[str], known: Sequence[str]) -> N
     faults = Faults()
     for name in outcomes:
         if name not in known:
-            faults.add(key, name, "is no outcome of this scene", closest(name, known))
+            faults.add(key, name, "is not an outcome of this scene", closest(name, known))
     faults.raise_if_any()

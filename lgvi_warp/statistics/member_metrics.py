@@ -36,7 +36,7 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
     statistic = from_table(key, entry)
     if not isinstance(statistic, MemberStatistic):
         remedy = 'give a metric such as lw.metrics.Overshoot("depth"), or "max(depth)"'
-        raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)
+        raise refusal(key, statistic.type, "is not a metric: it is not one number of each member", remedy)
     if getattr(statistic, "of", None) is not None:
         size = statistic.quantity.size
         if size != 1 and len(statistic.then_of(np.array([0.0, 1.0]))[0].quantity.labels) != 1:

@@ -129,11 +129,11 @@ class Quantiles(Statistic):
         levels = faults.finite("levels", self.levels)
         if levels is not None:
             if levels.ndim > 1 or levels.size == 0 or np.any(levels <= 0.0) or np.any(levels >= 1.0):
-                faults.add("levels", self.levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
+                faults.add("levels", self.levels, "are not numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
             object.__setattr__(self, "levels", tuple(np.unique(levels).tolist()))
         n = self.size
         if not is_whole(n, 64) or int(n) & (int(n) - 1):
-            faults.add("size", n, "is no power of two from 64", "give 2048")
+            faults.add("size", n, "is not a power of two from 64", "give 2048")
         else:
             object.__setattr__(self, "size", int(n))
 

@@ -51,7 +51,7 @@ class OfEnds(Statistic):
         """Return a quantity with the outcome's name, which needs no samples; SceneError where `of` is no name."""
         if not isinstance(self.of, str) or not self.of:
             remedy = 'give "floor", the name of an event of the scene, "stopped" or "failed"'
-            raise refusal(f"{self.type}.of", self.of, "is no outcome", remedy)
+            raise refusal(f"{self.type}.of", self.of, "is not an outcome", remedy)
         return Quantity(self.of, _nothing, "s", (), (self.of,), needs_limit=True)
 
     @property

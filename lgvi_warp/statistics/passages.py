@@ -226,7 +226,7 @@ def check_levels(faults: Faults, levels: Any) -> None:
     """Note a fault if levels are no fractions between 0 and 1."""
     numbers = faults.finite("levels", levels)
     if numbers is not None and (numbers.ndim != 1 or np.any(numbers <= 0.0) or np.any(numbers >= 1.0)):
-        faults.add("levels", levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
+        faults.add("levels", levels, "are not numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
 
 
 def design_effect(weighted: Weighted, share: np.ndarray, squares: np.ndarray) -> np.ndarray:

@@ -60,10 +60,10 @@ class Until:
         True
     """
 
-    statistic: str = text("is no name", 'give "mean position[2]"')
+    statistic: str = text("is not a name", 'give "mean position[2]"')
     half_width: float = positive(unit="in the unit of the statistic")
     at: Any = declared(_time_or_all, None)
-    members: int = whole(2, "is no whole number from 2", "give 1024", 1024)
+    members: int = whole(2, "is not a whole number from 2", "give 1024", 1024)
 
     def __post_init__(self) -> None:
         faults = Faults("until.")
@@ -142,7 +142,7 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> S
     elif until.at is not None:
         rows = rows_at(times, until.at)
         if not len(rows):
-            faults.add("at", until.at, "is no sample time", "give a time at which samples are kept, or leave it out")
+            faults.add("at", until.at, "is not a sample time", "give a time at which samples are kept, or leave it out")
     target = None
     with faults.including():
         target = _target(until.statistic, _named(statistics))
@@ -203,4 +203,4 @@ def _target(name: str, known: Mapping[str, Named]) -> Named:
     if not hint.startswith("did you mean"):  # list the statistics alone, not their components
         estimates = dict.fromkeys(estimate for _, estimate, _ in known.values())
         hint = closest(name, estimates) if known else 'give a mean, such as "mean depth", or statistics'
-    raise refusal("until.statistic", name, "is none of the run's statistics", hint)
+    raise refusal("until.statistic", name, "is not a statistic of the run", hint)

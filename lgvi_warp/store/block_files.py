@@ -102,7 +102,9 @@ class BlockFiles:
         parts = self.parts_key(block)
         faults = [f"{key} is not in the marker" for key in (*sizes, *([parts] if keepers else [])) if key not in sums]
         strange = [key for key in sums if key not in sizes and key != parts]
-        faults += [f"{key!r:.100} is in the marker of block {name_of(block)}, and is no file of it" for key in strange]
+        faults += [
+            f"{key!r:.100} is in the marker of block {name_of(block)}, and is not a file of it" for key in strange
+        ]
         wrong = [key for key, size in sizes.items() if key in sums and sums[key][0] != size]
         return faults + [f"{key} has {sums[key][0]} bytes in the marker, not {sizes[key]}" for key in wrong]
 

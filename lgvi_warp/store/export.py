@@ -15,7 +15,7 @@ from typing import Any
 from lgvi_warp.common import extensions
 from lgvi_warp.common import files as durable
 from lgvi_warp.common.arguments import file_path, flag, path_of
-from lgvi_warp.common.errors import MissingExtra, SceneError, refusal
+from lgvi_warp.common.errors import MissingExtra, SceneError, install, refusal
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.results.result import Result
@@ -48,7 +48,7 @@ def export(
     overwrite: bool = False,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Path:
-    """Export a run, or some of its members, to a file of another program; the file's ending says of which kind.
+    """Export a run, or some of its members, to a file for other programs; the file's ending chooses the format.
 
     ".csv" and ".parquet": a table with a row for each member and time of the samples, else for each member. ".nc": NetCDF-4
     with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and transforms in the
@@ -155,7 +155,7 @@ def _ending(to: Any) -> str:
     ending = Path(to).suffix.lower() if isinstance(to, str | os.PathLike) else ""
     if ending not in (known := [*WRITERS, *extensions.words("exporters")]):
         remedy = f"give a name that ends in {', '.join(known)}, or a word of {', '.join(FORMATS)}"
-        raise refusal("to", to, "is no file of a known kind", remedy)
+        raise refusal("to", to, "is not a file of a known kind", remedy)
     return ending
 
 
@@ -239,7 +239,7 @@ def fault_of_library(to: str, target: Path) -> Iterator[None]:
     except MissingExtra as error:
         raise SceneError([f"to = {to!r}: {error}"]) from error
     except ImportError as error:
-        raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error
+        raise SceneError([f"to = {to!r}: {error}; install it: {install('export')}"]) from error
     except (OSError, RuntimeError) as error:
         # Neither library names the file, and netCDF4 hides the system's error.
         reason = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"

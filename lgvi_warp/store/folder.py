@@ -47,7 +47,7 @@ class Folder:
         provenance: Scene, ensemble, settings, versions and machine of the run.
         recipe: Settings of its plan.
         shared: Parameters that all members have in common.
-        messages: What the user should know.
+        messages: Remarks on how far the result can be relied on.
         layout: Its arrays.
         found: Blocks that this process found finished.
         ran: Blocks that this process ran.
@@ -272,7 +272,7 @@ def foreign(path: Path) -> str | None:
     Returns: A text on the first such file, or on why the folder is none of a run; None if it holds a run alone.
     """
     if path.is_symlink() or not path.is_dir():
-        return "is no folder of a run"
+        return "is not a folder of a run"
     names = []
     for name, entry in safe_files.entries(path):
         folder = entry.is_dir(follow_symlinks=False)

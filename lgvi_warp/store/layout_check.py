@@ -160,7 +160,7 @@ def layout_of(content: Mapping[str, Any], members: int) -> Layout:
         if name.partition("/")[0] == KEPT:
             continue  # a group with metadata of its own, which is looked at when it is opened
         if not all(is_name(part) for part in name.split("/")) or name.count("/") > 1:
-            raise NotOursError(f"{name!r} is no name of an array")
+            raise NotOursError(f"{name!r} is not a name of an array")
         if _table(metadata, name).get("node_type") == "group":
             groups.append(name)
         else:
@@ -173,7 +173,7 @@ def layout_of(content: Mapping[str, Any], members: int) -> Layout:
 
 def _table(value: Any, name: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise NotOursError(f"{name} is no table")
+        raise NotOursError(f"{name} is not a table")
     return value
 
 

@@ -166,7 +166,9 @@ def open_run(
         more = f", and {len(lost) - 1:,} more" if len(lost) > 1 else ""
         text = f"{folder.path}: {lost[0]} is missing{more}"
         if not incomplete:
-            raise SceneError([f"{text}; mend it with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
+            raise SceneError(
+                [f"{text}; repair it with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"]
+            )
         return result_of(folder, members, (*messages, text))
     observed_content = folder.provenance.get("observed")
     if members is not None or observed_content is None or (statistics is None and observed_content.get("functions")):

@@ -185,7 +185,7 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
             faults.add(type(keeper).__name__, keeper, "cannot be stored", "give it name, to_arrays and from_arrays")
     names = names_of(keepers)
     for name in sorted({name for name in names if names.count(name) > 1 or "/" in name}):
-        faults.add("name", name, "is no name of its own", "give each keeper another name, without /")
+        faults.add("name", name, "is not a name of its own", "give each keeper another name, without /")
     faults.raise_if_any()
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common.arguments import explained, listed
 from lgvi_warp.common.declared import read, real, word
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, SceneError, install
 from lgvi_warp.control.signals import SAVED
 from lgvi_warp.store.arrays import whole_array
 from lgvi_warp.store.layout import MEMBER, parameter_units
@@ -62,7 +62,7 @@ class Store:
     def __post_init__(self) -> None:
         faults = Faults("store.")
         if not isinstance(self.path, str | os.PathLike) or self.whole.suffix != ".zarr":
-            faults.add("path", self.path, "is no folder of a store", 'end its name in .zarr: "runs/x/run.zarr"')
+            faults.add("path", self.path, "is not a folder of a store", 'end its name in .zarr: "runs/x/run.zarr"')
         read(self, faults)
         with faults.including():
             for name in () if self.fields is None else listed("fields", self.fields, "names of fields"):
@@ -112,4 +112,4 @@ def needed() -> None:
         import xarray  # noqa: F401
         import zarr  # noqa: F401
     except ImportError as error:
-        raise SceneError([f"store: {error}; install it: pip install 'lgvi-warp[store]'"]) from error
+        raise SceneError([f"store: {error}; install it: {install('store')}"]) from error

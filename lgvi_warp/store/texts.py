@@ -79,23 +79,23 @@ def check_texts(attributes: Mapping[str, Any], provenance: Any, recipe: Any, mes
     for table, rules, name in ((provenance, PROVENANCE, "provenance"), (recipe, RECIPE, "recipe")):
         _rules(name, table, rules, required=True)
     if not _of_texts(provenance.get("functions", {})):
-        raise NotOursError("provenance.functions is no table of texts")
+        raise NotOursError("provenance.functions is not a table of texts")
     if not isinstance(provenance.get("start", {}), dict):
-        raise NotOursError("provenance.start is no table")
+        raise NotOursError("provenance.start is not a table")
     if "observed" in provenance:
         _rules("observed", provenance["observed"], OBSERVED, required=False)
     if not _texts(messages) or not isinstance(shared, dict) or not all(is_text(name) for name in shared):
         raise NotOursError("messages are no list of texts, or shared no table")
     words = ("Conventions", "title", "source")
     if type(attributes.get("complete")) is not bool or not all(is_text(attributes.get(word, "")) for word in words):
-        raise NotOursError("complete is no truth value, or the title no text")
+        raise NotOursError("complete is not a truth value, or the title no text")
     if not _maybe(_whole(1, recipe["members"]))(attributes.get("members")):
         raise NotOursError(f"members are {attributes['members']!r:.60} of {recipe['members']}")
 
 
 def _rules(name: str, table: Any, rules: Mapping[str, Rule], required: bool) -> None:
     if not isinstance(table, dict):
-        raise NotOursError(f"{name} is no table")
+        raise NotOursError(f"{name} is not a table")
     for key, rule in rules.items():
         if key not in table and not required:
             continue

@@ -169,7 +169,7 @@ def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> n
 def symmetric(faults: Faults, key: str, matrix: np.ndarray) -> np.ndarray:
     """Return the symmetric part of a matrix that is symmetric to the digits given."""
     if np.abs(matrix - matrix.T).max() > RELATIVE * np.abs(matrix).max():
-        remedy = "added mass of a body in unbounded water is symmetric: mend the pair"
+        remedy = "added mass of a body in unbounded water is symmetric: correct the pair"
         faults.add(key, matrix, "is not symmetric", remedy)
     return 0.5 * (matrix + matrix.T)
 
@@ -377,7 +377,7 @@ def with_partners(
         elif abs(matrix[row, column] - matrix[column, row]) > RELATIVE * abs(matrix[row, column]):
             problem = f"differs from its partner {lower} = {coefficients[lower]}"
             faults.add(
-                upper, coefficients[upper], problem, "the added mass matrix is symmetric: mend one or leave it out"
+                upper, coefficients[upper], problem, "the added mass matrix is symmetric: correct one or leave it out"
             )
         else:
             full[column, row] = full[row, column]

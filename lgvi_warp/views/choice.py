@@ -63,7 +63,7 @@ def of_members(count: int, total: int) -> str:
 
 
 def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
-    """Choose what is shown of a run; every picture and recording that draws some members follows this rule.
+    """Choose the members that pictures and recordings show when they draw only some.
 
     Drawn are the members that reach farthest along each axis; then of those that did not end ok up to a third of the places,
     shared among the outcomes; then members in the order of a hash of their index. The hash is as fair for grids, tables and

@@ -10,7 +10,7 @@ import pytest
 import lgvi_warp as lw
 from tests.support.bridges import example
 
-pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'lgvi-warp[fmu]'")
+pytest.importorskip("fmpy", reason="FMPy is not installed: pip install '.[fmu]'")
 if shutil.which("cc") is None:
     pytest.skip("no C compiler, cc, is on the path: no FMU can be made", allow_module_level=True)
 
@@ -65,7 +65,7 @@ def test_what_the_file_has_not_is_named(fmu):
 def test_a_file_that_is_no_fmu_is_told(tmp_path):
     other = tmp_path / "law.fmu"
     for _ in range(2):
-        with pytest.raises(ValueError, match=r"law\.fmu: is no FMU, or not there; give the path of one"):
+        with pytest.raises(ValueError, match=r"law\.fmu: is not an FMU, or not there; give the path of one"):
             BRIDGE.FmuLaw(other, BRIDGE.PERIOD, BRIDGE.INPUTS, BRIDGE.OUTPUTS)
         other.write_text("no archive")
 

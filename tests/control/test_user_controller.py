@@ -152,9 +152,9 @@ def shapeless_control(w: Any, r: Any, y: Any, p: Any):
 
 
 def test_what_is_no_part_or_does_not_compile_is_refused():
-    with pytest.raises(lw.SceneError, match="is no part of a controller; give an object"):
+    with pytest.raises(lw.SceneError, match="is not a part of a controller; give an object"):
         lw.laws.check_controller(lw.control.HeadingPID)
-    with pytest.raises(lw.SceneError, match="is no part of a controller"):
+    with pytest.raises(lw.SceneError, match="is not a part of a controller"):
         lw.laws.check_controller(lw.terms.Current(velocity=(1.0, 0.0, 0.0)))
     device = type("Shapeless", (), {"control": shapeless_control})
     kind = type("ShapelessLaw", (lw.laws.ControlLaw,), {"device": device})

@@ -44,7 +44,7 @@ def test_links_resolve(page):
         assert goal.is_relative_to(ROOT), f"{name(page)}: {target} is not there"
         assert goal.exists(), f"{name(page)}: {target} is not there"
         if anchor:
-            assert anchor in anchors(goal), f"{name(page)}: {target} is no heading of {name(goal)}"
+            assert anchor in anchors(goal), f"{name(page)}: {target} is not a heading of {name(goal)}"
 
 
 def test_every_page_is_linked():

@@ -54,7 +54,7 @@ def test_it_holds_text_and_code_and_the_outputs_of_this_code(path):
     assert [cell.execution_count for cell in code] == list(range(1, len(code) + 1)), again
     outputs = [output for cell in code for output in cell.outputs]
     assert {output.output_type for output in outputs} <= {"stream", "execute_result", "display_data"}
-    assert {output.get("name", "stdout") for output in outputs} == {"stdout"}, "a warning is no output to store"
+    assert {output.get("name", "stdout") for output in outputs} == {"stdout"}, "a warning is not an output to store"
     assert {"image/png", "text/plain"} <= {kind for output in outputs for kind in output.get("data", ())}
     assert path.stem in OVERVIEWS or "image/png" in [kind for kind, _ in notebooks.parts(code[-1])]
 

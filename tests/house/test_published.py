@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.common import errors
 from tests.conftest import ROOT
 from tests.support.pages import snippets
 
@@ -60,6 +61,14 @@ def test_the_pages_install_it_from_where_it_is(page):
         assert f"git clone {SOURCE}" in text
         assert re.search(r"pip install (-e )?'\.\[viz\]'", text)
         assert not re.search(r"(pip install|uvx) '?lgvi-warp", text)
+
+
+def test_messages_and_pages_install_extras_from_where_they_are():
+    assert CONFIGURATION["tool"]["lgvi_warp"]["published"] == errors.PUBLISHED
+    home = Path(errors.__file__)
+    files = [path for folder in ("docs", "lgvi_warp", "examples") for path in (ROOT / folder).rglob("*")]
+    texts = {path: path.read_text() for path in files if path.suffix in (".md", ".py", ".ipynb") and path != home}
+    assert [path for path, text in texts.items() if re.search(r"pip install '?lgvi-warp", text)] == []
 
 
 def test_the_recipe_asks_for_what_the_package_asks_for():

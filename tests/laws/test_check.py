@@ -358,7 +358,7 @@ WRONG = {
         "leave follow() out", "by the exact solution over view.h"),
     "numbers that do not fit": (
         Forgetful(strength=0.3), ["numbers"],
-        "strength is not in packed().values", "strange is no field of params()"),
+        "strength is not in packed().values", "strange is not a field of params()"),
     "numbers that cannot vary": (
         Shared(force=(1.0, 2.0, 3.0)), ["law: varied numbers", ...], "one entry a member"),
 }  # fmt: skip

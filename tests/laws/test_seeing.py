@@ -84,7 +84,7 @@ def test_it_is_checked_like_any_law():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda water_at: {"push": None}, "is no dict with load"),
+        (lambda water_at: {"push": None}, "is not a dict with load"),
         (lambda water_at: {"load": len}, "is not a Warp function; decorate it with @wp.func"),
         (lambda water_at: {"load": LinearFlow.device.flow}, "takes 3 arguments; write load(D, w, view, p, sea)"),
     ],

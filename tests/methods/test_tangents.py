@@ -327,10 +327,10 @@ def test_a_member_that_ended_has_no_derivatives_from_there_on():
 @pytest.mark.parametrize(
     ("tangents", "settings", "message"),
     [
-        *((listed, {}, "is no list of names") for listed in ([], 5, True, {"vehicle.mass"}, {"vehicle.mass": 1})),
+        *((listed, {}, "is not a list of names") for listed in ([], 5, True, {"vehicle.mass"}, {"vehicle.mass": 1})),
         (iter(["a"]), {}, "does not name what the scene has"),
-        ([["vehicle.mass"]], {}, "is no list of names"),
-        ([["vehicle.mass"], "vehicle.mass"], {}, "is no list of names"),
+        ([["vehicle.mass"]], {}, "is not a list of names"),
+        ([["vehicle.mass"], "vehicle.mass"], {}, "is not a list of names"),
         (["vehicle.mas"], {}, "does not name what the scene has"),
         (["drag.quadratic"], {}, "names 6 numbers"),
         (["vehicle.mass", "vehicle.mass"], {}, "is named twice"),

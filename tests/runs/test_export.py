@@ -337,26 +337,26 @@ def test_faults(result, tmp_path, monkeypatch):
         with pytest.raises(lw.SceneError, match=words):
             lw.export(result, *values, **settings)
 
-    refused("to = 'run.xyz': is no file of a known kind; give a name that ends in .csv", "run.xyz")
-    refused("to = 5: is no file of a known kind", 5)
+    refused("to = 'run.xyz': is not a file of a known kind; give a name that ends in .csv", "run.xyz")
+    refused("to = 5: is not a file of a known kind", 5)
     refused("to = 'netcdf': is all that a store holds", "netcdf", tmp_path / "a.nc")
     refused(r"members = \[1\]: is given for all that a store holds", "netcdf", tmp_path / "a.nc", members=[1])
-    refused("to = 5: is no file", 5, "b.csv")
+    refused("to = 5: is not a file", 5, "b.csv")
     refused("overwrite = 'yes': is neither true nor false", "a.csv", overwrite="yes")
     refused("out = None: is missing, and the run is in memory", "parquet")
     refused("out = .*: is given beside the file 'a.csv'", "a.csv", "b.csv")
     for members in ("all", [0.5], [[1]], 3):
-        refused("members = .*: is no list of members", "a.csv", members=members)
+        refused("members = .*: is not a list of members", "a.csv", members=members)
     refused("members = 5: is none of the 5 members; give indices from 0 to 4", "a.csv", members=[5])
     refused("members = -1: is negative", "a.csv", members=[-1])
     refused("members = .*: is a mask of 1 for 5 members", "a.csv", members=[True])
     for members in (slice(5, 9), []):
         refused("members = .*: names no member", "a.csv", members=members)
-    refused("^origin = 95.0: is no latitude", "a.csv", origin=[95.0, 0.0])
-    refused("^start = 'soon': is no date and time", "a.csv", start="soon")
+    refused("^origin = 95.0: is not a latitude", "a.csv", origin=[95.0, 0.0])
+    refused("^start = 'soon': is not a date and time", "a.csv", start="soon")
     refused("start = .*: is before 1970", tmp_path / "a.mcap", start="1960-01-01")
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(lw.SceneError, match="run = 5: is no path"):
+    with pytest.raises(lw.SceneError, match="run = 5: is not a path"):
         lw.export(5, "a.csv")
 
 
@@ -430,7 +430,7 @@ def test_the_command_exports_any_run(stored, tmp_path, capsys):
                         (tmp_path, "holds no store; give the folder of a run")):  # fmt: skip
         assert main(["export", str(path), "--to", str(tmp_path / "x.csv")]) == 2
         assert words in capsys.readouterr().err
-    for option, words in ((["--members", "a:b"], "--members a:b: is no list of members"),
-                          (["--origin", "north"], "--origin north: is no place")):  # fmt: skip
+    for option, words in ((["--members", "a:b"], "--members a:b: is not a list of members"),
+                          (["--origin", "north"], "--origin north: is not a place")):  # fmt: skip
         assert main(["export", str(folder), "--to", str(tmp_path / "x.csv"), *option]) == 2
         assert words in capsys.readouterr().err

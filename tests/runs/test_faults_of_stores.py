@@ -189,7 +189,7 @@ def test_a_file_of_the_users_is_not_taken_for_a_lock(tmp_path):
         lambda: os.mkfifo(path),
     ):
         make()
-        with pytest.raises(lw.SceneError, match=r"is no lock of lgvi-warp, but has its name; move it away"):
+        with pytest.raises(lw.SceneError, match=r"is not a lock of lgvi-warp, but has its name; move it away"):
             lw.solve(fleet(10), **SETTINGS, store=tmp_path / "run.zarr")
         assert not (tmp_path / "run.zarr").exists()
         assert not (tmp_path / "other").exists()

@@ -107,7 +107,7 @@ def test_what_was_not_kept_is_named():
     assert lw.gather(none, [lw.statistics.Outcome("floor")])["outcome floor"].value[-1] >= 0.0
     with pytest.raises(lw.SceneError, match="no outcome of this scene"):
         lw.gather(none, [lw.statistics.Outcome("flor")])
-    with pytest.raises(lw.SceneError, match="is no result"):
+    with pytest.raises(lw.SceneError, match="is not a result"):
         lw.gather(fleet_of(2), [lw.statistics.Mean("depth")])
 
 

@@ -350,7 +350,7 @@ def test_other_arguments_that_do_not_go_together_are_refused(white):
         lw.uq.draws_of(given, [-1])
     with pytest.raises(lw.SceneError, match=r"indices = .*from 0"):
         lw.uq.draws_of(given, [[1], [1, 2]])
-    with pytest.raises(lw.SceneError, match=r"run = .*: is no prepared run"):
+    with pytest.raises(lw.SceneError, match=r"run = .*: is not a prepared run"):
         lw.uq.draws_of(lambda X: X)
 
 

@@ -345,7 +345,7 @@ def test_what_is_refused():
             fleet, t1=1.0, h=0.02, start=final, save=lw.SaveAt(at=[0.1])
         ),
         "start.attitude = '...': was not kept": lambda: lw.solve(fleet, "rk4", t1=1.0, h=STEPS, start=few),
-        "t0 = 0.05: is no whole number of steps": lambda: lw.prepare(
+        "t0 = 0.05: is not a whole number of steps": lambda: lw.prepare(
             fleet.scene, method="psi_x", h=STEPS, t1=0.2
         ).states(final, t0=0.05),
         "lies between two ticks": lambda: lw.prepare(autopilot().scene, method="psi_x", h=0.01, t1=0.2).states(

@@ -13,6 +13,7 @@ import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.cli import report
 from lgvi_warp.common import status
+from lgvi_warp.common.errors import install
 from lgvi_warp.common.status import Status, StatusArray, failed, stopped
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.results import outcomes
@@ -438,7 +439,7 @@ def test_a_plain_installation_runs(scene_file, capsys, monkeypatch, absent, file
     code, said, errors = run(scene_file, capsys)
     assert code == 0
     assert "not written" not in errors
-    assert f"note        {words}to have pictures: pip install 'lgvi-warp[viz]'\n" in said
+    assert f"note        {words}to have pictures: {install('viz')}\n" in said
     assert sorted(path.name for path in (scene_file.parent / "out").iterdir()) == files
 
 

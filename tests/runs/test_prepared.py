@@ -153,7 +153,7 @@ def test_states_may_be_given(paper):
     expected = lw.solve(lw.Ensemble.from_states(paper, *states, mass), **SETTINGS)
     np.testing.assert_array_equal(run.states(*states, mass), expected.position[-1])
     for keys in ([1, 2], [1.0, 2.0, 3.0, 4.0], [-1, 0, 1, 2], [2**31, 0, 1, 2]):
-        with pytest.raises(lw.SceneError, match=r"indices = .*(below 2147483648|is no list of members|is negative)"):
+        with pytest.raises(lw.SceneError, match=r"indices = .*(below 2147483648|is not a list of members|is negative)"):
             run.states(*states, indices=keys)
     for seed in (-1, 1.5):
         with pytest.raises(lw.SceneError, match="seed = "):

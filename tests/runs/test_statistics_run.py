@@ -540,7 +540,7 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
 
 @pytest.mark.parametrize(("inputs", "text"), [
     ({"statistics": "mean"}, "no list"), ({"statistics": [3]}, "no statistic"), ({"keep": "some"}, "keep"),
-    ({"keep": [5]}, "is none of the"), ({"keep": [-1]}, "is negative"), ({"keep": 3}, "is no list of members"),
+    ({"keep": [5]}, "is none of the"), ({"keep": [-1]}, "is negative"), ({"keep": 3}, "is not a list of members"),
     ({"statistics": [Mean("depth"), Mean("depth")]}, "name of 2 statistics"),
     ({"until": 3}, "no table"),
     ({"statistics": [Mean()]}, "mean.of"),

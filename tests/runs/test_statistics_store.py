@@ -71,7 +71,7 @@ def test_statistics_of_damaged_parts_are_refused(complete, tmp_path):
     with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
         lw.open_run(path)
     (path / "blocks" / "000000256.json").unlink()
-    with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing; mend it with `lgvi-warp resume"):
+    with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing; repair it with `lgvi-warp resume"):
         lw.open_run(path)
 
 

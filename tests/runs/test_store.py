@@ -315,7 +315,7 @@ def test_what_was_there_is_told(copy):
 def test_a_missing_block_is_one_line_with_the_remedy(copy, name, tmp_path, capsys):
     """Its members would be drawn as if they had failed."""
     (copy / name).unlink()
-    with pytest.raises(lw.SceneError, match=rf"{name} is missing.*; mend it with `lgvi-warp resume"):
+    with pytest.raises(lw.SceneError, match=rf"{name} is missing.*; repair it with `lgvi-warp resume"):
         lw.open_run(copy)
     assert f"{name} is missing" in lw.open_run(copy, incomplete=True).messages[-1]
     for verb in (["view", "--out", str(tmp_path / "a.rrd")], ["plot"], ["report"]):

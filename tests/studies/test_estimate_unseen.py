@@ -293,7 +293,7 @@ def test_what_is_no_recipe_is_refused():
     found = lw.estimate(fleet, "position[0]", 0.2, **STILL)
     says(refused(lw.estimate, fleet, "position[1]", recipe=found.recipe), "is of another question")
     for odd in ({}, 3, [], {**found.recipe, "rounds": [[0.0, [-1]]]}, {**found.recipe, "levels": [{}]}):
-        says(refused(lw.estimate, fleet, "position[0]", recipe=odd), "recipe", "is no recipe of an answer")
+        says(refused(lw.estimate, fleet, "position[0]", recipe=odd), "recipe", "is not a recipe of an answer")
 
 
 def test_the_time_of_plain_members_is_of_whole_members():

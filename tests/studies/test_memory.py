@@ -210,7 +210,7 @@ def test_functions_are_told_apart(tmp_path, ran):
 
 
 def test_what_cannot_be_kept_is_refused(tmp_path):
-    says(refused(rare, store=3), "store", "is no path")
+    says(refused(rare, store=3), "store", "is not a path")
     (tmp_path / "file").write_text("a file")
     with pytest.raises(OSError, match="file"):
         rare(store=tmp_path / "file")

@@ -225,7 +225,7 @@ def test_the_least_value_of_a_cubic(curve, least):
 
 
 def test_a_metric_of_an_event_that_is_not_there():
-    with pytest.raises(lw.SceneError, match="is no outcome of this scene"):
+    with pytest.raises(lw.SceneError, match="is not an outcome of this scene"):
         lw.solve(scene_of(), statistics=[lw.metrics.Nearest("floor")], **RUN)
     with pytest.raises(lw.SceneError, match="of no type whose distance is known"):
         lw.metrics.Nearest("bottom")
@@ -352,8 +352,8 @@ def test_noise_alone_can_be_the_cause():
     ("position[0] - 1000.0", "within 17 levels, each a tenth of the one before"),
     ("position[0] + 1000.0", "happens for each of"),
     ("position[1] - 1.0", "has the same value for most members"),
-    (3.0, "is no event"),
-    ({"position[0]": {"near": 1.0}}, "is no condition"),
+    (3.0, "is not an event"),
+    ({"position[0]": {"near": 1.0}}, "is not a condition"),
     ({"max(depth)": {"above": 9.0}, "position[0]": {"above": 9.0}}, 'give "max(position[0])"'),
 ])  # fmt: skip
 def test_what_is_no_rare_event_is_refused(limit, words):
@@ -366,7 +366,7 @@ def test_faulty_arguments_are_told_at_once():
     with pytest.raises(lw.SceneError) as error:
         lw.rare_event(fleet_of(), "depth", relative_error=2.0, failed="drop", levels=True, **RUN)
     says(str(error.value), "failed = 'drop'", "relative_error = 2.0", "levels = True")
-    for more, words in (({"cheaper": {"h": 1.0}}, "is no list"), ({"cheaper": [{}]}, "names nothing that differs"),
+    for more, words in (({"cheaper": {"h": 1.0}}, "is not a list"), ({"cheaper": [{}]}, "names nothing that differs"),
                         ({"cheaper": [{"start.position[0]": 1.0}]}, "is of a number that varies"),
                         ({"most": 10}, "most = 10")):  # fmt: skip
         with pytest.raises(lw.SceneError, match=words):

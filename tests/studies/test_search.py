@@ -141,9 +141,9 @@ def test_what_cannot_be_tuned():
     fleet = lw.Ensemble(regulated(), 4, 3, STARTS)
     for words, message in (
         ({"over": {"start.position[2]": (0.0, 1.0)}}, "varies by member too"),
-        ({"risk": "median"}, "is no risk"),
+        ({"risk": "median"}, "is not a risk"),
         ({"budget": 10}, "is less than a generation of all members"),
-        ({"fresh": -1}, "is no number of members"),
+        ({"fresh": -1}, "is not a number of members"),
     ):
         with pytest.raises(lw.SceneError, match=message):
             lw.tune_gains(fleet, **{"over": OVER, "minimise": "depth", **words}, **RUN)
@@ -216,8 +216,8 @@ def test_searches_by_metrics_of_a_loop():
     assert str(never).startswith("settling_time depth is infinite, or a member fails, at start.position[2]")
     for of, message in (
         ("iae depht", "depht"),
-        ("mean", "is no metric"),
-        (lw.statistics.Mean("depth"), "is no metric"),
+        ("mean", "is not a metric"),
+        (lw.statistics.Mean("depth"), "is not a metric"),
     ):
         with pytest.raises(lw.SceneError, match=message):
             lw.worst_case(regulated(), within, of, budget=64, **RUN)

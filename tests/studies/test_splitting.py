@@ -333,7 +333,7 @@ def test_noise_and_numbers_are_both_moved(answer):
     share = NORTH**2 / ((place_of(1e-5, NORTH) - place_of(0.5)) / -ndtri(1e-5)) ** 2
     assert answer.moved["start.position[0]"] == pytest.approx(4.4 * np.sqrt(share), abs=0.5)
     assert answer.draws.shape == (len(answer.weights), 0)
-    assert any("draws of noise are no numbers" in message for message in answer.messages)
+    assert any("draws of noise are not numbers" in message for message in answer.messages)
     assert len(answer.runs) % 16 == 0
 
 

@@ -315,8 +315,8 @@ baseline = "stiff"
 
 
 @pytest.mark.parametrize(("more", "text"), [
-    ({"success": {"overshot": {"below": 1.0}}}, "is no metric of this sweep"),
-    ({"success": {"way": {"under": 1.0}}}, "is no condition"), ({"success": {"status": "fine"}}, "success.status"),
+    ({"success": {"overshot": {"below": 1.0}}}, "is not a metric of this sweep"),
+    ({"success": {"way": {"under": 1.0}}}, "is not a condition"), ({"success": {"status": "fine"}}, "success.status"),
     ({"metrics": ["overshoot headin"]}, "did you mean 'heading'"), ({"cases": [{"set": {}}]}, "has no name"),
     ({"grid": {"controller.delay": []}}, "no list of values"), ({"baseline": "hard"}, "baseline"),
     ({"interval": "wald"}, "interval"),

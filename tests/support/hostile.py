@@ -329,7 +329,7 @@ def endless(path, home):
         os.chdir(here)
 
 
-UNKNOWN, MARK, NAMES = "is no file of it", "does not fit the arrays", "created.json is damaged"
+UNKNOWN, MARK, NAMES = "is not a file of it", "does not fit the arrays", "created.json is damaged"
 DAMAGED, LINKED, GB50, EVIL = "is damaged", "is a link", sized(50 * 10**9), [{"type": "evil_module.run"}]
 OBSERVED, SAMPLING = "provenance.observed", "provenance.ensemble.sampling"
 BIG_ENDIAN = [codec("bytes", endian="big"), {"name": "crc32c"}]
@@ -388,14 +388,14 @@ STORES = {
     "folders without an end": (endless, "lies deeper"),
     # The root's metadata.
     "the root is empty": (at(ROOT, content(b"")), DAMAGED),
-    "the root is no text": (at(ROOT, content(bytes(range(256)))), DAMAGED),
+    "the root is not a text": (at(ROOT, content(bytes(range(256)))), DAMAGED),
     "the root is a list": (at(ROOT, content(b"[]")), DAMAGED),
     "the root is half": (lambda path, home: os.truncate(path / ROOT, 3000), DAMAGED),
     "the root is nested without an end": (at(ROOT, content(b"[" * 200_000)), DAMAGED),
     "the root has a number of 5000 digits": (at(ROOT, content(b'{"attributes":' + b"9" * 5000 + b"}")), DAMAGED),
-    "the root has 50 GB": (at(ROOT, GB50), "is no file of a run"),
-    "created has 50 GB": (at("created.json", GB50), "is no file of a run"),
-    "a marker has 50 GB": (at(MARKER, GB50), "is no file of a run"),
+    "the root has 50 GB": (at(ROOT, GB50), "is not a file of a run"),
+    "created has 50 GB": (at("created.json", GB50), "is not a file of a run"),
+    "a marker has 50 GB": (at(MARKER, GB50), "is not a file of a run"),
     "a chunk has 50 TB": (at(STATUS, sized(10**13)), "is torn"),
     "times have 50 TB": (at("time/c.0", sized(10**13)), "is torn"),
     "a shape of 10^15": (array("status", shape=[10**15]), "has the shape"),
@@ -414,8 +414,8 @@ STORES = {
     "a transformer": (array("status", storage_transformers=[{"name": "evil_module"}]), "storage_transformers of status"),
     "a key nobody knows": (array("status", evil_module=1), "evil_module of status"),
     "slashes in keys": (array("status", chunk_key_encoding=codec("default", separator="/")), "chunk_key_encoding of status"),
-    "an array above": (array("../status"), "is no name of an array"),
-    "an array with a drive": (array("C:status"), "is no name of an array"),
+    "an array above": (array("../status"), "is not a name of an array"),
+    "an array with a drive": (array("C:status"), "is not a name of an array"),
     "an array nobody knows": (array("evil"), "evil has the type"),
     "a group nobody knows": (array("evil/status"), "groups that no run has"),
     "no status": (lacks("status"), "has no status"),
@@ -435,7 +435,7 @@ STORES = {
     "versions that write on the terminal": (text("provenance.versions", {"lgvi-warp": "\x1b]0;x\x07"}), "provenance.versions"),
     "messages that write on the terminal": (text("messages", ["\x1b[2J"]), "no list of texts"),
     "messages that are none": (text("messages", 7), "no list of texts"),
-    "complete, says a text": (text("complete", "yes"), "complete is no truth value"),
+    "complete, says a text": (text("complete", "yes"), "complete is not a truth value"),
     "an attribute nobody knows": (text("evil_module", "x"), "is not known"),
     "a chunk of no bytes": (text("recipe.store.chunk_bytes", 0), "recipe.store"),
     "statistics of functions": (text(f"{OBSERVED}.functions", ["evil_module.run"]), None),
@@ -479,7 +479,7 @@ RESULTS = {
     "the same bytes a thousand times": (overlapping, "promises more bytes"),
     "a list of files without an end": (long_list, "list of files is too long"),
     "a pickle": (zipped(**{"time.npy": pickled}), "promises an array of type object"),
-    "a pickle that is no array": (zipped(time=payload), "magic string"),
+    "a pickle that is not an array": (zipped(time=payload), "magic string"),
     "10^15 numbers": (zipped(**{"time.npy": HUGE}), "promises an array"),
     "10^15 times nothing": (zipped(**{"time.npy": HUGE_OF_NOTHING}), "promises an array"),
     "a header that is a call": (zipped(**{"time.npy": CALL}), "header"),
@@ -519,7 +519,7 @@ NUMBERS = {
     "a number": (content(b"3"), DAMAGED),
     "a number of 5,000 digits": (content(b"9" * 5000), DAMAGED),
     "no JSON": (content(b"time,depth\n"), DAMAGED),
-    "not UTF-8": (content(bytes(range(256))), "is no text in UTF-8"),
+    "not UTF-8": (content(bytes(range(256))), "is not a text in UTF-8"),
     "empty": (content(b""), DAMAGED),
     "half": (torn(0.5), DAMAGED),
 }
@@ -535,7 +535,7 @@ FOLDERS = {
     "tradeoff: the table is a link": ("tradeoff.csv", link("secret"), None),
     "tradeoff: the table is a pipe": ("tradeoff.csv", pipe, None),
     "tradeoff: the table has a long field": ("tradeoff.csv", content(b"a" * 200_000), None),
-    "tradeoff: the table is no text": ("tradeoff.csv", content(bytes(range(256))), None),
+    "tradeoff: the table is not a text": ("tradeoff.csv", content(bytes(range(256))), None),
     "tradeoff: the table has zero bytes": ("tradeoff.csv", content(b"a,b\n\0,\0\n"), None),
     "tradeoff: the table has 50 GB": ("tradeoff.csv", GB50, None),
     "tradeoff: a picture is a link": ("x.png", link("secret"), None),
@@ -547,7 +547,7 @@ FOLDERS = {
     "tradeoff: a name of two lines": ("a\nb.csv", content(b"x"), None),
     "sensitivity: 10^5 names each": ("sensitivity.json",
         other_keys(quantities=["q"] * 10**5, factors=["f"] * 10**5), "rows for 100,000 quantities"),
-    "sensitivity: another analysis": ("sensitivity.json", other_keys(name="evil_module"), "is no analysis"),
+    "sensitivity: another analysis": ("sensitivity.json", other_keys(name="evil_module"), "is not an analysis"),
     "stability: texts for numbers": ("stability.json", other_keys(classes={"psi": [["x"]]}), DAMAGED),
     "stability: a class nobody knows": ("stability.json", other_keys(classes={"psi": [[9**9, 3]]}), None),
     "stability: no methods": ("stability.json", other_keys(classes={}), None),

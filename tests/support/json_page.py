@@ -44,7 +44,7 @@ def _table(value, keys, where):
 
 def _value(value, kind, where):
     if kind in PLAIN:
-        return [] if PLAIN[kind](value) else [f"{where}: {value!r} is no {kind}"]
+        return [] if PLAIN[kind](value) else [f"{where}: {value!r} is not a {kind}"]
     if kind.startswith("list of "):
         if not isinstance(value, list):
             return [f"{where}: no list"]

@@ -17,7 +17,7 @@ def faults(value, schema, where=""):
     assert schema.keys() <= KNOWN, schema.keys() - KNOWN
     kinds = schema.get("type", [])
     if kinds and not any(is_a(value, kind) for kind in ([kinds] if isinstance(kinds, str) else kinds)):
-        return [f"{where}: {value!r} is no {kinds}"]
+        return [f"{where}: {value!r} is not a {kinds}"]
     found = []
     if ("const" in schema and value != schema["const"]) or ("enum" in schema and value not in schema["enum"]):
         found.append(f"{where}: {value!r} is not allowed")

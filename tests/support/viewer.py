@@ -15,6 +15,7 @@ from PIL import Image
 
 from lgvi_warp.views.recording import headless
 from lgvi_warp.views.recording.headless import free_port
+from lgvi_warp.views.recording.world import WATER
 
 # What the viewer warns of on a machine with a software renderer.
 EXPECTED = re.compile(r"[Ss]oftware rasterizer|not found for screenshot")
@@ -120,8 +121,23 @@ def moved(first, second):
     return float((np.abs(first - second).max(axis=-1) > 8).mean())
 
 
+# Exponent from a number of a pixel, 0 to 1, to its light. A pixel seen through the surface has the light of the sheet on top,
+# which is drawn from both sides, one over the other. Less light than ROUNDED may be that of a number's last digit.
+GAMMA, ROUNDED = 2.2, 0.002
+SHEET = (1.0 - (1.0 - WATER[3] / 255.0) ** 2) * (np.array(WATER[:3]) / 255.0) ** GAMMA
+
+
 def colored(picture, rgb, tolerance=0.06):
-    """Number of pixels whose hue and saturation are those of a colour, whatever the light on it."""
-    bright = np.maximum(picture.max(axis=-1), 1)
-    near = np.abs(picture / bright[..., None] - np.array(rgb) / max(rgb)).max(axis=-1) < tolerance
-    return int((near & (bright > 60)).sum())
+    """Number of pixels that have the hue and saturation of a colour, lit or shaded, in the open or through the surface."""
+    light = (picture / 255.0) ** GAMMA
+    below = light - SHEET
+    behind = (below > -0.01).all(axis=-1) & _hued(np.where(below > ROUNDED, below, 0.0), rgb, tolerance)
+    return int((_hued(light, rgb, tolerance) | behind).sum())
+
+
+def _hued(light, rgb, tolerance):
+    """Pixels (height, width) whose light (height, width, 3) is bright and has the hue of a colour."""
+    shown = light ** (1.0 / GAMMA)
+    bright = np.maximum(shown.max(axis=-1), 1.0 / 255.0)
+    near = np.abs(shown / bright[..., None] - np.array(rgb) / max(rgb)).max(axis=-1) < tolerance
+    return near & (bright > 60.0 / 255.0)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.errors import SceneError, install
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.executors.base import MOST_DEATHS, Advanced, deaf, received, sent
 from lgvi_warp.engine.work import Work
@@ -77,7 +77,7 @@ class Dask:
         try:
             import distributed
         except ImportError as error:
-            raise SceneError([f"executor = 'dask': {error}; install it: pip install 'lgvi-warp[cluster]'"]) from error
+            raise SceneError([f"executor = 'dask': {error}; install it: {install('cluster')}"]) from error
         if isinstance(self.scheduler, distributed.Client):
             yield self.scheduler
             return

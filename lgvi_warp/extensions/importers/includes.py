@@ -21,7 +21,7 @@ def put_in_place(root: Element, given: Any) -> None:
     """Put models in the place of <include> elements whose <name>, <uri>, or its last part, is in a map of paths or texts."""
     if not (isinstance(given, Mapping) and all(isinstance(each, str | os.PathLike) for each in given.values())):
         raise refusal(
-            "include", given, "is no map of files", "give include={'tethys': 'model.sdf'}: a path or text by name"
+            "include", given, "is not a map of files", "give include={'tethys': 'model.sdf'}: a path or text by name"
         )
     files = {name: parse_xml(source, f"include {name!r}") for name, source in given.items()}
     used: set[str] = set()
@@ -37,7 +37,7 @@ def put_in_place(root: Element, given: Any) -> None:
 def _put(root: Element, files: Mapping[str, Element], used: set[str], known: set[str], depth: int) -> int:
     """Put models in place below an element; the number of elements there is then."""
     if depth > MOST_NESTED:
-        raise SceneError([f"SDF include: is nested more than {MOST_NESTED} deep, or in a circle; mend the files"])
+        raise SceneError([f"SDF include: is nested more than {MOST_NESTED} deep, or in a circle; correct the files"])
     size = sum(1 for _ in root.iter())
     for parent in [element for element in root.iter() if element.find("include") is not None]:
         for place, child in reversed(list(enumerate(parent))):

@@ -139,7 +139,7 @@ class Poses:
         if key in self.known:
             return self.known[key]
         if key in chain or len(chain) > LONGEST_CHAIN:
-            self.faults.add(f"{scope.prefix}{name} <pose>", name, "is relative to itself", "mend relative_to")
+            self.faults.add(f"{scope.prefix}{name} <pose>", name, "is relative to itself", "correct relative_to")
             return HERE
         chain = (*chain, key)
         if name == "__model__":
@@ -170,5 +170,5 @@ class Poses:
         except KeyError:
             outside = name in ("world", "__root__")
             remedy = "name a frame of it" if outside else closest(name, [*scope.named, "__model__"])
-            self.faults.add("relative_to", name, f"is no frame of the model {scope.model.get('name')!r}", remedy)
+            self.faults.add("relative_to", name, f"is not a frame of the model {scope.model.get('name')!r}", remedy)
             return scope, "__model__"

@@ -80,7 +80,7 @@ def remedy_for(content: bytes) -> str:
     """Return what to do with a text that is not XML."""
     mark = next((mark for mark in (b"<%", b"{%", b"{{", b"@(", b"@{", b"=@") if mark in content), None)
     if mark is None:
-        return "mend that line"
+        return "correct that line"
     shown = f"{mark.decode()}, which is not executed here"
     return f"it looks like a template: it holds {shown}; {TEMPLATES.get(mark.decode(), TEMPLATES['@'])}"
 

@@ -220,5 +220,5 @@ def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], pl
     for body_link in parts:
         if body_link.shapeless and has_buoyancy(read, body_link.name):
             remedy = "give volume= [m3] or buoyancy= [N], and center_of_buoyancy=, of the whole vehicle"
-            shapes, problem = listed(body_link.shapeless), "is no shape whose volume is known"
+            shapes, problem = listed(body_link.shapeless), "is not a shape whose volume is known"
             faults.add(f"{body_link.name} <collision>", shapes, problem, remedy)

@@ -63,6 +63,6 @@ def place(faults: Faults, links: dict[str, Link], origins: dict[str, tuple[str, 
             above, pose = origins[above]
             link.pose = pose.then(link.pose)
             if above in passed:
-                faults.add("<joint>", name, "is above itself", "mend <parent> and <child>")
+                faults.add("<joint>", name, "is above itself", "correct <parent> and <child>")
                 break
             passed.add(above)

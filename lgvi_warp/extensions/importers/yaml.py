@@ -132,7 +132,9 @@ def table_of(content: Mapping[str, Any], path: Any) -> Mapping[str, Any]:
         inner = content.get(key)
         if not isinstance(inner, Mapping):
             tables = [str(name) for name, value in content.items() if isinstance(value, Mapping)]
-            raise refusal("table", key, "is no table of the file", closest(key, tables) if tables else "leave it out")
+            raise refusal(
+                "table", key, "is not a table of the file", closest(key, tables) if tables else "leave it out"
+            )
         content = inner
     return content
 

@@ -121,12 +121,12 @@ class Vehicles:
         self._observe = observe if callable(observe) else observer(faults, observe, _wishes(controller))
         for key, value in (("reward", reward), ("terminated", terminated)):
             if value is not None and not callable(value):
-                faults.add(key, value, "is no function", f"give {key}(t, y, r)")
+                faults.add(key, value, "is not a function", f"give {key}(t, y, r)")
         self._reward, self._terminated = reward, terminated
         self._with_actions = reward is not None and callable(reward) and _arguments(reward) > 3
         self.num_envs = ensemble.members if num_envs is None else num_envs
         if not isinstance(self.num_envs, int | np.integer) or not 1 <= self.num_envs < MOST_MEMBERS:
-            faults.add("num_envs", num_envs, "is no number of environments", "give a whole number from 1")
+            faults.add("num_envs", num_envs, "is not a number of environments", "give a whole number from 1")
         outputs = listed("outputs", outputs, "demands")
         for i, name in enumerate(outputs):
             faults.choice(f"outputs[{i}]", name, COMPONENTS)
@@ -253,7 +253,7 @@ class Vehicles:
             ValueError: Where the mask has another shape, or is False throughout.
         """
         if seed is not None and not isinstance(seed, int | np.integer):
-            raise TypeError(f"seed = {brief(seed)}: is no whole number; give one for all environments")
+            raise TypeError(f"seed = {brief(seed)}: is not a whole number; give one for all environments")
         super().reset(seed=seed)  # type: ignore[misc]  # of gymnasium.vector.VectorEnv
         mask = _mask(options, self.num_envs)
         all_begin = mask.all() or not self._begun
@@ -439,7 +439,7 @@ def _whole_periods(duration: float | None, period: float) -> float:
         return np.inf
     count = round(duration / period)
     if count < 1 or whole_steps(duration, period) is None:
-        raise refusal("duration", duration, f"is no whole number of periods of {period:.9g} s", "give a multiple")
+        raise refusal("duration", duration, f"is not a whole number of periods of {period:.9g} s", "give a multiple")
     return count
 
 
@@ -493,7 +493,7 @@ def _mask(options: Mapping[str, Any] | None, count: int) -> np.ndarray:
     if mask is None:
         return np.ones(count, bool)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-        raise TypeError(f"options['reset_mask'] = {brief(mask)}: is no NumPy array of truth values; give one")
+        raise TypeError(f"options['reset_mask'] = {brief(mask)}: is not a NumPy array of truth values; give one")
     if mask.shape != (count,) or not mask.any():
         problem = f"has shape {mask.shape} and {int(mask.sum())} True"
         raise ValueError(f"options['reset_mask']: {problem}; give shape ({count},) with one True at least")

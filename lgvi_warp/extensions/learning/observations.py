@@ -138,7 +138,7 @@ def observer(
     }
     listed = items_of(names)
     if not listed:
-        faults.add("observe", names, "is no list of names and no function", "give names such as depth_error")
+        faults.add("observe", names, "is not a list of names and no function", "give names such as depth_error")
     for i, entry in enumerate(listed or ()):
         if not isinstance(entry, str) or entry not in known:
             faults.add(f"observe[{i}]", entry, "is not known", closest(entry, known))

@@ -47,7 +47,7 @@ def sb3(env: Vehicles) -> Any:
     """
     made = _vec_env(needed())
     if not isinstance(env, Vehicles):
-        problem = "is no lw.gym.VectorEnv"
+        problem = "is not a lw.gym.VectorEnv"
         raise refusal("env", type(env).__name__, problem, "give it without wrappers; Stable-Baselines3 has its own")
     space: Any = env.single_action_space
     if not np.isfinite([space.low, space.high]).all():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the filters of an ensemble believe what is so: chi-square tests of their errors and innovations."""
+"""Consistency of the filters of an ensemble: chi-square tests of their errors and innovations."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class TimeAverage(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Consistency(Summarized):
-    """Means of NEES and NIS over the members at each time, beside the bands in which chance leaves those of a right filter.
+    """Means of NEES and NIS over the members at each time, with the bands that a consistent filter stays within.
 
     Attributes:
         time: Times of the samples (k,) [s].
@@ -104,7 +104,7 @@ class Consistency(Summarized):
 
 
 def consistency(result: Any, level: float = 0.95) -> Consistency:
-    """Compare what the filters of an ensemble believe with what is so, by chi-square tests at each time.
+    """Test whether the filters of an ensemble are consistent: chi-square tests of NEES and NIS at each time.
 
     A filter is consistent where its errors are as large as its covariance says. Then NEES, e^T P^-1 e by the truth, has 15
     degrees of freedom, and the squared innovations over their variances (NIS) have one each, if the model is linear and the
@@ -133,7 +133,7 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
     faults = Faults()
     chance = faults.number("level", level)
     if chance is not None and not 0.0 < chance < 1.0:
-        faults.add("level", level, "is no probability between 0 and 1", "give 0.95, say")
+        faults.add("level", level, "is not a probability between 0 and 1", "give 0.95, say")
     faults.raise_if_any()
     missing = [name for name in NEEDED if name not in result.samples]
     if missing:

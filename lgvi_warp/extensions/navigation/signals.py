@@ -25,7 +25,7 @@ add_signals(
         36,
     ),
     absent=(
-        "is told by a filter, which this scene has not, or which does not report",
+        "is reported by a filter; this scene has none, or its filter does not report it",
         'give [[controller.sensors]] type = "error_state_filter" with report = true',
     ),
 )

@@ -175,7 +175,7 @@ def _times(name: str, dim: str, coordinate: Any) -> np.ndarray:
     where = f"{name}.{dim}"
     if coordinate is None or coordinate.dtype.kind != "M":
         shown = "" if coordinate is None else np.asarray(coordinate.values)[:3]
-        raise refusal(where, shown, "is no time of the standard calendar", "write the attribute units = "
+        raise refusal(where, shown, "is not a time of the standard calendar", "write the attribute units = "
                       "'seconds since 2024-01-01', or convert it by ds.convert_calendar('standard')")  # fmt: skip
     values = np.asarray(coordinate.values, dtype="datetime64[ns]")
     if np.isnat(values).any() or np.any(np.diff(values) <= np.timedelta64(0, "ns")):

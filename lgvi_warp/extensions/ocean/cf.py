@@ -143,7 +143,9 @@ def variable_name(ds: Any, quantity: OceanQuantity, named: str | None = None) ->
     """The name of the variable that holds a quantity; None where there is none."""
     if named is not None:
         if named not in ds.data_vars:
-            raise refusal("variables", named, "is no variable of the data set", closest(named, map(str, ds.data_vars)))
+            raise refusal(
+                "variables", named, "is not a variable of the data set", closest(named, map(str, ds.data_vars))
+            )
         return named
     by_standard = [str(name) for name, v in ds.data_vars.items()
                    if str(v.attrs.get("standard_name", "")).strip().lower() in quantity.standard_names]  # fmt: skip
@@ -216,7 +218,7 @@ def instant(key: str, value: Any) -> np.datetime64:
     except (ValueError, TypeError, OverflowError):
         moment = np.datetime64("NaT")
     if np.isnat(moment):
-        raise refusal(key, value, "is no moment", "give a datetime, or a text such as '2024-05-01T12:00:00'")
+        raise refusal(key, value, "is not a moment", "give a datetime, or a text such as '2024-05-01T12:00:00'")
     return moment
 
 
@@ -226,7 +228,7 @@ def _ordered(variable: Any, axes: Axes) -> Any:
     others = [dim for dim in variable.dims if dim not in known]
     for dim in others:
         if variable.sizes[dim] != 1:
-            raise refusal(f"{variable.name}.dims", dim, "is no axis that is known",
+            raise refusal(f"{variable.name}.dims", dim, "is not an axis that is known",
                           f"take one of it, by ds.isel({dim}=0), or write its attribute axis")  # fmt: skip
     return variable.isel(dict.fromkeys(others, 0)).transpose(*known)
 

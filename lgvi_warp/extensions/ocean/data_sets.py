@@ -103,7 +103,7 @@ def regular_file(source: Any, key: str) -> Iterator[tuple[str, BinaryIO]]:
         try:
             file = stack.enter_context(reading.opened(path, "data set"))
         except reading.UnreadableError as error:
-            raise refusal(key, os.fspath(source), f"{error.what}: it is no regular file", REMEDY) from None
+            raise refusal(key, os.fspath(source), f"{error.what}: it is not a regular file", REMEDY) from None
         except (OSError, ValueError) as error:
             raise refusal(key, os.fspath(source), str(getattr(error, "strerror", None) or error), REMEDY) from None
         yield path, file

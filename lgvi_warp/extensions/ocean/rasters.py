@@ -55,7 +55,7 @@ class Raster:
         self.transformer, self.geographic = self._transformer(file.crs)
         if not (np.isfinite(self.bounds()).all() and np.all(self.spacing() > 0.0)):
             raise refusal(
-                "file", path, "lies at no place of the Earth", "mend its geotransform, by gdal_edit.py -a_ullr"
+                "file", path, "lies at no place of the Earth", "correct its geotransform, by gdal_edit.py -a_ullr"
             )
 
     def pixels(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

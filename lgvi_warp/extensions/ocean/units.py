@@ -24,7 +24,7 @@ def factor(where: str, text: Any, unit: str) -> float:
     value = known.get(_plain(str(text)))
     if value is None:
         raise refusal(
-            f"{where}.units", text, f"is no unit of {unit}", f"convert it, and write one of {', '.join(known)}"
+            f"{where}.units", text, f"is not a unit of {unit}", f"convert it, and write one of {', '.join(known)}"
         )
     return value
 

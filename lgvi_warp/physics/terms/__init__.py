@@ -27,7 +27,7 @@ IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 
 
 def register(kind: type[AnyTerm]) -> type[AnyTerm]:
-    """Check that scene files know a user's term, event or part of a controller by its `type`; a decorator of the class.
+    """Register a user's term, event or part of a controller under its `type`, for scene files; a decorator of the class.
 
     A class is known as soon as it is made, if its `type` is not taken; this function says so where it is.
 
@@ -41,7 +41,7 @@ def register(kind: type[AnyTerm]) -> type[AnyTerm]:
         ValueError: Where `type` is empty or taken by another class.
     """
     if not isinstance(kind, type) or not hasattr(kind, "kinds"):
-        raise refusal("kind", kind, "is no class of a term", "give a subclass of lw.laws.Term")
+        raise refusal("kind", kind, "is not a class of a term", "give a subclass of lw.laws.Term")
     if not registry.add(kind.kinds, kind):
         former = kind.kinds.get(kind.type)
         problem = f"is that of {former.__module__}.{former.__qualname__}" if former else "is missing"
@@ -85,7 +85,7 @@ def _allowed(where: str, term: Term) -> Term:
 def _from_table(where: str, table: Any) -> Term:
     if not isinstance(table, Mapping):
         remedy = "write a table with type = ..., or give a term such as lw.terms.Drag(quadratic=...)"
-        raise refusal(where, table, "is no term", remedy)
+        raise refusal(where, table, "is not a term", remedy)
     word = table.get("type", "")
     implied = [term.type for term in IMPLIED]
     kind = TYPES.get(word) if isinstance(word, str) else None

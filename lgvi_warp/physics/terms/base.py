@@ -849,7 +849,7 @@ def check_list(key: str, entries: Any, example: str) -> list[Any]:
     """Read a list; refuse what is none, or has more terms or events than a scene may have."""
     listed = items_of(entries)
     if listed is None:
-        raise refusal(key, entries, "is no list", example)
+        raise refusal(key, entries, "is not a list", example)
     if len(listed) > MOST_TERMS:
         raise SceneError([f"{key}: are {len(listed):,}; give at most {MOST_TERMS:,}"])
     return listed

@@ -190,7 +190,7 @@ class MissionDone(Event):
     # First of the rows in which that guidance tells that it is done; set for an event of a scene.
     row: ClassVar[int] = 0
 
-    guidance: str = text("is no name", "give the name of guidance of the type waypoints", "waypoints")
+    guidance: str = text("is not a name", "give the name of guidance of the type waypoints", "waypoints")
 
     @property
     def follows(self) -> str:
@@ -233,7 +233,7 @@ class Outside(Event):
     status: ClassVar[Status] = Status.OUTSIDE
     device: ClassVar[Any] = "box"
 
-    field: str = text("is no name", "give the name of a current_field", "current_field")
+    field: str = text("is not a name", "give the name of a current_field", "current_field")
 
     @classmethod
     def lanes(cls) -> tuple[tuple[str, int], ...] | None:

@@ -61,7 +61,7 @@ def _read_products(faults: Faults, key: str, value: Any) -> None:
         return
     read = [read_product(name) for name in names]
     for name in (name for name, product in zip(names, read, strict=True) if product is None):
-        faults.add(key, name, "is no product of two velocities", _REMEDY)
+        faults.add(key, name, "is not a product of two velocities", _REMEDY)
     twice = [
         product for product, count in Counter(_ordered(product) for product in read if product).items() if count > 1
     ]

@@ -180,7 +180,7 @@ def linearize(
         faults.add(misplaced, period or inputs, "is that of a plant", "leave it out, or closed=True")
     if not (about is None or isinstance(about, Trim) or (closed and isinstance(about, int | float))):
         remedy = "give what lw.linear.trim returns" + (", or a time in seconds" if closed else ", or leave it out")
-        faults.add("about", about, "is no motion", remedy)
+        faults.add("about", about, "is not a motion", remedy)
     faults.raise_if_any()
     if isinstance(about, Trim):
         scene = replace(scene, start=about.start)

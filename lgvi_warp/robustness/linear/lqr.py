@@ -64,7 +64,7 @@ class Regulator:
 
 
 def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
-    """Find the gains that make the sum over ticks of x^T Q x + u^T R u least.
+    """Design a linear quadratic regulator: gains that minimise the sum over ticks of x^T Q x + u^T R u.
 
     Args:
         model: The linear model, as of `lw.linear.linearize` with inputs="wrench" for `lw.control.StateFeedback`.

@@ -234,7 +234,7 @@ def margins(
     method: str | Method | None = None,
     h: float | None = None,
 ) -> Margins:
-    """Find how much gain and delay the loop of each member bears.
+    """Compute the gain and delay margins of each member's loop.
 
     A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
     vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at its
@@ -350,7 +350,7 @@ def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: floa
     if controller is None:
         faults.add("controller", None, "is not in the scene, and margins are those of a loop", "give [controller]")
     elif loop is not None and loop not in (keys := [law.key for law in controller.laws]):
-        faults.add("loop", loop, "is no law of the controller", closest(loop, keys))
+        faults.add("loop", loop, "is not a law of the controller", closest(loop, keys))
     elif not faults and seconds < LEAST_TICKS * controller.period:
         least = LEAST_TICKS * controller.period
         faults.add(

@@ -97,7 +97,7 @@ class Trim(Saved):
         lists = {"free": self.values, "fixed": self.fixed}
         return [
             *(f"{name:<12}{', '.join(_texts(each)) or 'nothing'}" for name, each in lists.items()),
-            f"left        {remainder}",
+            f"residual    {remainder}",
         ]
 
 

@@ -50,7 +50,7 @@ class SearchBox:
             faults.add(key, bounds, "maps no names to bounds", f"give {example}")
         for name, pair in bounds.items() if not faults else ():
             if not isinstance(name, str):
-                faults.add(key, name, "is no name of a number", f"give {example}")
+                faults.add(key, name, "is not a name of a number", f"give {example}")
                 continue
             with faults.including():
                 name = single_number(scene, name, key)[0].label

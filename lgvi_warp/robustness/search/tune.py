@@ -33,7 +33,7 @@ from lgvi_warp.statistics.base import Statistic
 
 @dataclass(frozen=True)
 class Tuned(Saved):
-    """The numbers with the least risk that a search found.
+    """Tuned numbers: those of least risk that a search found.
 
     Attributes:
         parameters: the numbers by name.
@@ -130,7 +130,7 @@ def tune_gains(
     progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> Tuned:
-    """Search numbers, such as gains, for which the risk of a fleet is least.
+    """Tune numbers, such as gains, to minimise the risk over a fleet.
 
     Every candidate meets the same members, with the same noise: a generation is an ensemble of candidates times members. Then
     it is tried on fresh ones.
@@ -175,7 +175,7 @@ def tune_gains(
     measure = risk_of(faults, risk)
     box = _checked_box(faults, ensemble, over, budget)
     if fresh is not None and (not isinstance(fresh, int) or fresh < 0):
-        faults.add("fresh", fresh, "is no number of members", "give a whole number, 0 for none")
+        faults.add("fresh", fresh, "is not a number of members", "give a whole number, 0 for none")
     if ensemble.weights(0, 1) is not None:
         faults.add("fleet", "...", "has members with weights, and a risk counts them alike", "leave the weights out")
     faults.raise_if_any()

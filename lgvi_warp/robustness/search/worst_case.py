@@ -100,7 +100,8 @@ class WorstCase(Saved):
             return []
         bound = "a lower bound of the largest" if self.worst == "largest" else "an upper bound of the smallest"
         restarts = ", ".join(f"{value:.6g}" for value in self.restarts)
-        seen = f"; a separate peak in {self.unseen:.2g} of the box or more was met with 95 %" if self.points else ""
+        peak = f"; a separate peak in {self.unseen:.2g} of the box or more would be found with probability 95 %"
+        seen = peak if self.points else ""
         return [f"bound       {bound}; restarts: {restarts}{seen}"]
 
 
@@ -118,7 +119,7 @@ def worst_case(
     progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> WorstCase:
-    """Search numbers within bounds for the member whose quantity is worst.
+    """Search for the worst case of a quantity within bounds of the scene's numbers.
 
     Differential evolution, in which a generation is an ensemble, several times from other places; then the corners, where they
     are few; then a walk from the worst place. What is left of the budget goes to Sobol points over the whole box, and to walks

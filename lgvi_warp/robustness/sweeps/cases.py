@@ -60,13 +60,13 @@ class Case:
     def __post_init__(self) -> None:
         faults = Faults(f"case {self.name!r}: " if isinstance(self.name, str) else "cases: ")
         if not isinstance(self.name, str) or not self.name:
-            faults.add("name", self.name, "is no name", 'give name = "pid"')
+            faults.add("name", self.name, "is not a name", 'give name = "pid"')
         for key in ("set", "replace"):
             if not isinstance(getattr(self, key), Mapping):
                 example = 'set = { "heading_pid.kp" = 2.0 }' if key == "set" else "replace = { laws = [...] }"
-                faults.add(key, getattr(self, key), "is no table", f"write {example}")
+                faults.add(key, getattr(self, key), "is not a table", f"write {example}")
         if self.scene is not None and not isinstance(self.scene, Scene):
-            faults.add("scene", self.scene, "is no Scene", "give lw.Scene.load(path)")
+            faults.add("scene", self.scene, "is not a Scene", "give lw.Scene.load(path)")
         check_rare(faults, self.rare)
         faults.raise_if_any()
 
@@ -87,7 +87,7 @@ class Case:
             scene = scene.with_numbers({f"vehicle.{name}": value for name, value in self.vehicle.items()})
         elif self.vehicle is not None:
             if not isinstance(self.vehicle, Vehicle):
-                raise refusal("vehicle", self.vehicle, "is no Vehicle", "give lw.Vehicle(...), or numbers of it")
+                raise refusal("vehicle", self.vehicle, "is not a Vehicle", "give lw.Vehicle(...), or numbers of it")
             scene = replace(scene, vehicle=self.vehicle)
         return with_lists(scene, self.replace).with_numbers(self.set)
 
@@ -107,7 +107,7 @@ def cases_of(tables: Any) -> tuple[Case, ...]:
                    for name, table in tables.items()]  # fmt: skip
     elif not (entries := items_of(tables) or []):
         example = 'give [{"name": "pid"}, {"name": "stiff", "set": {"heading_pid.kp": 2.0}}]'
-        raise refusal("cases", tables, "is no list of cases", example)
+        raise refusal("cases", tables, "is not a list of cases", example)
     for i, entry in enumerate(entries):
         if isinstance(entry, Case):
             cases.append(entry)
@@ -140,12 +140,12 @@ def grid_of(grid: Any) -> dict[str, list[Any]]:
     if grid is None:
         return {}
     if not isinstance(grid, Mapping):
-        raise refusal("grid", grid, "is no table", 'write [grid] and "controller.delay" = [0.0, 0.1] below')
+        raise refusal("grid", grid, "is not a table", 'write [grid] and "controller.delay" = [0.0, 0.1] below')
     faults = Faults("grid.")
     axes = {name: items_of(values) or [] for name, values in grid.items()}
     for name, values in axes.items():
         if not values:
-            faults.add(f'"{name}"', grid[name], "is no list of values", "give [0.0, 0.1, 0.2]")
+            faults.add(f'"{name}"', grid[name], "is not a list of values", "give [0.0, 0.1, 0.2]")
         elif any(value in values[:i] for i, value in enumerate(values)):
             faults.add(f'"{name}"', values, "has a value twice", "keep one of them")
     faults.raise_if_any()
@@ -163,7 +163,7 @@ def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
     faults = Faults("replace.")
     for name in lists:
         if name not in known:
-            faults.add(name, "...", "is no list of a scene", closest(name, known))
+            faults.add(name, "...", "is not a list of a scene", closest(name, known))
         elif name in SECTIONS and scene.controller is None and "controller" not in lists:
             faults.add(name, "...", "is a list of a controller, which this scene has not", "give the whole controller")
     faults.raise_if_any()

@@ -31,11 +31,11 @@ def arguments_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
     faults.keys("", content, KEYS)
     if not isinstance(content.get("scene"), str):
         remedy = 'write scene = "remus_autopilot.toml"'
-        faults.add("scene", content.get("scene", ""), "is no path of a scene file", remedy)
+        faults.add("scene", content.get("scene", ""), "is not a path of a scene file", remedy)
     for name, kind in (("vary", Mapping), ("grid", Mapping), ("compare", Mapping), ("run", Mapping), ("cases", list),
                        ("metrics", list)):  # fmt: skip
         if not isinstance(content.get(name, kind() if kind is list else {}), kind):
-            faults.add(name, content[name], "is no list" if kind is list else "is no table", f"see {KEYS_PAGE}")
+            faults.add(name, content[name], "is not a list" if kind is list else "is not a table", f"see {KEYS_PAGE}")
     faults.raise_if_any()
     faults.keys("compare", content.get("compare", {}), COMPARE)
     faults.keys("run", content.get("run", {}), RUN)
@@ -66,11 +66,11 @@ KEYS_PAGE = "docs/guide/is_my_controller_robust.md"
 def _case(entry: Any, folder: Path, scene_path: Path) -> Any:
     """The table of a case, with its scene and its vehicle made."""
     if not isinstance(entry, Mapping):
-        raise refusal("cases", entry, "is no table", 'write [[cases]] and name = "pid" below')
+        raise refusal("cases", entry, "is not a table", 'write [[cases]] and name = "pid" below')
     case = dict(entry)
     scene = case.get("scene")
     if scene is not None and not isinstance(scene, str):
-        raise refusal("cases.scene", scene, "is no path of a scene file", 'write scene = "other.toml"')
+        raise refusal("cases.scene", scene, "is not a path of a scene file", 'write scene = "other.toml"')
     path = scene_path if scene is None else located(scene, folder)
     vehicle = case.get("vehicle")
     try:

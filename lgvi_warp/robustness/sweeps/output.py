@@ -138,7 +138,7 @@ class Sweep(SweepTable):
             raise refusal("case", cell.name, "did not ask for its rare failure", "give the case rare = true")
         if answer.found is None:
             raise refusal(
-                "case", cell.name, f"has no rare failure: {answer.refused}", "mend it, or ask for another one"
+                "case", cell.name, f"has no rare failure: {answer.refused}", "correct it, or choose another one"
             )
         return answer.found
 
@@ -197,7 +197,7 @@ class Sweep(SweepTable):
         limited = [name for name, (_, below) in self.conditions.limits.items() if np.isfinite(below)]
         by = by or next(iter([*limited, *self.metrics]))
         if by not in self.metrics:
-            raise refusal("by", by, "is no metric of this sweep", closest(str(by), self.metrics))
+            raise refusal("by", by, "is not a metric of this sweep", closest(str(by), self.metrics))
         places: list[tuple[float, float, int, int]] = []
         for cell in (cell for name in ((case,) if case else self.cases) for cell in self.cells_of(name)):
             record = self.record(cell)

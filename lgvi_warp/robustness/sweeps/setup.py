@@ -238,7 +238,7 @@ def electrical(entries: Any, scene: Any) -> Any:
 def metrics_of(entries: Any) -> dict[str, Statistic]:
     """Metrics by name, each with the number of every member; "time_to_failure" is added."""
     if (listed := items_of(entries)) is None:
-        raise refusal("metrics", entries, "is no list", 'give ["overshoot depth", lw.metrics.IAE("heading")]')
+        raise refusal("metrics", entries, "is not a list", 'give ["overshoot depth", lw.metrics.IAE("heading")]')
     faults, metrics = Faults(), dict[str, Statistic]()
     for i, entry in enumerate((*listed, TimeToFailure())):
         with faults.including():

@@ -55,7 +55,7 @@ def sweep(
     progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> Sweep:
-    """Run cases at all points of a grid on the same members, and say what holds and which case is better.
+    """Compare controller designs on the same members: success rate, ranking, worst members.
 
     All cells have the same vehicles, starts, seas, sensor noise and faults: what is drawn depends on seed, member and name
     alone. What a case sets does not vary in it; so does what it does not have. Cells that differ in numbers share a kernel. A

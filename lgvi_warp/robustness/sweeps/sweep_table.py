@@ -101,13 +101,13 @@ class SweepTable:
             SceneError: there is no such case, or no such point.
         """
         if case not in self.cases:
-            raise refusal("case", case, "is none of this sweep", closest(str(case), self.cases))
+            raise refusal("case", case, "is not part of this sweep", closest(str(case), self.cases))
         for name, value in (at or {}).items():
             axes = self.setup.axes
             if name not in axes:
-                raise refusal("at", name, "is no axis of the grid", closest(name, tuple(axes)))
+                raise refusal("at", name, "is not an axis of the grid", closest(name, tuple(axes)))
             if value not in axes[name]:
-                raise refusal(f'at["{name}"]', value, "is no value of this axis", f"give one of {axes[name]}")
+                raise refusal(f'at["{name}"]', value, "is not a value of this axis", f"give one of {axes[name]}")
         wanted = (at or {}).items()
         return [cell for cell in self.cells if cell.case.name == case and wanted <= cell.point.items()]
 
@@ -130,7 +130,7 @@ class SweepTable:
             raise refusal("at", at, f"leaves {len(cells)} cells of {case!r}", remedy)
         record = self.record(cells[0])
         if record.refused:
-            raise refusal("case", cells[0].name, f"was refused: {record.refused}", "mend it, or ask for another one")
+            raise refusal("case", cells[0].name, f"was refused: {record.refused}", "correct it, or choose another one")
         return cells[0]
 
     def passed(self, cell: SweepCell) -> np.ndarray:
@@ -160,7 +160,7 @@ class SweepTable:
             SceneError: there is no such case, point or metric.
         """
         if metric not in self.metrics:
-            raise refusal("metric", metric, "is none of this sweep", closest(str(metric), self.metrics))
+            raise refusal("metric", metric, "is not part of this sweep", closest(str(metric), self.metrics))
         return self.record(self.cell(case, at)).numbers[metric]
 
     def success(self, case: str, at: Mapping[str, Any] | None = None) -> Probability:

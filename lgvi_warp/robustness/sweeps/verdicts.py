@@ -26,7 +26,7 @@ def matters_of(matters: Any, metrics: Sequence[str], success: str) -> dict[str, 
     for name, value in matters.items():
         key = f'matters."{name}"'
         if name not in known:
-            faults.add(key, value, "is no metric of this sweep", closest(str(name), known))
+            faults.add(key, value, "is not a metric of this sweep", closest(str(name), known))
         else:
             faults.number(key, value, "points" if name == success else "unit of the metric", 0.0)
     faults.raise_if_any()

@@ -101,7 +101,7 @@ class Sampling(Documented):
         elif members % group:
             low = members // group * group
             near = f"{low} or {low + group}" if low else f"{group}"
-            fault = f"is no whole number of groups of {group}, which {self.kind} is made of here"
+            fault = f"is not a whole number of groups of {group}, which {self.kind} is made of here"
             faults.add("members", members, fault, f"give {near}")
 
     def to_dict(self) -> Any:
@@ -121,7 +121,7 @@ def inside(cube: np.ndarray) -> np.ndarray:
 def check_replicates(faults: Faults, replicates: Any) -> None:
     """Add a fault where a number of replicates is no power of two from 1 to 64."""
     if not is_whole(replicates, 1, MOST_REPLICATES) or replicates & (replicates - 1):
-        remark = f"is no power of two from 1 to {MOST_REPLICATES}"
+        remark = f"is not a power of two from 1 to {MOST_REPLICATES}"
         faults.add("replicates", replicates, remark, "give 8, 16, 32 or 64")
 
 

@@ -45,7 +45,7 @@ def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dic
         _check_chosen(faults, path, rows.line_num, names, chosen)
         numbers = np.empty((0, 0)) if faults else _numbers(faults, path, rows, names, chosen)
     except csv.Error as error:
-        faults.add("file", path, f"cannot be read ({error}, line {rows.line_num})", "mend that line")
+        faults.add("file", path, f"cannot be read ({error}, line {rows.line_num})", "correct that line")
     return {} if faults else dict(zip(chosen, np.ascontiguousarray(numbers.T), strict=True))
 
 
@@ -105,7 +105,7 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
         faults.add("file", path, fault, remedy)
     if len(reports) > MOST_TOLD:
         more = f"{len(reports) - MOST_TOLD} more such faults" + " or more" * (len(reports) >= MOST_COUNTED)
-        faults.add("file", path, f"has {more}", "mend them too")
+        faults.add("file", path, f"has {more}", "correct them too")
     if not values and not reports:
         faults.add("file", path, "has names and no members", "write a line of numbers for each member")
     return np.array(values).reshape(-1, len(chosen)) if not reports else np.empty((0, 0))
@@ -121,7 +121,7 @@ def _faults_of_line(
     for name, cell in zip(chosen, cells, strict=True):
         number = _number(cell)
         if number is None:
-            description = f"{cell!r}, which is no number," if cell.strip() else "no number"
+            description = f"{cell!r}, which is not a number," if cell.strip() else "no number"
         elif not math.isfinite(number):
             description = f"{cell.strip()}, which is not finite,"
         else:

@@ -52,12 +52,12 @@ class Saltelli(Sampling):
         pairs = list(groups.items()) if isinstance(groups, Mapping) else items_of(groups)
         pairs = [groups] if pairs is None else pairs
         if not all(isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
-            faults.add("groups", groups, "is no mapping of names to lists of factors", example)
+            faults.add("groups", groups, "is not a mapping of names to lists of factors", example)
             pairs = []
         pairs = [(name, items_of(members)) for name, members in pairs]
         for name, members in pairs:
             if not members or not all(isinstance(m, str) for m in members):
-                faults.add(f"groups.{name}", members, "is no list of names of factors", example)
+                faults.add(f"groups.{name}", members, "is not a list of names of factors", example)
         faults.raise_if_any()
         object.__setattr__(self, "replicates", int(self.replicates))
         object.__setattr__(self, "groups", tuple((name, tuple(members)) for name, members in pairs) or None)

@@ -56,7 +56,9 @@ class Grid(Sampling):
                 continue
             values = faults.finite(f'"{name}"', axis)
             if values is not None and (values.ndim == 0 or not len(values)):
-                faults.add(f'"{name}"', axis, "is no list of values", "give [value, value, ...] or a number of levels")
+                faults.add(
+                    f'"{name}"', axis, "is not a list of values", "give [value, value, ...] or a number of levels"
+                )
         faults.raise_if_any()
 
     def distributions(self) -> dict[str, Any]:

@@ -115,7 +115,7 @@ class Table(Sampling):
                 continue
             listed = items_of(chosen)
             if not listed or not all(isinstance(entry, str) for entry in listed):
-                faults.add(name, chosen, "is no list of names", f'write {name} = ["vehicle.mass"]')
+                faults.add(name, chosen, "is not a list of names", f'write {name} = ["vehicle.mass"]')
             else:
                 object.__setattr__(self, name, listed)
         if self.columns is not None and self.ignore is not None:
@@ -143,10 +143,10 @@ class Table(Sampling):
             for name in getattr(self, option) or ():
                 if name not in known:
                     remedy = functools.partial(closest, name, names)
-                    faults.add(option, name, "is no column of the table", remedy)
+                    faults.add(option, name, "is not a column of the table", remedy)
         if self.weights is not None and self.weights not in known:
             faults.add(
-                "weights", self.weights, "is no column of the table", functools.partial(closest, self.weights, names)
+                "weights", self.weights, "is not a column of the table", functools.partial(closest, self.weights, names)
             )
         wanted, unwanted = {*(self.columns or names), self.weights}, set(self.ignore or ()) - {self.weights}
         chosen = [name for name in names if name in wanted and name not in unwanted]
@@ -188,7 +188,7 @@ class Table(Sampling):
         try:
             return columns_of(faults, path, content, self._chosen)
         except UnicodeDecodeError:
-            faults.add("file", path, "is no text in UTF-8", "save it as CSV in UTF-8")
+            faults.add("file", path, "is not a text in UTF-8", "save it as CSV in UTF-8")
             return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
@@ -256,6 +256,6 @@ def _column(faults: Faults, key: str, column: Any) -> np.ndarray | None:
         return None
     array = faults.finite(key, column)
     if array is not None and array.ndim == 0:
-        faults.add(key, column, "is no column", "give one value for each member")
+        faults.add(key, column, "is not a column", "give one value for each member")
         return None
     return array

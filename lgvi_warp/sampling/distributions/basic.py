@@ -338,7 +338,7 @@ class Choice(Distribution):
         except (TypeError, ValueError, OverflowError):
             return  # a fault for numbers that are not numeric is there already
         if values.ndim == 0 or not len(values):
-            faults.add("values", self.values, "is no list of values", "give one value or more")
+            faults.add("values", self.values, "is not a list of values", "give one value or more")
         elif weights.shape != values.shape[:1] or not weights.sum() > 0.0:
             fault = f"does not weigh {len(values)} values"
             faults.add("weights", self.weights, fault, "give one from 0 for each value")

@@ -64,7 +64,7 @@ class Copula(JointLaw):
                 law = as_distribution(f"{self.kind}.marginals.{place}", value)
                 if not isinstance(law, Distribution) or law.joint:
                     remedy = "give one of a single number, such as lw.distributions.Normal(...)"
-                    faults.add(f"marginals.{place}", value, "is no distribution of a single number", remedy)
+                    faults.add(f"marginals.{place}", value, "is not a distribution of a single number", remedy)
                 laws.append(law)
         matrix = covariance_of(faults, SimpleNamespace(std=1.0, correlation=self.correlation), None)
         if matrix is not None and len(matrix) != len(marginals):

@@ -49,7 +49,7 @@ class Derived(JointLaw):
         faults = Faults(f"{self.kind}.")
         if not isinstance(functions, Mapping) or not functions:
             faults.add(
-                "functions", functions, "are no functions by name", 'give {"drag.quadratic": lambda k: k * base}'
+                "functions", functions, "are not functions by name", 'give {"drag.quadratic": lambda k: k * base}'
             )
             faults.raise_if_any()
         if not factors:
@@ -60,10 +60,10 @@ class Derived(JointLaw):
                 law = laws[name] = as_distribution(f"{self.kind}.{name}", value)
                 if not isinstance(law, Distribution) or law.joint:
                     remedy = "give one of a single number, such as lw.distributions.Normal(std=0.1)"
-                    faults.add(name, value, "is no distribution of a single number", remedy)
+                    faults.add(name, value, "is not a distribution of a single number", remedy)
         for name, function in functions.items():
             if not callable(function):
-                faults.add(f'"{name}"', function, "is no function", "give one, such as lambda k: k * base")
+                faults.add(f'"{name}"', function, "is not a function", "give one, such as lambda k: k * base")
         takes = {name: _arguments(faults, name, function, laws) for name, function in functions.items()}
         faults.raise_if_any()
         for name, value in (("functions", dict(functions)), ("factors", laws), ("_takes", takes)):
@@ -145,6 +145,9 @@ def _arguments(faults: Faults, name: str, function: Any, factors: Mapping[str, A
         if parameter.name not in factors and parameter.default is parameter.empty:
             known = ", ".join(factors)
             faults.add(
-                f'"{name}"', parameter.name, f"is no factor, of {known}", "name arguments like factors: lambda k: ..."
+                f'"{name}"',
+                parameter.name,
+                f"is not a factor, of {known}",
+                "name arguments like factors: lambda k: ...",
             )
     return taken

@@ -44,7 +44,7 @@ class Factor(JointLaw):
         faults, law = Faults(), as_distribution(self.kind, self.law)
         if not isinstance(law, Distribution) or law.joint or law.fault([()]):
             remedy = "give one of a single number, such as { uniform = { low = 0.8, high = 1.2 } }"
-            faults.add(self.kind, self.law, "is no distribution of a single number", remedy)
+            faults.add(self.kind, self.law, "is not a distribution of a single number", remedy)
         faults.raise_if_any()
         object.__setattr__(self, "law", law)
 

@@ -75,7 +75,9 @@ def covariance_of(faults: Faults, distribution: Any, size: int | None) -> np.nda
         return None
     square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
     if name != "std" and not (square and np.allclose(matrix, matrix.T)):
-        faults.add(name, matrix, "is no symmetric matrix", "give n x n numbers, the same on both sides of the diagonal")
+        faults.add(
+            name, matrix, "is not a symmetric matrix", "give n x n numbers, the same on both sides of the diagonal"
+        )
         return None
     if name != "covariance":
         std = faults.finite("std", distribution.std)

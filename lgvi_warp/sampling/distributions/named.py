@@ -53,7 +53,7 @@ class ScipyDistribution(Distribution):
         if (unfrozen := name_of_unfrozen(self.distribution)) is not None:
             faults.add("distribution", f"scipy.stats.{unfrozen}", *without_numbers(self.distribution))
         elif not is_frozen(self.distribution):
-            faults.add("distribution", self.distribution, "is no frozen distribution of scipy.stats",
+            faults.add("distribution", self.distribution, "is not a frozen distribution of scipy.stats",
                        "give one with its numbers, such as scipy.stats.gamma(2.0, scale=3.0)")  # fmt: skip
         elif not all([faults.finite(name, value) is not None for name, value in self.numbers_by_name().items()]):
             pass
@@ -118,7 +118,7 @@ class ScipyDistribution(Distribution):
         name = SCIPY.get(kind, values.get("name"))
         distribution = getattr(stats, name, None) if isinstance(name, str) else None
         if not isinstance(distribution, stats.rv_continuous | stats.rv_discrete):
-            fault = "is no distribution of scipy.stats"
+            fault = "is not a distribution of scipy.stats"
             raise refusal(f"{key}.{kind}.name", name, fault, 'give its name, such as "gamma"')
         faults, shapes, known = Faults(), _shapes(distribution), _numbers_of(distribution)
         parameters = {parameter: value for parameter, value in values.items() if kind in SCIPY or parameter != "name"}
@@ -245,7 +245,7 @@ def without_numbers(value: Any) -> tuple[str, str]:
     """The fault of a distribution of scipy.stats that was given without numbers."""
     numbers = ", ".join(f"{name}=..." for name in _numbers_of(value))
     remedy = f"give them: scipy.stats.{value.name}({numbers})"
-    return "is no frozen distribution of scipy.stats: it has no numbers", remedy
+    return "is not a frozen distribution of scipy.stats: it has no numbers", remedy
 
 
 def _shapes(distribution: Any) -> list[str]:

@@ -153,7 +153,7 @@ class Estimates(Summarized, Mapping[str, Estimate]):
             name = self._spelled.get(canonical(name), name)
         if name not in self._found:
             hint = closest(name, self._found) if self._found else "none were asked for: give statistics=[...]"
-            raise KeyError(f"{brief(name)} is no statistic of this run; {hint}")
+            raise KeyError(f"{brief(name)} is not a statistic of this run; {hint}")
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -57,7 +57,7 @@ class OfChannels(Total):
             return _ALL[self.of]
         names = [*CHANNELS, *(f"{name}[0]" for name in CHANNELS)]
         if not isinstance(self.of, str) or self.of.split("[")[0] not in CHANNELS:
-            raise refusal(f"{self.type}.of", self.of, "is no signal of actuators", closest(str(self.of), names))
+            raise refusal(f"{self.type}.of", self.of, "is not a signal of actuators", closest(str(self.of), names))
         return named(f"{self.type}.of", self.of, self.of)
 
 
@@ -260,9 +260,11 @@ class CustomMetric(Metric):
     def meant(self) -> Quantity:
         if not callable(self.of):
             remedy = "give a function of (state, tick), such as def heel(state, tick): ..."
-            raise refusal("own_metric.of", self.of, "is no function", remedy)
+            raise refusal("own_metric.of", self.of, "is not a function", remedy)
         if not all(isinstance(name, str) and name in SAVED for name in self.fields):
-            raise refusal("own_metric.fields", self.fields, "are no names of samples", closest(str(self.fields), SAVED))
+            raise refusal(
+                "own_metric.fields", self.fields, "are not names of samples", closest(str(self.fields), SAVED)
+            )
         label = str(getattr(self.of, "__name__", type(self.of).__name__))
         return replace(all_of(*self.fields), name=label, labels=(label,), unit=self.unit_of)
 

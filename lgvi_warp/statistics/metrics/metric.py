@@ -143,8 +143,8 @@ class Metric(MemberStatistic):
     def finish(self, state: State) -> np.ndarray:
         """Return the members' numbers (n,) from the state after the last tick.
 
-        It also has "until" (n,) [s], each member's last tick under way, "ended" (n,) [s], when it stopped or failed, else
-        infinite, "failed" (n,), and "end" [s], that of the run; "ended_so" (n,), whether by its outcome, where it names one.
+        The state also has "until" (n,) [s], each member's last tick under way, "ended" (n,) [s], when it stopped or failed,
+        else infinite, "failed" (n,), and "end" [s], that of the run; "ended_so" (n,), whether by its outcome, if it names one.
         """
         raise TypeError(f"{type(self).__name__} is abstract")
 

@@ -115,7 +115,7 @@ class Nearest(Metric):
     def meant(self) -> Quantity:
         name, kind = self.of, self.of if self.kind is None else self.kind
         if not isinstance(name, str) or not name:
-            raise refusal("nearest.of", name, "is no name", 'give the name of an event, "floor"')
+            raise refusal("nearest.of", name, "is not a name", 'give the name of an event, "floor"')
         if kind not in COUNTS:
             remedy = f"say what it is: kind=..., {closest(str(kind), COUNTS)}"
             raise refusal("nearest.of", name, "is of no type whose distance is known", remedy)

@@ -266,7 +266,7 @@ class SteadyStateError(Total, OfTracking):
         super().check(faults)
         share = faults.number("share", self.share, "1")
         if share is not None and not 0.0 < share <= 1.0:
-            faults.add("share", self.share, "is no part of the run", "give a number above 0 and up to 1")
+            faults.add("share", self.share, "is not a part of the run", "give a number above 0 and up to 1")
 
     def begin(self, x: np.ndarray) -> State:
         return super().begin(x) | {"count": np.zeros(1)}

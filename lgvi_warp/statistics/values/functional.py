@@ -138,7 +138,7 @@ def _parsed(key: str, of: str, text: str) -> Functional:
         if name not in FUNCTIONS:
             faults.add(key, of, f"has a function {name!r} that is not known", closest(name, FUNCTIONS))
     if sum(name in OVER_TIME for name in names) > 1:
-        faults.add(key, of, "looks over the path twice", f"keep one of {', '.join(OVER_TIME)}")
+        faults.add(key, of, "is taken over the path twice", f"keep one of {', '.join(OVER_TIME)}")
     faults.raise_if_any()
     if len(operands := _operands(inner)) > 1:
         meaning = _difference(key, of, [_parsed(key, of, operand) for operand in operands])
@@ -148,10 +148,10 @@ def _parsed(key: str, of: str, text: str) -> Functional:
         meaning = of_number(key, of, inner)
     else:
         form = 'write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"'
-        raise refusal(key, of, "is no quantity", f"{form}, of {', '.join(KNOWN)}")
+        raise refusal(key, of, "is not a quantity", f"{form}, of {', '.join(KNOWN)}")
     base = Functional(text.replace("-", " - "), meaning, tuple(reversed(names)))
     if "horizontal" in base.functions and (base.functions[0] != "horizontal" or not _inertial(meaning)):
-        problem = "has a horizontal length of what is no vector in inertial axes"
+        problem = "has a horizontal length of what is not a vector in inertial axes"
         raise refusal(key, of, problem, "write horizontal(navigation_error) or horizontal(velocity_inertial)")
     if entry is not None and (base.size == 1 or entry >= base.size):
         fault = f"{outer} has {base.size} component{'s' * (base.size > 1)}"
@@ -190,7 +190,7 @@ def _difference(key: str, of: str, operands: Sequence[Functional]) -> Quantity:
     for operand in operands:
         if operand.over_path:
             remedy = "give a difference of quantities at each time, as in max(measured_depth - depth)"
-            raise refusal(key, of, f"{operand.label} looks over the path, and has no difference", remedy)
+            raise refusal(key, of, f"{operand.label} is taken over the whole path, and has no difference", remedy)
     first, *others = parts = [operand.as_quantity() for operand in operands]
     for other in others:
         if other.size != first.size or other.unit != first.unit or not other.unit:
@@ -222,11 +222,11 @@ def quantity(key: str, of: Any) -> Quantity:
         parts = [quantity(f"{key}[{i}]", item) for i, item in enumerate(items)]
         for i, (part, item) in enumerate(zip(parts, items, strict=True)):
             if len(items) > 1 and over_path(part):
-                fault = "looks over the path, and a list is of numbers at each time"
+                fault = "is taken over the whole path, and a list is of numbers at each time"
                 raise refusal(f"{key}[{i}]", item, fault, "ask for it alone")
         return joined(parts)
     remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
-    raise refusal(key, of, "is no quantity", remedy)
+    raise refusal(key, of, "is not a quantity", remedy)
 
 
 def over_path(quantity: Quantity) -> Functional | None:

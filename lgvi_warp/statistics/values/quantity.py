@@ -211,13 +211,13 @@ def of_number(key: str, of: str, text: str) -> Quantity:
         if name not in (*members.parameters, *starts):
             if name.startswith("start."):
                 raise refusal(key, of, "does not vary", "vary it, or give a quantity at the start, as in 'depth at 0'")
-            raise refusal(key, of, "is no number of this scene", closest(name, (*members.parameters, *starts)))
+            raise refusal(key, of, "is not a number of this scene", closest(name, (*members.parameters, *starts)))
         values = members.parameters[name] if name in members.parameters else starts[name]
         shape = values.shape[1:]
         if len(place) != len(shape) or any(i >= most for i, most in zip(place, shape, strict=True)):
             first, last = (",".join(str(i) for i in corner) for corner in ([0] * len(shape), [n - 1 for n in shape]))
             remedy = f"give '{name}[{first}]' to '{name}[{last}]'" if shape else f"give {name!r}"
-            raise refusal(key, of, f"is no single number: {name} has shape {shape}", remedy)
+            raise refusal(key, of, f"is not a single number: {name} has shape {shape}", remedy)
         return np.broadcast_to(values[entry], (len(samples.time), members.count))
 
     return Quantity(name + index, function, unit_of_number(name), ("position",), needs_limit=True)

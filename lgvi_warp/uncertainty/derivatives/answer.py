@@ -20,7 +20,7 @@ ARRAYS = ("value", "jacobian", "error", "increments")
 
 @dataclass(frozen=True, eq=False)
 class Derivatives(Saved):
-    """Derivatives of what a run gives by numbers of its scene, made by `lw.derivatives`.
+    """Derivatives of a run's outputs with respect to numbers of its scene, made by `lw.derivatives`.
 
     m is the number of quantities, k that of numbers. Of a fleet of n members every array has the members first: (n, m, k).
 

@@ -42,7 +42,7 @@ def derivatives(
     scheduler: str | None = None,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Derivatives:
-    """Find the derivatives of what whole runs give by any numbers of the scene, each with an estimate of its error.
+    """Compute derivatives of a run's outputs with respect to numbers of the scene, each with an error estimate.
 
     Copies of a member, moved by many increments to both sides, run beside it in one call, with its noise; their differences
     are extrapolated, and the increments that agree best are taken. What goes in steps, or jumps, has no derivative: it is

@@ -68,7 +68,7 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
             if len({why for _, why in refused}) == 1:  # no step would help
                 raise SceneError([refused[0][1]])
             causes = "; ".join(f"{name}: {why}" for name, why in refused)
-            raise SceneError([f"setting: no step was taken: {causes}; mend what fails, or fix method= and h="])
+            raise SceneError([f"setting: no step qualified: {causes}; fix the failing members, or set method= and h="])
         if climbed and climbed[-1].ladder.end == "apart":
             break
     climbed = [with_rounding(pilot, each) for each in climbed]

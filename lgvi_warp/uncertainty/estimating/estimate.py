@@ -66,46 +66,47 @@ def estimate(
     store: str | os.PathLike[str] | None = None,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Estimated:
-    """Estimate a statistic at an error, for the least work that a small pilot finds.
+    """Estimate a mean, probability or quantile to a requested accuracy at the lowest cost.
 
-    A pilot runs few members at several steps. It tells the bias of each, and what plain Monte Carlo, Sobol points, regression
-    and levels (paired differences of fine and coarse settings) would take. The cheapest is run with numbers of members that
+    A pilot runs few members at several steps. It estimates the bias of each, and the cost of plain Monte Carlo, Sobol points,
+    regression and levels (paired differences of fine and coarse settings). The cheapest is run with numbers of members that
     are fixed beforehand.
 
     Choices follow counted costs: steps times the evaluations of forces of each. One seed gives one answer, to the bit, on any
     number of threads. `found.recipe` holds what was chosen, so that the same members can be run again later.
 
-    No answer is surer than the effect of members that so few others do not show: of n, up to 3 / n may be odd. How odd, the
-    spread, 512 to 2,048 members all over what varies, and probes far out tell. A message of a mean names the share that may
-    not have been seen. Rare branches of a Choice are strata of their own.
+    A sample of n members can miss a share of up to 3 / n that behaves otherwise. The spread, 512 to 2,048 members all over
+    what varies, and probes far out show how otherwise. A message of a mean names the share that may have been missed. Rare
+    branches of a Choice are strata of their own.
 
     Args:
         fleet: the ensemble, or a Scene with one. Its distributions are drawn from anew; members and sampling do not matter.
-        of: what is asked, at the end of the run: "mean position[0]", "depth above 3", "outcome floor", "max(depth)",
+        of: statistic to estimate, at the end of the run: "mean position[0]", "depth above 3", "outcome floor", "max(depth)",
             lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles of one level, or a metric such as
             lw.metrics.ITAE("depth").
-        error: root mean square error asked for, of sampling and bias together, in the unit of the statistic; above 0.
+        error: requested root mean square error, of sampling and bias together, in the unit of the statistic; above 0.
         relative_error: the same as a fraction of the statistic, in place of `error`.
         t1: end time [s]. Default: run.duration of the scene.
-        risk: of a quantity or a metric: "mean" (the default), the level of a quantile, such as 0.95, or lw.metrics.CVaR(0.05).
+        risk: risk of a quantity or a metric: "mean" (the default), the level of a quantile, such as 0.95, or
+            lw.metrics.CVaR(0.05).
         cheaper: scenes that cost less and behave alike: numbers that differ, such as {"controller.delay": 0.0}, or Scenes.
             They serve as coarse levels alone. Default none.
         method: fixes the method. Default: the scene's own, and one that suits what acts.
-        h: fixes the step [s], whose bias is told all the same; with the scene's method unless `method` is given.
+        h: fixes the step [s], whose bias is reported; with the scene's method unless `method` is given.
         dtype: fixes the precision, of coarse levels too. Default: that of the scene, and "float32" of coarse levels that gain
             by it.
         estimator: fixes the estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol". Default:
             the one that is predicted to cost least.
         recipe: `found.recipe` of an answer: the same members are run again, without a pilot, and the error, the setting, the
             estimator and the seed are those of the recipe. Fleet, `of`, `risk` and `cheaper` must be as they were.
-        heavy_tail: True tells a mean all the same whose variance seems to be infinite. Default False: it is refused.
-        seed: of points and noise. Default: that of the ensemble.
+        heavy_tail: True reports a mean even if its variance seems to be infinite. Default False: it is refused.
+        seed: seed of points and noise. Default: that of the ensemble.
         threads: threads of the runs. Default: as of `lw.solve`.
-        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Of those that are no threads the
-            time that passes is taken for the cost.
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Other than with threads, the cost
+            is the elapsed time.
         scheduler: address of Dask's scheduler.
-        store: folder for the results of runs: the same call, after it was interrupted, takes them from there and goes on, with
-            the answer of one that was not. One of other arguments is refused. Default: none.
+        store: folder for the results of runs: the same call continues from there after an interruption, with the same answer.
+            A folder of other arguments is refused. Default: none.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             from 0 to 1.
 
@@ -198,7 +199,7 @@ def recipe_of(recipe: Mapping[str, Any], question: Question, scenes: int) -> tup
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, SceneError):
             raise
-        raise refusal("recipe", recipe, "is no recipe of an answer", remedy) from None
+        raise refusal("recipe", recipe, "is not a recipe of an answer", remedy) from None
     if label != question.label or most >= scenes:
         raise refusal(
             "recipe", label, f"is of another question than {question.label}, or of more cheaper scenes", remedy
@@ -235,7 +236,7 @@ def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
     """The same variation of each cheaper scene; names of what varies that a change fixes stay varied."""
     listed = items_of(cheaper)
     if listed is None:
-        raise refusal("cheaper", cheaper, "is no list of scenes", 'give [{"controller.delay": 0.0}]')
+        raise refusal("cheaper", cheaper, "is not a list of scenes", 'give [{"controller.delay": 0.0}]')
     faults, fleets = Faults(), list[Ensemble]()
     for i, entry in enumerate(listed):
         with faults.including():
@@ -244,7 +245,7 @@ def cheaper_fleets(fleet: Ensemble, cheaper: Sequence[Any]) -> list[Ensemble]:
             if isinstance(entry, Ensemble):
                 entry = entry.scene
             if not isinstance(entry, Scene):
-                raise refusal(f"cheaper[{i}]", entry, "is no scene", 'give {"controller.delay": 0.0}, or a Scene')
+                raise refusal(f"cheaper[{i}]", entry, "is not a scene", 'give {"controller.delay": 0.0}, or a Scene')
             fleets.append(Ensemble(entry, 1, fleet.seed, fleet.vary))
     faults.raise_if_any()
     return fleets

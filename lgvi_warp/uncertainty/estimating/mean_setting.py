@@ -73,7 +73,7 @@ def mean_settings(
     if not kept:
         if not closest:
             raise SceneError(
-                [f"error = {error:g} of {question.label}: no step was taken: members fail; mend what fails"]
+                [f"error = {error:g} of {question.label}: no step qualified: members fail; fix the failing members"]
             )
         best = min(closest, key=lambda each: each.largest)
         problem = (

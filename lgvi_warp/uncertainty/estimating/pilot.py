@@ -208,7 +208,7 @@ class Pilot:
             f"has no finite variance, as it seems: its tail falls off with the power {index:.2g} of {len(y)} members"
         )
         if not self.heavy_tail:
-            remedy = "ask for a quantile, risk=0.5, or a probability; heavy_tail=True tells the mean all the same"
+            remedy = "ask for a quantile, risk=0.5, or a probability; heavy_tail=True reports the mean nevertheless"
             raise refusal("of", self.runs.question.label, problem, remedy)
         if not any("no finite variance" in message for message in self.messages):
             self.messages.append(f"{self.runs.question.label} {problem}: its interval is not to be trusted")
@@ -401,4 +401,4 @@ def failing(setting: Setting, y: np.ndarray) -> SceneError:
     """The refusal of a statistic of members that fail at the finest step."""
     count = int(np.isnan(y).sum())
     problem = f"{count} of {len(y)} members fail, or have no finite number"
-    return refusal("setting", str(setting), problem, "mend what fails (lw.solve says which), or vary less")
+    return refusal("setting", str(setting), problem, "fix the failing members (lw.solve says which), or vary less")

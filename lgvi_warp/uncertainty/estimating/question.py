@@ -50,7 +50,7 @@ class Question:
         if self.metric.ticks and scene.controller is not None:
             every = None  # a metric comes to every tick by itself
         elif every is None:
-            problem = "looks over the path, and the scene says of no samples"
+            problem = "is taken over the whole path, and the scene keeps no samples"
             raise refusal("of", self.label, problem, "give [run] save_every, the time between them")
         return {"statistics": [self.metric], "save": SaveAt(every=every, fields=("position",))}
 
@@ -88,7 +88,7 @@ def with_risk(question: Question, risk: Any) -> Question:
     if isinstance(risk, float) and 0.0 < risk < 1.0:
         return replace(question, label=f"{100.0 * risk:g} % quantile of {inner}", target=Sought("quantile", risk))
     remedy = 'give "mean", a level such as 0.95, or lw.metrics.CVaR(0.05)'
-    raise refusal("risk", risk, "is no risk", remedy)
+    raise refusal("risk", risk, "is not a risk", remedy)
 
 
 def _read(of: Any) -> Question:
@@ -149,7 +149,7 @@ def _of_statistic(statistic: Statistic) -> Question:
         statistic,
         statistics.Mean | statistics.Exceedance | statistics.Quantiles | statistics.FirstPassage | MemberStatistic,
     ):
-        raise refusal("of", statistic.key, "is no mean, probability or quantile of all members", REMEDY)
+        raise refusal("of", statistic.key, "is not a mean, probability or quantile of all members", REMEDY)
     if isinstance(statistic, MemberStatistic):
         _, gathering = metric_of("of", statistic)
         question = Question(f"mean {statistic.key}", statistic.unit or "1", Sought(), None, gathering)
@@ -182,7 +182,7 @@ def _asked_of(question: Question, statistic: Statistic) -> Question:
         return _bounded(question, **{k: None if v is None else float(np.ravel(v)[0]) for k, v in limits.items()})
     if isinstance(statistic, statistics.Mean):
         return question
-    raise refusal("of", statistic.type, "is no mean, probability or quantile", REMEDY)
+    raise refusal("of", statistic.type, "is not a mean, probability or quantile", REMEDY)
 
 
 def _bounded(question: Question, above: float | None = None, below: float | None = None) -> Question:

@@ -167,7 +167,7 @@ def _positions(result: Result, word: str, at: Any) -> tuple[np.ndarray, np.ndarr
             remedy = (
                 f"give {' or '.join(f'{time:g}' for time in np.sort(near))}, or keep it: save=lw.SaveAt(at=[{word}])"
             )
-            raise refusal("at", at, "is no time of a sample", remedy)
+            raise refusal("at", at, "is not a time of a sample", remedy)
         row, there = int(rows[0]), there | (stop_time(result) >= when)
     elif word != "end":
         events = from_list(result.provenance["scene"].get("events", ()))

@@ -62,7 +62,7 @@ def cheaper_of(entries: Any, fleet: Ensemble, settings: Mapping[str, Any]) -> li
     """Read the cheaper settings: mappings of numbers of the scene and settings of the run to their values."""
     listed = items_of(entries)
     if listed is None:
-        raise refusal("cheaper", entries, "is no list", 'give [{"h": 0.1, "dtype": "float32"}]')
+        raise refusal("cheaper", entries, "is not a list", 'give [{"h": 0.1, "dtype": "float32"}]')
     faults, settled = Faults(), []
     for i, entry in enumerate(listed):
         if not isinstance(entry, Mapping) or not entry:

@@ -112,7 +112,7 @@ def condition_of(limit: Any, scene: Any) -> RareCondition:
         (quantity,) = quantities(limit)
         of = limit if isinstance(limit, Quantity) else _bounded(limit)
         return RareCondition(f"{quantity.label} above 0", of, {quantity.label: (0.0, np.inf)})
-    raise refusal("limit", limit, "is no event", EXAMPLE)
+    raise refusal("limit", limit, "is not an event", EXAMPLE)
 
 
 def _bounded(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -144,7 +144,7 @@ def _of_text(text: str, scene: Any) -> RareCondition:
         raise refusal("limit", text, problem, remedy)
     if found := SAID_OTHERWISE.fullmatch(text):
         side = "above" if found[2] == "above" or OVER.fullmatch(found[2]) else "below"
-        problem = "is no event in the words that are read"
+        problem = "is not an event in the words that are read"
         raise refusal("limit", text, problem, f'write "{found[1]} {side} {found[3] or "12.0"}"')
     if text.partition(" ")[0] in TYPES:
         raise refusal("limit", text, "is a metric without a bound", f'write "{text} above 12.0"')

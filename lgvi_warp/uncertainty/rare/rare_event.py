@@ -70,30 +70,30 @@ def rare_event(
     progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> RareEvent:
-    """Estimate the probability of an event that plain Monte Carlo would hardly ever see, with its error.
+    """Estimate the probability of a rare event, with its interval, and list failing members.
 
     Chains of members go level by level towards the event (subset simulation), over the numbers that vary and over the draws of
     noise, in four independent runs; then members drawn about the failing ones, with weights, are the answer where checks say
-    that it may be believed, and more chains otherwise. What is likelier than 1e-3 is sampled plainly.
+    that it is reliable, and more chains otherwise. Events more likely than 1e-3 are sampled directly.
 
     Args:
         fleet: A Scene or an Ensemble; what varies is its `vary`, by distributions, and its noise.
         limit: The event: a quantity or a function of a Result, of which above 0 is the event, "max(depth) - 40.0"; conditions
             in a sweep's words, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of an event of the
             scene.
-        relative_error: Standard deviation wanted of the probability's error, as a part of it, 0.005 to 0.5; 0.1 by default.
+        relative_error: Target relative standard error of the probability, 0.005 to 0.5; 0.1 by default.
         by: "chains", the default, or "splitting", for a scene with noise and an event that is seen on the way: a number at the
             end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
-        cheaper: Settings that chains may use first, the answer being that of the scene's own: numbers and settings of the run
-            that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by default.
+        cheaper: Coarser settings that chains may use first; the answer is that of the scene's own. Numbers and settings of the
+            run that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by default.
         intervals: Splitting: number of time intervals, at most, 2 to 1,000; 50 by default. More intervals need fewer members,
             and each costs a call. They begin at samples and at ticks of a controller.
-        failed: "event", the default: a member that fails counts as the event, and is told apart; "refuse" for an error.
-        most: About how many members may be run, from 10,000; 1,000,000 by default. A pilot comes in any case.
-        seed: Seed of all that is drawn; 0 by default.
-        store: Folder for the results of runs: the same call, after it was interrupted, takes them from there and goes on,
-            with the answer of one that was not; with splitting level by level, after its pilot was run again. One of other
-            arguments is refused. None by default.
+        failed: "event", the default: a member that fails counts as the event, and is reported apart; "refuse" for an error.
+        most: Approximate largest number of members to run, from 10,000; 1,000,000 by default. A pilot is not counted.
+        seed: Seed of all random draws; 0 by default.
+        store: Folder for the results of runs: the same call continues from there after an interruption, with the same answer;
+            with splitting level by level, after its pilot was run again. A folder of other arguments is refused. None by
+            default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False for
             nobody.
@@ -156,7 +156,7 @@ def rare_event(
     if found.probability >= 1.0:
         lost = bool(np.isinf(found.limits).all())
         problem = f"happens for each of {found.members:,} members" + (", all of which failed" if lost else "")
-        remedy = "mend what fails" if lost else ASK
+        remedy = "fix the failing members" if lost else ASK
         raise refusal("limit", condition.label, problem, remedy)
     return _told(found, own, others, condition, settings)
 

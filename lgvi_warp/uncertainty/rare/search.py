@@ -327,7 +327,7 @@ class RareSearch:
         lookers = math.ceil(LOOKED / self.relative_error)
         seen = witnessed(self._happens, self.d, wide_of(probability or 1e-6), rng, lookers)
         if not len(seen.u) and probability is not None:
-            self.notes.append("the second look for other failure modes met no failing member, and tells nothing")
+            self.notes.append("the second look for other failure modes met no failing member, so it is inconclusive")
         return seen
 
     def _happens(self, u: np.ndarray) -> np.ndarray:

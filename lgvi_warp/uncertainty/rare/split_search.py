@@ -113,7 +113,7 @@ class SplitSearch:
         paths = tuple(path for each in rounds for path in each.paths)
         if self.walk.d:
             self.notes.append(
-                "draws of noise are no numbers with splitting: the likeliest member goes by its numbers alone"
+                "draws of noise are not numbers with splitting: the likeliest member goes by its numbers alone"
             )
         share = weights / weights.sum() if len(weights) else weights
         if self.walk.d and (starts := different(failing, share)) < FEW_STARTS:

@@ -92,7 +92,7 @@ def sobol(
     if not faults and samples % replicates:
         near = samples // replicates * replicates
         ways = " or ".join(str(number) for number in (near, near + replicates) if number)
-        faults.add("samples", samples, f"is no multiple of replicates = {replicates}", f"give {ways}")
+        faults.add("samples", samples, f"is not a multiple of replicates = {replicates}", f"give {ways}")
     faults.raise_if_any()
     fleet = designed(scene, vary, seed, design, samples)
     outputs = evaluate(fleet, of, **settings)
@@ -100,7 +100,7 @@ def sobol(
 
 
 def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, failed: str = "refuse") -> SobolIndices:
-    """Estimate Sobol indices from outputs that are already there.
+    """Estimate Sobol indices from existing outputs.
 
     Args:
         fleet: the ensemble that was run, with Saltelli's design.
@@ -170,7 +170,7 @@ def morris(
     failed: str = "refuse",
     **settings: Any,
 ) -> MorrisEffects:
-    """Screen for the factors that matter at all, by Morris' elementary effects on few members.
+    """Screen for the factors that matter, by Morris' elementary effects on few members.
 
     Args:
         scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
@@ -209,7 +209,7 @@ def morris(
 def morris_of(
     fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, resamples: int = 100, failed: str = "refuse"
 ) -> MorrisEffects:
-    """Compute elementary effects from outputs that are already there.
+    """Compute elementary effects from existing outputs.
 
     Args:
         fleet: the ensemble that was run, with Morris' design.
@@ -309,7 +309,7 @@ def salib() -> Callable[..., Any]:
 def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
     """Mask of groups without failure (N,), and messages about the others; FailedMembers where too few have none."""
     if outputs.failed.any() and failed == "refuse":
-        remedy = 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
+        remedy = 'fix the failing members (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
         raise FailedMembers([outputs.text(remedy)])
     whole = np.asarray(~outputs.failed.reshape(-1, group).any(axis=1))
     count, messages = int(whole.sum()), list[str]()

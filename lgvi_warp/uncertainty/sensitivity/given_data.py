@@ -54,7 +54,7 @@ class GivenDataIndices(Indices):
 def given_data(
     result: Result | str | os.PathLike[str], of: OfInterest | Sequence[OfInterest], *, confidence: float = 0.95
 ) -> GivenDataIndices:
-    """Estimate first-order indices of a run that is over, by every number that varied in it, those of the start too.
+    """Estimate first-order indices of a finished run for every number that varied in it, including those of the start.
 
     No design is needed. The members are divided into bins of each input. The index is the part of the variance that lies
     between the bins' means, less the part that chance alone would put there. The interval is that of the noncentral F
@@ -84,7 +84,9 @@ def given_data(
     if isinstance(result, str | os.PathLike):
         result = open_run(result)
     if not isinstance(result, Result):
-        raise refusal("result", result, "is no result", "give what lw.solve or lw.open_run returned, or a store's path")
+        raise refusal(
+            "result", result, "is not a result", "give what lw.solve or lw.open_run returned, or a store's path"
+        )
     interests, inputs = quantities(of), varied(result)
     _check(result, inputs, confidence)
     columns, labels = _values(result, interests)

@@ -91,7 +91,7 @@ class Indices(Saved):
         first = [f for f in known if values[f] + half[f] >= least]
         texts = [f"{self.factors[f]} ({self._amount(q, values[f], half[f])})" for f in known[: max(2, len(first))]]
         if len(first) > 1:
-            return f"{quantity} depends most on {listed(texts, 2)}, which sampling error does not tell apart"
+            return f"{quantity} depends most on {listed(texts, 2)}, whose order is within sampling error"
         worth = max(half[known[1]], LEAST_SECOND * values[known[0]]) if len(known) > 1 else np.inf
         second = len(self.quantities) == 1 and len(known) > 1 and values[known[1]] > worth
         then = f", then on {texts[1]}" if second else ""
@@ -135,7 +135,7 @@ class Indices(Saved):
         """Indices of the analysis that the content names. Raises ValueError where that is not known."""
         kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
         if not kinds:
-            raise ValueError(f"{content['name']!r} is no analysis")
+            raise ValueError(f"{content['name']!r} is not an analysis")
         return kinds[0]._from(content)
 
     @classmethod

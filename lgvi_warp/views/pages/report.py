@@ -59,7 +59,7 @@ svg, img { max-width: 100%; height: auto; } .outcome { display: inline-block; wi
 
 
 def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
-    """Write one HTML file that says what a run or studies found; it opens without a network.
+    """Write one HTML file with the results of a run or of studies; it opens without a network.
 
     Of a run it has the outcomes of the members with remedies, notes and warnings, the pictures that suit it, the statistics
     with their intervals, how it was run, the scene as it was written, and how to run it again. Of a study it has the pictures

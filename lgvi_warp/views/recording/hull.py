@@ -114,7 +114,7 @@ def mesh_of(path: str) -> Mesh:
         low, high = (np.array(side, dtype=float) for side in zip(*corners, strict=True))
         length = float((high.max(axis=0) - low.min(axis=0)).max())
     except (struct.error, ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
-        raise refusal(key, Path(path).name, "is no binary glTF 2.0 file", remedy) from None
+        raise refusal(key, Path(path).name, "is not a binary glTF 2.0 file", remedy) from None
     if outside:
         raise refusal(key, Path(path).name, "names further files", remedy)
     if not (np.isfinite(length) and length > 0.0):

@@ -84,7 +84,7 @@ def write(result: Result, path: str | os.PathLike[str], *, members: Any = None, 
         faults.choice("by", by, WAYS)
     count, length = faults.number("frames", frames, "", 2), faults.number("seconds", seconds, "s")
     if count is not None and count != int(count):
-        faults.add("frames", frames, "is no whole number", "give how many pictures, as 60")
+        faults.add("frames", frames, "is not a whole number", "give how many pictures, as 60")
     if length is not None and length <= 0.0:
         faults.add("seconds", seconds, "is not above 0", "give how long it plays [s]")
     faults.raise_if_any()

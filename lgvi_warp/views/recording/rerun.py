@@ -33,7 +33,7 @@ def record(
     members: Any = None,
     to: Any = None,
 ) -> Path | None:
-    """Record the fleet for the rerun viewer; a file is there whole or not at all.
+    """Record the fleet for the rerun viewer. The file appears only when it is complete.
 
     Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`, each in the colour of its
     outcome from the moment it has it. Curves are of the members under way at each time. The same run always gives the

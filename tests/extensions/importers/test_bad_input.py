@@ -11,14 +11,14 @@ LINK = ("<sdf><model name='m'><link name='b'><inertial><mass>10</mass><inertia><
 SDF = [
     ("<sdf/>", {}, "SDF link", "has none", "with a <link>"),
     ("<sdf><link name='b'/></sdf>", {}, "'b'", "no <inertial>", "add mass, pose and inertia"),
-    ("<sdf><", {}, "not XML", "mend that line"),
+    ("<sdf><", {}, "not XML", "correct that line"),
     ("missing.sdf", {}, "missing.sdf", "No such file", "give the path of a file, or its text"),
     (None, {}, "SDF file None", "give the path of a file, or its text"),
     (LINK.replace("<mass>10</mass>", ""), {}, "<mass>", "is missing", "[kg]"),
     (LINK.replace(">10<", ">ten<"), {}, "<mass> = 'ten'", "does not hold 1 finite numbers"),
     (LINK.replace("<xU>-1</xU>", "<xU>-1</xU><yV>1</yV>"), {}, "plugin's linear drag", "both signs", "Fossen's signs"),
     (LINK.replace("xU", "xUabsV"), {}, "<xUabsV> = -1.0", "product of velocities", "leave it out"),
-    ("<sdf><link></sdf>", {}, "not XML", "mend that line"),
+    ("<sdf><link></sdf>", {}, "not XML", "correct that line"),
     (LINK, {"link": "c"}, "SDF link = 'c'", "not in the file", "known: b"),
     (LINK, {"volume": -1.0}, "volume = -1.0", "not positive", "[m3]"),
     (LINK, {"volume": 0.01, "gravity": "g"}, "gravity = 'g'", "not numeric", "[m/s2]"),
@@ -41,7 +41,7 @@ YAML = [
     ("mass: 10\ninertia: [1, 2, 2.5]\ncoefficients: [1]\n", "coefficients = [1]", "not a map", "X_udot"),
     ("- 1\n- 2\n", "is not a map", "write mass: ..."),
     ("nowhere.yaml", "nowhere.yaml", "give the path"),
-    ("mass: [1\n", "YAML", "mend that line"),
+    ("mass: [1\n", "YAML", "correct that line"),
 ]
 
 

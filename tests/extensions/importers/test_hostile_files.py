@@ -38,7 +38,7 @@ YAML = {
     "infinite": (GOOD.replace("30", ".inf"), ("mass = inf", "not finite")),
     "yes": (GOOD.replace("30", "yes"), ("mass = True", "not numeric")),
     "two documents": (GOOD + "---\n" + GOOD, ("another document",)),
-    "a key that is a list": ("[1, 2]: 3\n", ("is a key that is no text",)),
+    "a key that is a list": ("[1, 2]: 3\n", ("is a key that is not a text",)),
     "a zero byte": (GOOD + "a: \0\n", ("not allowed",)),
     "unknown keys": (GOOD + numbered("k{}: 1\n", 2000), ("2,000 faults", "and 1,980 more")),
     "a long text": (GOOD + "a: '" + "x" * 200_000 + "'\n", ("131,072",)),

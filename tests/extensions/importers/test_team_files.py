@@ -44,8 +44,8 @@ def test_a_mass_matrix_is_taken_apart(table, axes):
 @pytest.mark.parametrize(("text", "more", "words"), [
     ("mass_matrix: [30, 35, 40, 1, 2, 3]\n", {}, "is not that of a rigid body"),
     ("mass_matrix: [30, 30, 30, 1, 2, 3]\nmass: 30\n", {}, "mass = 30: is given besides mass_matrix"),
-    (TEAM, {"table": "vehicle.dynamic"}, "table = 'dynamic': is no table of the file; did you mean 'dynamics'"),
-    (TEAM, {"table": "controller.rate"}, "is no table of the file"),
+    (TEAM, {"table": "vehicle.dynamic"}, "table = 'dynamic': is not a table of the file; did you mean 'dynamics'"),
+    (TEAM, {"table": "controller.rate"}, "is not a table of the file"),
     (TEAM, {"table": 3}, "table"),
 ])  # fmt: skip
 def test_team_files_that_are_refused(text, more, words):
@@ -172,8 +172,8 @@ def test_a_merged_model_lies_where_its_pose_says():
     ({"swimmer": EQUIPPED.format("", "", ""), "tethys": EQUIPPED.format("", "", "")}, "nested more than 8 deep"),
     ({"swimmer": "<sdf/>"}, "the file has no <model>"),
     ({"swimmer": "nowhere.sdf"}, "include 'swimmer' file 'nowhere.sdf': No such file"),
-    ({"swimmer": 3}, "is no map of files"),
-    ("model.sdf", "is no map of files"),
+    ({"swimmer": 3}, "is not a map of files"),
+    ("model.sdf", "is not a map of files"),
 ])  # fmt: skip
 def test_includes_that_are_refused(include, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -283,7 +283,7 @@ WRONG = {
     "twice": (dict(outputs=["N", "N"]), "is named twice"),
     "scale": (dict(scale=[1.0, 2.0]), r"has shape \(2,\)"),
     "mode": (dict(autoreset_mode="now"), "is not known"),
-    "reward": (dict(reward=1.0), "is no function"),
+    "reward": (dict(reward=1.0), "is not a function"),
 }
 
 

@@ -114,16 +114,16 @@ def with_latitude(values):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (with_attribute("uo", "units", "furlong"), "is no unit of m/s; convert it"),
+        (with_attribute("uo", "units", "furlong"), "is not a unit of m/s; convert it"),
         (lambda ds: ds.uo.attrs.pop("units") and None, "uo.units = '': is missing"),
         (with_attribute("depth", "positive", "up"), "upside down: write the attribute positive = 'down'"),
         (lambda ds: ds.drop_vars("depth"), "uo.depth = 'depth': has no depths"),
         (lambda ds: ds.rename(latitude="row").drop_vars("row"), "have no latitude"),
         (lambda ds: ds.isel(time=[0, 2, 1]), "does not rise; sort it by ds.sortby"),
         (lambda ds: ds.isel(latitude=[0, 2, 1]), "neither rises nor falls"),
-        (lambda ds: ds.assign_coords(time=[0.0, 1.0, 2.0, 3.0]), "is no time of the standard calendar"),
+        (lambda ds: ds.assign_coords(time=[0.0, 1.0, 2.0, 3.0]), "is not a time of the standard calendar"),
         (with_latitude(np.where(np.arange(11) == 3, np.nan, data.LATITUDE)), "has 1 holes; give a place to every node"),
-        (lambda ds: ds.expand_dims(track=2), "uo.dims = 'track': is no axis that is known"),
+        (lambda ds: ds.expand_dims(track=2), "uo.dims = 'track': is not an axis that is known"),
         (with_latitude(data.LATITUDE * 10.0), "passes 90 degrees"),
     ],
 )  # fmt: skip
@@ -136,7 +136,7 @@ def test_names_that_are_not_there():
     ds = data.cmems(U, data.still, standard=False).rename(uo="a", vo="b")
     assert cf.variable_name(ds, cf.EASTWARD) is None
     assert "have no CF names that are known" in str(cf.missing(ds, [cf.EASTWARD]))
-    with pytest.raises(lw.SceneError, match="is no variable of the data set"):
+    with pytest.raises(lw.SceneError, match="is not a variable of the data set"):
         cf.variable_name(ds, cf.EASTWARD, "uo")
     ds.a.attrs["standard_name"] = ds.b.attrs["standard_name"] = "eastward_sea_water_velocity"
     with pytest.raises(lw.SceneError, match="are all the eastward velocity; name the one"):
@@ -144,7 +144,7 @@ def test_names_that_are_not_there():
 
 
 @pytest.mark.parametrize(
-    ("file", "words"), [("none.nc", "No such file"), ("", "is no regular file"), ("a.nc", "no NetCDF file")]
+    ("file", "words"), [("none.nc", "No such file"), ("", "is not a regular file"), ("a.nc", "no NetCDF file")]
 )
 def test_files_that_are_none(tmp_path, file, words):
     (tmp_path / "a.nc").write_text("not data")

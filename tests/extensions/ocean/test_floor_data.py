@@ -202,7 +202,7 @@ def holed():
     (gebco(), {"region": [[0.0, 1e3], [1e3, 0.0]]}, "ends before it begins"),
     (gebco(), {"spacing": [1.0, 0.01]}, "are too many nodes for a scene; give a smaller region or a wider spacing"),
     (gebco(), {"spacing": [1.0, -1.0]}, "spacing = .*: is not positive"),
-    (gebco(), {"variable": "depht"}, "variables = 'depht': is no variable of the data set"),
+    (gebco(), {"variable": "depht"}, "variables = 'depht': is not a variable of the data set"),
     (gebco(), {"fill": "guess"}, "fill = 'guess'"),
     (gebco(), {"positive": "down"}, "makes all of the floor dry land"),
     (gebco().rename(elevation="q").assign(q=gebco().elevation.drop_attrs().rename("q")), {}, "have no CF names"),

@@ -222,18 +222,18 @@ def test_angles_are_compared_within_half_a_turn(of):
 def test_what_is_refused():
     fleet, (_, _, fixes) = drifting(10), series()
     for message, call in {
-        "is no whole number of steps of 0.3 s": lambda: lw.assimilate(fleet, fixes, h=0.3),
+        "is not a whole number of steps of 0.3 s": lambda: lw.assimilate(fleet, fixes, h=0.3),
         "does not vary": lambda: lw.assimilate(fleet, fixes, ["vehicle.buoyancy"], h=0.05),
         "is one member": lambda: lw.assimilate(fleet.scene, fixes, h=0.05),
         "is where the members start": lambda: lw.assimilate(
             fleet, lw.studies.Series("depth", [0.0], [1.0], 0.1), h=0.05
         ),
-        "is no Series": lambda: lw.assimilate(fleet, [1.0], h=0.05),
+        "is not a Series": lambda: lw.assimilate(fleet, [1.0], h=0.05),
         "series = <object": lambda: lw.assimilate(fleet, object(), h=0.05),
         "h = 0: is not positive": lambda: lw.assimilate(fleet, fixes, h=0),
         "discount = 'all': is not numeric": lambda: lw.assimilate(fleet, fixes, discount="all", h=0.05),
         "seed = -1": lambda: lw.assimilate(fleet, fixes, seed=-1, h=0.05),
-        "learn = 3: is no list": lambda: lw.assimilate(fleet, fixes, 3, h=0.05),
+        "learn = 3: is not a list": lambda: lw.assimilate(fleet, fixes, 3, h=0.05),
         "names no instrument": lambda: lw.assimilate(fleet, [], h=0.05),
         "is not known": lambda: lw.assimilate(fleet, fixes, filter="ukf", h=0.05),
         "series.std = 0": lambda: lw.studies.Series("depth", [1.0], [1.0], 0.0),

@@ -96,7 +96,7 @@ def test_pictures_are_of_results(draw, odd):
 @pytest.mark.parametrize("odd", [None, 3, "", "a\0b", b"x", object()])
 def test_what_is_no_path_is_told_before_anything_is_read_or_written(odd):
     for call in (tradeoff_of(4.0).save, tradeoff_of(4.0).to_csv, sobol().save, type(region()).load, lw.Result.load):
-        with pytest.raises(lw.SceneError, match=r"(path|folder) = .*(is no path|is empty|null character)"):
+        with pytest.raises(lw.SceneError, match=r"(path|folder) = .*(is not a path|is empty|null character)"):
             call(odd)
 
 

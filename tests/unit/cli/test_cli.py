@@ -210,7 +210,7 @@ def test_what_an_interrupt_leaves_is_said(tmp_path, capsys):
 def test_exit_codes_are_told(capsys):
     with pytest.raises(SystemExit):
         cli.main(["--help"])
-    assert "exit codes: 0 done; 1 members, files or the disk failed" in capsys.readouterr().out
+    assert "exit codes:\n  0    done\n  1    members, files or the disk failed" in capsys.readouterr().out
 
 
 @pytest.mark.kernel

@@ -78,7 +78,7 @@ def test_contents_of_a_folder(tmp_path):
     (alone / "c.zarr").mkdir(parents=True)
     assert contents(alone) == [Content("store", alone / "c.zarr")]
     assert contents(tmp_path / "none.zarr") == [Content("store", tmp_path / "none.zarr")]
-    for name, words in (("none", "is not there"), ("c.zarr/..", "holds nothing that a verb wrote")):
+    for name, words in (("none", "is not there"), ("c.zarr/..", "contains no results of a command")):
         (tmp_path / "empty").mkdir(exist_ok=True)
         place = tmp_path / ("empty" if "nothing" in words else name)
         with pytest.raises(lw.SceneError) as caught:
@@ -160,7 +160,7 @@ def test_members_to_view_are_a_list():
     assert view.indices(None) is None
     assert view.indices(" 3, 17") == [3, 17]
     for text in ("3,,4", "-1", "", "3;4"):
-        with pytest.raises(lw.SceneError, match="is no list of members; write --members 3,17"):
+        with pytest.raises(lw.SceneError, match="is not a list of members; write --members 3,17"):
             view.indices(text)
 
 
@@ -245,7 +245,7 @@ def test_a_run_is_exported_and_reported(tmp_path, capsys):
 
 def test_files_that_were_written_and_why_not(tmp_path):
     written = Written()
-    from lgvi_warp.common.errors import MissingExtra
+    from lgvi_warp.common.errors import MissingExtra, install
 
     for name, study in (("a", Study(tmp_path / "a")), ("b", Study(ValueError("odd"))), ("c", Study(lw_error("nothing"))),
                         ("d", Study(MissingExtra("plots", "matplotlib", "viz"))), ("e", Study(ImportError("broken"))),
@@ -255,7 +255,7 @@ def test_files_that_were_written_and_why_not(tmp_path):
     assert written.files == [tmp_path / "a"]
     assert written.empty == [f"{tmp_path}/c was not written: nothing"]
     assert written.faults == [f"{tmp_path}/{name}" for name in ("b was not written: odd", "e was not written: broken")]
-    libraries = "not made without matplotlib and pandas; to have pictures: pip install 'lgvi-warp[viz,io]'"
+    libraries = f"not made without matplotlib and pandas; to have pictures: {install('viz,io')}"
     assert written.note_lines() == [f"note        d, f, g: {libraries}"]
     assert Written().note_lines() == []
     with pytest.raises(KeyError):

@@ -139,7 +139,7 @@ def test_a_live_run_hands_over_its_blocks(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--live"], "pip install 'lgvi-warp[viz]'"),
+        (["--live"], "pip install '.[viz]'"),
         (["--viewer", "x"], "has no effect without --live; add --live"),
         (["--live", "--keep", "none"], "--live: shows members as they are done, and the run keeps none; add --keep all"),
         (["--live", "--keep", "1,2"], "--live: shows members as they are done, and the run keeps none; add --keep all"),

@@ -229,10 +229,11 @@ ESTIMATE = ["estimate", PAPER, "--of", "depth", "--error", "1"]
     (["sensitivity", PAPER, "--of", "depth", "--levels", "4"], ["--levels = '4': is an option of morris; leave it out"]),
     (["rare", PAPER, "--limit", "depth above 3", "--cheaper", "h"], ["--cheaper = 'h': names no value; give A=X,B=Y"]),
     ([*ESTIMATE, "--risk", "large", "--cheaper", "a", "--seed", "1.5"],
-     ["--risk = 'large': is no risk", "--cheaper = 'a': names no value", "--seed = '1.5': is no whole number", "3 faults"]),
-    ([*ESTIMATE, "--risk", "cvar:2"], ["is no part"]),
+     ["--risk = 'large': is not a risk", "--cheaper = 'a': names no value", "--seed = '1.5': is not a whole",
+      "3 faults"]),
+    ([*ESTIMATE, "--risk", "cvar:2"], ["is not a part"]),
     (["stability", PAPER, "--points", "3,x", "--error", "low"],
-     ["--points = '3,x': is no whole number", "--error = 'low': is no number; give one, as 0.5"]),
+     ["--points = '3,x': is not a whole number", "--error = 'low': is not a number; give one, as 0.5"]),
     *[(["stability", PAPER, "--grid", "mass", axis, "h"],
        ["--grid mass: names the same axes as --x and --y; leave out --grid, or both of them"]) for axis in ("--x", "--y")],
     (["worst-case", SCENE, "--of", "depth", "--within", "=1:2", "--within", "a"],
@@ -244,9 +245,9 @@ ESTIMATE = ["estimate", PAPER, "--of", "depth", "--error", "1"]
     (["worst-case", SCENE, "--of", "depth", "--within", "start.velocity=4:5"],
      ["within.\"start.velocity\" = '...': is not a single number"]),
     (["trim", SCENE, "--fixed", "pitch", "--fixed", "roll=low", "--fixed", "=2"],
-     ["--fixed = 'pitch': is no value; give NAME=0.1", "'roll=low'", "'=2'"]),
+     ["--fixed = 'pitch': is not a value; give NAME=0.1", "'roll=low'", "'=2'"]),
     (["margins", SCENE, "--loop", "heading", "--skew", "2"],
-     ["loop = 'heading': is no law of the controller; did you mean 'heading_pid'?",
+     ["loop = 'heading': is not a law of the controller; did you mean 'heading_pid'?",
       "skew = 2.0: is above 1; give a number from -1 to 1"]),
     (["margins", PAPER],
      ["controller = None: is not in the scene, and margins are those of a loop; give [controller]"]),
@@ -441,7 +442,7 @@ def test_an_estimate_is_written_and_run_again_by_its_file(tmp_path, capsys):
     assert (second["recipe"], second["heavy_tail"]) == (recipe, True)
     (tmp_path / "odd.json").write_text("[1]")
     assert main([*verb, "--recipe", str(tmp_path / "odd.json")]) == 2
-    assert "is no recipe of an answer" in capsys.readouterr().err
+    assert "is not a recipe of an answer" in capsys.readouterr().err
 
 
 def test_margins_are_read_back_from_their_files(tmp_path, capsys):

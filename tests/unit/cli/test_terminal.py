@@ -307,9 +307,9 @@ def test_the_check_of_documents_finds_each_kind_of_fault():
     good = {"verb": "check", "version": "1", "scene": "a", "members": 3, "method": None, "notes": ["odd"]}
     assert differing(good, "check") == []
     for key, value, text in (
-        ("members", 3.5, "check.members: 3.5 is no whole number"),
-        ("members", True, "check.members: True is no whole number"),
-        ("notes", [1], "check.notes[0]: 1 is no text"),
+        ("members", 3.5, "check.members: 3.5 is not a whole number"),
+        ("members", True, "check.members: True is not a whole number"),
+        ("notes", [1], "check.notes[0]: 1 is not a text"),
         ("notes", "odd", "check.notes: no list"),
         ("more", 1, "check.more: not stated"),
     ):

@@ -27,8 +27,8 @@ def test_a_recording_of_some_members(folder, tmp_path, capsys, name):
 
 @pytest.mark.parametrize(("arguments", "words"), [
     (["--members", "6"], "members = 6: is none of the 6 members; give indices from 0 to 5"),
-    (["--members", "a"], "--members a: is no list of members; write --members 3,17"),
-    (["--members", ""], "is no list of members"),
+    (["--members", "a"], "--members a: is not a list of members; write --members 3,17"),
+    (["--members", ""], "is not a list of members"),
 ])  # fmt: skip
 def test_bad_members_are_refused(folder, tmp_path, capsys, arguments, words):
     assert main(["view", str(folder), "--out", str(tmp_path / "a.rrd"), *arguments]) == 2
@@ -70,4 +70,4 @@ def test_a_disk_that_is_full_while_recording_is_one_line_and_leaves_no_file(tmp_
 def test_no_rerun_is_one_line_with_the_remedy(folder, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
     assert main(["view", str(folder), "--out", str(tmp_path / "a.rrd")]) == 2
-    assert "pip install 'lgvi-warp[viz]'" in capsys.readouterr().err
+    assert "pip install '.[viz]'" in capsys.readouterr().err

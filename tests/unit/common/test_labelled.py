@@ -245,7 +245,7 @@ def test_given_parameters_that_do_not_fit(drifting):
 
     assert "did you mean 'vehicle.mass'" in message(pd.DataFrame({"vehicle.masss": ROWS[:, 0]}))
     assert "columns of one name" in message(pd.concat([FRAME, FRAME], axis=1))
-    assert "is no entry" in message({"current.velocity[3]": ROWS[:, 0]})
+    assert "is not an entry" in message({"current.velocity[3]": ROWS[:, 0]})
     assert "is varied by" in message({"current.velocity[1]": ROWS[:, 0], "current.velocity": ROWS[:, 2:]})
     assert "hides 1 of 3" in message({MASS: np.ma.masked_equal(ROWS[:, 0], 124.0)})
     assert "has no names" in message(ROWS)

@@ -186,7 +186,7 @@ def test_a_quantity_without_its_samples_says_which():
 
 def test_a_statistic_that_is_not_there_is_answered_with_those_that_are():
     statistics = result().statistics
-    with pytest.raises(KeyError, match="'mean dept' is no statistic of this run; did you mean 'mean depth'"):
+    with pytest.raises(KeyError, match="'mean dept' is not a statistic of this run; did you mean 'mean depth'"):
         statistics["mean dept"]
     with pytest.raises(KeyError, match="known: mean depth, mean speed"):
         statistics["xyz"]

@@ -333,10 +333,10 @@ def test_a_mean_is_compared_by_the_end_of_its_interval(scene):
 
 
 @pytest.mark.parametrize(("of", "words"), [
-    ("mean attitude", "of = 'mean attitude': is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"),
-    ("mean mean depth", "is no mean of numbers"),
+    ("mean attitude", "of = 'mean attitude': is not a mean of numbers; give the mean of an entry, such as 'mean attitude"),
+    ("mean mean depth", "is not a mean of numbers"),
     (("depth", "speed"), "of = ('depth', 'speed'): is several quantities; errors are of one of them: give its name"),
-    ("max(depth)", "looks over the path, and errors are of a quantity at each time; give 'depth', whose largest error"),
+    ("max(depth)", "is taken over the whole path, and errors are of a quantity at each time; give 'depth', whose"),
 ])  # fmt: skip
 def test_quantities_that_cannot_be_compared_are_refused(of, words):
     assert words in refusal(lw.tradeoff, lw.Scene.named("sphere"), 1.0, of)

@@ -17,9 +17,9 @@ BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
     ({"length": 1.0}, "vehicle.shape.diameter = None: is missing"),
     ({"length": 1.0, "diameter": 0.0}, "vehicle.shape.diameter = 0.0: is not positive"),
     ({"length": "x", "diameter": 1.0}, "vehicle.shape.length = 'x'"),
-    ({"mesh": "hull.stl"}, "is no name of a .glb file"), ({"mesh": 3}, "is no name of a .glb file"),
+    ({"mesh": "hull.stl"}, "is not a name of a .glb file"), ({"mesh": 3}, "is not a name of a .glb file"),
     ({"mesh": "a.glb", "length": 1.0}, "stands beside a length"), ({"lenght": 1.0}, "did you mean 'length'"),
-    (3, "is no table"),
+    (3, "is not a table"),
 ])  # fmt: skip
 def test_a_wrong_shape_is_refused(shape, words):
     with pytest.raises(lw.SceneError) as caught:

@@ -169,7 +169,7 @@ def test_places_of_the_cube_are_numbers_of_the_box():
     ({"vehicle.mass": (0.0, 2.0, "log")}, "has no logarithm; give bounds above 0"),
     ({"vehicle.mass": (1.0, 2.0, "lin")}, 'over."vehicle.mass"'), ({"vehicle.mass": (1.0,)}, 'over."vehicle.mass"'),
     ({"vehicle.mas": (1.0, 2.0)}, "vehicle.mas"), ({"x": 3}, '"x"'),
-    ({5: (1.0, 2.0)}, 'over = 5: is no name of a number; give {"heading_pid.kp": (0.5, 5.0)}'),
+    ({5: (1.0, 2.0)}, 'over = 5: is not a name of a number; give {"heading_pid.kp": (0.5, 5.0)}'),
     ({}, 'over = {}: maps no names to bounds; give {"heading_pid.kp": (0.5, 5.0)}'), ([], "maps no names to bounds"),
 ])  # fmt: skip
 def test_bounds_that_are_none(bounds, words):
@@ -198,7 +198,7 @@ def test_risks_at_their_ends():
         assert faults
     for wrong in (0.0, 1.1, -1.0):
         with pytest.raises(
-            lw.SceneError, match=r"CVaR\.share = .*: is no part; give a number in \(0, 1\], such as 0\.05"
+            lw.SceneError, match=r"CVaR\.share = .*: is not a part; give a number in \(0, 1\], such as 0\.05"
         ):
             lw.metrics.CVaR(wrong)
     given = lw.metrics.CVaR(0.3)
@@ -292,7 +292,7 @@ def test_worst_cases_in_words():
                                np.array([3.0, 2.5]), 64, None)  # fmt: skip
     assert str(one).splitlines() == ["bound       a lower bound of the largest; restarts: 3, 2.5", one.answer]
     assert "an upper bound of the smallest;" in str(dataclasses.replace(one, worst="smallest"))
-    assert "; a separate peak in 0.0003 of the box or more was met with 95 %\n" in str(
+    assert "; a separate peak in 0.0003 of the box or more would be found with probability 95 %\n" in str(
         dataclasses.replace(one, points=10_000)
     )
     assert (one.unseen, dataclasses.replace(one, points=10_000).unseen) == (1.0, box.least_peak(10_000))
@@ -358,7 +358,7 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     with pytest.raises(lw.SceneError, match="varies by member too; leave it out of one of them"):
         tune.tune_gains(fleet, {"start.position[0]": (0.0, 1.0)}, "depth")
     for fresh in (-1, 1.5):
-        with pytest.raises(lw.SceneError, match="is no number of members; give a whole number, 0 for none"):
+        with pytest.raises(lw.SceneError, match="is not a number of members; give a whole number, 0 for none"):
             tune.tune_gains(fleet, OVER, "depth", fresh=fresh)
 
 

@@ -187,11 +187,11 @@ def test_a_scene_file_holds_no_functions():
         (lambda: D.Copula(np.eye(3), [D.Normal(std=1), D.Normal(std=1)]), "does not fit 2 marginals"),
         (
             lambda: D.Copula(np.eye(2), [D.Normal(std=1), 3.0]),
-            r"marginals.1 = 3.0: is no distribution of a single number",
+            r"marginals.1 = 3.0: is not a distribution of a single number",
         ),
         (lambda: D.Copula(np.eye(1), []), "are no list of distributions"),
-        (lambda: D.Derived({MASS: 3.0}, k=D.Normal(std=1)), "is no function"),
-        (lambda: D.Derived({MASS: lambda q: q}, k=D.Normal(std=1)), "is no factor, of k"),
+        (lambda: D.Derived({MASS: 3.0}, k=D.Normal(std=1)), "is not a function"),
+        (lambda: D.Derived({MASS: lambda q: q}, k=D.Normal(std=1)), "is not a factor, of k"),
         (lambda: D.Derived({MASS: lambda k: k}), "factors = None: are missing"),
     ],
 )

@@ -105,7 +105,7 @@ TERMS = [
     ({"type": "tether"}, "terms[0].anchor", "is missing", "give it [m]"),
     ({"type": "drag", "name": 3}, "name = 3", "not a text", "give a name"),
     ({"type": "drag", "name": "vehicle"}, "terms = 'vehicle'", "section of the scene", 'name = "vehicle_term"'),
-    (3, "terms[0] = 3", "is no term", "write a table with type"),
+    (3, "terms[0] = 3", "is not a term", "write a table with type"),
 ]  # fmt: skip
 
 
@@ -147,8 +147,8 @@ LISTS = [
     ([Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
     ([lw.events.Surface()], "terms[0] = 'surface'", "is an event", "events=[...]"),
     ([Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
-    ([Drag], "terms[0] = <class", "is no term", "lw.terms.Drag(quadratic=...)"),
-    (Drag(), "terms = Drag", "is no list", "terms=[lw.terms.Drag(...)]"),
+    ([Drag], "terms[0] = <class", "is not a term", "lw.terms.Drag(quadratic=...)"),
+    (Drag(), "terms = Drag", "is not a list", "terms=[lw.terms.Drag(...)]"),
 ]
 
 
@@ -168,7 +168,7 @@ SETTINGS = [
     *((f"run.{name}", SIX, "give a number", "[s]") for name in ("step", "duration", "save_every")),
     ("run.dtype", ["float16", "double", np.float64, 64], "is not known", "float"),
     ("run.method", [3], "is not a text", 'such as "psi_s"'),
-    ("run.save_fields", [3, "position"], "is no list of names", "give one"),
+    ("run.save_fields", [3, "position"], "is not a list of names", "give one"),
     ("run.save_fields", [["positoin"]], "= 'positoin': is not known", "did you mean 'position'?"),
     ("run.save_fields", [[[1]]], "= [1]: is not known", "known: "),
     ("run.solver", ["cayly"], "is not known", "did you mean 'cayley'"),
@@ -253,7 +253,12 @@ def test_a_vehicle(values, words):
 FOSSEN = [
     ({"X_udot": 5.0}, "X_udot = 5.0", "is positive", "write -5"),
     ({"X_u|u|": 5.0}, "X_u|u| = 5.0", "is positive", "write -5"),
-    ({"Y_rdot": -1.0, "N_vdot": -2.0}, "Y_rdot = -1.0", "from its partner N_vdot = -2.0", "mend one or leave it out"),
+    (
+        {"Y_rdot": -1.0, "N_vdot": -2.0},
+        "Y_rdot = -1.0",
+        "from its partner N_vdot = -2.0",
+        "correct one or leave it out",
+    ),
     ({"X_u": -1.0, "Xu": -2.0}, "Xu = -2.0", "given twice", "leave one out"),
     ({"X_udot": -1.0, "Xdu": -1.0}, "Xdu = -1.0", "also as X_udot", "leave one out"),
     ({"Y_uv": -1.0}, "Y_uv = -1.0", "product of two velocities", "ignore="),
@@ -309,7 +314,7 @@ RUNS = [
     (MATRIX, {"t1": -1.0}, "t1 = -1.0", "not positive", "above 0 [s]"),
     (MATRIX, {"h": "a"}, "h = 'a'", "not numeric", "[s]"),
     (MATRIX, {"t1": [1.0]}, "t1 = [1.0]", "shape", "[s]"),
-    (MATRIX, {"save": 0.1}, "save = 0.1", "is no SaveAt", "lw.SaveAt("),
+    (MATRIX, {"save": 0.1}, "save = 0.1", "is not a SaveAt", "lw.SaveAt("),
 ]  # fmt: skip
 
 
@@ -330,7 +335,7 @@ def planned(inputs):
 # What is given wrongly, and how: rows of what is given, and words of the one fault that is said.
 ONE_FAULT = [
     (lambda table: from_table(table, "events"), EVENTS),
-    (of_terms, LISTS + [(one, "terms = ", "is no list") for one in ("drag", 3, None, {"type": "drag"})]),
+    (of_terms, LISTS + [(one, "terms = ", "is not a list") for one in ("drag", 3, None, {"type": "drag"})]),
     (lambda values: lw.Start(**values), STARTS),
     (lambda given: lw.vehicles.from_fossen(given, **BODY), FOSSEN),
     (lambda given: from_dict(lw.vehicles.from_fossen(given, **BODY)), ENERGY),

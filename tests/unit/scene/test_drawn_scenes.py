@@ -86,7 +86,7 @@ def test_what_is_given_in_the_place_of_a_table_or_a_name_is_refused_by_its_key(o
 
 
 def test_a_path_of_bytes_is_refused_though_its_file_is_there():
-    with pytest.raises(lw.SceneError, match="is no path"):
+    with pytest.raises(lw.SceneError, match="is not a path"):
         lw.Scene.load(bytes(ROOT / "examples" / "paper.toml"))
 
 

@@ -114,7 +114,7 @@ SCENES = {
         BODY + "[ensemble]\nmembers = 2147483648\nsampling = {latin_hypercube = {group = 2147483648}}\n",
         ("group", "1048576")),
     "a law of scipy's that is none": (
-        VARY + "'vehicle.mass' = {scipy = {name = '__import__'}}\n", ("__import__", "is no distribution")),
+        VARY + "'vehicle.mass' = {scipy = {name = '__import__'}}\n", ("__import__", "is not a distribution")),
     "a law of the user's": (VARY + "'vehicle.mass' = {own = {law = 'eval'}}\n", ("a file does not hold",)),
     "a table that is a device": (TABLED.replace("table.csv", "/dev/zero"), ("is a device",)),
 }  # fmt: skip
@@ -257,7 +257,7 @@ SET = {
     "run.method=psi_s\npsi": "is not one value",
     "vehicle.mass=" + "9" * 5000: "vehicle.mass",
     "vehicle.mass=" + "[" * 5000 + "]" * 5000: "nested",
-    "=3": "is no NAME=VALUE",
+    "=3": "is not a NAME=VALUE",
 }
 ARGUMENTS = (
     [([*option.split(), value, PAPER], f"{key} = {told}") for option, key, values in OPTIONS for value, told in values.items()]
@@ -301,11 +301,11 @@ def test_so_many_faults_are_said_and_the_rest_is_counted():
     faults = errors.Faults()
     asked = []
     for i in range(63):
-        faults.add(f"key{i}", i, "is odd", lambda i=i: asked.append(i) or "mend it")
+        faults.add(f"key{i}", i, "is odd", lambda i=i: asked.append(i) or "correct it")
     error = refused(faults.raise_if_any)
     lines = str(error).splitlines()
     assert lines[0] == "63 faults:"
-    assert lines[1] == "  key0 = 0: is odd; mend it"
+    assert lines[1] == "  key0 = 0: is odd; correct it"
     assert lines[-1] == "  and 43 more"
     assert len(lines) == 22
     assert len(error.faults) == 20
@@ -317,7 +317,7 @@ def test_faults_within_faults_are_counted_once():
     inner = lw.SceneError(f"fault {i}" for i in range(50))
     assert (len(inner.faults), inner.more) == (20, 30)
     outer = errors.Faults()
-    outer.add("first", 1, "is odd", "mend it")
+    outer.add("first", 1, "is odd", "correct it")
     for _ in range(2):
         with outer.including():
             raise inner.prefixed("here: ")

@@ -158,8 +158,8 @@ REFUSED = {
     "a key without its section": ({"methd": "rk4"}, ["did you mean 'run.method'"]),
     "a name by place": ({"controller.laws[1].kpp": 1.0}, ["did you mean 'heading_pid.kp'"]),
     "a place that is not there": ({"controller.laws[7].kp": 1.0}, ["controller.laws[7].kp"]),
-    "several names": ({"heading_pid.kp, heading_pid.ki": 1.0}, ["is no number"]),
-    "no name": ({5: 1.0}, ["is no name of a quantity"]),
+    "several names": ({"heading_pid.kp, heading_pid.ki": 1.0}, ["is not a number"]),
+    "no name": ({5: 1.0}, ["is not a name of a quantity"]),
 }  # fmt: skip
 
 

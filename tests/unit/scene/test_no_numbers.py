@@ -94,9 +94,9 @@ def test_no_door_takes_what_is_no_number(door, odd):
 
 def test_members_that_are_masked():
     members = np.ma.array([0, 1, 2], mask=[False, True, False])
-    assert "is no list of members" in refused(RunSettings, keep=members)
-    assert "is no list of members" in refused(EnsembleSettings, indices=members)
-    assert "is no list of members" in refused(EnsembleSettings, indices=members)
+    assert "is not a list of members" in refused(RunSettings, keep=members)
+    assert "is not a list of members" in refused(EnsembleSettings, indices=members)
+    assert "is not a list of members" in refused(EnsembleSettings, indices=members)
 
 
 def test_a_mask_says_how_many_and_where():

@@ -49,11 +49,11 @@ def test_a_current_of_a_file_fits():
 
 @pytest.mark.parametrize(("key", "value", "place"), [
     ("vehicle.mas", 1.0, ".vehicle.mas: unknown"),
-    ("vehicle.mass", "heavy", ".vehicle.mass: 'heavy' is no number"),
+    ("vehicle.mass", "heavy", ".vehicle.mass: 'heavy' is not a number"),
     ("start.position", [0.0, 0.0], ".start.position: 2 entries"),
-    ("start.position", [0.0, 0.0, "deep"], ".start.position[2]: 'deep' is no number"),
-    ("environment.gravity", True, ".environment.gravity: True is no number"),
-    ("run.step", [0.1], ".run.step: [0.1] is no number"),
+    ("start.position", [0.0, 0.0, "deep"], ".start.position[2]: 'deep' is not a number"),
+    ("environment.gravity", True, ".environment.gravity: True is not a number"),
+    ("run.step", [0.1], ".run.step: [0.1] is not a number"),
     ("run.until", {"statistic": "mean depth"}, ".run.until.half_width: missing"),
     ("terms", [{"type": "current"}], ".terms[0].velocity: missing"),
     (

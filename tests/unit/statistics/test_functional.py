@@ -43,15 +43,15 @@ REFUSED = {
     "speed[0]": "speed has one component; give 'speed'",
     "position[3]": "position has the components position[0], position[1], position[2]; give one of them",
     "median(speed)": "has a function 'median' that is not known; did you mean 'mean'?",
-    "max(min(depth))": "looks over the path twice; keep one of max, min, mean, range",
+    "max(min(depth))": "is taken over the path twice; keep one of max, min, mean, range",
     "max(position)[3]": "max(position) has 3 components; give one of them from 0, or max(position) alone",
-    "max(speed": 'is no quantity; write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"',
-    "max(depth) - depth": "max(depth) looks over the path, and has no difference; give a difference of quantities at",
+    "max(speed": 'is not a quantity; write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"',
+    "max(depth) - depth": "max(depth) is taken over the whole path, and has no difference; give a difference of quantities at",
     "depth - speed": "depth has 1 x [m] and speed has 1 x [m/s]; give quantities of one unit and size",
     "position - depth": "position has 3 x [m] and depth has 1 x [m]; give quantities of one unit and size",
     "depth - deph": "is not known; did you mean 'depth'?",
-    "horizontal(depth)": "has a horizontal length of what is no vector in inertial axes; write horizontal(navigation_error)",
-    "horizontal(max(position))": "has a horizontal length of what is no vector in inertial axes",
+    "horizontal(depth)": "has a horizontal length of what is not a vector in inertial axes; write horizontal(",
+    "horizontal(max(position))": "has a horizontal length of what is not a vector in inertial axes",
 }  # fmt: skip
 
 
@@ -186,7 +186,9 @@ def test_each_door_refuses_with_the_same_words(scene, text, tmp_path, capsys):
 
 def test_what_has_no_number_at_each_time_is_refused_with_a_remedy(scene, capsys):
     text = "range(norm(velocity))"
-    wanted = f"of = {text!r}: looks over the path, and errors are of a quantity at each time; give 'norm(velocity)'"
+    wanted = (
+        f"of = {text!r}: is taken over the whole path, and errors are of a quantity at each time; give 'norm(velocity)'"
+    )
     for door in (lambda: lw.tradeoff(scene, ["psi_s"], of=text), lambda: lw.suggest(scene, error=1e-3, of=text),
                  lambda: lw.stability_map(scene, of=text), ["tradeoff", str(PAPER), "--of", text]):  # fmt: skip
         assert wanted in said_by(door, capsys)
@@ -198,7 +200,7 @@ def test_what_has_no_number_at_each_time_is_refused_with_a_remedy(scene, capsys)
     (lambda: lw.statistics.PathMean("max(depth)"), "max(depth) is one number of each member; ask for its mean"),
     (lambda: lw.statistics.Mean("max(depth)", at="floor"),
      "mean.at = 'floor': says when, and max(depth) has no time; leave it out"),
-    (lambda: lw.statistics.Mean(["speed", "max(depth)"]), "mean.of[1] = 'max(depth)': looks over the path, and a list is of"),
+    (lambda: lw.statistics.Mean(["speed", "max(depth)"]), "mean.of[1] = 'max(depth)': is taken over the whole path, and a"),
     (lambda: lw.statistics.Exceedance("max(depth)"), "max(depth) is compared with nothing; give above=... or below=... [m]"),
     (lambda: lw.statistics.PathMaximum("depth", lw.statistics.Mean("max(depth)")), "is given already"),
 ])  # fmt: skip
@@ -214,7 +216,7 @@ def test_what_a_statistic_of_one_number_cannot_do(make, words, capsys):
 ])  # fmt: skip
 def test_what_is_watched_is_one_of_the_statistics_or_a_mean(statistics, name, words, capsys):
     message = said_by(lambda: watch(lw.Until(name, 1.0), statistics, np.zeros(1)), capsys)
-    assert f"until.statistic = {name!r}: is none of the run's statistics; {words}" in message
+    assert f"until.statistic = {name!r}: is not a statistic of the run; {words}" in message
 
 
 def test_a_watched_name_may_have_other_spaces():

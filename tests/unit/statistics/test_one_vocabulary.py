@@ -65,7 +65,7 @@ def test_what_looks_over_the_path(result, text):
     assert found.over_path
     assert len(found.values(result)) == N
     message = refused(compared_in, text)
-    says(message, "looks over the path", "largest error over the path")
+    says(message, "is taken over the whole path", "largest error over the path")
     assert lw.statistics.Mean(text).key == f"mean {text}"
 
 

@@ -147,7 +147,7 @@ def test_words_for_outcomes():
     check_outcomes("outcome.of", ("top", "surface", "failed", "not_converged"), known)
     with pytest.raises(lw.SceneError, match="did you mean 'floor'"):
         check_outcomes("outcome.of", ("flor",), known)
-    with pytest.raises(lw.SceneError, match="is no outcome of this scene"):
+    with pytest.raises(lw.SceneError, match="is not an outcome of this scene"):
         check_outcomes("mean.at", ("box",), known)
 
 
@@ -321,13 +321,13 @@ def test_from_a_scene_file():
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: lw.statistics.Outcome(3), "is no outcome"),
+    (lambda: lw.statistics.Outcome(3), "is not an outcome"),
     (lambda: lw.statistics.Outcome("floor", levels=(0.0,)), "between 0 and 1"),
     (lambda: lw.statistics.EndTime("floor", lw.statistics.FirstPassage(above=1.0)), "one number of each member"),
     (lambda: lw.statistics.EndTime("floor", lw.statistics.Mean(at="floor")), "leave it out"),
     (lambda: lw.statistics.FirstPassage("depth", above=1.0, at="floor"), "of all times"),
     (lambda: lw.statistics.PathMean("depth", at="floor"), "of all times"),
-    (lambda: lw.statistics.Mean("depth", at=""), "is no outcome"),
+    (lambda: lw.statistics.Mean("depth", at=""), "is not an outcome"),
     (lambda: lw.statistics.Outcome("floor", at="floor"), "of all times"),
     (lambda: lw.statistics.Histogram("depth", bins=3, limits="run"), "lw.statistics.EndTime"),
 ])  # fmt: skip

@@ -840,7 +840,7 @@ def test_coins_are_fair_and_fixed():
 
 @pytest.mark.parametrize(("make", "text"), [
     (lambda: Mean("positon"), "did you mean 'position'"), (lambda: Mean("position[3]"), "components position"),
-    (lambda: Mean("depth[0]"), "has one component"), (lambda: Mean(3.0), "is no quantity"),
+    (lambda: Mean("depth[0]"), "has one component"), (lambda: Mean(3.0), "is not a quantity"),
     (lambda: Mean("depth", confidence=1.5), "between 0 and 1"), (lambda: Mean("depth", stopped="no"), "held"),
     (lambda: Quantiles("depth", (0.0, 0.5)), "between 0 and 1"),
     (lambda: Quantiles("depth", size=1000), "power of two"), (lambda: Histogram("depth"), "edges"),

@@ -155,7 +155,7 @@ def test_numbers_of_every_member_are_as_they_are():
     [
         ([1.0, -2.0, 3.0], "weights = -2.0: is below 0, of member 1"),
         ([0.0, 0.0, 0.0], "are all 0"),
-        ("v", "is no column of the table"),
+        ("v", "is not a column of the table"),
         ([1.0, 2.0], "are the columns' lengths"),
         (["a", "b", "c"], "weights"),
     ],

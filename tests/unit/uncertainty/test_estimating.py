@@ -303,8 +303,8 @@ def test_what_is_asked():
     ("of", "words"),
     [
         (lw.statistics.Mean("position"), "name one, such as 'position[0]'"),
-        (lw.statistics.EndTime("floor"), "is no mean, probability or quantile of all members"),
-        (lw.statistics.Covariance("position"), "is no mean, probability or quantile"),
+        (lw.statistics.EndTime("floor"), "is not a mean, probability or quantile of all members"),
+        (lw.statistics.Covariance("position"), "is not a mean, probability or quantile"),
         (lw.statistics.Quantiles("depth"), "ask for one: levels=[0.95]"),
         (lw.statistics.Mean("depth", at="floor"), "whose number is not fixed"),
         ("end_time floor", "ask for the probability of the outcome"),

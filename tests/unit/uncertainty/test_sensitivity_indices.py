@@ -102,7 +102,7 @@ def test_an_analysis_comes_back_from_its_files(built, tmp_path):
     assert (content["mean"], content["provenance"]) == ([1.23456789, None], {"seed": 3})
     assert content["name"] == found.name
     (tmp_path / "x.json").write_text(json.dumps(content | {"name": "heat"}))
-    with pytest.raises(ValueError, match=r"x\.json: .*'heat' is no analysis"):
+    with pytest.raises(ValueError, match=r"x\.json: .*'heat' is not an analysis"):
         Indices.load(tmp_path / "x.json")
 
 
@@ -251,9 +251,9 @@ def test_factors_are_in_the_users_order_and_in_groups():
 
 
 @pytest.mark.parametrize(("groups", "words"), [
-    ({"a": ["start.positon"]}, "does not vary by itself; did you mean"), (3, "is no mapping of names"),
-    ({"a": ["vehicle.mass"], "b": ["vehicle.mass"]}, "is in 'a' as well"), ({"a": []}, "is no list of names"),
-    ({"a": "vehicle.mass"}, "is no list of names"), ({"vehicle.mass": ["start.position[0]"]}, "is the name of a factor"),
+    ({"a": ["start.positon"]}, "does not vary by itself; did you mean"), (3, "is not a mapping of names"),
+    ({"a": ["vehicle.mass"], "b": ["vehicle.mass"]}, "is in 'a' as well"), ({"a": []}, "is not a list of names"),
+    ({"a": "vehicle.mass"}, "is not a list of names"), ({"vehicle.mass": ["start.position[0]"]}, "is the name of a factor"),
 ])  # fmt: skip
 def test_groups_that_are_none(groups, words):
     with pytest.raises(lw.SceneError) as caught:
@@ -268,7 +268,7 @@ def test_samples_are_shared_among_replicates():
     ):
         with pytest.raises(lw.SceneError, match=words):
             analyses.sobol(BARE, "depth", samples=samples, vary=VARY)
-    with pytest.raises(lw.SceneError, match=r"replicates = 3: is no power of two"):
+    with pytest.raises(lw.SceneError, match=r"replicates = 3: is not a power of two"):
         analyses.sobol(BARE, "depth", samples=6, replicates=3, vary=VARY)
 
 
@@ -315,8 +315,9 @@ def test_groups_with_failures_are_refused_or_left_out():
     made = outputs.Outputs(values, ("q",), lost, {"OK": 9, "NON_FINITE": 1, "SURFACE": 2}, {})
     with pytest.raises(outputs.FailedMembers) as caught:
         analyses.whole_groups(made, 4, "refuse")
-    assert 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"' in str(
-        caught.value
+    assert (
+        'fix the failing members (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
+        in str(caught.value)
     )
     whole, messages = analyses.whole_groups(made, 4, "drop")
     assert whole.tolist() == [True, False, True]

@@ -87,12 +87,12 @@ def test_a_mesh_is_read_with_its_size(tmp_path):
 
 
 @pytest.mark.parametrize(("content", "words"), [
-    (None, "cannot be read"), (b"", "is no binary glTF"), (b"root:x:0:0" * 9, "is no binary glTF"),
-    (b"glTF" + b"\xff" * 60, "is no binary glTF"),
+    (None, "cannot be read"), (b"", "is not a binary glTF"), (b"root:x:0:0" * 9, "is not a binary glTF"),
+    (b"glTF" + b"\xff" * 60, "is not a binary glTF"),
     ({"buffers": [{"uri": "../secret.bin", "byteLength": 36}]}, "names further files"),
-    ({"images": [{"uri": "file:///etc/passwd"}]}, "names further files"), ({"accessors": []}, "is no binary glTF"),
-    ({"meshes": 3}, "is no binary glTF"), ({"accessors": [{"min": [0, 0, 0], "max": [0, 0, 0]}]}, "has no size"),
-    ({"accessors": [{"min": ["a", 0, 0], "max": [1, 0, 0]}]}, "is no binary glTF"),
+    ({"images": [{"uri": "file:///etc/passwd"}]}, "names further files"), ({"accessors": []}, "is not a binary glTF"),
+    ({"meshes": 3}, "is not a binary glTF"), ({"accessors": [{"min": [0, 0, 0], "max": [0, 0, 0]}]}, "has no size"),
+    ({"accessors": [{"min": ["a", 0, 0], "max": [1, 0, 0]}]}, "is not a binary glTF"),
 ])  # fmt: skip
 def test_what_is_no_mesh_is_refused_in_one_line(tmp_path, content, words):
     path = tmp_path / "hull.glb"

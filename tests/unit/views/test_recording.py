@@ -385,7 +385,7 @@ def test_a_viewer_that_takes_no_more_leaves_the_whole_file(tmp_path, mixed, monk
     ({"members": [40]}, lw.SceneError, "members = 40: is none of the 40 members; give indices from 0 to 39"),
     ({"members": [-1]}, lw.SceneError, "members = -1: is negative; count members from 0"),
     ({"members": []}, lw.SceneError, "names no member"),
-    ({"members": "3"}, lw.SceneError, "is no list of members"), ({"path": None}, ValueError, "give path="),
+    ({"members": "3"}, lw.SceneError, "is not a list of members"), ({"path": None}, ValueError, "give path="),
     ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*start a viewer with "rerun"'),
     ({"to": "nowhere"}, OSError, "no viewer answers"),
 ])  # fmt: skip

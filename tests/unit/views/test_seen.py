@@ -18,7 +18,7 @@ from lgvi_warp.views.recording.hull import FIN
 from lgvi_warp.views.recording.live import Live
 from tests.conftest import ROOT
 from tests.support.made import made
-from tests.support.viewer import colored, moved, painted, viewer
+from tests.support.viewer import GAMMA, colored, moved, painted, viewer
 from tests.unit.views.test_hull import glb
 from tests.unit.views.test_live import blocks
 from tests.unit.views.test_recording import SCENE, fleet
@@ -59,6 +59,26 @@ def faults_in(window, paths, times, rgbs=None):
 
 # Of bodies, and of the fin, which is seen where light noses hide all else; the surface, the floor and arrows have other hues.
 COLORS = [*(OUTCOME_STYLES[code].rgb for code in (Status.OK, Status.FLOOR, Status.SURFACE, Status.NON_FINITE)), FIN]
+
+
+def test_a_hue_counts_in_the_open_and_through_the_surface():
+    # Two sheets of the surface, one over the other, mix with what is behind them in light, not in numbers of pixels.
+    sheet, alpha = np.array(world.WATER[:3]) / 255.0, world.WATER[3] / 255.0
+    background, grid = np.array(layout.BACKGROUND), np.array(world.TRAIL[:3])
+
+    def through(rgb):
+        light = np.array(rgb) / 255.0
+        for _ in range(2):
+            light = ((1.0 - alpha) * light**GAMMA + alpha * sheet**GAMMA) ** (1.0 / GAMMA)
+        return np.round(255.0 * light)
+
+    for rgb in COLORS:
+        shades = np.stack(
+            [shaded for part in (1.0, 0.7) for shaded in (part * np.array(rgb), through(part * np.array(rgb)))]
+        )
+        assert [colored(shade[None, None], rgb) for shade in shades] == [1, 1, 1, 1]
+        others = [background, through(background), grid, through(grid), 0.7 * grid, sheet * 255.0]
+        assert colored(np.stack(others)[None], rgb) == 0
 
 
 def many(n=1000):

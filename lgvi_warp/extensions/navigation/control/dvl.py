@@ -28,7 +28,7 @@ FARTHEST = 2e4
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DVL(MeasuringPart):
-    """A Doppler velocity log with four beams in a cross: the velocity over ground of its place along each of them.
+    """Doppler velocity log with four beams in a cross: each measures the velocity over ground of its place along it.
 
         reading_i = u_i . (nu + Omega x place) + noise xi_i
         u_i = (+-sin(angle) / sqrt(2), +-sin(angle) / sqrt(2), cos(angle))
@@ -47,8 +47,8 @@ class DVL(MeasuringPart):
         floor: Key of the scene's `lw.events.Floor` that is the ground; "" by default: always an echo.
         least_range: Shortest way along a beam to the floor [m]; 0 by default.
         greatest_range: Longest way along a beam to the floor [m]; inf by default.
-        silent_from: From when on it is silent [s]; inf by default, never.
-        silent_to: Until when [s]; inf by default, to the end.
+        silent_from: Time from which it gives no readings [s]; inf by default, never.
+        silent_to: Time until which it gives none [s]; inf by default, to the end.
 
     Raises:
         SceneError: Where `every` is no whole number, or a range or a silence ends before it begins; and as `Term`. A scene
@@ -82,7 +82,7 @@ class DVL(MeasuringPart):
     def check(self, faults: Faults) -> None:
         if float(self.every) != round(float(self.every)):
             near = f"{np.floor(self.every):g} or {np.ceil(self.every):g}"
-            faults.add("every", float(self.every), "is no whole number of ticks", f"give {near}")
+            faults.add("every", float(self.every), "is not a whole number of ticks", f"give {near}")
         for first, last in (("least_range", "greatest_range"), ("silent_from", "silent_to")):
             begin, end = float(getattr(self, first)), float(getattr(self, last))
             if np.isfinite(end) and end <= begin:

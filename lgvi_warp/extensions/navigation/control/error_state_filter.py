@@ -47,7 +47,7 @@ def _sensor(default: str = "") -> Any:
 class ErrorStateFilter(MeasuringPart):
     """An error-state Kalman filter of 15 states: position, velocity, attitude, biases of accelerometers and gyroscopes.
 
-    It stands after the sensors that it names. These hand their readings to it alone, and it replaces the measured position,
+    List it after the sensors that it names. These hand their readings to it alone, and it replaces the measured position,
     attitude, velocity over ground and angular velocity by its estimate. At each tick it goes on by what the IMU has
     gained; then it takes each new reading, number by number in Joseph's form. A delayed fix corrects the position copied
     as the fix was taken, with its covariances (stochastic cloning), one at a time. The filter believes the noises that the
@@ -147,7 +147,7 @@ class ErrorStateFilter(MeasuringPart):
         what = f"a sensor of {reading}" if reading else f"a part of type {kind.type}"
         if sensor is None:
             remedy = closest(key, before) if before else f"give the scene {what}, above the filter"
-            faults.add(word, key, "is no sensor that stands before the filter", remedy)
+            faults.add(word, key, "is not a sensor that stands before the filter", remedy)
         elif not isinstance(sensor, kind) or (isinstance(sensor, Sensor) and sensor.of != reading):
             faults.add(word, key, f"is not {what}", f"name one that is {what}")
         elif list(self.uses.values()).count(key) > 1:

@@ -24,9 +24,9 @@ ROWS, BIAS_ROWS = 18, slice(12, 18)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IMU(MeasuringPart):
-    """Accelerometers and gyroscopes: the velocity and the turn that they gain from one tick to the next, with errors.
+    """Inertial measurement unit: increments of velocity and rotation from one tick to the next, with errors.
 
-    As units do that correct for coning and sculling, it adds up over the whole period what happens between two ticks:
+    It sums over the whole period between two ticks, as units do that correct for coning and sculling:
 
         turn     = log(R_k-1^T R_k) + T b_w + sqrt(T) gyroscope_noise xi
         velocity = R_k-1^T (v_k - v_k-1 - g T) + T b_a + sqrt(T) accelerometer_noise xi,   in the axes of the last tick

@@ -24,7 +24,7 @@ MOST_NAMED = 2
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Assimilated(Summarized, Saved):
-    """Members that followed what was measured, after each measurement.
+    """Members after each measurement that they assimilated: means, spreads, innovations, learned numbers.
 
     Attributes:
         time: Times of the measurements (k,) [s].
@@ -46,7 +46,7 @@ class Assimilated(Summarized, Saved):
             `run.states(final, parameters=parameters)` takes them.
         weights: Weights of the members at the end, (n,), with the sum 1.
         method: Name of the filter.
-        messages: What the user should know.
+        messages: Remarks on how far the result can be relied on.
         provenance: Scene, ensemble, settings, versions and machine.
         units: Units of the learned numbers by name.
     """
@@ -91,7 +91,7 @@ class Assimilated(Summarized, Saved):
             rows.append((name, f"{_text(self.mean[name][-1])} +- {_text(self.std[name][-1])}"))
         rows.append(("position", f"{_text(self.mean['position'][-1])} +- {_text(self.std['position'][-1])} m"))
         for name, test in self.consistency().items():
-            text = f"{test.ratio:.2f} of what their spread should be, {test.verdict}"
+            text = f"{test.ratio:.2f} of their expected spread, {test.verdict}"
             rows.append((f"innovations of {name}", text))
         rows.append(("log-likelihood", f"{self.log_likelihood:.2f}"))
         if (self.inflation != 1.0).any():
@@ -147,7 +147,7 @@ class Assimilated(Summarized, Saved):
         faults = Faults()
         chance = faults.number("level", level)
         if chance is not None and not 0.0 < chance < 1.0:
-            faults.add("level", level, "is no probability between 0 and 1", "give 0.95, say")
+            faults.add("level", level, "is not a probability between 0 and 1", "give 0.95, say")
         faults.raise_if_any()
         tests = {}
         for name, apart in self.innovations.items():
@@ -187,5 +187,5 @@ def _packed(rows: np.ndarray) -> dict[str, Any]:
 def _unpacked(content: Mapping[str, Any]) -> np.ndarray:
     dtype = np.dtype(content["dtype"])
     if dtype.kind not in "fiub":
-        raise ValueError(f"{dtype} are no numbers")
+        raise ValueError(f"{dtype} are not numbers")
     return np.frombuffer(base64.b64decode(content["base64"]), dtype).reshape(content["shape"]).copy()

@@ -64,7 +64,7 @@ def assimilate(
     threads: int | None = None,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Assimilated:
-    """Let the members of a fleet follow what was measured, and learn numbers of the scene on the way.
+    """Assimilate measurements: correct the members of a fleet by measured series, and estimate numbers of the scene.
 
     The members are the knowledge before the first measurement: their starts and numbers vary as far as these are not known.
     They run to each time of the series, and a filter brings them to the values measured there. What actuators and controllers
@@ -117,7 +117,7 @@ def assimilate(
     instruments = [series] if isinstance(series, Series) else listed("series", series, "lw.studies.Series")
     for one in instruments:
         if not isinstance(one, Series):
-            faults.add("series", one, "is no Series", "give lw.studies.Series(of, time, values, std)")
+            faults.add("series", one, "is not a Series", "give lw.studies.Series(of, time, values, std)")
     labels = [one.label for one in instruments if isinstance(one, Series)]
     for label in sorted({label for label in labels if labels.count(label) > 1}):
         faults.add("series", label, "is measured by two of them", "give one of them a name: Series(..., name=...)")
@@ -158,7 +158,7 @@ def _targets(faults: Faults, fleet: Ensemble, learn: Sequence[str]) -> list[Targ
     """Learned quantities: numbers of the scene that vary."""
     targets, known, varied = list[Target](), fleet.scene.parameters(), fleet.varied_names
     if isinstance(learn, str):
-        faults.add("learn", learn, "is no list of names", f"give [{learn!r}]")
+        faults.add("learn", learn, "is not a list of names", f"give [{learn!r}]")
         return targets
     for name in names_of("learn", learn):
         (target,) = variations.targets(name)
@@ -204,7 +204,7 @@ def _check_times(times: np.ndarray, steps: _Steps) -> None:
     for time in times:
         if whole_steps(float(time), steps.h) is None:
             near = round(float(time) / steps.h) * steps.h
-            problem = f"is no whole number of steps of {steps.h:g} s"
+            problem = f"is not a whole number of steps of {steps.h:g} s"
             raise SceneError(
                 [f"series.time = {time:.9g}: {problem}; give {near:.9g}, or a step that divides all times"]
             )

@@ -12,7 +12,7 @@ from lgvi_warp.common.summaries import Rows, Summarized
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InnovationTest(Summarized):
-    """Innovations of one instrument, beside the bands in which chance leaves those of a right filter.
+    """Innovations of one instrument, with the bands that a consistent filter stays within.
 
     Attributes:
         count: Number of values that were compared.

@@ -49,7 +49,7 @@ class Series:
         faults = Faults("series.")
         time, values, std = (faults.real(name, getattr(self, name)) for name in ("time", "values", "std"))
         if time is not None and (time.ndim != 1 or not len(time) or np.any(np.diff(time) <= 0.0) or time[0] < 0.0):
-            faults.add("time", self.time, "is no rising list of times >= 0", "sort it and drop repetitions")
+            faults.add("time", self.time, "is not a rising list of times >= 0", "sort it and drop repetitions")
         if values is not None and time is not None and (values.ndim not in (1, 2) or len(values) != time.size):
             faults.add("values", self.values, f"has shape {values.shape}", f"give {time.size} rows, one for each time")
         if values is not None and np.isinf(values).any():

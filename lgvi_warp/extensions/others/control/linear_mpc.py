@@ -46,7 +46,7 @@ class Condensed(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearMPC(ControlLaw):
-    """Inputs that are best over a horizon by a linear model and within their limits (Rawlings, Mayne & Diehl 2017, chapter 1).
+    """Linear model predictive control: optimal inputs over a horizon, within limits (Rawlings, Mayne & Diehl 2017, ch. 1).
 
     With x' = A x + B u + d from tick to tick, the inputs of the next `horizon` periods make the sum of (x - x_s)^T Q (x - x_s)
     + (u - u_s)^T R (u - u_s), and (x - x_s)^T P (x - x_s) at the end, least, with |u| up to `limit` and its rate up to
@@ -113,8 +113,8 @@ class LinearMPC(ControlLaw):
     rate_limit: Any = number(("m",), "N/s, N m/s", None, optional=True, above=0.0)
     disturbance_time: Any = number((), "s", 5.0, above=0.0, infinite=True)
     tracked: Sequence[str] | None = None
-    horizon: int = whole(1, "is no number of periods", f"give 1 to {LONGEST}", default=10)
-    iterations: int = whole(1, "is no number of iterations", "give 1 or more", default=50)
+    horizon: int = whole(1, "is not a number of periods", f"give 1 to {LONGEST}", default=10)
+    iterations: int = whole(1, "is not a number of iterations", "give 1 or more", default=50)
     period: float | None = real(None, unit="s", least=1e-9)
 
     def check(self, faults: Faults) -> None:

@@ -29,9 +29,9 @@ def mpc(
     tracked: Sequence[str] | None = None,
     name: str = "",
 ) -> LinearMPC:
-    """Make the law of model predictive control of a linear model, with the cost of its regulator at the end of the horizon.
+    """Design model predictive control of a linear model; the terminal cost is that of its linear quadratic regulator.
 
-    Within the limits the law then is the linear quadratic regulator of the model, whatever the horizon.
+    While no limit is active, the law equals the linear quadratic regulator, whatever the horizon.
 
     Args:
         model: The linear model, of `lw.linear.linearize(scene, inputs="wrench", period=...)`, of some of its states by

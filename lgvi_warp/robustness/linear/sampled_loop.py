@@ -180,6 +180,15 @@ class SampledLoop:
                 rows[:, r, s : s + m] += seen[:, 12:]
             yield Opened(some, A, B, rows)
 
+    def seen(self, opened: Opened) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """A, B, C of each of some opened loops in what laws see, which is all that their demands depend on."""
+        base = self._s + self._m
+        for i, A, B, C in zip(*opened, strict=True):
+            count = int(self._ranks[i])
+            axes = self._axes[i, :count]
+            (smaller,) = self._of_seen(A[None], np.array([i]), count)
+            yield smaller, np.concatenate([axes @ B[:base], B[base:]]), np.hstack([C[:, :base] @ axes.T, C[:, base:]])
+
     def _of_seen(self, A: np.ndarray, some: np.ndarray, count: int) -> np.ndarray:
         """The loops' matrices of what laws see, and of commands."""
         axes, base = self._axes[some][:, :count], self._s + self._m

@@ -50,7 +50,12 @@ GAINS = ("gain_lower", "gain_upper")
 # Margins beside the gain in the words of the answer.
 NAMED = {"delay": "{} more delay", "phase": "{} of phase", "disk": "a disk margin of {}"}
 DISKS = ("disk", "disk_gain_lower", "disk_gain_upper", "disk_phase", "disk_frequency")
+# Names of margins, by what is asked for.
 NAMES = {"gain": GAINS, "delay": ("delay",), "phase": ("phase", "phase_frequency"), "disk": DISKS, "peak": ()}
+# What is asked for, by the name of a margin.
+WORD_OF = {name: word for word, each in NAMES.items() for name in each} | {
+    f"{name}_peak": "peak" for name in OF_THE_DEMAND
+}
 
 
 def unit_of(name: str) -> str:
@@ -69,10 +74,10 @@ class Margins(Saved):
         values: by name, (n,): "gain_lower" and "gain_upper", between which the factors on the demand lie that the loop bears
             (0 and infinite where it bears all that were asked); "delay", the largest delay [s] beside the loop's own, in whole
             steps; "phase", the phase margin [rad], and the crossover where it is least ("phase_frequency" [rad/s]): infinite,
-            at NaN, where no gain of the loop crosses 1; "disk", the disk margin of all components of the demand at once, what it says of factors
-            ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where ("disk_frequency" [rad/s]);
-            peak gains, "sensitivity_peak", "complementary_peak" and "position[2]_peak" of what was asked `to`, and where
-            ("..._frequency" [rad/s]).
+            at NaN, where no gain of the loop crosses 1; "disk", the disk margin of all components of the demand at once, what
+            it says of factors ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where
+            ("disk_frequency" [rad/s]); peak gains, "sensitivity_peak", "complementary_peak" and "position[2]_peak" of what was
+            asked `to`, and where ("..._frequency" [rad/s]).
         by_runs: the same, as runs show them; without those that were not asked.
         why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
             nothing" where its commands have no effect, "failed"; "" where it has.
@@ -214,7 +219,9 @@ class Margins(Saved):
         said = [f"tolerates {' or '.join(texts)}"] * bool(texts) + [f"has {' and '.join(peaks)}"] * bool(peaks)
         good, some = int(self.steady.sum()), f"{int(self.steady.sum()):,} of {every}" if bad else every
         least = f"; member {self.worst(self.members)[self.members - good]} has the least margin" if good > 1 else ""
-        taken = "".join(f", with {text.removeprefix(AS_LINEAR)}" for text in self.messages if text.startswith(AS_LINEAR))
+        taken = "".join(
+            f", with {text.removeprefix(AS_LINEAR)}" for text in self.messages if text.startswith(AS_LINEAR)
+        )
         return f"The loop of {self.loop} {' and '.join(said)} in {some}{bad}{taken}{least}."
 
     def _report(self) -> list[str]:

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.control import HeadingPID, Sensor, StateFeedback
+from lgvi_warp.control import HeadingPID, Sensor, SetPoint, StateFeedback
 from lgvi_warp.distributions import Uniform
 from lgvi_warp.terms import Drag
 from tests.support.refusals import refused, says
@@ -89,11 +89,12 @@ def test_coupled_axes_beside_eigenvalues(inertia, delay):
     assert found.values["phase"][0] == pytest.approx(turned_until_it_grows(A, B, C), rel=1e-7)
 
 
-def spinning(gain, stiffness=0.0, drag=4.0, name="state_feedback"):
+def spinning(gain, stiffness=0.0, drag=4.0):
     """A law that damps rolling, of a body with drag whose weight hangs below its buoyancy or not."""
     K = np.zeros((6, 12))
     K[3, 9] = gain
-    one = scene(StateFeedback(K=K), (5.0, 8.0, J), delay=0.0)
+    wanted = [SetPoint(position=np.zeros(3), heading=0.0)]
+    one = scene(StateFeedback(K=K), (5.0, 8.0, J), delay=0.0, guidance=wanted)
     vehicle = dataclasses.replace(one.vehicle, center_of_buoyancy=(0.0, 0.0, -stiffness / 200.0))
     return dataclasses.replace(one, vehicle=vehicle, terms=[*one.terms, Drag(linear=[50.0] * 3 + [drag, 40.0, 40.0])])
 

@@ -100,9 +100,10 @@ def spinning(gain, stiffness=0.0, drag=4.0):
 
 
 def held(stiffness, drag, gain, inertia=5.0):
+    """The loop by hand: angle and rate; the rate alone where nothing turns the body back."""
     F, G = np.array([[0.0, 1.0], [-stiffness / inertia, -drag / inertia]]), np.array([[0.0], [1.0 / inertia]])
-    both = expm(PERIOD * np.block([[F, G], [np.zeros((1, 3))]]))
-    return both[:2, :2], both[:2, 2:], np.array([[0.0, -gain]])
+    both, first = expm(PERIOD * np.block([[F, G], [np.zeros((1, 3))]])), 0 if stiffness else 1
+    return both[first:2, first:2], both[first:2, 2:], np.array([[0.0, -gain]])[:, first:]
 
 
 def test_loops_without_a_crossover_bear_any_phase_and_several_crossovers_have_a_worst():

@@ -8,5 +8,7 @@ from lgvi_warp.robustness.linear.lqr import Regulator as Regulator
 from lgvi_warp.robustness.linear.lqr import lqr as lqr
 from lgvi_warp.robustness.linear.margins import Margins as Margins
 from lgvi_warp.robustness.linear.margins import margins as margins
+from lgvi_warp.robustness.linear.open_loop import OpenLoops as OpenLoops
+from lgvi_warp.robustness.linear.open_loop import loop as loop
 from lgvi_warp.robustness.linear.trim import Trim as Trim
 from lgvi_warp.robustness.linear.trim import trim as trim

@@ -12,6 +12,8 @@ from lgvi_warp.views.plots.estimates import statistics as statistics
 from lgvi_warp.views.plots.fans import compare as compare
 from lgvi_warp.views.plots.fans import fan as fan
 from lgvi_warp.views.plots.footprints import footprint as footprint
+from lgvi_warp.views.plots.loops import bode as bode
+from lgvi_warp.views.plots.loops import nyquist as nyquist
 from lgvi_warp.views.plots.maps import stability as stability
 from lgvi_warp.views.plots.overview import drift as drift
 from lgvi_warp.views.plots.overview import summary as summary

@@ -283,6 +283,8 @@ def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool
 # What of a sensor changes from tick to tick by chance, in whatever motion; and beside it what linear models take as such.
 RANDOM = ("noise", "drift")
 OF_MEAN_ZERO = (*RANDOM, "quantum")
+# How the message of what a linear loop leaves out begins.
+AS_LINEAR = "of the loop as a linear one: "
 
 
 def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, tuple[str, ...], tuple[str, ...]]:
@@ -305,7 +307,7 @@ def of_the_mean(scene: Any, words: Sequence[str] = OF_MEAN_ZERO) -> tuple[Any, t
         faults
     )
     scene = replace(scene, controller=replace(controller, sensors=sensors, faults=()))
-    return scene, tuple(zeros), (f"of the loop as a linear one: {'; '.join(texts)}",)
+    return scene, tuple(zeros), (f"{AS_LINEAR}{'; '.join(texts)}",)
 
 
 def check_parts(controller: Any, purpose: str, refused: Collection[str] | None = None) -> None:

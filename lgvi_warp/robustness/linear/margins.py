@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`margins`: how much gain and delay the loop of each member bears, by eigenvalues and by runs in lanes."""
+"""`margins`: how much gain, delay and phase the loop of each member bears, by eigenvalues and by runs in lanes."""
 
 from __future__ import annotations
 
@@ -21,28 +21,41 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.robustness.linear.bench import COORDINATES, calm
 from lgvi_warp.robustness.linear.disk import disks
 from lgvi_warp.robustness.linear.edges import edges
-from lgvi_warp.robustness.linear.linearize import OF_MEAN_ZERO, RANDOM, check_parts, chosen_places, of_the_mean
+from lgvi_warp.robustness.linear.linearize import (
+    AS_LINEAR,
+    OF_MEAN_ZERO,
+    RANDOM,
+    check_parts,
+    chosen_places,
+    of_the_mean,
+)
 from lgvi_warp.robustness.linear.loops import IDLE, LEAST_TICKS, UNSETTLED, Loops, Study
 from lgvi_warp.robustness.linear.peaks import OF_THE_DEMAND, peaks
+from lgvi_warp.robustness.linear.phase import phases
 from lgvi_warp.robustness.linear.sampled_loop import SampledLoop
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
-OF, WAYS = ("gain", "delay", "disk", "peak"), ("eigenvalues", "runs")
+OF, WAYS = ("gain", "delay", "phase", "disk", "peak"), ("eigenvalues", "runs")
 # Those of a linear model alone.
-LINEAR = ("disk", "peak")
+LINEAR = ("phase", "disk", "peak")
 # Members whose margins are sought together.
 GROUP = 2048
 # Width of the last brackets, in the logarithm of the factor: of eigenvalues, and of runs, which judge to some 0.4 %.
 NARROW = {"eigenvalues": 1e-6, "runs": 2e-3}
 PERCENTILES = (0.0, 5.0, 25.0, 50.0, 75.0, 95.0, 100.0)
-UNITS = {"delay": "s", "disk_phase": "rad", "frequency": "rad/s"}
+UNITS = {"delay": "s", "phase": "rad", "frequency": "rad/s"}
 GAINS = ("gain_lower", "gain_upper")
 # Margins beside the gain in the words of the answer.
-NAMED = {"delay": "{} more delay", "disk": "a disk margin of {}"}
+NAMED = {"delay": "{} more delay", "phase": "{} of phase", "disk": "a disk margin of {}"}
 DISKS = ("disk", "disk_gain_lower", "disk_gain_upper", "disk_phase", "disk_frequency")
-NAMES = {"gain": GAINS, "delay": ("delay",), "disk": DISKS, "peak": ()}
+# Names of margins, by what is asked for.
+NAMES = {"gain": GAINS, "delay": ("delay",), "phase": ("phase", "phase_frequency"), "disk": DISKS, "peak": ()}
+# What is asked for, by the name of a margin.
+WORD_OF = {name: word for word, each in NAMES.items() for name in each} | {
+    f"{name}_peak": "peak" for name in OF_THE_DEMAND
+}
 
 
 def unit_of(name: str) -> str:
@@ -60,10 +73,11 @@ class Margins(Saved):
         loop: key of the law; "all laws" for the whole controller.
         values: by name, (n,): "gain_lower" and "gain_upper", between which the factors on the demand lie that the loop bears
             (0 and infinite where it bears all that were asked); "delay", the largest delay [s] beside the loop's own, in whole
-            steps; "disk", the disk margin of all components of the demand at once, what it says of factors
-            ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where ("disk_frequency" [rad/s]);
-            peak gains, "sensitivity_peak", "complementary_peak" and "position[2]_peak" of what was asked `to`, and where
-            ("..._frequency" [rad/s]).
+            steps; "phase", the phase margin [rad], and the crossover where it is least ("phase_frequency" [rad/s]): infinite,
+            at NaN, where no gain of the loop crosses 1; "disk", the disk margin of all components of the demand at once, what
+            it says of factors ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where
+            ("disk_frequency" [rad/s]); peak gains, "sensitivity_peak", "complementary_peak" and "position[2]_peak" of what was
+            asked `to`, and where ("..._frequency" [rad/s]).
         by_runs: the same, as runs show them; without those that were not asked.
         why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
             nothing" where its commands have no effect, "failed"; "" where it has.
@@ -138,15 +152,13 @@ class Margins(Saved):
             of: percentages (k,), in [0, 100].
 
         Returns:
-            By name, (k,): each the margin of a member; NaN where no member settles.
+            By name, (k,): each the margin of a member; NaN where no member has one.
         """
-        columns = self._columns()
         quantiles = np.asarray(of) / 100.0
+        known = {name: v[~np.isnan(v)] for name, v in self._columns().items()}
         return {
-            name: np.quantile(v[self.steady], quantiles, method="inverted_cdf")
-            if self.steady.any()
-            else np.full(len(quantiles), np.nan)
-            for name, v in columns.items()
+            name: np.quantile(v, quantiles, method="inverted_cdf") if len(v) else np.full(len(quantiles), np.nan)
+            for name, v in known.items()
         }
 
     def curve(self, name: str, by: str | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -168,14 +180,14 @@ class Margins(Saved):
 
         Args:
             count: how many (default 10).
-            name: by which margin; None, the default, for the first of "gain_upper", "delay", "disk" and "sensitivity_peak"
-                that was asked. Of a peak the largest is the worst.
+            name: by which margin; None, the default, for the first of "gain_upper", "delay", "phase", "disk" and
+                "sensitivity_peak" that was asked. Of a peak the largest is the worst.
 
         Returns:
             Indices (count,), the least first; members that do not settle as they are before all others.
         """
         columns = self._columns()
-        chosen = name or next(word for word in ("gain_upper", "delay", "disk", "sensitivity_peak") if word in columns)
+        chosen = name or next(word for word in ("gain_upper", *NAMED, "sensitivity_peak") if word in columns)
         values = columns[chosen] * (-1.0 if chosen.endswith(("lower", "peak")) else 1.0)
         return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[:count]
 
@@ -199,11 +211,18 @@ class Margins(Saved):
             ends = (few_digits(worst[name], "", 4) for name in GAINS)
             texts.append("{} to {} times its gain".format(*ends))
         texts += [f.format(few_digits(worst[name], unit_of(name), 4)) for name, f in NAMED.items() if name in worst]
+        if np.isfinite(worst.get("phase", np.nan)):
+            where = self.values["phase_frequency"][np.nanargmin(self.values["phase"])]
+            texts = [text.replace("of phase", f"of phase at {few_digits(where, 'rad/s', 4)}") for text in texts]
+        texts = [text.replace("inf rad of phase", "any phase (its gain crosses 1 nowhere)") for text in texts]
         peaks = [f"{name} up to {few_digits(value, '', 4)}" for name, value in worst.items() if name.endswith("_peak")]
         said = [f"tolerates {' or '.join(texts)}"] * bool(texts) + [f"has {' and '.join(peaks)}"] * bool(peaks)
         good, some = int(self.steady.sum()), f"{int(self.steady.sum()):,} of {every}" if bad else every
         least = f"; member {self.worst(self.members)[self.members - good]} has the least margin" if good > 1 else ""
-        return f"The loop of {self.loop} {' and '.join(said)} in {some}{bad}{least}."
+        taken = "".join(
+            f", with {text.removeprefix(AS_LINEAR)}" for text in self.messages if text.startswith(AS_LINEAR)
+        )
+        return f"The loop of {self.loop} {' and '.join(said)} in {some}{bad}{taken}{least}."
 
     def _report(self) -> list[str]:
         lines = [f"{self.loop}: margins of {self.members} members"]
@@ -213,7 +232,7 @@ class Margins(Saved):
         lines.append(f"{'':{width}}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
         for name, row in self.percentiles().items():
             lines.append(f"{f'{name} {unit_of(name)}'.strip():{width}}" + "".join(f"{value:10.4g}" for value in row))
-        return [*lines, *self.messages]
+        return [*lines, *(text for text in self.messages if not text.startswith(AS_LINEAR))]
 
 
 @near_names()
@@ -234,7 +253,7 @@ def margins(
     method: str | Method | None = None,
     h: float | None = None,
 ) -> Margins:
-    """Compute the gain and delay margins of each member's loop.
+    """Compute the gain, delay and phase margins of each member's loop.
 
     A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
     vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at its
@@ -254,6 +273,11 @@ def margins(
 
     Noise and drift of sensors are taken as 0, their mean, and faults as off; by eigenvalues rounding, too: see `messages`.
 
+    The phase margin is the least phase, lag or lead, that all components of the law's demand bear at once: with one component
+    that at the crossovers of its gain, with several at those of the characteristic loci of the sampled loop (MacFarlane,
+    Postlethwaite 1977, Int. J. Control 25(1)). It is infinite where no gain crosses 1 between 1e-5 of the Nyquist frequency
+    and that.
+
     The disk margin is that of the sampled loop, opened at all components of the law's demand: at any frequency each may have
     a complex factor of its own in the disk (1 + (1 - skew) d / 2) / (1 - (1 + skew) d / 2), |d| < margin (Seiler, Packard,
     Gahinet 2020, IEEE Control Systems 40(5)). It is 1 / the largest structured singular value of S + (skew - 1) / 2.
@@ -266,8 +290,8 @@ def margins(
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is meant; without waves and noise.
         loop: Key of the law, such as "heading_pid"; None, the default, for all laws together.
-        of: Some of "gain", "delay", "disk" and "peak"; the first two by default. A delay is that of all commands; "disk" and
-            "peak" are by eigenvalues only.
+        of: Some of "gain", "delay", "phase", "disk" and "peak"; the first two by default. A delay is that of all commands;
+            "phase", "disk" and "peak" are by eigenvalues only.
         by: "eigenvalues", the default, "runs", or both.
         about: Time after which the loop is looked at [s]; 60 by default.
         settle: Longest time that a member is given to be steady [s]; 1200 by default.
@@ -311,7 +335,8 @@ def margins(
     faults.number("most", most, "", 1.0)
     faults.number("skew", skew, "", -1.0, 1.0)
     if set(LINEAR) & set(of) and "eigenvalues" not in by:
-        faults.add("by", by, "has no disk margins and no peaks, which are of a linear model", 'add "eigenvalues"')
+        problem = "has no phase and disk margins and no peaks, which are of a linear model"
+        faults.add("by", by, problem, 'add "eigenvalues"')
     outputs = _outputs(faults, to, of)
     _check_loop(faults, scene.controller, loop, seconds)
     faults.raise_if_any()
@@ -429,7 +454,8 @@ def _of_frequencies(
     """Disk margins and peak gains by name (n,) of loops with delays in steps; NaN where they do not settle."""
     values: dict[str, np.ndarray] = {}
     for opened in sampled.opened(delays, np.flatnonzero(settled)):
-        found = disks(opened, skew, period) if "disk" in of else {}
+        found = phases(sampled.seen(opened), period) if "phase" in of else {}
+        found |= disks(opened, skew, period) if "disk" in of else {}
         found |= peaks(opened, list(outputs.values()), list(outputs), period) if "peak" in of else {}
         for name, column in found.items():
             values.setdefault(name, np.full(len(delays), np.nan))[opened.some] = column

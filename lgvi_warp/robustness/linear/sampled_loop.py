@@ -48,6 +48,12 @@ class Opened(NamedTuple):
     B: np.ndarray
     C: np.ndarray
 
+    def at(self, component: int) -> Opened:
+        """The same, opened at one of the components of the demand: the others are closed."""
+        others = np.arange(self.B.shape[2]) != component
+        A = self.A + self.B[:, :, others] @ self.C[:, others]
+        return Opened(self.some, A, self.B[:, :, ~others], self.C[:, ~others])
+
 
 class SampledLoop:
     """x' = P x + Q1 u of q ticks ago + Q0 u of the tick before that; u' and what parts remember follow from x' at the tick.
@@ -179,6 +185,25 @@ class SampledLoop:
                 rows[:, r] = np.einsum("ki,kij->kj", seen[:, :12], A[:, :12])
                 rows[:, r, s : s + m] += seen[:, 12:]
             yield Opened(some, A, B, rows)
+
+    def opened_at_commands(self, steps: np.ndarray, places: np.ndarray, channels: Sequence[int]) -> Iterator[Opened]:
+        """Some loops (m,), opened at some commands; those of one delay, in steps (n,), together."""
+        commands = self._s + self._m + np.asarray(channels)
+        for q in np.unique(steps[places] // self.every):
+            some = places[steps[places] // self.every == q]
+            A = self._matrices(np.ones(len(some)), int(q), steps[some] % self.every, some)
+            rows = A[:, commands].copy()
+            A[:, commands] = 0.0
+            yield Opened(some, A, np.tile(np.eye(A.shape[1])[:, commands], (len(some), 1, 1)), rows)
+
+    def seen(self, opened: Opened) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """A, B, C of each of some opened loops in what laws see, which is all that their demands depend on."""
+        base = self._s + self._m
+        for i, A, B, C in zip(*opened, strict=True):
+            count = int(self._ranks[i])
+            axes = self._axes[i, :count]
+            (smaller,) = self._of_seen(A[None], np.array([i]), count)
+            yield smaller, np.concatenate([axes @ B[:base], B[base:]]), np.hstack([C[:, :base] @ axes.T, C[:, base:]])
 
     def _of_seen(self, A: np.ndarray, some: np.ndarray, count: int) -> np.ndarray:
         """The loops' matrices of what laws see, and of commands."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,28 +24,43 @@ class Numbers:
 
     A metric may be infinite, as a settling time is where a member never settles.
 
-    names: of the columns of a call; None where members are given as states.
+    names: of the columns of a call; None where members are given as states. more: further quantities and metrics, each one
+    number more of each member.
     """
 
-    def __init__(self, scene: Scene, names: list[str] | None, key: str, of: Any, settings: Mapping[str, Any]):
+    def __init__(
+        self, scene: Scene, names: list[str] | None, key: str, of: Any, settings: Mapping[str, Any],
+        more: Sequence[str] = (),
+    ):  # fmt: skip
         # As of a sweep: "energy" is the metric here.
-        self.of_metric = names_a_statistic(of) and not names_an_end(of)
+        self.of_metric = _names_a_metric(of)
         if self.of_metric:
             of = MetricQuantity.named(key, of)
             self.label = of.label
         else:
             self.label = of if isinstance(of, str) else getattr(of, "__name__", str(of))
         self._scene, self._unit = scene, unit_of(of)
-        self.run: Prepared = prepare(scene, names, of, failed="nan", **settings)
+        others = {each: MetricQuantity.named("constraints", each) if _names_a_metric(each) else each for each in more}
+        # What is asked for twice is gathered once.
+        wanted = {self.label: of} | {name: each for name, each in others.items() if name != self.label}
+        self._columns = [list(wanted).index(name) for name in (self.label, *more)]
+        self._count = len(wanted)
+        several = list(wanted.values()) if len(wanted) > 1 else of
+        self.run: Prepared = prepare(scene, names, several, failed="nan", **settings)
 
     def units(self, names: Iterable[str]) -> dict[str, str]:
         """The unit of the objective and of numbers of the scene, by name."""
         return {self.label: self._unit} | units_of_numbers(self._scene, names)
 
     def __call__(self, call: Callable[[Prepared], Any]) -> np.ndarray:
-        """The numbers of members (n,)."""
+        """The numbers of members (n,), or with `more` (n, 1 + those)."""
         values, faults = np.asarray(call(self.run)), Faults()
-        if values.ndim != 1:
-            faults.add("of", f"{values.shape[1]} numbers", "is not a single number", "name one of its entries")
+        count = 1 if values.ndim == 1 else values.shape[1]
+        if count != self._count:
+            faults.add("of", f"{count} numbers", "is not a single number", "name one of its entries")
         faults.raise_if_any()
-        return values
+        return values if len(self._columns) == 1 else values.reshape(len(values), -1)[:, self._columns]
+
+
+def _names_a_metric(of: Any) -> bool:
+    return names_a_statistic(of) and not names_an_end(of)

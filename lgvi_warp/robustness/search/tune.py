@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Self
 
@@ -21,6 +21,7 @@ from lgvi_warp.criteria.risk import risk_of
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.robustness.search.box import LEAST, POPULATION, SearchBox, search
+from lgvi_warp.robustness.search.constraints import BROKEN, Constraint, constraints_of, margins_of, penalised
 from lgvi_warp.robustness.search.numbers import MOST_NAMED, Numbers
 from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
@@ -49,6 +50,11 @@ class Tuned(Saved):
         restarts: (r,), the least risk of each evolution.
         runs: number of members that were run.
         units: unit of the quantity and of the numbers, by name.
+        constraints: by text, such as "disk above 0.5": "worst", the number of the member of the search that keeps it least;
+            "fresh_worst" and "fresh_before", of fresh members with these numbers and with those of the scene; "fresh_broken",
+            how many fresh members break it. A number is NaN where a member has none.
+        messages: what the margins of constraints leave out.
+        feasible: whether all members of the search keep all constraints.
     """
 
     study: ClassVar[str] = "tune_gains"
@@ -66,6 +72,9 @@ class Tuned(Saved):
     restarts: np.ndarray
     runs: int
     units: Mapping[str, str] = field(default_factory=dict)
+    constraints: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    messages: tuple[str, ...] = ()
+    feasible: bool = True
 
     @property
     def optimism(self) -> float:
@@ -73,7 +82,11 @@ class Tuned(Saved):
         return self.fresh_cost - self.cost
 
     def _content(self) -> dict[str, Any]:
-        return dict(finite_or_none({item.name: getattr(self, item.name) for item in fields(self)}))
+        content = {item.name: getattr(self, item.name) for item in fields(self)}
+        # Of a margin infinity is an answer, and none is another.
+        bounds = {text: {name: str(value) if math.isinf(value) else value for name, value in each.items()}
+                  for text, each in self.constraints.items()}  # fmt: skip
+        return dict(finite_or_none(content | {"constraints": bounds}))
 
     @classmethod
     def _of_content(cls, content: dict[str, Any]) -> Self:
@@ -81,7 +94,10 @@ class Tuned(Saved):
         costs = {name: with_missing_as(content[name], math.inf if content["fresh"] or name == "cost" else math.nan)
                  for name in ("cost", "fresh_cost", "fresh_before")}  # fmt: skip
         restarts = np.array(with_missing_as(content["restarts"], math.inf), np.float64)
-        return cls(**content | costs | {"restarts": restarts, "at_bounds": tuple(content["at_bounds"])})
+        bounds = {text: {name: math.nan if value is None else float(value) for name, value in each.items()}
+                  for text, each in content.get("constraints", {}).items()}  # fmt: skip
+        read = {"restarts": restarts, "at_bounds": tuple(content["at_bounds"]), "constraints": bounds}
+        return cls(**content | costs | read | {"messages": tuple(content.get("messages", ()))})
 
     def rows(self) -> Iterator[dict[str, Any]]:
         for name, value in self.parameters.items():
@@ -97,7 +113,10 @@ class Tuned(Saved):
             few_digits(cost, self.units.get(self.of, ""), 4) if math.isfinite(cost) else "infinite, as members fail,"
             for cost in (self.fresh_cost, self.fresh_before, self.cost)
         )
-        risk, where = f"{self.risk} of {self.of}", f"with {listed(numbers, MOST_NAMED)}."
+        kept = "".join(f"; {text}: {_least_kept(each, self.fresh)}" for text, each in self.constraints.items())
+        risk, where = f"{self.risk} of {self.of}", f"with {listed(numbers, MOST_NAMED)}{kept}."
+        if not self.feasible:
+            return f"No numbers were found for which all members keep the constraints; the nearest has {risk} {seen} {where}"
         if not self.fresh:
             return f"{risk} is {seen} over the {plural(self.members, 'member')} of the search {where}"
         change = f"{'falls' if self.fresh_cost < self.fresh_before else 'rises'} from {before} to {after}"
@@ -112,7 +131,16 @@ class Tuned(Saved):
         ]
         if self.at_bounds:
             lines.append(f"bounds      may be too narrow, they are reached: {', '.join(self.at_bounds)}")
-        return lines
+        return [*lines, *(f"margins     {text}" for text in self.messages)]
+
+
+def _least_kept(numbers: Mapping[str, float], fresh: int) -> str:
+    """Words for how a constraint is kept."""
+    words = ["none" if math.isnan(value) else f"{value:.4g}" for value in (numbers["worst"], numbers["fresh_worst"])]
+    if not fresh:
+        return f"at worst {words[0]}"
+    broken = int(numbers["fresh_broken"])
+    return f"at worst {words[1]} in fresh members" + (f", {broken:,} of {fresh:,} break it" if broken else "")
 
 
 @shows_progress
@@ -127,6 +155,7 @@ def tune_gains(
     fresh: int | None = None,
     restarts: int = 1,
     seed: int = 0,
+    constraints: Sequence[str] = (),
     progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> Tuned:
@@ -146,6 +175,9 @@ def tune_gains(
         fresh: Number of fresh members; None, the default, for four times those of the fleet.
         restarts: Number of evolutions; 1 by default.
         seed: Seed of the search; 0 by default.
+        constraints: Bounds that every member must keep: "disk above 0.5" of all laws, "phase heading_pid above 0.6" of one, as
+            `lw.linear.margins` names margins; "overshoot depth below 0.3" of a metric, "max(depth) below 12.0" of a quantity.
+            Numbers that keep them are preferred to all others. A loop that does not settle keeps no bound. None by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
             None, the default, for nobody.
         **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
@@ -172,7 +204,7 @@ def tune_gains(
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene
     n, faults = ensemble.members, Faults()
-    measure = risk_of(faults, risk)
+    measure, bounds = risk_of(faults, risk), constraints_of(faults, constraints, scene.controller)
     box = _checked_box(faults, ensemble, over, budget)
     if fresh is not None and (not isinstance(fresh, int) or fresh < 0):
         faults.add("fresh", fresh, "is not a number of members", "give a whole number, 0 for none")
@@ -180,24 +212,43 @@ def tune_gains(
         faults.add("fleet", "...", "has members with weights, and a risk counts them alike", "leave the weights out")
     faults.raise_if_any()
     assert box is not None
-    numbers_of = Numbers(scene, None, "minimise", minimise, settings)
-    costs, report = _Costs(numbers_of, ensemble, box), callback(progress) or (lambda share: None)
+    more = [one.name for one in bounds if not one.margin]
+    numbers_of = Numbers(scene, None, "minimise", minimise, settings, more)
+    costs, report = _Costs(numbers_of, ensemble, box, bounds, settings), callback(progress) or (lambda share: None)
+
+    def cost(inside: np.ndarray) -> np.ndarray:
+        candidates = box.values(inside)
+        each = costs(candidates)
+        risks = np.asarray(measure(each[0]))
+        return penalised(risks, bounds, costs.bounded(candidates, each[1:], np.isfinite(risks))) if bounds else risks
+
     optimum = search(
-        lambda inside: np.asarray(measure(costs(box.values(inside)))), len(box.names), budget // n, seed, restarts,
-        report=lambda count: report(min(1.0, n * count / budget)))  # fmt: skip
+        cost, len(box.names), budget // n, seed, restarts, report=lambda count: report(min(1.0, n * count / budget))
+    )
     best = box.values(optimum.at[None])
     before = np.array([[single_number(scene, name)[1] for name in box.names]])
     drawn = ensemble.sampling.kind == "random" and bool(ensemble.vary) and not ensemble.explicit()
     count = (4 * n if fresh is None else fresh) if drawn else 0
-    fresh_costs = np.full(2, np.nan)
+    searched = costs.judged(best, measure) if bounds else (optimum.cost, [])
+    fresh_costs, kept = np.full(2, np.nan), [[np.full(1, np.nan)] * len(bounds)] * 2
     if count:
-        strangers = _Costs(numbers_of, ensemble.with_seed(ensemble.seed + 1, count), box)
-        fresh_costs = np.array([float(measure(strangers(numbers))[0]) for numbers in (best, before)])
+        strangers = _Costs(numbers_of, ensemble.with_seed(ensemble.seed + 1, count), box, bounds, settings)
+        judged = [strangers.judged(numbers, measure) for numbers in (best, before)]
+        fresh_costs, kept = np.array([risk for risk, _ in judged]), [values for _, values in judged]
+    table = {
+        one.text: {
+            "worst": one.worst(values),
+            "fresh_worst": one.worst(fresh_values),
+            "fresh_before": one.worst(before_values),
+            "fresh_broken": float((one.slack(fresh_values) < 0.0).sum()) if count else math.nan,
+        }
+        for one, values, fresh_values, before_values in zip(bounds, searched[1], *kept, strict=True)
+    }
     edges = zip(box.names, best[0], box.low, box.high, strict=True)
     return Tuned(
         parameters=dict(zip(box.names, map(float, best[0]), strict=True)),
         before=dict(zip(box.names, map(float, before[0]), strict=True)),
-        cost=optimum.cost,
+        cost=searched[0],
         fresh_cost=float(fresh_costs[0]),
         fresh_before=float(fresh_costs[1]),
         of=numbers_of.label,
@@ -205,9 +256,12 @@ def tune_gains(
         members=n,
         fresh=count,
         at_bounds=tuple(name for name, value, low, high in edges if value in (low, high)),
-        restarts=optimum.restarts,
-        runs=n * optimum.runs + 2 * count,
+        restarts=np.where(optimum.restarts < BROKEN, optimum.restarts, np.inf),
+        runs=n * optimum.runs + 2 * count + n * bool(bounds),
         units=numbers_of.units(box.names),
+        constraints=table,
+        messages=costs.messages,
+        feasible=all((one.slack(values) >= 0.0).all() for one, values in zip(bounds, searched[1], strict=True)),
     )
 
 
@@ -233,10 +287,15 @@ def _array_of(name: str) -> str:
 
 
 class _Costs:
-    """Costs of candidates (k, d), of each member: (k, members)."""
+    """Costs of candidates (k, d), of each member, and what constraints bound that is no margin: (1 + c, k, members)."""
 
-    def __init__(self, numbers_of: Numbers, fleet: Ensemble, box: SearchBox):
+    def __init__(
+        self, numbers_of: Numbers, fleet: Ensemble, box: SearchBox, constraints: Sequence[Constraint],
+        settings: Mapping[str, Any],
+    ):  # fmt: skip
         n = fleet.members
+        self._scene, self._constraints, self._settings = fleet.scene, constraints, settings
+        self.messages: tuple[str, ...] = ()
         self._numbers_of, self._members = numbers_of, fleet.select(0, n)
         self._found = {name: single_number(fleet.scene, name)[0] for name in box.names}
         self._starts = {target.name: every_number(fleet.scene)[target.name] for target in self._found.values()
@@ -244,7 +303,8 @@ class _Costs:
         varied = {name: self._members.parameters[name] for name in fleet.varied()}
         self._varied = {name: np.broadcast_to(v, (n, *v.shape[1:])) for name, v in varied.items()}
 
-    def __call__(self, candidates: np.ndarray) -> np.ndarray:
+    def _members_with(self, candidates: np.ndarray) -> tuple[np.ndarray, dict[str, Any], dict[str, np.ndarray]]:
+        """Members (k n,) of candidates: their places in the fleet, states, and parameters."""
         members, k = self._members, len(candidates)
         n = members.count
         every = np.tile(np.arange(n), k)
@@ -260,10 +320,40 @@ class _Costs:
         for name, values in starts.items():
             form = name.removeprefix("start.")
             states |= {"attitude": resolve_attitude({form: values})} if form in ATTITUDES else {form: values}
+        return every, states, parameters
+
+    def __call__(self, candidates: np.ndarray) -> np.ndarray:
+        members = self._members
+        every, states, parameters = self._members_with(candidates)
 
         def called(run: Prepared) -> Any:
             indices = None if run.common_noise else members.indices[every]
             return run.states(**states, parameters=parameters, indices=indices, seed=members.seed)
 
-        costs = self._numbers_of(called)
-        return np.where(np.isnan(costs), np.inf, costs).reshape(k, n)
+        numbers = self._numbers_of(called).reshape(len(candidates), members.count, -1)
+        numbers[..., 0] = np.where(np.isnan(numbers[..., 0]), np.inf, numbers[..., 0])
+        return np.moveaxis(numbers, 2, 0)
+
+    def bounded(self, candidates: np.ndarray, numbers: np.ndarray, good: np.ndarray) -> list[np.ndarray]:
+        """What the constraints bound, each (k, members); margins of the candidates that are good (k,) alone, else NaN."""
+        others, found = iter(numbers), dict[str, np.ndarray]()
+        if good.any() and any(one.margin for one in self._constraints):
+            _, states, parameters = self._members_with(candidates[good])
+            found, self.messages = margins_of(
+                self._constraints, Ensemble.from_states(self._scene, **states, parameters=parameters), self._settings
+            )
+        rows = []
+        for one in self._constraints:
+            column = np.full((len(candidates), self._members.count), np.nan)
+            if one.name in found:
+                column[good] = found[one.name].reshape(-1, self._members.count)
+            rows.append(column if one.margin else next(others))
+        return rows
+
+    def judged(
+        self, candidate: np.ndarray, measure: Callable[[np.ndarray], np.ndarray]
+    ) -> tuple[float, list[np.ndarray]]:
+        """The risk of one candidate (1, d), and what the constraints bound, each (members,)."""
+        each = self(candidate)
+        risks = np.asarray(measure(each[0]))
+        return float(risks[0]), [values[0] for values in self.bounded(candidate, each[1:], np.isfinite(risks))]

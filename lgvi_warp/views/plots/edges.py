@@ -19,6 +19,7 @@ LABELS = {
     "gain_lower": "lower gain margin, a factor",
     "gain_upper": "upper gain margin, a factor",
     "delay": "delay margin [s]",
+    "phase": "phase margin [rad]",
     "disk": "disk margin",
     "disk_gain_upper": "disk margin as a factor",
     "disk_phase": "disk margin as a phase [rad]",

@@ -76,6 +76,7 @@ class Sensor(MeasuringPart):
 
     type: ClassVar[str] = "sensor"
     every_feature: ClassVar[tuple[str, ...]] = (*IDLE, PLACED, GIVEN, HANDED)
+    handed_flags: ClassVar[int] = 1
 
     of: str = ""
     noise: Any = number((3,), "unit", 0.0, least=0.0)
@@ -106,6 +107,14 @@ class Sensor(MeasuringPart):
     def count(self) -> int:
         """Count of numbers that it reads."""
         return READINGS[self.of]
+
+    @property
+    def reading(self) -> str:  # type: ignore[override]
+        """What it reads."""
+        return self.of
+
+    def fault_channels(self, handed: bool) -> int:
+        return self.count
 
     def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
         # One number for each that it reads; a sensor of a scalar has scalars.

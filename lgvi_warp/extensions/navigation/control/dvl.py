@@ -65,6 +65,8 @@ class DVL(MeasuringPart):
     device: ClassVar[str] = f"{DEVICE}.dvl"
     linear: ClassVar[bool] = False
     every_feature: ClassVar[tuple[str, ...]] = ("noise", "dropout", "floor", "grid", "silent", HANDED)
+    reading: ClassVar[str] = "velocity"
+    handed_flags: ClassVar[int] = BEAMS
     # The floor; set for a part of a scene.
     ground: ClassVar[Any] = None
 
@@ -94,6 +96,9 @@ class DVL(MeasuringPart):
     @property
     def handed_rows(self) -> int:
         return 2 * BEAMS
+
+    def fault_channels(self, handed: bool) -> int:
+        return BEAMS if handed else super().fault_channels(handed)
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # What some member has.

@@ -34,6 +34,10 @@ def _kinds(faults: Faults, key: str, value: Any) -> None:
         faults.choice(key, word, KINDS)
 
 
+def _is_channel(value: Any) -> bool:
+    return is_whole(value, -MOST_PERIODS) or (isinstance(value, str) and value == ALL)
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fault(Sending):
     """A fault of an actuator or of a sensor: from one time to another its command or its reading x is another one.
@@ -48,16 +52,16 @@ class Fault(Sending):
     | delay | x comes later; until the first one has come the last one repeats |
     | intermittent | x is lost: a command is as of "gain", the last reading stays, an estimator gets none |
 
-    It begins at the first tick at or after `time`, and is over at the first at or after `until`. It comes and goes where `duty`
-    is below 1: each `period` from its onset on it acts at the first ticks alone. A sensor's fault acts right after the sensor,
-    on what has arrived of its reading. Where an estimator takes the readings, it changes what the estimator gets: a kind with
-    memory goes by those that are new. Laws know nothing of it, and their integrals go on.
+    It begins at the first tick at or after `time`, and is over at the first at or after `until`. It comes and goes where
+    `duty` is below 1: of each `period` from the onset on it acts in the first part. A sensor's fault acts right after the
+    sensor, on what has arrived of its reading. Where an estimator takes the readings, it changes what the estimator gets; a
+    kind with memory goes by those that are new. Laws know nothing of it, and their integrals go on.
 
     Args:
         of: Key of the term or of the sensor.
-        channel: Number of the channel, from 0, or "all"; 0 by default. Of a sensor, of its reading: an attitude has roll, pitch
-            and yaw [rad]. Of an `IMU` behind an estimator: the means over a period of specific force (0 to 2) [m/s^2] and rate
-            (3 to 5) [rad/s]; of a `DVL` behind one: its beams.
+        channel: Number of the channel, from 0, or "all"; 0 by default. Of a sensor, of its reading: an attitude has roll,
+            pitch and yaw [rad]. Where an estimator takes them, of an `IMU` the means over a period of specific force (0 to 2)
+            [m/s^2] and rate (3 to 5) [rad/s], and of a `DVL` its beams.
         kind: Kind of fault, or a list of kinds among which `choice` chooses; "gain" by default.
         choice: Number of the kind in that list, from 0; 0 by default.
         time: When it begins [s]; 0 by default; inf for never.
@@ -88,12 +92,7 @@ class Fault(Sending):
     every_feature: ClassVar[tuple[str, ...]] = ("until", "duty", "held", "placed", "late", "lost")
 
     of: str = text("is not a text", "give the name of an actuator or of a sensor", "")
-    channel: Any = checked(
-        lambda value: value == ALL or is_whole(value, -MOST_PERIODS),
-        "is no whole number",
-        'give the number of a channel, from 0, or "all"',
-        0,
-    )
+    channel: int | str = checked(_is_channel, "is no whole number", 'give the number of a channel, from 0, or "all"', 0)
     kind: Any = declared(_kinds, "gain")
     choice: Any = number((), "1", 0.0, least=0.0)
     time: Any = number((), "s", 0.0, least=0.0, infinite=True)
@@ -122,9 +121,13 @@ class Fault(Sending):
         if self.known and np.isfinite(self.until):
             problem = "ends a fault that the allocation knows, which leaves the channel out for good"
             faults.add("until", float(self.until), problem, "leave out until, or known")
-        for name, bad in self.unphysical({name: np.array([value]) for name, value in self.parameters().items()}).items():
+        for name, bad in self.unphysical(
+            {name: np.array([value]) for name, value in self.parameters().items()}
+        ).items():
             if bad.any() and name == "choice":
-                faults.add(name, float(self.choice), "is no number of a kind", f"give 0 to {len(self.kinds_listed) - 1}")
+                faults.add(
+                    name, float(self.choice), "is no number of a kind", f"give 0 to {len(self.kinds_listed) - 1}"
+                )
             elif bad.any():
                 problem = f"is not after time = {float(self.time):g}"
                 faults.add(name, float(getattr(self, name)), problem, "give a later one, or leave it out")

@@ -57,6 +57,7 @@ class Altimeter(Part):
     def begin(self) -> None:
         """No reading yet."""
         names = ("noise", "bias", "drift", "quantum", "every", "latency", "dropout", "seed0", "seed1", "channel")
+        names += ("burst", "outlier", "outlier_std")
         self.errors = Sensor(of="depth", **{name: value for name, value in vars(self).items() if name in names})
         self.errors.begin()
         self.reading = 0.0

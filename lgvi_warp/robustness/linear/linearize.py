@@ -281,7 +281,7 @@ def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool
 
 
 # What of a sensor changes from tick to tick by chance, in whatever motion; and beside it what linear models take as such.
-RANDOM = ("noise", "drift")
+RANDOM = ("noise", "drift", "outlier")
 OF_MEAN_ZERO = (*RANDOM, "quantum")
 
 

@@ -38,7 +38,8 @@ def made(features):
         """
         lanes = ["begin", "gain", "offset"] + ["end"] * ends + ["cycle", "on"] * comes_and_goes
         lanes += ["holds", "share"] * held + ["stuck"] * placed + ["late", "ticks"] * late + ["loses"] * lost
-        words = ("row", "count", "acting", "before", "memory", "work", "channel", "flag", "flags", "sets") + ("place_row",) * placed
+        words = ["row", "count", "acting", "before", "memory", "work", "channel", "flag", "flags", "sets"]
+        words += ["place_row"] * placed
         each = dict.fromkeys(lanes, lane(width, real)) | dict.fromkeys(words, wp.int32)
         return struct(f"Fault_{'_'.join(features)}", **each)
 

@@ -296,8 +296,8 @@ def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
         may[: bus.channels] = may[bus.acting : bus.answer] = True
     sensor = getattr(bench.part, "sensor", None)
     if sensor is not None:
-        for row, count in ((bus.ranges.get(sensor.key), 1), (bus.handed.get(sensor.key), sensor.handed_rows)):
-            may[row or 0 :][: count if row else 0] = True
+        for first_rows, many in ((bus.ranges, 1), (bus.handed, sensor.handed_rows)):
+            may[first_rows.get(sensor.key, 0) :][: many if sensor.key in first_rows else 0] = True
     if isinstance(bench.part, MeasuringPart):
         row = bus.handed.get(bench.part.key, 0)
         may[row : row + bench.part.handed_rows * bench.part.is_handed] = True

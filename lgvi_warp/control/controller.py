@@ -372,7 +372,7 @@ class Controller(Documented):
             if part.of not in counts:
                 remedy = closest(part.of, counts)
                 faults.add(f"{part.key}.of", part.of, "is no actuator and no sensor of this controller", remedy)
-            elif part.channel != ALL and not 0 <= part.channel < count:
+            elif part.channel != ALL and not 0 <= int(part.channel) < count:
                 remedy = f"give 0 to {count - 1}" if count > 1 else "give 0"
                 faults.add(key, part.channel, f"is beyond the {count} of {part.of}", remedy)
 

@@ -151,9 +151,14 @@ class Fault(Sending):
         return 1 + int(np.max(self.delay) / self.bus.period) if set(self.kinds_listed) - {"gain", "offset"} else 0
 
     @property
+    def _is_handed(self) -> bool:
+        """Whether an estimator takes the readings that it changes."""
+        return self.of in self.bus.handed
+
+    @property
     def _flags(self) -> int:
         """Rows by which its sensor tells an estimator what is new."""
-        return self.sensor.handed_flags if self.sensor is not None and self.sensor.is_handed else 0
+        return self.sensor.handed_flags if self._is_handed else 0
 
     def _is(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """For each kind the members (1 or n,) that have it, and in addition those with each way of the device code."""
@@ -161,7 +166,7 @@ class Fault(Sending):
         have = {word: kinds == word for word in KINDS}
         at_value = have["stuck"] & (self.value is not None)
         stays = (have["stuck"] & ~at_value) | have["freeze"]
-        reads = self.sensor is not None and not self.sensor.is_handed
+        reads = self.sensor is not None and not self._is_handed
         moves = self.actuator is not None and self.actuator.memory
         held = stays | have["slow"] | (have["intermittent"] & reads)
         ways = {"held": held, "late": have["delay"], "placed": have["stuck"] & ~at_value & moves}
@@ -179,16 +184,16 @@ class Fault(Sending):
         sensor = self.sensor
         if sensor is None:
             return f"fault:{','.join(('delayed' if self.bus.delayed else 'command', *self.chosen))}"
-        in_rows = sensor.is_handed or sensor.key in self.bus.ranges
-        more = ("angle",) if sensor.reading in ANGLES and "held" in self.chosen else ()
-        more += ("flagged",) if self._flags else ()
+        in_rows = self._is_handed or sensor.key in self.bus.ranges
+        more = ["angle"] if sensor.reading in ANGLES and "held" in self.chosen else []
+        more += ["flagged"] if self._flags else []
         return f"fault:{','.join(('rows' if in_rows else sensor.reading, *self.chosen, *more))}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Numbers by member, times in ticks; the rows that it changes.
         bus, sensor, h = self.bus, self.sensor, context.h
         ways, T = self._is(numbers), bus.period
-        summed = T if sensor is not None and sensor.is_handed and sensor.sums else 1.0
+        summed = T if self._is_handed and sensor.sums else 1.0
         late, slow = np.rint(numbers["delay"] / T), np.maximum(numbers["time_constant"], 1e-30 * T)
         value = numbers["value"] if self.value is not None else np.zeros(1)
         gain = np.where(ways["offset"], 1.0, np.where(ways["at value"], 0.0, numbers["gain"]))
@@ -207,13 +212,13 @@ class Fault(Sending):
             values |= acting[name]
         lanes = dict(zip(values, repeated(*values.values()), strict=True))
         sets = int(np.max(np.where(ways["late"], late, 0.0))) + 1 if "late" in self.chosen else 0
-        size, first, flags = self._count, 0 if self.channel == ALL else self.channel, self._flags
+        size, first, flags = self._count, 0 if self.channel == ALL else int(self.channel), self._flags
         keeps = ("held" in self.chosen) + sets + bool(flags and {"held", "late"} & set(self.chosen))
         count = size if self.channel == ALL else 1
         row, flag = first, 0
         if sensor is None:
             row += bus.commands[self.of][0]
-        elif sensor.is_handed:
+        elif self._is_handed:
             row += bus.handed[self.of]
             flag = bus.handed[self.of] + size + min(first, max(flags - 1, 0))
         elif self.of in bus.ranges:
@@ -223,14 +228,14 @@ class Fault(Sending):
         if "placed" in self.chosen:
             # To be the row where the actuator is: the engine knows it.
             rows["place_row"] = bus.report + row
-        reads = sensor is not None and not sensor.is_handed and self.of not in bus.ranges
+        reads = sensor is not None and not self._is_handed and self.of not in bus.ranges
         memory = np.zeros((1, count * keeps)) if keeps else None
         return Packed(lanes | rows, memory=memory, work=size * reads)
 
     @property
     def _count(self) -> int:
         """Channels of what has it."""
-        return int(self.sensor.fault_channels(self.sensor.is_handed) if self.sensor else self.actuator.channels)
+        return int(self.sensor.fault_channels(self._is_handed) if self.sensor else self.actuator.channels)
 
 
 def _tick(time: np.ndarray, h: float, period: float) -> np.ndarray:

@@ -177,8 +177,10 @@ class Sensor(MeasuringPart):
         """
         count = self.count
         drift = Stream("drift", 1, 0, 1) if count == 1 else Stream("drift", 3, 1)
-        each = (Stream("noise", count), drift, Stream("dropout", 1, 0, 3))
-        each += (Stream("outlier", 1, 2, 3), Stream("outlier_std", count, 2))
+        each = (
+            *(Stream("noise", count), drift, Stream("dropout", 1, 0, 3)),
+            *(Stream("outlier", 1, 2, 3), Stream("outlier_std", count, 2)),
+        )
         return tuple(stream for stream in each if stream.name in acting)
 
     def device_in(self, aligned: bool) -> Any:

@@ -19,11 +19,14 @@ class Fault:
     angle: whether differences are within half a turn; held: whether an intermittent one keeps the last number.
     """
 
-    kind, channel, time, until, gain, offset, value = "gain", 0, 0.0, math.inf, 0.0, 0.0, None
+    of: str
+    channel: Any
+    value: float | None = None
+    kind, time, until, gain, offset = "gain", 0.0, math.inf, 0.0, 0.0
     time_constant, delay, duty, period, angle, held = 1.0, 1.0, 1.0, 1.0, False, False
 
     def __init__(
-        self, of: str, channel: int = 0, time: float = 0.0, gain: float = 0.0, offset: float = 0.0, **more: Any
+        self, of: str, channel: Any = 0, time: float = 0.0, gain: float = 0.0, offset: float = 0.0, **more: Any
     ):
         vars(self).update(of=of, channel=channel, time=time, gain=gain, offset=offset, **more)
         self.begin()
@@ -88,45 +91,3 @@ class SensorFault(Part):
         for i in range(len(v)) if self.each[0].channel == "all" else [int(self.each[0].channel)]:
             v[i] = self.each[i].change(y.tick, y.period, float(v[i]))
         return with_values(y, self.of, v)
-
-
-class HandedFault(Part):
-    """The same of a sensor whose readings an estimator takes.
-
-    of: its key; handed: as of the sensors; numbers, flags: names of what it hands on, and of what says that this is new (or
-    ""); scale: of offset and value.
-    """
-
-    scale, flags = 1.0, "fresh"
-
-    def begin(self) -> None:
-        """No reading yet."""
-        names = ("handed", "numbers", "flags", "scale", "each", "seen")
-        numbers = {name: value for name, value in vars(self).items() if name not in names}
-        numbers["offset"] = self.scale * numbers.get("offset", 0.0)
-        if numbers.get("value") is not None:
-            numbers["value"] = self.scale * numbers["value"]
-        self.each = [Fault(**numbers) for _ in range(6)]
-        self.seen: dict[int, float] = {}
-
-    def measure(self, y: Measurement) -> Measurement:
-        """Change what the estimator gets."""
-        read = self.handed[self.of]
-        v = np.concatenate([np.atleast_1d(read[name]) for name in self.numbers])
-        fresh = np.array(np.broadcast_to(read[self.flags], len(v))) if self.flags else np.ones(len(v), bool)
-        chosen = range(len(v)) if self.each[0].channel == "all" else [int(self.each[0].channel)]
-        for i in chosen:
-            fault = self.each[i]
-            simple = fault.kind in ("gain", "offset", "intermittent") or fault.value is not None
-            self.seen[i] = v[i] if simple or fresh[i] or i not in self.seen else self.seen[i]
-            out = fault.change(y.tick, y.period, self.seen[i])
-            if fault.acts(y.tick, y.period):
-                lost = fault.kind == "intermittent" and bool(self.flags)
-                v[i] = v[i] if lost else out
-                fresh[i] = fresh[i] and not lost
-        if self.flags:
-            read[self.flags] = fresh if np.ndim(read[self.flags]) else bool(np.all(fresh))
-        for name in self.numbers:
-            size = np.size(read[name])
-            read[name], v = v[:size].reshape(np.shape(read[name])), v[size:]
-        return y

@@ -58,10 +58,10 @@ class Sensor(MeasuringPart):
         every: Ticks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
         latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first one is there.
         dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default. The first is never lost.
-        burst: Mean length of a run of lost readings [ticks], at least 1 and dropout / (1 - dropout); 0 by default: each is
-            lost by itself. The share of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
-        outlier: Probability with which a reading is an outlier; 0 by default.
-        outlier_std: Standard deviation of what an outlier adds to the reading; 0 by default.
+        burst: Mean length of a run of lost readings [ticks], at least 1 and dropout / (1 - dropout); by default, or where 0,
+            each is lost by itself. The share of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
+        outlier: Probability with which a reading is an outlier; by default none is.
+        outlier_std: Standard deviation of what an outlier adds to the reading.
         deepest: Depth of its place below which readings are lost, as those of GPS are [m]; inf by default.
         place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
             reads the position or the depth of this place.
@@ -95,10 +95,10 @@ class Sensor(MeasuringPart):
     latency: Any = number((), "ticks", IDLE["latency"], least=0.0, most=MOST_TICKS)
     dropout: Any = number((), "1", IDLE["dropout"], least=0.0, most=1.0)
     deepest: Any = number((), "m", IDLE["deepest"], infinite=True)
-    burst: Any = number((), "ticks", IDLE["burst"], least=0.0)
-    outlier: Any = number((), "1", IDLE["outlier"], least=0.0, most=1.0)
-    outlier_std: Any = number((3,), "unit", IDLE["outlier_std"], least=0.0)
-    # Absent where it is not given, so that a sensor without it has no such parameter.
+    # Absent where they are not given, so that a sensor without them has no such parameters.
+    burst: Any = number((), "ticks", None, least=0.0, optional=True)
+    outlier: Any = number((), "1", None, least=0.0, most=1.0, optional=True)
+    outlier_std: Any = number((3,), "unit", None, least=0.0, optional=True)
     place: Any = number((3,), "m", None, optional=True)
 
     def __post_init__(self) -> None:
@@ -121,7 +121,7 @@ class Sensor(MeasuringPart):
 
     @property
     def reading(self) -> str:  # type: ignore[override]
-        """What it reads."""
+        """Its reading, among READINGS."""
         return self.of
 
     def fault_channels(self, handed: bool) -> int:
@@ -144,7 +144,7 @@ class Sensor(MeasuringPart):
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         bad = super().unphysical(numbers)
-        return bad | {"burst": bad["burst"] | is_short(numbers)}
+        return bad | ({"burst": bad["burst"] | is_short(numbers)} if "burst" in numbers else {})
 
     @property
     def ticks_before(self) -> int:
@@ -154,7 +154,8 @@ class Sensor(MeasuringPart):
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # The names of the numbers that matter for some member.
-        acting = tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
+        given = {name: idle for name, idle in IDLE.items() if name in numbers}
+        acting = tuple(name for name, idle in given.items() if np.any(_whole(name, numbers[name]) != idle))
         acting = tuple(name for name in acting if IDLE_WITHOUT.get(name, name) in acting)
         placed = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
         return (
@@ -244,7 +245,7 @@ def is_short(numbers: Numbers) -> np.ndarray:
 
 def check_burst(part: Any, faults: Faults) -> None:
     """Add a fault where the mean length of a burst is too short."""
-    if is_short({name: np.array([getattr(part, name)]) for name in ("dropout", "burst")})[0]:
+    if part.burst is not None and is_short({name: np.array([getattr(part, name)]) for name in ("dropout", "burst")})[0]:
         least = max(1.0, float(part.dropout) / (1.0 - float(part.dropout)))
         problem = f"is too short for dropout = {float(part.dropout):g}"
         faults.add("burst", float(part.burst), problem, f"give at least {least:g}, or 0")

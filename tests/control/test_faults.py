@@ -143,7 +143,7 @@ def test_a_sensors_fault_is_that_of_an_own_loop(sensed, of):
 @pytest.mark.kernel
 @pytest.mark.slow
 def test_a_fault_of_angles_and_of_a_range():
-    """Of an attitude roll, pitch and yaw; of an altimeter its reading, over a flat floor."""
+    """Roll, pitch and yaw of an attitude; the reading of an altimeter over a flat floor."""
     floor = lw.events.Floor(depth=40.0, clearance=-100.0)
     sensors = [lw.control.Altimeter(), lw.control.Sensor(name="ahrs", of="attitude")]
     faults = [kinds("tilted", "ahrs", "all"), kinds("echo", "altimeter")]
@@ -176,7 +176,7 @@ def test_a_fault_of_angles_and_of_a_range():
 @pytest.mark.kernel
 @pytest.mark.slow
 def test_a_fault_of_a_filters_sensor_is_that_of_an_own_loop():
-    """What the filter gets, number by number: IMU, beams, fixes, depth and heading, some new at some ticks alone."""
+    """Numbers that the filter gets, one by one: IMU, beams, fixes, depth and heading, some new at some ticks alone."""
     sensors = [
         lw.control.IMU(**NOISES), lw.control.DVL(**LOG | {"dropout": 0.3}),
         lw.control.Sensor(name="cell", of="depth", noise=0.02),
@@ -261,7 +261,7 @@ def demanded(result, m):
 
 
 def followed(u, lag):
-    """Where an actuator is after each step, (steps + 1,), from the commands of the steps."""
+    """Places of an actuator after each step, (steps + 1,), from the commands of the steps."""
     n = np.zeros(len(u) + 1)
     for k, command in enumerate(u):
         n[k + 1] = command + math.exp(-H / lag) * (n[k] - command) if lag > 0.0 else command

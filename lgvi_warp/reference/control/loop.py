@@ -92,7 +92,7 @@ class Loop:
                 before[i] = (after[i] if last is None else last) if memory else old
 
     def place(self, name: str, x: State, body: Body) -> Any:
-        """Where an actuator is that lags; None for one that is where it is commanded."""
+        """The place of an actuator that lags; None for one that is where it is commanded."""
         law = self.actuators[name]
         return next(rows for term, rows in zip(body.terms, x.memory, strict=True) if term is law) if law.moves else None
 

@@ -43,9 +43,9 @@ class DVL(MeasuringPart):
         angle: Angle of the beams from the body's third axis [rad]; 30 degrees by default.
         noise: Standard deviation along a beam [m/s]; 0 by default.
         dropout: Probability with which a beam is lost at a tick; 0 by default.
-        burst: Mean length of a run of losses of a beam [ticks], as of `lw.control.Sensor`; 0 by default: each by itself.
-        outlier: Probability with which the reading of a beam is an outlier, each by itself; 0 by default.
-        outlier_std: Standard deviation of what an outlier adds to it [m/s]; 0 by default.
+        burst: Mean length of a run of losses of a beam [ticks], as of `lw.control.Sensor`; by default each is by itself.
+        outlier: Probability with which the reading of a beam is an outlier, each by itself; by default none is.
+        outlier_std: Standard deviation of what an outlier adds to it [m/s].
         every: Ticks from one new reading to the next, a whole number; 1 by default.
         floor: Key of the scene's `lw.events.Floor` that is the ground; "" by default: always an echo.
         least_range: Shortest way along a beam to the floor [m]; 0 by default.
@@ -86,9 +86,9 @@ class DVL(MeasuringPart):
     angle: Any = number((), "rad", np.pi / 6.0, above=0.0, most=MOST_ANGLE)
     noise: Any = number((), "m/s", 0.0, least=0.0)
     dropout: Any = number((), "1", 0.0, least=0.0, most=1.0)
-    burst: Any = number((), "ticks", 0.0, least=0.0)
-    outlier: Any = number((), "1", 0.0, least=0.0, most=1.0)
-    outlier_std: Any = number((), "m/s", 0.0, least=0.0)
+    burst: Any = number((), "ticks", None, least=0.0, optional=True)
+    outlier: Any = number((), "1", None, least=0.0, most=1.0, optional=True)
+    outlier_std: Any = number((), "m/s", None, least=0.0, optional=True)
     every: Any = number((), "ticks", 1.0, least=1.0, most=MOST_TICKS)
     floor: str = text("is not a text", "give the name of a floor among the scene's events", "")
     least_range: Any = number((), "m", 0.0, least=0.0)
@@ -108,7 +108,7 @@ class DVL(MeasuringPart):
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         bad = super().unphysical(numbers)
-        return bad | {"burst": bad["burst"] | is_short(numbers)}
+        return bad | ({"burst": bad["burst"] | is_short(numbers)} if "burst" in numbers else {})
 
     def in_scene(self, faults: Faults, events: Sequence[Term], sensors: Sequence[Any]) -> Any:
         return with_floor(self, faults, events) if self.floor else self
@@ -123,8 +123,9 @@ class DVL(MeasuringPart):
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # What some member has.
         acting = [name for name in ("noise", "dropout") if np.any(numbers[name])]
-        acting += ["burst"] if "dropout" in acting and np.any(numbers["burst"]) else []
-        acting += ["outlier"] if np.any(numbers["outlier"]) and np.any(numbers["outlier_std"]) else []
+        acting += ["burst"] if "dropout" in acting and np.any(numbers.get("burst", 0.0)) else []
+        far = all(np.any(numbers.get(name, 0.0)) for name in ("outlier", "outlier_std"))
+        acting += ["outlier"] if far else []
         acting += [] if self.ground is None else ["grid" if self.ground.on_grid else "floor"]
         acting += ["silent"] if np.any(np.isfinite(numbers["silent_from"])) else []
         return (*acting, HANDED) if self.is_handed else tuple(acting)

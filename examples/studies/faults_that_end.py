@@ -14,7 +14,7 @@ import numpy as np
 import lgvi_warp as lw
 
 KINDS = ["stuck", "slow", "delay", "intermittent"]
-ONSETS, LASTS, END = [5.0, 20.0], [2.0, 10.0], 60.0  # s
+ONSETS, LASTS, END = [0.5, 2.0], [1.0, 3.0, 10.0], 60.0  # s
 NEAR = 10.0  # deg
 
 

@@ -50,12 +50,11 @@ class Fault(Sending):
     | freeze | the last command or reading repeats |
     | slow | x follows with the time constant, from the last one on |
     | delay | x comes later; until the first one has come the last one repeats |
-    | intermittent | x is lost: a command is as of "gain", the last reading stays, an estimator gets none |
+    | intermittent | on and off: a command is as of "gain", the last reading stays, an estimator gets none |
 
-    It begins at the first tick at or after `time`, and is over at the first at or after `until`. It comes and goes where
-    `duty` is below 1: of each `period` from the onset on it acts in the first part. A sensor's fault acts right after the
-    sensor, on what has arrived of its reading. Where an estimator takes the readings, it changes what the estimator gets; a
-    kind with memory goes by those that are new. Laws know nothing of it, and their integrals go on.
+    It begins at the first tick at or after `time`, and is over at the first at or after `until`. A sensor's fault acts right
+    after the sensor, on what has arrived of its reading. Where an estimator takes the readings, it changes what the estimator
+    gets; a kind with memory goes by those that are new. Laws know nothing of it, and their integrals go on.
 
     Args:
         of: Key of the term or of the sensor.
@@ -71,8 +70,8 @@ class Fault(Sending):
         value: Command or reading of a channel that is stuck; by default where it was.
         time_constant: Of a slow one [s]; 1 by default.
         delay: Of a late one [s], to the nearest tick; 1 by default.
-        duty: Part of each period in which it acts; 1 by default.
-        period: From one onset to the next of a fault that comes and goes [s], to the nearest tick; 1 by default.
+        duty: Part of each period, the first, in which an intermittent one acts; 0.5 by default.
+        period: From one onset to the next of an intermittent one [s], to the nearest tick; 1 by default.
         known: Of an actuator: whether the allocation leaves the channel out from `time` on; False by default.
 
     Raises:
@@ -102,7 +101,7 @@ class Fault(Sending):
     value: Any = number((), "unit", None, optional=True)
     time_constant: Any = number((), "s", 1.0, least=0.0)
     delay: Any = number((), "s", 1.0, least=0.0)
-    duty: Any = number((), "1", 1.0, least=0.0, most=1.0)
+    duty: Any = number((), "1", 0.5, least=0.0, most=1.0)
     period: Any = number((), "s", 1.0, above=0.0)
     known: bool = flag(False)
 
@@ -175,8 +174,7 @@ class Fault(Sending):
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # What some member's fault has.
         ways = self._is(numbers)
-        ends, comes = np.isfinite(numbers["until"]), numbers["duty"] < 1.0
-        acting = ways | {"until": ends, "duty": comes}
+        acting = ways | {"until": np.isfinite(numbers["until"]), "duty": ways["intermittent"] & (numbers["duty"] < 1.0)}
         return tuple(name for name in self.every_feature if np.any(acting[name]))
 
     def device_in(self, aligned: bool) -> Any:
@@ -198,11 +196,14 @@ class Fault(Sending):
         value = numbers["value"] if self.value is not None else np.zeros(1)
         gain = np.where(ways["offset"], 1.0, np.where(ways["at value"], 0.0, numbers["gain"]))
         offset = summed * np.where(ways["at value"], value, numbers["offset"])
-        cycle = np.maximum(np.rint(numbers["period"] / T), 1.0)
+        cycle, duty = (
+            np.maximum(np.rint(numbers["period"] / T), 1.0),
+            np.where(ways["intermittent"], numbers["duty"], 1.0),
+        )
         values: dict[str, Any] = {"begin": _tick(numbers["time"], h, T), "gain": gain, "offset": offset}
         acting: dict[str, dict[str, Any]] = {
             "until": {"end": _tick(numbers["until"], h, T)},
-            "duty": {"cycle": cycle, "on": np.ceil(numbers["duty"] * cycle - SAME_TIME)},
+            "duty": {"cycle": cycle, "on": np.ceil(duty * cycle - SAME_TIME)},
             "held": {"holds": 1.0 * ways["held"], "share": np.where(ways["slow"], -np.expm1(-T / slow), 0.0)},
             "placed": {"stuck": 1.0 * ways["placed"]},
             "late": {"late": 1.0 * ways["late"], "ticks": late},

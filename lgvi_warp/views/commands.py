@@ -61,7 +61,7 @@ def faults(result: Result) -> list[Broken]:
     broken = []
     for table in result.provenance["scene"].get("controller", {}).get("faults", ()):
         key = table.get("name") or table["type"]
-        names = ("time", "gain", "offset", "until", "duty")
+        names = ("time", "gain", "offset", "until")
         # Results of earlier versions have faults of one kind, which stay.
         numbers = {name: np.atleast_1d(result.parameters.get(f"{key}.{name}", np.inf)) for name in names}
         first, last = (float(end) for end in (numbers["time"].min(), numbers["time"].max()))
@@ -72,7 +72,6 @@ def faults(result: Result) -> list[Broken]:
             change = " or ".join(f"times {gain} plus {offset}" if each == "gain" else each for each in kinds)
             when = f"from {first:g} s" if first == last else f"from {first:g} s, of the last member from {last:g} s"
             when += f", until {_between(numbers['until'])} s" * bool(np.any(np.isfinite(numbers["until"])))
-            when += ", on and off" * bool(np.any(numbers["duty"] < 1.0))
             head = f"fault {key}" if table.get("name") else "fault"
             channel = f"{table['of']}[{table.get('channel', 0)}]"
             broken.append(Broken(first, f"{head}: {channel} {change}, {when}"))

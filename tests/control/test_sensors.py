@@ -64,7 +64,7 @@ FAULTS = {
     ],
     "plain": [
         dict(of="cell", time=1.55, until=4.0, kind="slow", time_constant=0.3),
-        dict(name="late", of="gyro", channel="all", kind="delay", delay=0.3, time=1.0, duty=0.5, period=1.2),
+        dict(name="late", of="gyro", channel="all", kind="delay", delay=0.3, time=1.0, until=4.5),
         dict(name="loose", of="fix", channel=1, kind="intermittent", time=2.0, until=5.0, duty=0.3, period=0.7),
         dict(name="jammed", of="ahrs", channel=1, kind="stuck", time=3.0, until=3.5),
     ],

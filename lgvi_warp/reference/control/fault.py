@@ -23,7 +23,7 @@ class Fault:
     channel: Any
     value: float | None = None
     kind, time, until, gain, offset = "gain", 0.0, math.inf, 0.0, 0.0
-    time_constant, delay, duty, period, angle, held = 1.0, 1.0, 1.0, 1.0, False, False
+    time_constant, delay, duty, period, angle, held = 1.0, 1.0, 0.5, 1.0, False, False
 
     def __init__(
         self, of: str, channel: Any = 0, time: float = 0.0, gain: float = 0.0, offset: float = 0.0, **more: Any
@@ -41,6 +41,8 @@ class Fault:
         """Whether it acts at a tick, T [s] after the one before. docs/theory/control_loop.md, (C5)."""
         if not self.time / T - SAME <= tick < self.until / T - SAME:
             return False
+        if self.kind != "intermittent":
+            return True
         cycle = max(1, round(self.period / T))
         age = tick - math.ceil(self.time / T - SAME)
         return bool(age % cycle < self.duty * cycle - SAME)

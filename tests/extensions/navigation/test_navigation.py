@@ -415,7 +415,7 @@ def test_faults_of_a_filters_sensors_are_their_own_numbers():
     """A log that loses contact is one that is silent, to the bit; a cell with an offset from the start has that bias."""
     truth, faulty = voyage(80), parts(("depth",))
     faults = [
-        lw.control.Fault(name="contact", of="dvl", channel="all", kind="intermittent", time=2.0, until=5.0),
+        lw.control.Fault(name="contact", of="dvl", channel="all", kind="intermittent", duty=1.0, time=2.0, until=5.0),
         lw.control.Fault(name="shifted", of="cell", kind="offset", offset=0.3),
     ]
     seen = measured(lw.Ensemble(scene(faulty, faults, PERIOD), 2), truth, H)

@@ -294,6 +294,10 @@ def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
         may[bus.ranges[bench.part.key]] = True
     if "send" in bench.roles:
         may[: bus.channels] = may[bus.acting : bus.answer] = True
+    sensor = getattr(bench.part, "sensor", None)
+    if sensor is not None:
+        for first_rows, many in ((bus.ranges, 1), (bus.handed, sensor.handed_rows)):
+            may[first_rows.get(sensor.key, 0) :][: many if sensor.key in first_rows else 0] = True
     if isinstance(bench.part, MeasuringPart):
         row = bus.handed.get(bench.part.key, 0)
         may[row : row + bench.part.handed_rows * bench.part.is_handed] = True

@@ -34,6 +34,9 @@ class Altimeter(Sensor):
         every: Ticks from one new reading to the next, a whole number; 1 by default.
         latency: Ticks until a reading arrives, a whole number; 0 by default.
         dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default.
+        burst: Mean length of a run of lost readings [ticks]; by default each is lost by itself.
+        outlier: Probability with which a reading is an outlier; by default none is.
+        outlier_std: Standard deviation of what an outlier adds to the reading [m].
 
     Raises:
         SceneError: Where the beam has no direction; and as `Sensor`. A scene refuses it where it has no floor, or several and

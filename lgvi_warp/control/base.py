@@ -273,6 +273,11 @@ class MeasuringPart(Part):
     linear: ClassVar[bool] = True
     # Rows of the bus with what it believes, beside the measurement.
     belief_rows: ClassVar[int] = 0
+    # For faults: what it reads, among READINGS; of the rows that it hands on those behind its numbers that tell what is new,
+    # and whether its numbers are sums over a period.
+    reading: ClassVar[str] = ""
+    handed_flags: ClassVar[int] = 0
+    sums: ClassVar[bool] = False
 
     @property
     def estimates_position(self) -> bool:
@@ -288,6 +293,14 @@ class MeasuringPart(Part):
     def handed_rows(self) -> int:
         """Numbers that it hands to an estimator at a tick; 0, the default, for a part that can hand on nothing."""
         return 0
+
+    def fault_channels(self, handed: bool) -> int:
+        """Count of numbers that faults can change; by default that of `reading`, 0 where it reads nothing.
+
+        Args:
+            handed: Whether an estimator takes its readings.
+        """
+        return READINGS.get(self.reading, 0)
 
     @property
     def is_handed(self) -> bool:

@@ -20,9 +20,8 @@ from lgvi_warp.control.altimeter import Altimeter
 from lgvi_warp.control.base import PLAIN_WISHES, READ_BY, SECTIONS, WISHES, Allocation, Bus, Part
 from lgvi_warp.control.callback import Callback, CallbackCommands, refuse_second
 from lgvi_warp.control.delay import MOST_PERIODS, Delay
-from lgvi_warp.control.fault import Fault
+from lgvi_warp.control.fault import ALL, Fault
 from lgvi_warp.control.pseudo_inverse import PseudoInverse
-from lgvi_warp.control.sensor import Sensor
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term, build, check_list
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
@@ -361,18 +360,19 @@ class Controller(Documented):
         return parts
 
     def _check_faults(self, faults: Faults, actuators: Mapping[str, Term]) -> None:
-        counts = {part.key: part.count for part in self.sensors if isinstance(part, Sensor)}
+        handed, least = self.handed_rows, MOST_PERIODS * self.period
+        counts = {part.key: part.fault_channels(part.key in handed) for part in self.sensors}
+        counts = {key: count for key, count in counts.items() if count}
         counts |= {key: term.channels for key, term in actuators.items()}
-        handed = self.handed_rows
         for part in (part for part in self.faults if isinstance(part, Fault)):
             key, count = f"{part.key}.channel", counts.get(part.of, 0)
-            if part.of in handed:
-                problem = "hands its readings to an estimator alone, which no fault changes"
-                faults.add(f"{part.key}.of", part.of, problem, "vary the sensor's own numbers, or leave the fault out")
-            elif part.of not in counts:
+            if part.delay > least:
+                problem, remedy = f"is more than {MOST_PERIODS} periods", f"give at most {least:.9g} s"
+                faults.add(f"{part.key}.delay", float(part.delay), problem, remedy)
+            if part.of not in counts:
                 remedy = closest(part.of, counts)
                 faults.add(f"{part.key}.of", part.of, "is not an actuator and no sensor of this controller", remedy)
-            elif not 0 <= part.channel < count:
+            elif part.channel != ALL and not 0 <= int(part.channel) < count:
                 remedy = f"give 0 to {count - 1}" if count > 1 else "give 0"
                 faults.add(key, part.channel, f"is beyond the {count} of {part.of}", remedy)
 

@@ -7,72 +7,238 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from lgvi_warp.common.declared import checked, flag, text
-from lgvi_warp.control.base import Bus, Sending, first_step
-from lgvi_warp.control.sensor import RANGE, Sensor
+import numpy as np
+
+from lgvi_warp.common.arguments import items_of
+from lgvi_warp.common.declared import checked, declared, flag, text
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.real_numbers import is_whole
+from lgvi_warp.control.base import SAME_TIME, Bus, MeasuringPart, Sending, first_step
+from lgvi_warp.control.delay import MOST_PERIODS
+from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
+KINDS = ("gain", "offset", "stuck", "freeze", "slow", "delay", "intermittent")
+# The channel that stands for all of a part.
+ALL = "all"
+# Readings whose differences are within half a turn.
+ANGLES = ("heading", "attitude")
 
-def _is_int(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+
+def _kinds(faults: Faults, key: str, value: Any) -> None:
+    """Read one of KINDS, or a list of them."""
+    words = [value] if isinstance(value, str) else items_of(value)
+    if not words:
+        faults.add(key, value, "is no kind of fault", f"give one or a list of {', '.join(KINDS)}")
+    for word in words or ():
+        faults.choice(key, word, KINDS)
+
+
+def _is_channel(value: Any) -> bool:
+    return is_whole(value, -MOST_PERIODS) or (isinstance(value, str) and value == ALL)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fault(Sending):
-    """A fault of one channel of an actuator or of a sensor: from a time on, x <- gain * x + offset, x its command or reading.
+    """A fault of an actuator or of a sensor: from one time to another its command or its reading x is another one.
 
-    gain = 0 is dead, or stuck at the offset; 0.5 is weak; gain = 1 with an offset is biased. It begins at the first tick at or
-    after its time. A sensor's fault acts right after the sensor, on what has arrived of its reading.
+    | kind | |
+    | --- | --- |
+    | gain | x <- gain x + offset: dead at a gain of 0, weak below 1 |
+    | offset | x <- x + offset |
+    | stuck | an actuator stays where it is at the onset, a sensor at its last reading; or x <- value |
+    | freeze | the last command or reading repeats |
+    | slow | x follows with the time constant, from the last one on |
+    | delay | x comes later; until the first one has come the last one repeats |
+    | intermittent | on and off: a command is as of "gain", the last reading stays, an estimator gets none |
+
+    It begins at the first tick at or after `time`, and is over at the first at or after `until`. A sensor's fault acts right
+    after the sensor, on what has arrived of its reading. Where an estimator takes the readings, it changes what the estimator
+    gets; a kind with memory goes by those that are new. Laws know nothing of it, and their integrals go on.
 
     Args:
         of: Key of the term or of the sensor.
-        channel: Number of the channel, from 0; of a sensor, of its reading: an attitude has roll, pitch and yaw [rad].
+        channel: Number of the channel, from 0, or "all"; 0 by default. Of a sensor, of its reading: an attitude has roll,
+            pitch and yaw [rad]. Where an estimator takes them, of an `IMU` the means over a period of specific force (0 to 2)
+            [m/s^2] and rate (3 to 5) [rad/s], and of a `DVL` its beams.
+        kind: Kind of fault, or a list of kinds among which `choice` chooses; "gain" by default.
+        choice: Number of the kind in that list, from 0; 0 by default.
         time: When it begins [s]; 0 by default; inf for never.
+        until: When it is over [s]; inf by default: it stays.
         gain: Factor of the command or reading; 0 by default.
         offset: Added to it, in its unit; 0 by default.
-        known: Of an actuator: whether the allocation leaves the channel out from then on; False by default.
+        value: Command or reading of a channel that is stuck; by default where it was.
+        time_constant: Of a slow one [s]; 1 by default.
+        delay: Of a late one [s], to the nearest tick; 1 by default.
+        duty: Part of each period, the first, in which an intermittent one acts; 0.5 by default.
+        period: From one onset to the next of an intermittent one [s], to the nearest tick; 1 by default.
+        known: Of an actuator: whether the allocation leaves the channel out from `time` on; False by default.
 
     Raises:
-        SceneError: Where `of` is no text, `channel` no whole number, or `known` neither true nor false; and as `Term`.
+        SceneError: Where `of` is no text, `channel` no whole number, a kind not known, `until` not after `time`, or `known`
+            neither true nor false; and as `Term`.
 
     Examples:
         >>> import lgvi_warp as lw
         >>> dead = lw.control.Fault(of="thrusters", channel=1, time=20.0, known=True)
         >>> float(dead.gain), dead.known
         (0.0, True)
+        >>> either = lw.control.Fault(of="rudder", kind=["stuck", "slow"], time=20.0, until=30.0)
+        >>> drawn = {"fault.choice": lw.distributions.Choice([0, 1])}
     """
 
     type: ClassVar[str] = "fault"
+    every_feature: ClassVar[tuple[str, ...]] = ("until", "duty", "held", "placed", "late", "lost")
 
     of: str = text("is not a text", "give the name of an actuator or of a sensor", "")
-    channel: int = checked(_is_int, "is not a whole number", "give the number of a channel, from 0", 0)
+    channel: int | str = checked(_is_channel, "is not a whole number", 'give the number of a channel, from 0, or "all"', 0)
+    kind: Any = declared(_kinds, "gain")
+    choice: Any = number((), "1", 0.0, least=0.0)
     time: Any = number((), "s", 0.0, least=0.0, infinite=True)
+    until: Any = number((), "s", np.inf, above=0.0, infinite=True)
     gain: Any = number((), "1", 0.0)
     offset: Any = number((), "unit", 0.0)
+    value: Any = number((), "unit", None, optional=True)
+    time_constant: Any = number((), "s", 1.0, least=0.0)
+    delay: Any = number((), "s", 1.0, least=0.0)
+    duty: Any = number((), "1", 0.5, least=0.0, most=1.0)
+    period: Any = number((), "s", 1.0, above=0.0)
     known: bool = flag(False)
 
-    # The sensor that has it; set for a part of a scene.
+    # The sensor or the actuator that has it; set for a part of a scene.
     sensor: ClassVar[Any] = None
+    actuator: ClassVar[Any] = None
+
+    @property
+    def kinds_listed(self) -> tuple[str, ...]:
+        """Kinds among which `choice` chooses."""
+        return (self.kind,) if isinstance(self.kind, str) else tuple(self.kind)
+
+    def check(self, faults: Faults) -> None:
+        if self.value is not None and "stuck" not in self.kinds_listed:
+            faults.add("value", self.value, "is of a fault of the kind stuck", 'give kind = "stuck", or leave it out')
+        if self.known and np.isfinite(self.until):
+            problem = "ends a fault that the allocation knows, which leaves the channel out for good"
+            faults.add("until", float(self.until), problem, "leave out until, or known")
+        for name, bad in self.unphysical(
+            {name: np.array([value]) for name, value in self.parameters().items()}
+        ).items():
+            if bad.any() and name == "choice":
+                faults.add(
+                    name, float(self.choice), "is no number of a kind", f"give 0 to {len(self.kinds_listed) - 1}"
+                )
+            elif bad.any():
+                problem = f"is not after time = {float(self.time):g}"
+                faults.add(name, float(getattr(self, name)), problem, "give a later one, or leave it out")
+
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        bad = super().unphysical(numbers)
+        time, until, choice = (numbers[name] for name in ("time", "until", "choice"))
+        bad["until"] = bad["until"] | (np.isfinite(time) & (until <= time))
+        bad["choice"] = bad["choice"] | (np.rint(choice) >= len(self.kinds_listed))
+        if hasattr(self, "bus"):
+            bad["delay"] = bad["delay"] | (numbers["delay"] > MOST_PERIODS * self.bus.period)
+        return bad
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        part, measuring = super().wired(bus, others), others[self.of]
-        object.__setattr__(part, "sensor", measuring if isinstance(measuring, Sensor) else None)
+        part, hit = super().wired(bus, others), others[self.of]
+        object.__setattr__(part, "sensor" if isinstance(hit, MeasuringPart) else "actuator", hit)
         return part
 
+    @property
+    def ticks_before(self) -> int:
+        return 1 + int(np.max(self.delay) / self.bus.period) if set(self.kinds_listed) - {"gain", "offset"} else 0
+
+    @property
+    def _is_handed(self) -> bool:
+        """Whether an estimator takes the readings that it changes."""
+        return self.of in self.bus.handed
+
+    @property
+    def _flags(self) -> int:
+        """Rows by which its sensor tells an estimator what is new."""
+        return self.sensor.handed_flags if self._is_handed else 0
+
+    def _is(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        """For each kind the members (1 or n,) that have it, and in addition those with each way of the device code."""
+        kinds = np.array(self.kinds_listed)[np.rint(numbers["choice"]).astype(int)]
+        have = {word: kinds == word for word in KINDS}
+        at_value = have["stuck"] & (self.value is not None)
+        stays = (have["stuck"] & ~at_value) | have["freeze"]
+        reads = self.sensor is not None and not self._is_handed
+        moves = self.actuator is not None and self.actuator.memory
+        held = stays | have["slow"] | (have["intermittent"] & reads)
+        ways = {"held": held, "late": have["delay"], "placed": have["stuck"] & ~at_value & moves}
+        return have | ways | {"lost": have["intermittent"] & bool(self._flags), "at value": at_value}
+
+    def features(self, numbers: Numbers) -> tuple[str, ...]:
+        # What some member's fault has.
+        ways = self._is(numbers)
+        acting = ways | {"until": np.isfinite(numbers["until"]), "duty": ways["intermittent"] & (numbers["duty"] < 1.0)}
+        return tuple(name for name in self.every_feature if np.any(acting[name]))
+
     def device_in(self, aligned: bool) -> Any:
-        # The device code for a command, or for what the sensor reads.
-        return "fault" if self.sensor is None else f"sensor_fault:{self.sensor.of}"
+        # The device code for a command, for numbers in rows, or for what the sensor reads.
+        sensor = self.sensor
+        if sensor is None:
+            return f"fault:{','.join(('delayed' if self.bus.delayed else 'command', *self.chosen))}"
+        in_rows = self._is_handed or sensor.key in self.bus.ranges
+        more = ["angle"] if sensor.reading in ANGLES and "held" in self.chosen else []
+        more += ["flagged"] if self._flags else []
+        return f"fault:{','.join(('rows' if in_rows else sensor.reading, *self.chosen, *more))}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # The numbers, and the rows of the command or the channel of the reading.
-        begin = first_step(numbers["time"], context.h)
-        members_numbers = {"begin": begin, "gain": numbers["gain"], "offset": numbers["offset"]}
-        if self.sensor is not None and self.sensor.of == RANGE:
-            return Packed(members_numbers | {"row": self.bus.ranges[self.of]})
-        if self.sensor is not None:
-            return Packed(members_numbers | {"channel": self.channel})
-        fresh = self.bus.commands[self.of][0] + self.channel
-        rows = {"fresh": fresh, "acting": 0, "before": 0, "delayed": int(self.bus.delayed)}
-        if self.bus.delayed:
-            rows |= {"acting": self.bus.acting + fresh, "before": self.bus.acting + self.bus.channels + fresh}
-        return Packed(members_numbers | rows)
+        # Numbers by member, times in ticks; the rows that it changes.
+        bus, sensor, h = self.bus, self.sensor, context.h
+        ways, T = self._is(numbers), bus.period
+        summed = T if self._is_handed and sensor.sums else 1.0
+        late, slow = np.rint(numbers["delay"] / T), np.maximum(numbers["time_constant"], 1e-30 * T)
+        value = numbers["value"] if self.value is not None else np.zeros(1)
+        gain = np.where(ways["offset"], 1.0, np.where(ways["at value"], 0.0, numbers["gain"]))
+        offset = summed * np.where(ways["at value"], value, numbers["offset"])
+        cycle, duty = (
+            np.maximum(np.rint(numbers["period"] / T), 1.0),
+            np.where(ways["intermittent"], numbers["duty"], 1.0),
+        )
+        values: dict[str, Any] = {"begin": _tick(numbers["time"], h, T), "gain": gain, "offset": offset}
+        acting: dict[str, dict[str, Any]] = {
+            "until": {"end": _tick(numbers["until"], h, T)},
+            "duty": {"cycle": cycle, "on": np.ceil(duty * cycle - SAME_TIME)},
+            "held": {"holds": 1.0 * ways["held"], "share": np.where(ways["slow"], -np.expm1(-T / slow), 0.0)},
+            "placed": {"stuck": 1.0 * ways["placed"]},
+            "late": {"late": 1.0 * ways["late"], "ticks": late},
+            "lost": {"loses": 1.0 * ways["lost"]},
+        }
+        for name in self.chosen:
+            values |= acting[name]
+        lanes = dict(zip(values, repeated(*values.values()), strict=True))
+        sets = int(np.max(np.where(ways["late"], late, 0.0))) + 1 if "late" in self.chosen else 0
+        size, first, flags = self._count, 0 if self.channel == ALL else int(self.channel), self._flags
+        keeps = ("held" in self.chosen) + sets + bool(flags and {"held", "late"} & set(self.chosen))
+        count = size if self.channel == ALL else 1
+        row, flag = first, 0
+        if sensor is None:
+            row += bus.commands[self.of][0]
+        elif self._is_handed:
+            row += bus.handed[self.of]
+            flag = bus.handed[self.of] + size + min(first, max(flags - 1, 0))
+        elif self.of in bus.ranges:
+            row += bus.ranges[self.of]
+        rows = {"row": row, "count": count, "acting": bus.acting + row, "before": bus.acting + bus.channels + row}
+        rows |= {"channel": first, "flag": flag, "flags": int(flags > 1), "sets": sets, "memory": 0, "work": 0}
+        if "placed" in self.chosen:
+            # To be the row where the actuator is: the engine knows it.
+            rows["place_row"] = bus.report + row
+        reads = sensor is not None and not self._is_handed and self.of not in bus.ranges
+        memory = np.zeros((1, count * keeps)) if keeps else None
+        return Packed(lanes | rows, memory=memory, work=size * reads)
+
+    @property
+    def _count(self) -> int:
+        """Channels of what has it."""
+        return int(self.sensor.fault_channels(self._is_handed) if self.sensor else self.actuator.channels)
+
+
+def _tick(time: np.ndarray, h: float, period: float) -> np.ndarray:
+    """The first tick at or after times [s]."""
+    return np.ceil(first_step(time, h) / max(1, round(period / h)) - SAME_TIME)

@@ -12,13 +12,17 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.control.base import READINGS, MeasuringPart
 from lgvi_warp.physics.given_draws import Stream
+from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.noisy import key_of
 
 # Numbers of a sensor, in the order of its device code, with the value that has no effect; those of each axis, those of ticks.
-VECTORS = ("bias", "noise", "drift", "quantum")
+VECTORS = ("bias", "noise", "drift", "quantum", "outlier_std")
 IDLE = dict.fromkeys(VECTORS, 0.0) | {"every": 1.0, "latency": 0.0, "dropout": 0.0, "deepest": np.inf}
-DRAWING = frozenset({"noise", "drift", "dropout"})
+IDLE |= {"burst": 0.0, "outlier": 0.0}
+DRAWING = frozenset({"noise", "drift", "dropout", "outlier"})
+# Numbers that do nothing unless another one acts as well.
+IDLE_WITHOUT = {"burst": "dropout", "outlier": "outlier_std", "outlier_std": "outlier"}
 KEEPING = frozenset({"every", "latency", "dropout", "deepest"})
 # What a sensor may read of a place of its own.
 OF_A_PLACE = ("position", "depth")
@@ -54,6 +58,10 @@ class Sensor(MeasuringPart):
         every: Ticks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
         latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first one is there.
         dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default. The first is never lost.
+        burst: Mean length of a run of lost readings [ticks], at least 1 and dropout / (1 - dropout); by default, or where 0,
+            each is lost by itself. The share of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
+        outlier: Probability with which a reading is an outlier; by default none is.
+        outlier_std: Standard deviation of what an outlier adds to the reading.
         deepest: Depth of its place below which readings are lost, as those of GPS are [m]; inf by default.
         place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
             reads the position or the depth of this place.
@@ -76,6 +84,7 @@ class Sensor(MeasuringPart):
 
     type: ClassVar[str] = "sensor"
     every_feature: ClassVar[tuple[str, ...]] = (*IDLE, PLACED, GIVEN, HANDED)
+    handed_flags: ClassVar[int] = 1
 
     of: str = ""
     noise: Any = number((3,), "unit", 0.0, least=0.0)
@@ -86,7 +95,10 @@ class Sensor(MeasuringPart):
     latency: Any = number((), "ticks", IDLE["latency"], least=0.0, most=MOST_TICKS)
     dropout: Any = number((), "1", IDLE["dropout"], least=0.0, most=1.0)
     deepest: Any = number((), "m", IDLE["deepest"], infinite=True)
-    # Absent where it is not given, so that a sensor without it has no such parameter.
+    # Absent where they are not given, so that a sensor without them has no such parameters.
+    burst: Any = number((), "ticks", None, least=0.0, optional=True)
+    outlier: Any = number((), "1", None, least=0.0, most=1.0, optional=True)
+    outlier_std: Any = number((3,), "unit", None, least=0.0, optional=True)
     place: Any = number((3,), "m", None, optional=True)
 
     def __post_init__(self) -> None:
@@ -107,6 +119,14 @@ class Sensor(MeasuringPart):
         """Count of numbers that it reads."""
         return READINGS[self.of]
 
+    @property
+    def reading(self) -> str:  # type: ignore[override]
+        """Its reading, among READINGS."""
+        return self.of
+
+    def fault_channels(self, handed: bool) -> int:
+        return self.count
+
     def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
         # One number for each that it reads; a sensor of a scalar has scalars.
         return () if self.count == 1 and item.name != PLACED else super().shape_of(item)
@@ -117,9 +137,14 @@ class Sensor(MeasuringPart):
             if value != round(value):
                 near = f"{np.floor(value):g} or {np.ceil(value):g}"
                 faults.add(name, value, "is not a whole number of ticks", f"give {near}")
+        check_burst(self, faults)
         if self.place is not None and not among(self.of, OF_A_PLACE):
             remedy = "leave it out" if not among(self.of, [RANGE]) else "give point"
             faults.add("place", self.place, f"has no meaning for a sensor of {self.of}", remedy)
+
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        bad = super().unphysical(numbers)
+        return bad | ({"burst": bad["burst"] | is_short(numbers)} if "burst" in numbers else {})
 
     @property
     def ticks_before(self) -> int:
@@ -129,7 +154,9 @@ class Sensor(MeasuringPart):
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # The names of the numbers that matter for some member.
-        acting = tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
+        given = {name: idle for name, idle in IDLE.items() if name in numbers}
+        acting = tuple(name for name, idle in given.items() if np.any(_whole(name, numbers[name]) != idle))
+        acting = tuple(name for name in acting if IDLE_WITHOUT.get(name, name) in acting)
         placed = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
         return (
             (*(name for name in acting if name != "latency"), *placed, HANDED) if self.is_handed else (*acting, *placed)
@@ -151,7 +178,10 @@ class Sensor(MeasuringPart):
         """
         count = self.count
         drift = Stream("drift", 1, 0, 1) if count == 1 else Stream("drift", 3, 1)
-        each = (Stream("noise", count), drift, Stream("dropout", 1, 0, 3))
+        each = (
+            *(Stream("noise", count), drift, Stream("dropout", 1, 0, 3)),
+            *(Stream("outlier", 1, 2, 3), Stream("outlier_std", count, 2)),
+        )
         return tuple(stream for stream in each if stream.name in acting)
 
     def device_in(self, aligned: bool) -> Any:
@@ -159,8 +189,6 @@ class Sensor(MeasuringPart):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The numbers that matter, the key of the random numbers, and the rows of what it keeps.
-        from scipy.special import ndtri
-
         chosen, count = set(self.chosen), self.count
         handed = HANDED in chosen
         values: dict[str, Any] = {name: _vector(numbers[name]) for name in VECTORS if name in chosen}
@@ -173,16 +201,54 @@ class Sensor(MeasuringPart):
             values["handed"] = self.bus.handed[self.key]
         if "dropout" in chosen:
             # A reading is lost where a standard normal is below this.
-            values["dropout"] = np.clip(ndtri(numbers["dropout"]), -1e30, 1e30)
+            values["dropout"] = level_of(numbers["dropout"])
+        if "burst" in chosen:
+            values |= burst_levels(numbers)
+        if "outlier" in chosen:
+            values["outlier"] = level_of(numbers["outlier"])
         if chosen & DRAWING and context.given is not None:
-            values["key"] = {"row": 0, **dict.fromkeys(sorted(DRAWING), 0), **context.given.places(self.key)}
+            values["key"] = {
+                "row": 0,
+                **dict.fromkeys(sorted({*DRAWING, "outlier_std"}), 0),
+                **context.given.places(self.key),
+            }
         elif chosen & DRAWING:
             values["key"] = key_of(self.key, context)
         sets = 1 + (int(values["latency"].max()) if "latency" in chosen else 0)
         rows = 9 if self.of == "attitude" else count
         kept = (sets + 1) * rows + 1 if chosen & KEEPING and not handed else 0
-        memory = np.zeros((1, count * ("drift" in chosen) + kept))
+        memory = np.zeros((1, count * ("drift" in chosen) + ("burst" in chosen) + kept))
         return Packed(values | {"sets": sets}, memory=memory)
+
+
+def level_of(chance: np.ndarray) -> np.ndarray:
+    """The level below which a standard normal is with a probability, within float32."""
+    from scipy.special import ndtri
+
+    return np.asarray(np.clip(ndtri(chance), -BOTTOMLESS, BOTTOMLESS))
+
+
+def burst_levels(numbers: Numbers) -> dict[str, np.ndarray]:
+    """Levels of the normals by which readings begin to be lost, and stay so, of a sensor with `dropout` and `burst`."""
+    lost, length = repeated(numbers["dropout"], numbers["burst"])
+    apart = length == 0.0
+    ends = 1.0 / np.where(apart, 1.0, length)
+    begins = np.where(lost < 1.0, lost * ends / np.where(lost < 1.0, 1.0 - lost, 1.0), 1.0)
+    return {"begins": level_of(np.where(apart, lost, begins)), "stays": level_of(np.where(apart, lost, 1.0 - ends))}
+
+
+def is_short(numbers: Numbers) -> np.ndarray:
+    """Whether the mean length of a burst is too short for the share of lost readings, (n,)."""
+    lost, length = repeated(numbers["dropout"], numbers["burst"])
+    return np.asarray((length > 0.0) & ((length < 1.0) | (lost > (1.0 - lost) * length)) & (lost < 1.0))
+
+
+def check_burst(part: Any, faults: Faults) -> None:
+    """Add a fault where the mean length of a burst is too short."""
+    if part.burst is not None and is_short({name: np.array([getattr(part, name)]) for name in ("dropout", "burst")})[0]:
+        least = max(1.0, float(part.dropout) / (1.0 - float(part.dropout)))
+        problem = f"is too short for dropout = {float(part.dropout):g}"
+        faults.add("burst", float(part.burst), problem, f"give at least {least:g}, or 0")
 
 
 def _vector(values: np.ndarray) -> np.ndarray:

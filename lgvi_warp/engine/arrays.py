@@ -142,6 +142,8 @@ class Lanes:
 
 # The field of an event's struct that is filled in with the row of the account of the energy used.
 ACCOUNT_FIELD = "account_row"
+# That of a part's struct with the row of the memory where an actuator is, by the row of the bus in which it reports that.
+PLACE_FIELD = "place_row"
 # The struct of a law that is held to its own rows: its numbers, and where its rows lie (lgvi_kernels.maps.bounded).
 FIELDS = ("own", "bounds")
 
@@ -210,6 +212,7 @@ class LawArrays:
         row, memory = 1, bus
         self.account = -1 if account is None else bus + sum(map(memory_rows, laws[:account]))
         self.places, self.remembered = [], []
+        moving: dict[int, int] = {}
         for law in laws:
             # The table's first row is none's: it is 0, and what a law without rows reads.
             size, end = row_count(law), memory + memory_rows(law)
@@ -218,6 +221,11 @@ class LawArrays:
             row_fields: dict[str, Any] = {name: place for name, place, part in wanted if part is not None}
             if ACCOUNT_FIELD in law.values:
                 row_fields[ACCOUNT_FIELD] = self.account
+            if "report" in law.values:
+                moving[law.values["report"]] = memory
+            if PLACE_FIELD in law.values:
+                report = max(row for row in moving if row <= law.values[PLACE_FIELD])
+                row_fields[PLACE_FIELD] = law.values[PLACE_FIELD] - report + moving[report]
             if law.normals is not None:
                 row_fields["key"] = law.values["key"] | {"row": row + size - law.normals.shape[1]}
             ends = (row, row + size - 1) if size else (0, 0)

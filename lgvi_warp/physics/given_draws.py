@@ -33,7 +33,8 @@ class NoiseDraws:
     Attributes:
         of: key of the term or of the sensor.
         stream: what they drive: "force" or "torque" of white noise; "current", and "start" for where it starts; "noise",
-            "drift" or "dropout" of a sensor; "0" or "1", the number of the stream, of a law of your own.
+            "drift", "dropout", "outlier" or "outlier_std" of a sensor; "0" or "1", the number of the stream, of a law of your
+            own.
         first: time of the first draw [s].
         spacing: time from one draw to the next [s].
         count: number of draws.

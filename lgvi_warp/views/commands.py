@@ -61,14 +61,20 @@ def faults(result: Result) -> list[Broken]:
     broken = []
     for table in result.provenance["scene"].get("controller", {}).get("faults", ()):
         key = table.get("name") or table["type"]
-        numbers = {name: np.atleast_1d(result.parameters[f"{key}.{name}"]) for name in ("time", "gain", "offset")}
+        names = ("time", "gain", "offset", "until")
+        # Results of earlier versions have faults of one kind, which stay.
+        numbers = {name: np.atleast_1d(result.parameters.get(f"{key}.{name}", np.inf)) for name in names}
         first, last = (float(end) for end in (numbers["time"].min(), numbers["time"].max()))
         if first <= result.time[-1]:
             gain, offset = (_between(numbers[name]) for name in ("gain", "offset"))
+            kind = table.get("kind", "gain")
+            kinds = [kind] if isinstance(kind, str) else kind
+            change = " or ".join(f"times {gain} plus {offset}" if each == "gain" else each for each in kinds)
             when = f"from {first:g} s" if first == last else f"from {first:g} s, of the last member from {last:g} s"
+            when += f", until {_between(numbers['until'])} s" * bool(np.any(np.isfinite(numbers["until"])))
             head = f"fault {key}" if table.get("name") else "fault"
             channel = f"{table['of']}[{table.get('channel', 0)}]"
-            broken.append(Broken(first, f"{head}: {channel} times {gain} plus {offset}, {when}"))
+            broken.append(Broken(first, f"{head}: {channel} {change}, {when}"))
     return sorted(broken)
 
 

@@ -27,8 +27,11 @@ def scene(sensors, faults=(), period=0.1, events=(), **law):
     return lw.Scene(vehicle, water, [lw.terms.ControlWrench()], controller=controller, events=events)
 
 
-def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
-    """Measurements at each tick, (ticks, members, FIELDS), of motions truth (ticks, members or 1, FIELDS)."""
+def measured(ensemble, truth, h=0.02, dtype="float64", width=4, bus=None):
+    """Measurements at each tick, (ticks, members, FIELDS), of motions truth (ticks, members or 1, FIELDS).
+
+    bus: a list that gets the memory (rows, members) as the last tick leaves it, the rows of the bus first.
+    """
     controller = ensemble.scene.controller
     plan = make_plan(ensemble, "psi_s", h, 1.0, dtype=dtype, width=width)
     n, ticks = ensemble.members, len(truth)
@@ -44,6 +47,9 @@ def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
     out = wp.zeros((packets.count, ticks * FIELDS), dtype=lane(width, plan.spec.real), device="cpu")
     inputs = [given, packets.laws.structs[1].array, packets.laws.table.array, packets.memory, every, h, ticks, out]
     wp.launch(kernel, dim=packets.count, inputs=inputs, device="cpu")
+    if bus is not None:
+        rows_left = packets.laws.memory.view
+        bus.append(rows_left.transpose(1, 0, 2).reshape(rows_left.shape[1], -1)[:, :n].copy())
     seen = out.numpy().reshape(packets.count, ticks, FIELDS, width).transpose(1, 0, 3, 2)
     return seen.reshape(ticks, -1, FIELDS)[:, :n]
 

@@ -41,7 +41,16 @@ def scene(lag, delay=0.0, faults=(), **more):
 def test_the_loop_is_the_twins(method, lag, delay):
     time_constant = LAG if lag else (0.0,) * 6
     steps = 300
-    faults = [lw.control.Fault(of="control_wrench", channel=5, time=4.0, gain=0.5, offset=0.2)]
+    faults = [
+        lw.control.Fault(of="control_wrench", channel=5, time=4.0, gain=0.5, offset=0.2),
+        lw.control.Fault(
+            name="slow", of="control_wrench", channel=4, kind="slow", time=1.03, until=3.5, time_constant=0.4
+        ),
+        lw.control.Fault(name="stuck", of="control_wrench", channel=5, kind="stuck", time=2.0, until=2.6),
+        lw.control.Fault(
+            name="late", of="control_wrench", channel=4, kind="delay", delay=0.3, time=3.0, duty=0.5, period=0.8
+        ),
+    ]
     looped = scene(time_constant, delay * H, faults)
     result = lw.solve(looped, method, h=H, t1=steps * H, save=lw.SaveAt(every=50 * H))
     start = STATE["position"], np.eye(3), STATE["velocity"], STATE["angular_velocity"]

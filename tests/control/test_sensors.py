@@ -19,6 +19,11 @@ from tests.control.bench import measured, scene
 from tests.support.tools import one
 
 MEMBERS, TICKS, PERIOD, H = 6, 60, 0.1, 0.02
+# Columns of a measurement that a sensor reads.
+FIELDS_OF = {
+    "depth": slice(2, 3), "position": slice(0, 3), "velocity": slice(12, 15), "water_velocity": slice(15, 18),
+    "angular_velocity": slice(18, 21),
+}  # fmt: skip
 EPS = {"float64": 2.0**-52, "float32": 2.0**-23}
 
 # Chains of parts, so that few kernels are compiled. No part hides what another does.
@@ -34,8 +39,17 @@ SENSORS = {
         dict(name="gyro", of="angular_velocity", noise=0.01, bias=0.02, drift=0.03),
     ],
     "plain": [
-        dict(name="fix", of="position", noise=0.5, every=4, dropout=0.5),
-        dict(name="cell", of="depth", noise=0.02),
+        dict(
+            name="fix",
+            of="position",
+            noise=0.5,
+            every=4,
+            dropout=0.5,
+            burst=3.0,
+            outlier=0.3,
+            outlier_std=(5.0, 0.0, 2.0),
+        ),
+        dict(name="cell", of="depth", noise=0.02, outlier=0.2, outlier_std=0.5),
         dict(name="ahrs", of="attitude", quantum=(0.1, 0.0, 0.2)),
         dict(name="log", of="velocity", bias=0.3),
         dict(name="gyro", of="angular_velocity", noise=0.01),
@@ -48,7 +62,12 @@ FAULTS = {
         dict(name="lost", of="compass", time=3.0, offset=-1.0),
         dict(name="tilted", of="ahrs", channel=1, time=1.0, gain=1.0, offset=0.2),
     ],
-    "plain": [dict(of="cell", time=1.55)],
+    "plain": [
+        dict(of="cell", time=1.55, until=4.0, kind="slow", time_constant=0.3),
+        dict(name="late", of="gyro", channel="all", kind="delay", delay=0.3, time=1.0, until=4.5),
+        dict(name="loose", of="fix", channel=1, kind="intermittent", time=2.0, until=5.0, duty=0.3, period=0.7),
+        dict(name="jammed", of="ahrs", channel=1, kind="stuck", time=3.0, until=3.5),
+    ],
     "reckoned": [],
 }
 ESTIMATORS = {
@@ -77,7 +96,13 @@ VARIED = {
         "complementary_filter.time_constant": np.array([0.0, 0.1, 1.0, 10.0, 2.0, 1e9]),
     },
     "reckoned": {"flow.bias": 0.01 * np.arange(3 * MEMBERS).reshape(MEMBERS, 3)},
-    "plain": {"cell.noise": 0.01 * np.arange(MEMBERS), "calm.time_constant": np.array([0.0, 0.1, 0.3, 1.0, 2.0, 50.0])},
+    "plain": {
+        "cell.noise": 0.01 * np.arange(MEMBERS),
+        "cell.outlier": np.linspace(0.0, 1.0, MEMBERS),
+        "fix.burst": np.array([0.0, 1.0, 1.5, 3.0, 8.0, 50.0]),
+        "late.delay": np.array([0.0, 0.1, 0.2, 0.5, 1.0, 0.3]),
+        "calm.time_constant": np.array([0.0, 0.1, 0.3, 1.0, 2.0, 50.0]),
+    },
 }
 
 
@@ -240,9 +265,10 @@ def test_each_sensor_and_seed_has_numbers_of_its_own():
     truth = motion(members=1)
     base = chain("plain").controller
     other = [*base.sensors[:4], replace(base.sensors[4], name="second"), *base.sensors[5:]]
+    faults = [fault for fault in base.faults if fault.of != "gyro"]
     errors = []
     for sensors in (base.sensors, other):
-        members = scene(sensors, base.faults, PERIOD)
+        members = scene(sensors, faults, PERIOD)
         errors += [
             measured(lw.Ensemble(members, 1, seed), truth, H)[:, 0, 18] - truth[:, 0, 18] for seed in (0, 1, 2**40)
         ]

@@ -26,8 +26,9 @@ def given_key():
 
 @functools.cache
 def given_ticks():
-    """The struct of a sensor's key. row: of its first normal; noise, drift, dropout: rows from there to those of each."""
-    return struct("GivenTicks", **dict.fromkeys(("row", "noise", "drift", "dropout"), wp.int32))
+    """The struct of a sensor's key. row: of its first normal; the others: rows from there to those of each stream."""
+    names = ("row", "noise", "drift", "dropout", "outlier", "outlier_std")
+    return struct("GivenTicks", **dict.fromkeys(names, wp.int32))
 
 
 GivenKey = given_key()

@@ -56,7 +56,8 @@ class Altimeter(Part):
 
     def begin(self) -> None:
         """No reading yet."""
-        names = ("noise", "bias", "drift", "quantum", "every", "latency", "dropout", "seed0", "seed1", "channel")
+        names = {"noise", "bias", "drift", "quantum", "every", "latency", "dropout", "burst", "outlier", "outlier_std"}
+        names |= {"seed0", "seed1", "channel"}
         self.errors = Sensor(of="depth", **{name: value for name, value in vars(self).items() if name in names})
         self.errors.begin()
         self.reading = 0.0

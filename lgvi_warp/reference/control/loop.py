@@ -8,19 +8,9 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.reference.control import NO_WISH, Measurement, Part
+from lgvi_warp.reference.control.fault import Fault
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.submaps import Body, State, look, water
-
-
-@dataclass(frozen=True)
-class Fault:
-    """From a time [s] on the command of a channel of an actuator is gain * command + offset."""
-
-    of: str
-    channel: int
-    time: float
-    gain: float = 0.0
-    offset: float = 0.0
 
 
 @dataclass
@@ -50,6 +40,8 @@ class Loop:
             law.command = np.zeros_like(law.limit)
             law.held = np.zeros_like(law.limit)
         self.sent, self.unmet = [], np.zeros(6)
+        for fault in self.faults:
+            fault.begin()
 
     def tick(self, x: State, body: Body, h: float) -> None:
         """Measure, guide, control and allocate at the start of step x.step. docs/theory/control_loop.md, (C2)."""
@@ -72,20 +64,45 @@ class Loop:
             w = part.allocate(w, self.actuators)
         self.unmet = w
         self.sent.append((x.step + self.delay, {name: law.command.copy() for name, law in self.actuators.items()}))
+        self.change(x, body, self.every * h)
+
+    def arrived(self, step: int) -> dict[str, Array]:
+        """The last commands that have come by a step."""
+        arrived = [commands for since, commands in self.sent if since <= step]
+        return arrived[-1] if arrived else {name: np.zeros_like(law.limit) for name, law in self.actuators.items()}
+
+    def change(self, x: State, body: Body, T: float) -> None:
+        """Let the faults change what acts in a period T [s], before its commands arrive and from then on.
+
+        docs/theory/control_loop.md, (C5).
+        """
+        tick, end = x.step // self.every, x.step + self.every - 1
+        self.turn = max((since for since, _ in self.sent if since <= end), default=0)
+        self.before, self.after = (
+            {name: value.copy() for name, value in self.arrived(step).items()} for step in (x.step - 1, end)
+        )
+        for fault in self.faults:
+            before, after, i = self.before[fault.of], self.after[fault.of], fault.channel
+            last, place = fault.last, self.place(fault.of, x, body)
+            after[i] = fault.change(tick, T, float(after[i]), None if place is None else float(place[i]))
+            if fault.acts(tick, T):
+                stays = fault.kind == "stuck" and fault.value is None
+                memory = fault.kind in ("freeze", "slow", "delay")
+                old = after[i] if stays else fault.changed(float(before[i]), 0, T, None)
+                before[i] = (after[i] if last is None else last) if memory else old
+
+    def place(self, name: str, x: State, body: Body) -> Any:
+        """The place of an actuator that lags; None for one that is where it is commanded."""
+        law = self.actuators[name]
+        return next(rows for term, rows in zip(body.terms, x.memory, strict=True) if term is law) if law.moves else None
 
     def act(self, step: int, h: float) -> None:
-        """Let the actuators hold what acts in a step: the last commands that have come, with the faults that have begun.
+        """Let the actuators hold what acts in a step: the last commands that have come, as the faults leave them.
 
-        docs/theory/control_loop.md, (C4), (C5).
+        docs/theory/control_loop.md, (C4).
         """
-        arrived = [commands for since, commands in self.sent if since <= step]
-        tick_time = step // self.every * self.every * h
         for name, law in self.actuators.items():
-            held = arrived[-1][name].copy() if arrived else np.zeros_like(law.limit)
-            for fault in self.faults:
-                if fault.of == name and tick_time + 1e-6 * h >= fault.time:
-                    held[fault.channel] = fault.gain * held[fault.channel] + fault.offset
-            law.held = held
+            law.held = (self.after if step >= self.turn else self.before)[name]
 
 
 def closed_loop(

@@ -13,6 +13,28 @@ from lgvi_warp.reference.random import normals
 from lgvi_warp.reference.rotation import Array
 
 
+def chance_of(z: float) -> float:
+    """Phi of a standard normal, which is uniform."""
+    return 0.5 * math.erfc(-z / math.sqrt(2.0))
+
+
+class Losses:
+    """Losses with a probability, each by itself, or in runs of a mean length (Gilbert 1960)."""
+
+    def __init__(self, dropout: float, burst: float) -> None:
+        self.dropout, self.burst = dropout, burst
+        self.lost: bool | None = None
+
+    def next(self, u: float) -> bool:
+        """Whether the next one is lost, by a uniform number."""
+        chance = self.dropout
+        if self.burst > 0.0 and self.lost is not None and self.dropout < 1.0:
+            begins = self.dropout / (1.0 - self.dropout) / self.burst
+            chance = 1.0 - 1.0 / self.burst if self.lost else begins
+        self.lost = bool(u < chance)
+        return self.lost
+
+
 class Sensor(Part):
     """Numbers as those of `lw.control.Sensor`, those of a 3-vector for all axes or (3,); the key of its random numbers.
 
@@ -20,7 +42,7 @@ class Sensor(Part):
     """
 
     key, handed = "sensor", None
-    noise = bias = drift = quantum = dropout = 0.0
+    noise = bias = drift = quantum = dropout = burst = outlier = outlier_std = 0.0
     deepest, place = math.inf, None
     every, latency = 1, 0
     seed0 = seed1 = channel = 0
@@ -29,6 +51,7 @@ class Sensor(Part):
         """No reading yet, and no walk."""
         self.walk: Any = 0.0
         self.arrived: list[Measurement] = []
+        self.losses = Losses(self.dropout, self.burst)
 
     def drawn(self, y: Measurement, stream: int) -> Array:
         """Four standard normals of this tick."""
@@ -40,16 +63,16 @@ class Sensor(Part):
         if self.place is not None:
             arm = y.R @ self.place
             y = replace(y, position=y.position + (arm if count == 3 else arm * [0.0, 0.0, 1.0]))
-        first, second = (self.drawn(y, stream) for stream in (0, 1))
-        z = shifted(y, self.of, self.bias + self.walk + self.noise * first[:count])
+        first, second, third = (self.drawn(y, stream) for stream in (0, 1, 2))
+        stray = self.outlier_std * third[:count] * (chance_of(third[3]) < self.outlier)
+        z = shifted(y, self.of, self.bias + self.walk + self.noise * first[:count] + stray)
         steps = first[1:2] if count == 1 else second[:3]
         self.walk = self.walk + self.drift * np.sqrt(y.period) * steps
         v, q = values(z, self.of), np.broadcast_to(self.quantum, count)
         if np.any(q > 0.0):
             v = np.where(q > 0.0, np.rint(v / np.where(q > 0.0, q, 1.0)) * q, v)
             z = with_values(z, self.of, v)
-        # Phi of a standard normal is uniform.
-        lost = 0.5 * math.erfc(-first[3] / math.sqrt(2.0)) < self.dropout or y.position[2] > self.deepest
+        lost = self.losses.next(chance_of(first[3])) or y.position[2] > self.deepest
         old = y.tick % self.every != 0
         if self.handed is not None:
             self.handed[self.key] = {"values": values(z, self.of), "fresh": not (old or lost)}

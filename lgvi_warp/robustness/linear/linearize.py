@@ -281,7 +281,7 @@ def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool
 
 
 # What of a sensor changes from tick to tick by chance, in whatever motion; and beside it what linear models take as such.
-RANDOM = ("noise", "drift")
+RANDOM = ("noise", "drift", "outlier")
 OF_MEAN_ZERO = (*RANDOM, "quantum")
 # How the message of what a linear loop leaves out begins.
 AS_LINEAR = "of the loop as a linear one: "

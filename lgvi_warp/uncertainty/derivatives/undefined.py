@@ -36,6 +36,14 @@ OF_SENSORS = {
     "every": "is a whole number of ticks",
     "latency": "is a whole number of ticks",
     "quantum": "is the step by which readings jump",
+    "burst": "decides which readings are lost, one by one",
+    "outlier": "decides which readings are outliers, one by one",
+}
+OF_FAULTS = {
+    "choice": "is the number of a kind",
+    "delay": "is that of a whole number of ticks",
+    "duty": "decides at which ticks the fault acts",
+    "period": "is that of a whole number of ticks",
 }
 BEFORE = 'ask for a quantity at a time before, "depth at 30", or for when it ends, "end_time NAME"'
 
@@ -49,8 +57,10 @@ def of_number(scene: Any, target: Target) -> str | None:
         reason = "lasts a whole number of steps"
     elif isinstance(part, Sensor):
         reason = OF_SENSORS.get(name)
-    elif isinstance(part, Fault) and name == "time":
+    elif isinstance(part, Fault) and name in ("time", "until"):
         reason = "is that of the tick at or after it"
+    elif isinstance(part, Fault):
+        reason = OF_FAULTS.get(name)
     elif isinstance(part, Waypoints) and name in ("radius", "loiter_turns", "loiter_time"):
         reason = "decides at which tick a leg is done"
     elif isinstance(part, Docking) and name in ("mouth", "funnel", "judged"):

@@ -76,7 +76,8 @@ def test_estimates_are_the_twins_over_ten_minutes():
 
 
 def test_a_log_and_a_gyroscope_without_a_filter_are_the_twins():
-    listed = [lw.control.DVL(**LOG | {"dropout": 0.3, "silent_from": 20.0, "silent_to": 25.0}), lw.control.IMU(**UNIT)]
+    rough = {"dropout": 0.3, "burst": 3.0, "outlier": 0.1, "outlier_std": 0.5, "silent_from": 20.0, "silent_to": 25.0}
+    listed = [lw.control.DVL(**LOG | rough), lw.control.IMU(**UNIT)]
     truth = voyage(300)
     seen = measured(fleet(listed, 2), truth, H)
     for member in range(2):
@@ -409,9 +410,28 @@ def test_what_does_not_fit_is_said(name):
         scene(sensors, period=PERIOD)
 
 
-def test_a_fault_of_a_sensor_that_a_filter_uses_is_refused():
-    with pytest.raises(lw.SceneError, match="hands its readings to an estimator"):
-        scene(parts(("depth",)), [lw.control.Fault(of="cell", time=1.0)], PERIOD)
+@pytest.mark.slow
+def test_faults_of_a_filters_sensors_are_their_own_numbers():
+    """A log that loses contact is one that is silent, to the bit; a cell with an offset from the start has that bias."""
+    truth, faulty = voyage(80), parts(("depth",))
+    faults = [
+        lw.control.Fault(name="contact", of="dvl", channel="all", kind="intermittent", duty=1.0, time=2.0, until=5.0),
+        lw.control.Fault(name="shifted", of="cell", kind="offset", offset=0.3),
+    ]
+    seen = measured(lw.Ensemble(scene(faulty, faults, PERIOD), 2), truth, H)
+    silent = parts(("depth",), log_numbers=LOG | {"silent_from": 2.0, "silent_to": 5.0})
+    silent[2] = dataclasses.replace(silent[2], bias=0.3)
+    assert np.abs(seen - measured(lw.Ensemble(scene(silent, (), PERIOD), 2), truth, H)).max() < 1e-12
+    well = measured(fleet(parts(("depth",)), 2), truth, H)
+    assert np.abs(seen - well)[:, :, 2].max() > 0.1
+
+
+def test_a_channel_beyond_those_of_a_sensor_of_a_filter_is_refused():
+    for of, count in (("dvl", 4), ("imu", 6), ("cell", 1)):
+        with pytest.raises(lw.SceneError, match=f"is beyond the {count} of {of}"):
+            scene(parts(("depth",)), [lw.control.Fault(of=of, channel=count, time=1.0)], PERIOD)
+    with pytest.raises(lw.SceneError, match="is no actuator and no sensor"):
+        scene(parts(("depth",)), [lw.control.Fault(of="error_state_filter", time=1.0)], PERIOD)
 
 
 def test_what_a_filter_believes_is_not_there_without_one():

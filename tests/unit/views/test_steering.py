@@ -73,15 +73,18 @@ def test_faults_are_those_that_begin_during_the_run():
     assert faults(dataclasses.replace(result, time=result.time / 2.0)) == []
     parts = AUTOPILOT.to_dict()
     parts["controller"]["faults"] += [{"name": "late", "type": "fault", "of": "compass", "time": float("inf")},
-                                      {"type": "fault", "of": "depth_cell", "time": 10.0, "gain": 0.5}]  # fmt: skip
+                                      {"type": "fault", "of": "depth_cell", "time": 10.0, "gain": 0.5},
+                                      {"name": "ends", "type": "fault", "of": "compass", "kind": ["slow", "freeze"],
+                                       "time": 5.0, "until": 7.5}]  # fmt: skip
     result = steered(scene=lw.Scene.from_dict(parts))
     assert [fault.text for fault in faults(result)] == [
+        "fault ends: compass[0] slow or freeze, from 5 s, until 7.5 s",
         "fault: depth_cell[0] times 0.5 plus 0, from 10 s",
         "fault stuck_rudder: control_fins[0] times 0 plus 0.1, from 40 s",
     ]
     varied = dict(result.parameters) | {"stuck_rudder.time": np.linspace(30.0, 50.0, 40),
                                         "stuck_rudder.offset": np.linspace(0, 0.1, 40)}  # fmt: skip
-    said = faults(dataclasses.replace(result, parameters=varied))[1]
+    said = faults(dataclasses.replace(result, parameters=varied))[-1]
     assert said.time == 30.0
     assert (
         said.text

@@ -12,7 +12,7 @@ from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.readings import make_reading, remember3, remembered3
 
 # Features that draw random numbers, and those by which a reading is not that of its own tick.
-DRAWING = ("noise", "drift", "dropout")
+DRAWING = ("noise", "drift", "dropout", "outlier")
 KEEPING = ("every", "latency", "dropout", "deepest")
 
 
@@ -45,16 +45,35 @@ def on_grid(v: Any, q: Any):
     )
 
 
-def make_kept(reading, drifting, rare, late):
-    """(y, p, lost) -> y with the reading that has arrived by now."""
-    count, rows, put, taken = reading.count, reading.rows, reading.put, reading.taken
+@wp.func
+def lost_in_bursts(y: Any, p: Any, z: Any, row: int):
+    """A chain of two states (Gilbert 1960, a row of the memory): `stays` lost, or `begins` to be; at first by its share."""
+    unity = ones(z)
+    zero = unity - unity
+    level = positive(remembered(y, row), p.stays, p.begins)
+    if y.step == y.start:
+        level = p.dropout
+    lost = level - z
+    remember(y, row, positive(lost, unity, zero))
+    return lost
+
+
+@wp.func
+def strayed(chance: Any, z: Any, size: Any):
+    """`size` where a standard normal is below that of the chance, else 0: an outlier."""
+    zero = z - z
+    far = chance - z
+    return vec3(positive(far, size.x, zero), positive(far, size.y, zero), positive(far, size.z, zero))
+
+
+def make_kept(reading, rare, late, before):
+    """(y, p, lost) -> y with the reading that has arrived by now; before: rows of the memory before those that it keeps."""
+    rows, put, taken = reading.rows, reading.put, reading.taken
 
     @wp.func
     def kept(y: Any, p: Any, lost: Any):
         """The reading that has arrived by now; `lost` is positive where that of this tick never will."""
-        at = p.memory
-        if wp.static(drifting):
-            at += wp.static(count)
+        at = p.memory + wp.static(before)
         unity = ones(y.position.x)
         half = y.h.dtype(0.5) * unity
         age = at
@@ -91,7 +110,7 @@ def make_kept(reading, drifting, rare, late):
     return kept
 
 
-def make_given(count, noisy, drifting, lossy):
+def make_given(count, noisy, drifting, lossy, bursting, wild):
     """(y, p, e) -> e with walk and noise, and whether the reading is lost, by the normals that the call gives."""
     # Functions that this sensor needs alone; a kernel without given draws has none of them.
     from lgvi_kernels.lanes.given_draws import first_of_tick, scalar_of_tick, vector_of_tick
@@ -105,7 +124,14 @@ def make_given(count, noisy, drifting, lossy):
         if wp.static(noisy):
             e = e + p.noise * drawn_noise(y, p.key.row + p.key.noise)
         if wp.static(lossy):
-            lost = p.dropout - scalar_of_tick(y, p.key.row + p.key.dropout)
+            chance = scalar_of_tick(y, p.key.row + p.key.dropout)
+            if wp.static(bursting):
+                lost = lost_in_bursts(y, p, chance, p.memory + wp.static(count * drifting))
+            else:
+                lost = p.dropout - chance
+        if wp.static(wild):
+            size = p.outlier_std * drawn_noise(y, p.key.row + p.key.outlier_std)
+            e = e + strayed(p.outlier, scalar_of_tick(y, p.key.row + p.key.outlier), size)
         if wp.static(drifting):
             spread = root(y.period * ones(y.position.x))
             if wp.static(count == 1):
@@ -131,23 +157,26 @@ def made(features):
     handed, deep, placed = (name in others for name in ("handed", "deepest", "place"))
     reading = make_reading(of)
     count, values, with_values, shifted = reading.count, reading.values, reading.with_values, reading.shifted
-    biased, noisy, drifting, quantised, rare, late, lossy = (
-        name in others for name in ("bias", "noise", "drift", "quantum", "every", "latency", "dropout")
+    biased, noisy, drifting, quantised, rare, late, lossy, bursting, wild = (
+        name in others
+        for name in ("bias", "noise", "drift", "quantum", "every", "latency", "dropout", "burst", "outlier")
     )
     listed = "given" in others and any(name in others for name in DRAWING)
     draws = not listed and any(name in others for name in DRAWING)
     keeps = any(name in others for name in KEEPING) and not handed
-    kept = make_kept(reading, drifting, rare, late)
-    given = make_given(count, noisy, drifting, lossy) if listed else kept
+    kept = make_kept(reading, rare, late, count * drifting + bursting)
+    given = make_given(count, noisy, drifting, lossy, bursting, wild) if listed else kept
 
     def fields(width, real):
         """Of Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings it keeps.
 
-        Its rows: the walk; how many ticks the last reading is old; that of this tick; `sets` readings, the latest first.
+        Its rows: the walk; whether it is lost, in bursts; how many ticks the last reading is old; that of this tick; `sets`
+        readings, the latest first.
         """
         Lane, Lane3 = lane(width, real), lane3(width, real)
-        vectors = {name: Lane3 for name in others if name in ("bias", "noise", "drift", "quantum")}
-        lanes = {name: Lane for name in others if name in KEEPING}
+        vectors = {name: Lane3 for name in others if name in ("bias", "noise", "drift", "quantum", "outlier_std")}
+        lanes = {name: Lane for name in others if name in (*KEEPING, "outlier")}
+        lanes |= {"begins": Lane, "stays": Lane} if bursting else {}
         key = {"key": noise_key(width)} if draws else {}
         if listed:
             from lgvi_kernels.lanes.given_draws import given_ticks
@@ -194,8 +223,14 @@ def made(features):
             four = drawn(unity, p.key, y.tick, 0)
             if wp.static(noisy):
                 e = e + p.noise * vec3(quarter(four, 0), quarter(four, 1), quarter(four, 2))
-            if wp.static(lossy):
+            if wp.static(bursting):
+                lost = lost_in_bursts(y, p, quarter(four, 3), p.memory + wp.static(count * drifting))
+            elif wp.static(lossy):
                 lost = p.dropout - quarter(four, 3)
+            if wp.static(wild):
+                stray = drawn(unity, p.key, y.tick, 2)
+                size = p.outlier_std * vec3(quarter(stray, 0), quarter(stray, 1), quarter(stray, 2))
+                e = e + strayed(p.outlier, quarter(stray, 3), size)
             if wp.static(drifting):
                 spread = root(y.period * unity)
                 if wp.static(count == 1):
@@ -212,7 +247,7 @@ def made(features):
             e, lost = given(y, p, e)
         if wp.static(deep):
             lost = positive(y.position.z - p.deepest, unity, lost)
-        if wp.static(biased or noisy or drifting):
+        if wp.static(biased or noisy or drifting or wild):
             y = shifted(y, e)
         if wp.static(quantised):
             y = with_values(y, on_grid(values(y), p.quantum))

@@ -13,7 +13,7 @@ from lgvi_warp.common.declared import text
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.control.base import MeasuringPart
 from lgvi_warp.control.over_floor import packed_over, with_floor
-from lgvi_warp.control.sensor import BOTTOMLESS, HANDED, MOST_TICKS
+from lgvi_warp.control.sensor import BOTTOMLESS, HANDED, MOST_TICKS, burst_levels, check_burst, is_short, level_of
 from lgvi_warp.extensions.navigation import DEVICE
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, own
 from lgvi_warp.physics.terms.noisy import key_of
@@ -43,6 +43,9 @@ class DVL(MeasuringPart):
         angle: Angle of the beams from the body's third axis [rad]; 30 degrees by default.
         noise: Standard deviation along a beam [m/s]; 0 by default.
         dropout: Probability with which a beam is lost at a tick; 0 by default.
+        burst: Mean length of a run of losses of a beam [ticks], as of `lw.control.Sensor`; by default each is by itself.
+        outlier: Probability with which the reading of a beam is an outlier, each by itself; by default none is.
+        outlier_std: Standard deviation of what an outlier adds to it [m/s].
         every: Ticks from one new reading to the next, a whole number; 1 by default.
         floor: Key of the scene's `lw.events.Floor` that is the ground; "" by default: always an echo.
         least_range: Shortest way along a beam to the floor [m]; 0 by default.
@@ -64,7 +67,18 @@ class DVL(MeasuringPart):
     type: ClassVar[str] = "dvl"
     device: ClassVar[str] = f"{DEVICE}.dvl"
     linear: ClassVar[bool] = False
-    every_feature: ClassVar[tuple[str, ...]] = ("noise", "dropout", "floor", "grid", "silent", HANDED)
+    every_feature: ClassVar[tuple[str, ...]] = (
+        "noise",
+        "dropout",
+        "burst",
+        "outlier",
+        "floor",
+        "grid",
+        "silent",
+        HANDED,
+    )
+    reading: ClassVar[str] = "velocity"
+    handed_flags: ClassVar[int] = BEAMS
     # The floor; set for a part of a scene.
     ground: ClassVar[Any] = None
 
@@ -72,6 +86,9 @@ class DVL(MeasuringPart):
     angle: Any = number((), "rad", np.pi / 6.0, above=0.0, most=MOST_ANGLE)
     noise: Any = number((), "m/s", 0.0, least=0.0)
     dropout: Any = number((), "1", 0.0, least=0.0, most=1.0)
+    burst: Any = number((), "ticks", None, least=0.0, optional=True)
+    outlier: Any = number((), "1", None, least=0.0, most=1.0, optional=True)
+    outlier_std: Any = number((), "m/s", None, least=0.0, optional=True)
     every: Any = number((), "ticks", 1.0, least=1.0, most=MOST_TICKS)
     floor: str = text("is not a text", "give the name of a floor among the scene's events", "")
     least_range: Any = number((), "m", 0.0, least=0.0)
@@ -83,10 +100,15 @@ class DVL(MeasuringPart):
         if float(self.every) != round(float(self.every)):
             near = f"{np.floor(self.every):g} or {np.ceil(self.every):g}"
             faults.add("every", float(self.every), "is not a whole number of ticks", f"give {near}")
+        check_burst(self, faults)
         for first, last in (("least_range", "greatest_range"), ("silent_from", "silent_to")):
             begin, end = float(getattr(self, first)), float(getattr(self, last))
             if np.isfinite(end) and end <= begin:
                 faults.add(last, end, f"is not above {first} = {begin:g}", "give a larger one, or leave it out")
+
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        bad = super().unphysical(numbers)
+        return bad | ({"burst": bad["burst"] | is_short(numbers)} if "burst" in numbers else {})
 
     def in_scene(self, faults: Faults, events: Sequence[Term], sensors: Sequence[Any]) -> Any:
         return with_floor(self, faults, events) if self.floor else self
@@ -95,9 +117,15 @@ class DVL(MeasuringPart):
     def handed_rows(self) -> int:
         return 2 * BEAMS
 
+    def fault_channels(self, handed: bool) -> int:
+        return BEAMS if handed else super().fault_channels(handed)
+
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # What some member has.
         acting = [name for name in ("noise", "dropout") if np.any(numbers[name])]
+        acting += ["burst"] if "dropout" in acting and np.any(numbers.get("burst", 0.0)) else []
+        far = all(np.any(numbers.get(name, 0.0)) for name in ("outlier", "outlier_std"))
+        acting += ["outlier"] if far else []
         acting += [] if self.ground is None else ["grid" if self.ground.on_grid else "floor"]
         acting += ["silent"] if np.any(np.isfinite(numbers["silent_from"])) else []
         return (*acting, HANDED) if self.is_handed else tuple(acting)
@@ -107,18 +135,20 @@ class DVL(MeasuringPart):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The numbers, the key of the random numbers, and the rows of the last velocity, and of the beams.
-        from scipy.special import ndtri
-
         values: dict[str, Any] = {name: numbers[name] for name in ("place", "noise", "least_range")}
         for name in ("greatest_range", "silent_from", "silent_to"):
             values[name] = np.minimum(numbers[name], BOTTOMLESS)
         values |= {"ahead": DIAGONAL * np.sin(numbers["angle"]), "down": np.cos(numbers["angle"])}
         values |= {"every": np.rint(numbers["every"]), "key": key_of(self.key, context)}
         # A beam is lost where a standard normal is below this.
-        values["dropout"] = np.clip(ndtri(numbers["dropout"]), -BOTTOMLESS, BOTTOMLESS)
+        values["dropout"] = level_of(numbers["dropout"])
+        values |= burst_levels(numbers) if "burst" in self.chosen else {}
+        if "outlier" in self.chosen:
+            values |= {"outlier": level_of(numbers["outlier"]), "outlier_std": numbers["outlier_std"]}
         # Without a filter its own memory has the rows of the beams, behind the last velocity.
         values["handed"] = self.bus.handed[self.key] if self.is_handed else 0
-        memory = np.zeros((1, 0 if self.is_handed else 3 + 2 * BEAMS))
+        first = 0 if self.is_handed else 3 + 2 * BEAMS
+        memory = np.zeros((1, first + BEAMS * ("burst" in self.chosen)))
         if "grid" in self.chosen:
             reach = {"most": np.minimum(numbers["greatest_range"], FARTHEST)}
             return packed_over(self.ground, context, values | reach)._replace(memory=memory)

@@ -61,6 +61,8 @@ class IMU(MeasuringPart):
     device: ClassVar[str] = f"{DEVICE}.imu"
     linear: ClassVar[bool] = False
     every_feature: ClassVar[tuple[str, ...]] = (*NOISES, HANDED)
+    reading: ClassVar[str] = "angular_velocity"
+    sums: ClassVar[bool] = True
 
     place: Any = number((3,), "m", (0.0, 0.0, 0.0))
     accelerometer_noise: Any = number((3,), "m/s^1.5", 0.0, least=0.0)
@@ -79,6 +81,10 @@ class IMU(MeasuringPart):
     @property
     def handed_rows(self) -> int:
         return HANDED_ROWS
+
+    def fault_channels(self, handed: bool) -> int:
+        # Behind them are the biases, which are no readings.
+        return HANDED_ROWS // 2 if handed else super().fault_channels(handed)
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # The noises that some member has.

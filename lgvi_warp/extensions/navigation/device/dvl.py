@@ -12,7 +12,7 @@ from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.altimeter import range_to_floor
 from lgvi_kernels.laws.control.readings import remember3, remembered3
-from lgvi_kernels.laws.control.sensor import drawn, is_due
+from lgvi_kernels.laws.control.sensor import drawn, is_due, lost_in_bursts
 
 
 @wp.func
@@ -37,12 +37,13 @@ def either(a: Any, b: Any, c: Any, d: Any):
 def made(features):
     """The device code of a log.
 
-    features: "noise", "dropout", "silent" where some member has them, "floor" or "grid" where there is one, flat or on a grid,
-    and "handed" where a filter takes the beams.
+    features: "noise", "dropout", "burst", "outlier", "silent" where some member has them, "floor" or "grid" where there is
+    one, flat or on a grid, and "handed" where a filter takes the beams.
     """
-    noisy, lossy, floored, gridded, silent, handed = (
-        name in features for name in ("noise", "dropout", "floor", "grid", "silent", "handed")
+    noisy, lossy, bursting, wild, floored, gridded, silent, handed = (
+        name in features for name in ("noise", "dropout", "burst", "outlier", "floor", "grid", "silent", "handed")
     )
+    first = 0 if handed else 11
 
     def params(width, real):
         """Params: the numbers by member; key of the random numbers; first of its rows of memory, and of what it hands on.
@@ -51,7 +52,8 @@ def made(features):
         """
         names = ("noise", "ahead", "down", "every", "dropout", "least_range", "greatest_range")
         ground = ("most",) if gridded else ("floor",)
-        lanes = dict.fromkeys((*names, *ground, "silent_from", "silent_to"), lane(width, real))
+        more = ("begins", "stays") * bursting + ("outlier", "outlier_std") * wild
+        lanes = dict.fromkeys((*names, *ground, "silent_from", "silent_to", *more), lane(width, real))
         words = dict.fromkeys(("memory", "handed"), wp.int32)
         grid = grid_fields(width, real) if gridded else {}
         return struct("DVL", place=lane3(width, real), **lanes, **grid, key=noise_key(width), **words)
@@ -122,6 +124,11 @@ def made(features):
         chance = four
         if wp.static(lossy):
             chance = drawn(unity, p.key, y.tick, 1)
+        size = four
+        stray = four
+        if wp.static(wild):
+            size = drawn(unity, p.key, y.tick, 2)
+            stray = drawn(unity, p.key, y.tick, 3)
         new = quiet(y, p)
         altitude = zero
         if wp.static(floored):
@@ -135,7 +142,12 @@ def made(features):
             fresh = new
             if wp.static(noisy):
                 along = along + p.noise * quarter(four, i)
-            if wp.static(lossy):
+            if wp.static(wild):
+                along = along + positive(p.outlier - quarter(stray, i), p.outlier_std * quarter(size, i), zero)
+            if wp.static(bursting):
+                lost = lost_in_bursts(y, p, quarter(chance, i), p.memory + wp.static(first) + i)
+                fresh = positive(lost, zero, fresh)
+            elif wp.static(lossy):
                 fresh = positive(p.dropout - quarter(chance, i), zero, fresh)
             if wp.static(floored):
                 fresh = echo(fresh, altitude, dot(u, y.down), p)

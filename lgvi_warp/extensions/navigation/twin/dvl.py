@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.reference.control import Measurement, Part
+from lgvi_warp.reference.control.sensor import Losses, chance_of
 from lgvi_warp.reference.random import normals
 from lgvi_warp.reference.rotation import Array
 
@@ -33,17 +34,19 @@ class DVL(Part):
     key, handed, ground = "dvl", None, None
     place = np.zeros(3)
     angle, noise, dropout, every = math.radians(30.0), 0.0, 0.0, 1
+    burst = outlier = outlier_std = 0.0
     floor, least_range, greatest_range, silent_from, silent_to = math.inf, 0.0, math.inf, math.inf, math.inf
     seed0 = seed1 = channel = 0
 
     def begin(self) -> None:
         """No reading yet: a velocity of 0."""
         self.last: Array = np.zeros(3)
+        self.losses = [Losses(self.dropout, self.burst) for _ in AZIMUTHS]
 
     def locked(self, y: Measurement, directions: Array) -> Any:
         """Mask of beams (4,) with an echo from the floor at this tick."""
         four = normals(self.seed0, self.seed1, y.member, y.tick, self.channel + 1)
-        kept = np.array([0.5 * math.erfc(-z / math.sqrt(2.0)) >= self.dropout for z in four])
+        kept = np.array([not losses.next(chance_of(z)) for losses, z in zip(self.losses, four, strict=True)])
         kept &= not self.silent_from <= y.t < self.silent_to
         if math.isfinite(self.floor):
             altitude = self.floor - (y.position + y.R @ self.place)[2]
@@ -58,8 +61,11 @@ class DVL(Part):
     def measure(self, y: Measurement) -> Measurement:
         """Hand the beams on, or let y have the velocity that follows from three of them or four; else the last one."""
         directions = beams(self.angle)
-        four = normals(self.seed0, self.seed1, y.member, y.tick, self.channel)
+        four, sizes, strays = (
+            normals(self.seed0, self.seed1, y.member, y.tick, self.channel + stream) for stream in (0, 2, 3)
+        )
         along = directions @ (y.velocity + np.cross(y.angular_velocity, self.place)) + self.noise * four
+        along = along + self.outlier_std * sizes * [chance_of(z) < self.outlier for z in strays]
         kept = self.locked(y, directions)
         if self.handed is not None:
             self.handed[self.key] = {"along": along, "fresh": kept}

@@ -16,10 +16,14 @@ MOST_STEPS = 60
 
 @dataclass(frozen=True, eq=False)
 class CurvedGrid:
-    """Nodes of a grid in metres to the north and the east, (y, x) each."""
+    """Nodes of a grid in metres to the north and the east, (y, x) each. known: mask of those that data stand at; None for all.
+
+    Places are looked for from cells between known nodes on.
+    """
 
     north: np.ndarray
     east: np.ndarray
+    known: np.ndarray | None = None
 
     def fractions(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the row and of the column (...) of places, with parts of a cell; beyond the grid too.
@@ -55,8 +59,11 @@ class CurvedGrid:
         from scipy.spatial import cKDTree
 
         middles = [0.25 * (x[1:, 1:] + x[1:, :-1] + x[:-1, 1:] + x[:-1, :-1]) for x in (self.north, self.east)]
-        _, index = cKDTree(np.stack([x.ravel() for x in middles], axis=-1)).query(places)
-        row, column = np.divmod(index, middles[0].shape[1])
+        known = np.ones(self.north.shape, bool) if self.known is None else self.known
+        cells = np.flatnonzero(known[1:, 1:] & known[1:, :-1] & known[:-1, 1:] & known[:-1, :-1])
+        cells = cells if len(cells) else np.arange(middles[0].size)
+        _, nearest = cKDTree(np.stack([x.ravel()[cells] for x in middles], axis=-1)).query(places)
+        row, column = np.divmod(cells[nearest], middles[0].shape[1])
         return row, column
 
     def _cells(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

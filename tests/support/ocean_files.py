@@ -40,7 +40,7 @@ class Writer:
     def __exit__(self, *error):
         self.file.close()
 
-    def add(self, name, dims, values, kind="f4", fill=None, **attributes):
+    def add(self, name, dims, values, kind="f4", fill=None, /, **attributes):
         values = np.ma.masked_invalid(values) if fill is not None else np.asarray(values)
         for dim, size in zip(dims, np.shape(values), strict=True):
             if dim not in self.file.dimensions:
@@ -62,8 +62,13 @@ def turned_places(projection, rows, columns, spacing, origin, angle):
 def angle_of(projection, rows, columns, spacing, origin, angle):
     """Angle [rad] from the east to the rows of such a grid, to the left, by a geodesic along each."""
     before, after = (turned_places(projection, rows, np.asarray(columns) + d, spacing, origin, angle) for d in (-0.01, 0.01))
-    azimuth, _, _ = pyproj.Geod(ellps="WGS84").inv(before[1], before[0], after[1], after[0])
-    return np.deg2rad(90.0 - azimuth)
+    return along(*before, *after)
+
+
+def along(south, west, north, east):
+    """Angle [rad] from the east to a short line, to the left, at its middle: latitudes and longitudes of both ends."""
+    there, back, _ = pyproj.Geod(ellps="WGS84").inv(west, south, east, north)
+    return np.deg2rad(90.0 - there - 0.5 * ((back + 180.0 - there + 180.0) % 360.0 - 180.0))
 
 
 ROWS, COLUMNS, LEVELS = 14, 18, 12
@@ -229,12 +234,11 @@ def delft3d(path, system="epsg", curved=True, named="projected_coordinate_system
     depth, level = 20.0 + 0.002 * (x - 560000.0), 0.3
     seconds = np.array([0.0, 1800.0])
     lon, lat = UTM(x, y, inverse=True)
-    turn = np.deg2rad(UTM.get_factors(lon, lat).meridian_convergence)
+    turn = along(*UTM(x - 10.0, y, inverse=True)[::-1], *UTM(x + 10.0, y, inverse=True)[::-1])
     values = {"u_x": [], "u_y": []}
     for t in seconds:
         z = -(level + sigma[:, None, None] * (level + depth))
         east, north = current(lat, lon, z, t)
-        # True north lies to the left of the grid's by the convergence, east of the middle.
         values["u_x"].append(east * np.cos(turn) + north * np.sin(turn))
         values["u_y"].append(north * np.cos(turn) - east * np.sin(turn))
     hole = np.zeros(x.shape, bool)

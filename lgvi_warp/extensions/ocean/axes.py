@@ -218,7 +218,8 @@ def _place(
             first.dims == c.dims and not np.array_equal(first.values, c.values) for c in others
         ):
             raise refusal(f"{name}.coordinates", brief(sorted(found)), f"are all its {meaning}",
-                          f"give attributes = {{'{name}.coordinates': '...'}} with the one that is meant")  # fmt: skip
+                          "name one in the variable's attribute coordinates, or give attributes = "
+                          f"{{'{name}.coordinates': {' '.join(sorted(found)[:1])!r}}}")  # fmt: skip
         if first is not None:
             return first
     return None

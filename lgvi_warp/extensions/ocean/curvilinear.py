@@ -46,14 +46,10 @@ class CurvedGrid:
         shape = np.shape(north)
         return at[:, 0].reshape(shape), at[:, 1].reshape(shape)
 
-    def directions(self, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Unit vectors (..., 2), to the north and the east, along which columns and rows are counted at places of the grid."""
-        at = np.stack([np.ravel(rows), np.ravel(columns)], axis=-1)
-        cell, corners = self._cells(at)
-        _, slopes = _bilinear(corners, at - cell)
-        unit = slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
-        shape = (*np.shape(rows), 2)
-        return unit[:, :, 1].reshape(shape), unit[:, :, 0].reshape(shape)
+    def directions(self, axis: int) -> np.ndarray:
+        """Unit vectors (y, x, 2) at the nodes, to the north and the east, along which columns (1) or rows (0) are counted."""
+        along = np.stack([np.gradient(x, axis=axis) for x in (self.north, self.east)], axis=-1)
+        return np.asarray(along / np.linalg.norm(along, axis=-1, keepdims=True))
 
     def _nearest_cells(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         from scipy.spatial import cKDTree

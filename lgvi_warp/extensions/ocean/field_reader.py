@@ -302,8 +302,8 @@ class _FieldReader:
             velocities, seconds = velocities[:, ~self.outage], seconds[~self.outage]
             name = self.components[0].placed.grid.name
             if not len(seconds):
-                raise refusal("region", name, "has no value there: land, or fields that are missing",
-                              "give a region in the water")  # fmt: skip
+                raise refusal("region", f"{name} at time {window[0]}",
+                              "has no value there: land, or a field that is missing", "give a region in the water")  # fmt: skip
             if not seconds[0] <= 0.0 <= seconds[-1]:
                 raise refusal("start", name, "has no value there at times before or after it, an outage",
                               f"give a moment {seconds[0]:g} to {seconds[-1]:g} s from it")  # fmt: skip
@@ -355,7 +355,7 @@ def _same_nodes(single: _Component, compared: _Component) -> bool:
     first, second = single.placed.grid, compared.placed.grid
     pairs = ((first.latitude, second.latitude), (first.longitude, second.longitude), (first.depth, second.depth))
     none = np.zeros(0)
-    same = [np.array_equal(none if a is None else a, none if b is None else b) for a, b in pairs]
+    same = [np.array_equal(none if a is None else a, none if b is None else b, equal_nan=True) for a, b in pairs]
     return all(same) and first.shape == second.shape
 
 

@@ -97,9 +97,11 @@ def _system(attributes: Mapping[str, Any]) -> Any:
     """The system of a grid mapping, of pyproj."""
     from pyproj import CRS
 
-    said = {name: " ".join(np.asarray(attributes[name]).astype(str).flat[0].split()) for name in TEXTS if name in attributes}
+    texts = [str(np.asarray(attributes[name]).flat[0]) for name in TEXTS if name in attributes]
     # In the order of the attributes of a file WKT, a text of PROJ and a number may stand under any of these names.
-    for text in said.values():
+    for written in texts:
+        # A sign of degrees in a file that says that it is in ASCII.
+        text = " ".join(written.encode("utf-8", "surrogateescape").decode("utf-8", "replace").split())
         if "[" in text:
             return CRS.from_wkt(text)
         if text.startswith("+"):
@@ -112,7 +114,7 @@ def _system(attributes: Mapping[str, Any]) -> Any:
     plain = {}
     for name in set(attributes) - set(TEXTS):
         with contextlib.suppress(ValueError, TypeError):
-            plain[name] = np.asarray(attributes[name], float).tolist()
+            plain[name] = np.squeeze(np.asarray(attributes[name], float)).tolist()
     named = " ".join(str(attributes[name]) for name in ELLIPSOID_NAMES if name in attributes)
     if not any(name in plain for name in ELLIPSOID):
         if not COMMON.search(named):

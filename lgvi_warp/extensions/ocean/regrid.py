@@ -154,8 +154,7 @@ def directions(placed: Placed, along: str) -> np.ndarray:
         return vectors
     along_grid = along in ("x", "y") and not grid.rectilinear
     if along_grid:
-        numbers = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
-        vectors[..., :2] = placed.curved.directions(*numbers)[along == "y"]
+        vectors[..., :2] = placed.curved.directions(1 if along == "x" else 0)
         if grid.angle is None:
             return vectors
     # From the plane's north to true north, towards the east; and to the left from the east to the grid's x.

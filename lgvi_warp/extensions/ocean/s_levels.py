@@ -90,7 +90,8 @@ def s_levels(ds: Any, name: str, level: str, horizontal: tuple[Any, Any], shape:
             field = field.transpose(..., *horizontal)
         if (shift := shift_of(field, horizontal, shape)) is None:
             raise refusal(f"{name}.{level}", word, f"stands at other nodes than {name}", f"interpolate {word} to them")
-        return field, shift, factor(word, field.attrs.get("units"), "m")
+        # Terms of the formula are metres, where they do not say otherwise.
+        return field, shift, factor(word, field.attrs.get("units", "m"), "m")
 
     said = numbers("", "Vtransform")
     kind = KINDS.get(standard) if said is None else int(said)

@@ -74,7 +74,9 @@ def axes_of(ds: Any, name: str) -> Axes:
             dims[part] = fitting[0]
     level = _along(coordinates, dims.get("depth"), _is_depth)[1]
     word = "" if level is None else _word(level, "standard_name")
-    follows = word in S_COORDINATES or (str(dims.get("depth")).lower() in FOLLOWING and word not in (*DOWNWARD, *UPWARD))
+    follows = word in S_COORDINATES or (
+        str(dims.get("depth")).lower() in FOLLOWING and word not in (*DOWNWARD, *UPWARD)
+    )
     depth = None if "depth" not in dims or follows else _depths(name, str(dims["depth"]), level)
     time = None
     if "time" in dims:
@@ -115,8 +117,7 @@ def _grid(
     """Dimensions along y and x, latitudes and longitudes or y and x, and the projection of a variable."""
     variable = ds[name]
     named = _said(variable, "coordinates").split()
-    axes = [_first(coordinates, named, lambda _, c, words=words: _word(c, "standard_name") in words) for words in
-            PROJECTED.values()]  # fmt: skip
+    axes = [_first(coordinates, named, words) for words in PROJECTED.values()]
     if any(c is None for c in axes):
         pairs = [[c for c in coordinates.values() if c.name == letter and c.dims == (letter,)] for letter in PROJECTED]
         axes = [pair[0] if pair else None for pair in pairs]
@@ -143,7 +144,9 @@ def _grid(
             return _horizontal(name, y, x), _degrees(name, y, 90.0), _degrees(name, x, 720.0), None
         if y is None or x is None:
             raise refusal(
-                f"{name}.coordinates", brief(sorted(coordinates)), "have no latitude and longitude, nor x and y of a projection",
+                f"{name}.coordinates",
+                brief(sorted(coordinates)),
+                "have no latitude and longitude, nor x and y of a projection",
                 f"give attributes = {{'lat.standard_name': 'latitude'}} for a coordinate lat along the dimensions of {name}",
             )
         plane = _projection(ds, name, mapped)
@@ -174,9 +177,13 @@ def _metres(name: str, axis: Any, plane: Projection) -> np.ndarray:
     """Numbers of an axis of a projection [m]; of one about another pole [deg]."""
     where, unit = str(axis.name), _word(axis, "units")
     if axis.size > MOST_PLACES:
-        raise refusal(f"{name}.{where}", axis.shape, f"has more than {MOST_PLACES:,} places", "cut the region out, by ds.isel")
+        raise refusal(
+            f"{name}.{where}", axis.shape, f"has more than {MOST_PLACES:,} places", "cut the region out, by ds.isel"
+        )
     if plane.geographic and not unit.startswith("degree"):
-        raise refusal(f"{where}.units", unit, "is no unit of degrees, in which the system of the grid is", "mend one of them")
+        raise refusal(
+            f"{where}.units", unit, "is no unit of degrees, in which the system of the grid is", "mend one of them"
+        )
     values = np.asarray(axis.values, dtype=np.float64) * (1.0 if plane.geographic else factor(where, unit, "m"))
     if axis.ndim == 1 and not np.isfinite(values).all():
         raise refusal(where, values, "has holes", "give a place to every row and column")
@@ -195,10 +202,10 @@ def _known(latitude: np.ndarray, longitude: np.ndarray) -> tuple[np.ndarray, np.
     return np.where(unknown, np.nan, latitude), np.where(unknown, np.nan, longitude)
 
 
-def _first(coordinates: Mapping[str, Any], named: list[str], fits: Callable[[str, Any], bool]) -> Any:
-    """The first coordinate that fits, of those that a variable names, else of all."""
-    own = {word: coordinates[word] for word in named if word in coordinates}
-    return next((c for offered in (own, coordinates) for word, c in offered.items() if fits(word, c)), None)
+def _first(coordinates: Mapping[str, Any], named: list[str], words: tuple[str, ...]) -> Any:
+    """The first coordinate with one of these standard names, of those that a variable names, else of all; None without."""
+    own = [coordinates[word] for word in named if word in coordinates]
+    return next((c for c in (*own, *coordinates.values()) if _word(c, "standard_name") in words), None)
 
 
 def _place(

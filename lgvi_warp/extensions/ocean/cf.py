@@ -179,7 +179,9 @@ def variable_name(ds: Any, quantity: OceanQuantity, named: str | None = None) ->
     """The name of the variable that holds a quantity; None where there is none."""
     if named is not None:
         if named in ds.encoding.get("damaged", {}):
-            raise refusal("variables", named, f"cannot be decoded, {ds.encoding['damaged'][named]}", "mend its attributes")
+            raise refusal(
+                "variables", named, f"cannot be decoded, {ds.encoding['damaged'][named]}", "mend its attributes"
+            )
         if named not in ds.data_vars:
             raise refusal("variables", named, "is no variable of the data set", closest(named, map(str, ds.data_vars)))
         return named

@@ -9,6 +9,8 @@ import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO
 
+import numpy as np
+
 from lgvi_warp.common import reading
 from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import MissingExtra, SceneError, brief, closest, refusal
@@ -16,7 +18,9 @@ from lgvi_warp.extensions.ocean.closed_files import leads_elsewhere
 
 # What reads a file, by how it begins: a stranger's file decides nothing else. HDF5 is read from the file that was looked at.
 HDF5, CLASSIC = b"\x89HDF\r\n\x1a\n", (b"CDF\1", b"CDF\2", b"CDF\5")
+# Where names of open files are.
 FOLDER = "/dev/fd"
+SCALES = ("scale_factor", "add_offset")
 REMEDY = "give the path of a NetCDF file, or an xarray Dataset"
 
 
@@ -60,9 +64,7 @@ def opened(source: Any, attributes: Mapping[str, Any] | None = None) -> Any:
             file.seek(0)
             if begin == HDF5:
                 _check_closed(file, path)
-                whole = library.open_dataset(
-                    file, engine="h5netcdf", cache=False, decode_cf=False, phony_dims="access"
-                )
+                whole = library.open_dataset(file, engine="h5netcdf", cache=False, decode_cf=False, phony_dims="access")
             elif begin.startswith(CLASSIC):
                 # The name of the open file: what is looked at is what is read, whatever becomes of the path.
                 held = next((name for name in (f"{FOLDER}/{file.fileno()}",) if os.path.exists(name)), path)
@@ -92,20 +94,24 @@ def decoded(ds: Any, attributes: Mapping[str, Any] | None = None) -> Any:
         if name and name not in ds.variables:
             raise refusal("attributes", key, "names no variable of the data set", closest(name, map(str, ds.variables)))
         (ds[name].attrs if name else ds.attrs)[attribute] = value
-    damaged = {}
+    # The library finds that one is a text when values are read.
+    damaged = {str(name): f"its {key} is no number" for name in ds.variables for key in SCALES
+               if key in ds[name].attrs and np.asarray(ds[name].attrs[key]).dtype.kind not in "fiu"}  # fmt: skip
+    ds = ds.drop_vars(damaged)
     with warnings.catch_warnings():
         # Of dates with a year of one digit, and of fill values that a variable cannot hold.
         warnings.simplefilter("ignore", library.SerializationWarning)
         try:
-            return library.decode_cf(ds, decode_timedelta=False)
+            result = library.decode_cf(ds, decode_timedelta=False)
         except Exception:  # of any one variable: attributes are a stranger's
             for name in ds.variables:
-                one = library.Dataset({"one": ds[name].variable.to_base_variable()})
                 try:
-                    library.decode_cf(one, decode_timedelta=False)
+                    library.decode_cf(
+                        library.Dataset({"one": ds[name].variable.to_base_variable()}), decode_timedelta=False
+                    )
                 except Exception as error:
                     damaged[str(name)] = " ".join(str(error).split())[:200] or type(error).__name__
-            result = library.decode_cf(ds.drop_vars(damaged), decode_timedelta=False)
+            result = library.decode_cf(ds.drop_vars(damaged, errors="ignore"), decode_timedelta=False)
     result.encoding["damaged"] = damaged
     return result
 

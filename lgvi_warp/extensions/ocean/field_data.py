@@ -154,4 +154,6 @@ def check_attributes(faults: Faults, attributes: Any) -> None:
         isinstance(attributes, dict)
         and all(isinstance(k, str) and isinstance(v, str | int | float) for k, v in attributes.items())
     ):
-        faults.add("attributes", attributes, "are no texts or numbers by name", "give {'uo.units': 'm s-1'} for instance")
+        faults.add(
+            "attributes", attributes, "are no texts or numbers by name", "give {'uo.units': 'm s-1'} for instance"
+        )

@@ -88,7 +88,9 @@ def projection(where: str, attributes: Mapping[str, Any]) -> Projection:
     try:
         return Projection(*transformer_of(_system(attributes)))
     except (ProjError, ValueError, TypeError, KeyError) as error:
-        problem = error.args[0] if type(error) is ValueError else f"is not understood, {' '.join(str(error).split())[:100]}"
+        problem = (
+            error.args[0] if type(error) is ValueError else f"is not understood, {' '.join(str(error).split())[:100]}"
+        )
     raise refusal(where, attributes.get("grid_mapping_name", ""), f"has a coordinate reference system that {problem}",
                   f"give attributes = {{'{where}.epsg': 32631}}, with the number of its system")  # fmt: skip
 
@@ -121,4 +123,3 @@ def _system(attributes: Mapping[str, Any]) -> Any:
             raise ValueError("says no ellipsoid, such as semi_major_axis and inverse_flattening")
         plain |= {"semi_major_axis": 6378137.0, "inverse_flattening": 298.257223563}
     return CRS.from_cf(plain | {"grid_mapping_name": str(attributes.get("grid_mapping_name", ""))})
-

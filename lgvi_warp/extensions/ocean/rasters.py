@@ -136,7 +136,11 @@ class Raster:
             return transformer, geographic
         except (ProjError, ValueError) as error:  # rasterio's errors of such systems are ValueErrors
             said = " ".join(str(error).split())[:100]
-            problem = said if type(error) is ValueError and said.startswith(("names", "is a")) else f"is not understood, {said}"
+            problem = (
+                said
+                if type(error) is ValueError and said.startswith(("names", "is a"))
+                else f"is not understood, {said}"
+            )
         raise refusal("file", self.path, f"has a coordinate reference system that {problem}",
                       "write one of latitudes and longitudes or a projection, by gdalwarp -t_srs EPSG:4326")  # fmt: skip
 

@@ -149,7 +149,9 @@ def directions(placed: Placed, along: str) -> np.ndarray:
     vectors = np.zeros((rows, columns, 3))
     latitude, longitude = placed.plane.geodetic(*placed.north_east)
     if along in ("x", "y") and grid.projection is not None:
-        first, last = (np.array(placed.plane.local(*place)) for place in grid.projection.neighbors(latitude, longitude, along))
+        first, last = (
+            np.array(placed.plane.local(*place)) for place in grid.projection.neighbors(latitude, longitude, along)
+        )
         vectors[..., :2] = np.moveaxis((last - first) / np.linalg.norm(last - first, axis=0), 0, -1)
         return vectors
     along_grid = along in ("x", "y") and not grid.rectilinear
@@ -158,7 +160,9 @@ def directions(placed: Placed, along: str) -> np.ndarray:
         if grid.angle is None:
             return vectors
     # From the plane's north to true north, towards the east; and to the left from the east to the grid's x.
-    turn = placed.plane.convergence(latitude, longitude) - (grid.angle if along_grid and grid.angle is not None else 0.0)
+    turn = placed.plane.convergence(latitude, longitude) - (
+        grid.angle if along_grid and grid.angle is not None else 0.0
+    )
     unit = (-np.sin(turn), np.cos(turn)) if along in ("east", "x") else (np.cos(turn), np.sin(turn))
     if along_grid:
         off = np.arccos(np.clip(vectors[..., 0] * unit[0] + vectors[..., 1] * unit[1], -1.0, 1.0))[_water(placed)]

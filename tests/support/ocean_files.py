@@ -51,7 +51,7 @@ class Writer:
 
 
 def turned_places(projection, rows, columns, spacing, origin, angle):
-    """Latitudes and longitudes of the nodes of a grid that is turned in a projection, at numbers with parts of rows and columns."""
+    """Latitudes and longitudes of nodes of a grid that is turned in a projection; rows and columns may have parts."""
     j, i = np.meshgrid(rows, columns, indexing="ij")
     x = origin[0] + spacing * (i * np.cos(angle) - j * np.sin(angle))
     y = origin[1] + spacing * (i * np.sin(angle) + j * np.cos(angle))
@@ -567,7 +567,7 @@ def regular(
     depth_units="meters",
     **words,
 ):
-    """Velocities on latitudes and longitudes; dims: names of time, level, rows and columns, "" for none, in order of the file."""
+    """Velocities on latitudes and longitudes; dims: in the order of the file, whose names are t, z, y and x."""
     t, z, y, x = (words.get(letter, letter) for letter in "tzyx")
     values = {t: np.asarray(seconds), z: np.zeros(1) if depth is None else depth, y: latitude, x: longitude}
     grid = dict(zip(dims, np.meshgrid(*(values[d] for d in dims), indexing="ij"), strict=True))
@@ -615,7 +615,7 @@ def oscar(path):
 
 
 def access(path, calendar="NOLEAP"):
-    """Means of ACCESS-OM2: velocities along the grid, a calendar without leap days, which the last of February comes before."""
+    """Means of ACCESS-OM2: velocities along the grid, a calendar without leap days, before and after the last of February."""
     regular(
         path,
         ("u", "v"),

@@ -312,8 +312,9 @@ def _times(name: str, dim: str, coordinate: Any) -> np.ndarray:
     moments = values is not None and values.dtype.kind == "O" and all(hasattr(one, "calendar") for one in values)
     if values is None or not (moments or values.dtype.kind in "mM"):
         known = dim if coordinate is None else coordinate.name
-        raise refusal(where, "" if values is None else values[:3], "is no time of the standard calendar, nor of another one that is known",
-                      f"give attributes = {{'{known}.units': 'seconds since 2024-01-01', '{known}.calendar': 'standard'}}")  # fmt: skip
+        shown, words = "" if values is None else values[:3], "'seconds since 2024-01-01'"
+        raise refusal(where, shown, "is no time of the standard calendar, nor of another one that is known",
+                      f"give attributes = {{'{known}.units': {words}, '{known}.calendar': 'standard'}}")  # fmt: skip
     if not moments:
         values = values.astype(f"{'datetime64' if values.dtype.kind == 'M' else 'timedelta64'}[ns]")
     if (not moments and np.isnat(values).any()) or np.any(np.diff(elapsed(values)) <= 0.0):

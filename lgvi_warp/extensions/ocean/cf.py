@@ -144,7 +144,7 @@ class Gridded:
         return field if "depth" in self.dims else field[None]
 
     def between(self, south: float, north: float, west: float, east: float) -> Gridded:
-        """The part of the grid that covers a box with the nodes next to it, in its own axes: longitudes as `longitude` has them."""
+        """The part of the grid that covers a box and the nodes next to it, in its own axes: longitudes as it has them."""
         rows, columns = _covering(self, south, north, west, east)
         pieces, first = [], 0
         for piece in self.pieces:
@@ -260,7 +260,7 @@ def says_along(ds: Any, name: str, quantity: OceanQuantity) -> bool:
 
 
 def seconds_since(time: np.ndarray, start: datetime.datetime | np.datetime64 | str | None) -> np.ndarray:
-    """Times [s] from `start`, in UTC where it names no zone, and in the calendar of the file; from the first where it is None."""
+    """Times [s] from `start`, in UTC where it names no zone, and in the file's calendar; from the first where it is None."""
     if start is None:
         return elapsed(time)
     first: Any = instant("start", start)
@@ -298,8 +298,12 @@ def instant(key: str, value: Any) -> np.datetime64:
 
 def _risen(ds: Any, name: str, axes: Axes) -> tuple[Any, Axes]:
     """The data set with rows and columns along rising y and x, where a grid of two dimensions has such axes too."""
-    falling = [dim for dim, words in ((axes.dims[part], words) for part, words in PROJECTED.items()) for c in ds.variables
-               if ds[c].dims == (dim,) and str(ds[c].attrs.get("standard_name")) in words and ds[c][0] > ds[c][-1]]  # fmt: skip
+    falling = [
+        axes.dims[part]
+        for part, words in PROJECTED.items()
+        for c in ds.variables
+        if ds[c].dims == (axes.dims[part],) and ds[c].attrs.get("standard_name") in words and ds[c][0] > ds[c][-1]
+    ]
     if axes.latitude.ndim == 1 or not falling:
         return ds, axes
     ds = ds.isel({dim: slice(None, None, -1) for dim in falling})

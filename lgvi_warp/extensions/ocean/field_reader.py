@@ -302,8 +302,8 @@ class _FieldReader:
             velocities, seconds = velocities[:, ~self.outage], seconds[~self.outage]
             name = self.components[0].placed.grid.name
             if not len(seconds):
-                raise refusal("region", f"{name} at time {window[0]}",
-                              "has no value there: land, or a field that is missing", "give a region in the water")  # fmt: skip
+                problem = "has no value there: land, or a field that is missing"
+                raise refusal("region", f"{name} at time {window[0]}", problem, "give a region in the water")
             if not seconds[0] <= 0.0 <= seconds[-1]:
                 raise refusal("start", name, "has no value there at times before or after it, an outage",
                               f"give a moment {seconds[0]:g} to {seconds[-1]:g} s from it")  # fmt: skip

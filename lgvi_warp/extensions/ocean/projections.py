@@ -16,10 +16,11 @@ from lgvi_warp.common.errors import MissingExtra, refusal
 # Words of a system in WKT that stand before the name of a file.
 NAMES_A_FILE = ("PARAMETERFILE", "GRIDS=", "EXTENSION[")
 # Parameters of a text of PROJ that name no file and no chain of steps.
-PROJ_WORDS = frozenset(
-    "proj lat_0 lat_1 lat_2 lat_ts lat_b lon_0 lon_1 lon_2 lonc alpha gamma k k_0 x_0 y_0 a b rf f R ellps datum towgs84 pm "
-    "units to_meter zone south no_defs no_off no_uoff o_proj o_lat_p o_lon_p wktext type over".split()
-)
+PROJ_WORDS = frozenset((
+    "proj", "lat_0", "lat_1", "lat_2", "lat_ts", "lon_0", "lon_1", "lon_2", "lonc", "alpha", "gamma", "k", "k_0", "x_0", "y_0",
+    "a", "b", "rf", "f", "R", "ellps", "datum", "towgs84", "pm", "units", "to_meter", "zone", "south", "no_defs", "no_off",
+    "no_uoff", "o_proj", "o_lat_p", "o_lon_p", "wktext", "type", "over",
+))  # fmt: skip
 # Attributes of a grid mapping that hold a text, in the order in which they are believed: WKT or PROJ, then a number of EPSG.
 TEXTS = ("crs_wkt", "spatial_ref", "esri_pe_string", "proj4", "proj4_string", "proj4_params", "proj4text", "proj_string",
          "proj4string", "epsg", "epsg_code", "EPSG_code", "EPSG")  # fmt: skip

@@ -166,9 +166,10 @@ def directions(placed: Placed, along: str) -> np.ndarray:
     unit = (-np.sin(turn), np.cos(turn)) if along in ("east", "x") else (np.cos(turn), np.sin(turn))
     if along_grid:
         off = np.arccos(np.clip(vectors[..., 0] * unit[0] + vectors[..., 1] * unit[1], -1.0, 1.0))[_water(placed)]
-        if np.nanmax(off, initial=0.0) > MOST_OFF:
-            raise refusal("angle", f"{np.rad2deg(np.nanmax(off)):.3g} degrees", f"is between it and the {along} of the grid",
-                          "give attributes = {'angle.units': 'degrees'} if it is in degrees, or leave the variable out")  # fmt: skip
+        if (most := np.nanmax(off, initial=0.0)) > MOST_OFF:
+            remedy = "give attributes = {'angle.units': 'degrees'} if it is in degrees, or leave the variable out"
+            shown, problem = f"{np.rad2deg(most):.3g} degrees", f"is between it and the {along} of the grid"
+            raise refusal("angle", shown, problem, remedy)
     vectors[..., 0], vectors[..., 1] = unit
     return vectors
 

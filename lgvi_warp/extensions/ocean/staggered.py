@@ -61,19 +61,16 @@ def places_at(ds: Any, variable: Any) -> tuple[tuple[Any, Any], np.ndarray, np.n
         return None
     pair, shape = (dims[0][0], dims[1][0]), [variable.sizes[found[0]] for found in dims]
     latitude = at_nodes(ds, "lat_rho", pair, shape)
+    if latitude is None or "lon_rho" not in ds.variables or (shift := shift_of(ds["lon_rho"], pair, shape)) is None:
+        return None
     # Means of unit vectors: a longitude may jump by a turn from one point to the next.
-    angle = np.deg2rad(ds["lon_rho"].values) if latitude is not None and "lon_rho" in ds.variables else None
-    if latitude is None or angle is None:
-        return None
-    shift = shift_of(ds["lon_rho"], pair, shape)
-    if shift is None:
-        return None
+    angle = np.deg2rad(ds["lon_rho"].values)
     longitude = np.rad2deg(np.arctan2(averaged(np.sin(angle), shift), averaged(np.cos(angle), shift)))
     return pair, latitude, longitude
 
 
 def land_at(ds: Any, dims: tuple[Any, Any], shape: Any) -> np.ndarray | None:
-    """Nodes (y, x) that a mask of ROMS calls land: one at these nodes, else a rho point on either side; None without a mask."""
+    """Nodes (y, x) that a mask of ROMS calls land: one at these nodes, else a rho point beside them; None without a mask."""
     for name in MASKS:
         if name in ds.variables and tuple(ds[name].dims) == tuple(dims):
             return np.asarray(ds[name].values) < 0.5

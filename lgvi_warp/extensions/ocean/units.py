@@ -26,8 +26,8 @@ def factor(where: str, text: Any, unit: str) -> float:
     """Size of a variable's unit in "m/s", "m" or "s"."""
     known = UNITS[unit]
     if text is None or not str(text).strip():
-        raise refusal(f"{where}.units", "", "is missing", f"write the attribute units, {unit!r} for instance, or give attributes = "
-                      f"{{'{where}.units': {unit!r}}}")  # fmt: skip
+        remedy = f"write the attribute units, {unit!r} for instance, or give attributes = {{'{where}.units': {unit!r}}}"
+        raise refusal(f"{where}.units", "", "is missing", remedy)
     value = known.get(_plain(str(text)))
     if value is None:
         raise refusal(

@@ -34,7 +34,7 @@ ROMS_BOX = box(8e3, 2.0, 60.0) | {"spacing": [1e3, 1e3, 4.0]}
 DELFT_BOX = box(800.0, 2.5, 15.0) | {"spacing": [100.0, 100.0, 1.0]}
 PLAIN = box(5e4, 0.0, 0.0)
 # A kind of file: how it is written, a place in it, what is read, and the error [m/s]. Bilinear cells of size h lose at most
-# 2 h^2 / (8 R^2) of the rotation and of the directions in each axis, 2 m/s in a radius; packed numbers what they are rounded to.
+# 2 h^2 / (8 R^2) of the rotation and of the directions in each axis, 2 m/s in a radius; packed numbers their rounding.
 KINDS = {
     "roms 1": (lambda p: ocean_files.roms(p, 1), ROMS, ROMS_BOX, 2e-6),
     "roms 2": (lambda p: ocean_files.roms(p, 2), ROMS, ROMS_BOX, 2e-6),

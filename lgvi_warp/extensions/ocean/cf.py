@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import SceneError, brief, closest, refusal
-from lgvi_warp.extensions.ocean.axes import Axes, axes_of
+from lgvi_warp.extensions.ocean import staggered
+from lgvi_warp.extensions.ocean.axes import NO_NUMBER, PROJECTED, Axes, axes_of, elapsed
+from lgvi_warp.extensions.ocean.projections import Projection
 from lgvi_warp.extensions.ocean.s_levels import SLevels, s_levels
-from lgvi_warp.extensions.ocean.units import factor
+from lgvi_warp.extensions.ocean.units import factor, positive
 
 # The dimensions of a variable in the order in which its values come.
 ORDER = ("scenario", "time", "depth", "y", "x")
@@ -40,12 +42,16 @@ EASTWARD = OceanQuantity("the eastward velocity", ("eastward_sea_water_velocity"
 NORTHWARD = OceanQuantity("the northward velocity", ("northward_sea_water_velocity", "surface_northward_sea_water_velocity"),
                      ("water_v", "vo", "v_northward"))  # fmt: skip
 UPWARD = OceanQuantity("the upward velocity", ("upward_sea_water_velocity",), ("water_w", "wo"))
-ALONG_X = OceanQuantity("the velocity along the grid's x", ("sea_water_x_velocity",), ("u", "vozocrtx"))
-ALONG_Y = OceanQuantity("the velocity along the grid's y", ("sea_water_y_velocity",), ("v", "vomecrty"))
+ALONG_X = OceanQuantity("the velocity along the grid's x", ("sea_water_x_velocity", "x_sea_water_velocity",
+                   "sea_water_x_velocity_at_u_location", "surface_sea_water_x_velocity"), ("u", "vozocrtx"))  # fmt: skip
+ALONG_Y = OceanQuantity("the velocity along the grid's y", ("sea_water_y_velocity", "y_sea_water_velocity",
+                   "sea_water_y_velocity_at_v_location", "surface_sea_water_y_velocity"), ("v", "vomecrty"))  # fmt: skip
+# Names and dimensions of a turned grid that say along what a velocity is, where no standard_name does.
+SAY_ALONG, SAY_DIMENSIONS = ("u_eastward", "v_northward", "vozocrtx", "vomecrty"), ("eta_", "xi_")
 FLOOR_DEPTH = OceanQuantity(
     "the depth of the sea floor",
     ("sea_floor_depth_below_sea_surface", "sea_floor_depth_below_geoid", "sea_floor_depth_below_mean_sea_level",
-     "sea_floor_depth"),
+     "sea_floor_depth", "sea_floor_depth_below_sea_level", "model_sea_floor_depth_below_geoid"),
     ("depth", "deptho", "bathymetry", "bathy", "h"),
     "m",
 )  # fmt: skip
@@ -73,6 +79,10 @@ class Gridded:
         dims: Name of the dimension by its part in `ORDER`.
         scenarios: How many; 1 for a variable without.
         s_levels: Depths of levels that follow the sea floor; None for others.
+        projection: Plane of the axes y and x [m], which then stand in place of latitudes and longitudes where they are of one
+            dimension, and along which velocities are; None for others.
+        land: Mask of nodes (y, x) that are on land or have no place; None where the file tells none.
+        angle: Angle [rad] (y, x) from the east to the grid's x, to the left; None where the file tells none.
     """
 
     name: str
@@ -85,11 +95,33 @@ class Gridded:
     dims: Mapping[str, Hashable]
     scenarios: int = 1
     s_levels: SLevels | None = None
+    projection: Projection | None = None
+    land: np.ndarray | None = None
+    angle: np.ndarray | None = None
 
     @property
     def rectilinear(self) -> bool:
-        """Whether latitude and longitude are axes of the grid."""
+        """Whether latitude and longitude, or y and x of a projection, are axes of the grid."""
         return self.latitude.ndim == 1
+
+    @property
+    def turned(self) -> bool:
+        """Whether its axes are others than those of latitude and longitude."""
+        return not self.rectilinear or self.projection is not None
+
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Latitudes and longitudes [deg] of the nodes (y, x), NaN for those without a place."""
+        if not self.rectilinear:
+            return self.latitude, self.longitude
+        y, x = np.meshgrid(self.latitude, self.longitude, indexing="ij")
+        return (y, x) if self.projection is None else self.projection.geodetic(x, y)
+
+    def extent(self, latitude: np.ndarray, longitude: np.ndarray) -> tuple[float, float, float, float]:
+        """Box around places [deg] for `between`."""
+        y, x = latitude, longitude
+        if self.rectilinear and self.projection is not None:
+            x, y = self.projection.plane(latitude, longitude)
+        return float(np.min(y)), float(np.max(y)), float(np.min(x)), float(np.max(x))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -105,11 +137,14 @@ class Gridded:
         at = {"scenario": scenario, "time": time}
         index = {self.dims[part]: at[part] for part in at if part in self.dims}
         parts = [np.asarray(piece.isel(index).values, dtype=np.float64) for piece in self.pieces]
-        field = np.concatenate(parts, axis=-1) * self.scale
+        field = np.concatenate(parts, axis=-1)
+        # As few values as possible are gone through twice.
+        missing = np.abs(field) >= NO_NUMBER if self.land is None else (np.abs(field) >= NO_NUMBER) | self.land
+        field = np.where(missing, np.nan, field) * self.scale
         return field if "depth" in self.dims else field[None]
 
     def between(self, south: float, north: float, west: float, east: float) -> Gridded:
-        """The part of the grid that covers a box [deg] with the nodes next to it; longitudes as `longitude` has them."""
+        """The part of the grid that covers a box and the nodes next to it, in its own axes: longitudes as it has them."""
         rows, columns = _covering(self, south, north, west, east)
         pieces, first = [], 0
         for piece in self.pieces:
@@ -121,12 +156,13 @@ class Gridded:
         cut = (rows, columns)
         places = (self.latitude[rows], self.longitude[columns]) if self.rectilinear else (
             self.latitude[cut], self.longitude[cut])  # fmt: skip
-        s_levels = self.s_levels and self.s_levels.isel({self.dims["y"]: rows, self.dims["x"]: columns})
         changed: dict[str, Any] = {
             "pieces": tuple(pieces),
             "latitude": places[0],
             "longitude": places[1],
-            "s_levels": s_levels,
+            "s_levels": self.s_levels and self.s_levels.part(rows, columns),
+            "land": None if self.land is None else self.land[cut],
+            "angle": None if self.angle is None else self.angle[cut],
         }
         return dataclasses.replace(self, **changed)
 
@@ -142,6 +178,10 @@ class Gridded:
 def variable_name(ds: Any, quantity: OceanQuantity, named: str | None = None) -> str | None:
     """The name of the variable that holds a quantity; None where there is none."""
     if named is not None:
+        if named in ds.encoding.get("damaged", {}):
+            raise refusal(
+                "variables", named, f"cannot be decoded, {ds.encoding['damaged'][named]}", "mend its attributes"
+            )
         if named not in ds.data_vars:
             raise refusal(
                 "variables", named, "is not a variable of the data set", closest(named, map(str, ds.data_vars))
@@ -176,32 +216,68 @@ def gridded(ds: Any, quantity: OceanQuantity, name: str, about: float | None = N
         name: The variable.
         about: A longitude [deg]; None, the default, for that of the data set's first node.
     """
-    variable = ds[name]
+    ds = staggered.trimmed(ds)
     axes = axes_of(ds, name)
+    ds, axes = _risen(ds, name, axes)
+    variable = ds[name]
     scale = factor(name, variable.attrs.get("units"), quantity.unit) * quantity.sign
-    if quantity is FLOOR_DEPTH and str(variable.attrs.get("positive", "")).lower() == "up":
+    if quantity is FLOOR_DEPTH and positive(variable.attrs) == "up":
         scale = -scale
     variable = _ordered(variable, axes)
     dims = {part: dim for part, dim in axes.dims.items() if dim in variable.dims}
     if axes.depth is not None:
         variable = variable.isel({dims["depth"]: _rising(f"{name}.{dims['depth']}", axes.depth, "m")})
     depth = None if axes.depth is None else np.sort(axes.depth)
-    about = float(axes.longitude.flat[0]) if about is None else about
+    grid, shape = (dims["y"], dims["x"]), variable.shape[-2:]
+    land = staggered.land_at(ds, grid, shape)
+    if axes.latitude.ndim == 1 and (land is not None or axes.s_levels is not None):
+        # What stands at each node keeps the order of the file.
+        latitude, longitude = np.meshgrid(axes.latitude, axes.longitude, indexing="ij")
+        if axes.projection is not None:
+            latitude, longitude = axes.projection.geodetic(longitude, latitude)
+        axes = dataclasses.replace(axes, latitude=latitude, longitude=longitude)
+    if axes.latitude.ndim == 2 and (nowhere := np.isnan(axes.latitude)).any():
+        land = nowhere if land is None else land | nowhere
+    about = float(axes.longitude[np.isfinite(axes.longitude)][0]) if about is None else about
     latitude, longitude, pieces = _places(name, axes, variable, about)
     scenarios = int(variable.sizes[dims["scenario"]]) if "scenario" in dims else 1
     levels = None
     if axes.s_levels is not None:
-        if latitude.ndim == 1:
-            raise refusal(f"{name}.{dims['depth']}", name, "has levels along the floor on axes of latitude and longitude",
-                          "interpolate the data onto levels of depth")  # fmt: skip
-        levels = s_levels(ds, name, axes.s_levels, (dims["y"], dims["x"]), dims.get("time"))
-    return Gridded(name, pieces, scale, latitude, longitude, depth, axes.time, dims, scenarios, levels)
+        levels = s_levels(ds, name, axes.s_levels, grid, shape, dims.get("time"))
+    angle = staggered.at_nodes(ds, "angle", grid, shape) if latitude.ndim == 2 else None
+    if angle is not None and str(ds["angle"].attrs.get("units", "rad")).lower().startswith("deg"):
+        angle = np.deg2rad(angle)
+    return Gridded(name, pieces, scale, latitude, longitude, depth, axes.time, dims, scenarios, levels, axes.projection, land,
+                   angle)  # fmt: skip
+
+
+def says_along(ds: Any, name: str, quantity: OceanQuantity) -> bool:
+    """Whether a file says along what axis a velocity is: by its standard_name, or by names that one model alone gives."""
+    standard = str(ds[name].attrs.get("standard_name", "")).strip().lower()
+    return (
+        standard in quantity.standard_names
+        or name.lower() in SAY_ALONG
+        or any(str(dim).startswith(SAY_DIMENSIONS) for dim in ds[name].dims)
+    )
 
 
 def seconds_since(time: np.ndarray, start: datetime.datetime | np.datetime64 | str | None) -> np.ndarray:
-    """Times [s] from `start`, in UTC where it names no zone; from the first time where it is None."""
-    first = time[0] if start is None else instant("start", start)
-    return np.asarray((time - first) / np.timedelta64(1, "ns") * 1e-9, dtype=np.float64)
+    """Times [s] from `start`, in UTC where it names no zone, and in the file's calendar; from the first where it is None."""
+    if start is None:
+        return elapsed(time)
+    first: Any = instant("start", start)
+    if time.dtype.kind == "m":
+        raise refusal("start", start, "is a moment, and the times of the file count from none",
+                      "leave it out, or give attributes = {'time.units': 'seconds since 2000-01-01'}")  # fmt: skip
+    if time.dtype.kind == "O":
+        moment = first.astype("datetime64[us]").item()
+        words = ("year", "month", "day", "hour", "minute", "second", "microsecond")
+        try:
+            first = time[0].replace(**{word: getattr(moment, word) for word in words})
+        except ValueError as error:
+            problem = f"is no day of the file's calendar, {time[0].calendar}"
+            raise refusal("start", start, problem, "give another day") from error
+    return elapsed(time, first)
 
 
 def instant(key: str, value: Any) -> np.datetime64:
@@ -220,6 +296,20 @@ def instant(key: str, value: Any) -> np.datetime64:
     if np.isnat(moment):
         raise refusal(key, value, "is not a moment", "give a datetime, or a text such as '2024-05-01T12:00:00'")
     return moment
+
+
+def _risen(ds: Any, name: str, axes: Axes) -> tuple[Any, Axes]:
+    """The data set with rows and columns along rising y and x, where a grid of two dimensions has such axes too."""
+    falling = [
+        axes.dims[part]
+        for part, words in PROJECTED.items()
+        for c in ds.variables
+        if ds[c].dims == (axes.dims[part],) and ds[c].attrs.get("standard_name") in words and ds[c][0] > ds[c][-1]
+    ]
+    if axes.latitude.ndim == 1 or not falling:
+        return ds, axes
+    ds = ds.isel({dim: slice(None, None, -1) for dim in falling})
+    return ds, axes_of(ds, name)
 
 
 def _ordered(variable: Any, axes: Axes) -> Any:
@@ -249,6 +339,9 @@ def _places(name: str, axes: Axes, variable: Any, about: float) -> tuple[np.ndar
     order = _rising(f"{name}.{y}", axes.latitude, "deg")
     variable, latitude = variable.isel({y: order}), axes.latitude[order]
     longitude = axes.longitude
+    if axes.projection is not None:
+        order = _rising(f"{name}.{x}", longitude, "m")
+        return latitude, longitude[order], (variable.isel({x: order}),)
     if np.any(np.diff(longitude) > 0.0) and np.any(np.diff(longitude) < 0.0):
         # It jumps by a whole turn.
         longitude = np.unwrap(longitude, period=360.0)
@@ -290,7 +383,7 @@ def _covering(grid: Gridded, south: float, north: float, west: float, east: floa
     inside &= (grid.longitude >= west) & (grid.longitude <= east)
     if not inside.any():
         middle = np.hypot(grid.latitude - 0.5 * (south + north), grid.longitude - 0.5 * (west + east))
-        inside.flat[int(np.argmin(middle))] = True
+        inside.flat[int(np.nanargmin(middle))] = True
     rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
     sizes = grid.latitude.shape
     # Two more on each side: cells of a turned grid reach into the box between its nodes.

@@ -16,10 +16,14 @@ MOST_STEPS = 60
 
 @dataclass(frozen=True, eq=False)
 class CurvedGrid:
-    """Nodes of a grid in metres to the north and the east, (y, x) each."""
+    """Nodes of a grid in metres to the north and the east, (y, x) each. known: mask of those that data stand at; None for all.
+
+    Places are looked for from cells between known nodes on.
+    """
 
     north: np.ndarray
     east: np.ndarray
+    known: np.ndarray | None = None
 
     def fractions(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the row and of the column (...) of places, with parts of a cell; beyond the grid too.
@@ -42,21 +46,20 @@ class CurvedGrid:
         shape = np.shape(north)
         return at[:, 0].reshape(shape), at[:, 1].reshape(shape)
 
-    def directions(self, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Unit vectors (..., 2), to the north and the east, along which columns and rows are counted at places of the grid."""
-        at = np.stack([np.ravel(rows), np.ravel(columns)], axis=-1)
-        cell, corners = self._cells(at)
-        _, slopes = _bilinear(corners, at - cell)
-        unit = slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
-        shape = (*np.shape(rows), 2)
-        return unit[:, :, 1].reshape(shape), unit[:, :, 0].reshape(shape)
+    def directions(self, axis: int) -> np.ndarray:
+        """Unit vectors (y, x, 2) at the nodes, to the north and the east, along which columns (1) or rows (0) are counted."""
+        along = np.stack([np.gradient(x, axis=axis) for x in (self.north, self.east)], axis=-1)
+        return np.asarray(along / np.linalg.norm(along, axis=-1, keepdims=True))
 
     def _nearest_cells(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         from scipy.spatial import cKDTree
 
         middles = [0.25 * (x[1:, 1:] + x[1:, :-1] + x[:-1, 1:] + x[:-1, :-1]) for x in (self.north, self.east)]
-        _, index = cKDTree(np.stack([x.ravel() for x in middles], axis=-1)).query(places)
-        row, column = np.divmod(index, middles[0].shape[1])
+        known = np.ones(self.north.shape, bool) if self.known is None else self.known
+        cells = np.flatnonzero(known[1:, 1:] & known[1:, :-1] & known[:-1, 1:] & known[:-1, :-1])
+        cells = cells if len(cells) else np.arange(middles[0].size)
+        _, nearest = cKDTree(np.stack([x.ravel()[cells] for x in middles], axis=-1)).query(places)
+        row, column = np.divmod(cells[nearest], middles[0].shape[1])
         return row, column
 
     def _cells(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,16 +5,22 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Mapping
 from typing import Any, BinaryIO
+
+import numpy as np
 
 from lgvi_warp.common import reading
 from lgvi_warp.common.arguments import path_of
-from lgvi_warp.common.errors import MissingExtra, SceneError, brief, refusal
+from lgvi_warp.common.errors import MissingExtra, SceneError, brief, closest, refusal
 from lgvi_warp.extensions.ocean.closed_files import leads_elsewhere
 
 # What reads a file, by how it begins: a stranger's file decides nothing else. HDF5 is read from the file that was looked at.
 HDF5, CLASSIC = b"\x89HDF\r\n\x1a\n", (b"CDF\1", b"CDF\2", b"CDF\5")
+# Where names of open files are.
+FOLDER = "/dev/fd"
+SCALES = ("scale_factor", "add_offset")
 REMEDY = "give the path of a NetCDF file, or an xarray Dataset"
 
 
@@ -28,24 +34,27 @@ def xarray() -> Any:
 
 
 @contextlib.contextmanager
-def data_set(source: Any) -> Iterator[Any]:
+def data_set(source: Any, attributes: Mapping[str, Any] | None = None) -> Iterator[Any]:
     """An xarray Dataset as `opened` gives it, closed at the end where it is that of a file."""
-    ds = opened(source)
+    ds = opened(source, attributes)
     try:
         yield ds
     except OSError as error:  # of what is read when it is needed
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise SceneError([f"file = {brief(os.fspath(source))}: is damaged: {reason}; {REMEDY}"]) from error
     finally:
-        if ds is not source:
+        if not isinstance(source, xarray().Dataset):
             ds.close()
 
 
-def opened(source: Any) -> Any:
-    """An xarray Dataset: the one that is given, or that of a NetCDF file, of which nothing but coordinates is read yet."""
+def opened(source: Any, attributes: Mapping[str, Any] | None = None) -> Any:
+    """An xarray Dataset: the one that is given, or that of a NetCDF file, of which nothing but coordinates is read yet.
+
+    attributes: by "variable.attribute", or "attribute" of the file, those that it lacks or that are wrong.
+    """
     library = xarray()
     if isinstance(source, library.Dataset):
-        return source
+        return decoded(source, attributes) if attributes else source
     if isinstance(source, library.DataArray):
         raise refusal("file", type(source).__name__, "is one variable", "give the Dataset that has it")
     with contextlib.ExitStack() as stack:
@@ -55,14 +64,16 @@ def opened(source: Any) -> Any:
             file.seek(0)
             if begin == HDF5:
                 _check_closed(file, path)
-                whole = library.open_dataset(file, engine="h5netcdf", cache=False, phony_dims="access")
+                whole = library.open_dataset(file, engine="h5netcdf", cache=False, decode_cf=False, phony_dims="access")
             elif begin.startswith(CLASSIC):
-                _check_whole(path, os.fstat(file.fileno()).st_size)
-                whole = library.open_dataset(path, engine="netcdf4", cache=False)
+                # The name of the open file: what is looked at is what is read, whatever becomes of the path.
+                held = next((name for name in (f"{FOLDER}/{file.fileno()}",) if os.path.exists(name)), path)
+                _check_whole(held, os.fstat(file.fileno()).st_size)
+                whole = library.open_dataset(held, engine="netcdf4", cache=False, decode_cf=False)
             else:
                 raise ValueError("it begins as none")
             stack.callback(whole.close)
-            ds = whole.copy()
+            ds = decoded(whole, attributes)
             ds.set_close(stack.pop_all().close)
             return ds
         except (SceneError, MissingExtra):
@@ -70,6 +81,39 @@ def opened(source: Any) -> Any:
         except Exception as error:  # whatever the library makes of a damaged file
             reason = " ".join(str(error).split())[:200] or type(error).__name__
             raise SceneError([f"file = {path}: is damaged, or no NetCDF file: {reason}; {REMEDY}"]) from error
+
+
+def decoded(ds: Any, attributes: Mapping[str, Any] | None = None) -> Any:
+    """The data set with attributes, by the CF conventions, without the variables of which that makes no sense.
+
+    The reasons are in its `encoding["damaged"]`.
+    """
+    library, ds = xarray(), ds.copy()
+    for key, value in (attributes or {}).items():
+        name, _, attribute = key.rpartition(".")
+        if name and name not in ds.variables:
+            raise refusal("attributes", key, "names no variable of the data set", closest(name, map(str, ds.variables)))
+        (ds[name].attrs if name else ds.attrs)[attribute] = value
+    # The library finds that one is a text when values are read.
+    damaged = {str(name): f"its {key} is no number" for name in ds.variables for key in SCALES
+               if key in ds[name].attrs and np.asarray(ds[name].attrs[key]).dtype.kind not in "fiu"}  # fmt: skip
+    ds = ds.drop_vars(damaged)
+    with warnings.catch_warnings():
+        # Of dates with a year of one digit, and of fill values that a variable cannot hold.
+        warnings.simplefilter("ignore", library.SerializationWarning)
+        try:
+            result = library.decode_cf(ds, decode_timedelta=False)
+        except Exception:  # of any one variable: attributes are a stranger's
+            for name in ds.variables:
+                try:
+                    library.decode_cf(
+                        library.Dataset({"one": ds[name].variable.to_base_variable()}), decode_timedelta=False
+                    )
+                except Exception as error:
+                    damaged[str(name)] = " ".join(str(error).split())[:200] or type(error).__name__
+            result = library.decode_cf(ds.drop_vars(damaged, errors="ignore"), decode_timedelta=False)
+    result.encoding["damaged"] = damaged
+    return result
 
 
 def _check_closed(file: BinaryIO, path: str) -> None:

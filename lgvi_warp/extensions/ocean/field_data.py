@@ -34,6 +34,8 @@ class FieldRequest:
         spacing: Distances of the nodes that are made [m], (3,); by default at least as fine as the data's own.
         fill: What stands where values are missing: "nearest", the default, "zero", or "refuse".
         checksum: That of the numbers of the file that are read, so that another file is not taken for it.
+        attributes: Attributes that the file lacks or has wrong: a table of "variable.attribute", or "attribute" of the file
+            itself, and their values, for instance {"uo.units": "m s-1"}.
     """
 
     origin: Any = array(None, shape=(2,), unit="deg")
@@ -45,6 +47,7 @@ class FieldRequest:
     spacing: Any = array(None, shape=(3,), unit="m")
     fill: str = word("nearest", known=FILLS)
     checksum: int | None = None
+    attributes: Any = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,7 @@ class FieldData:
         more: Whether the data has later ones.
         speed: Root mean square of the velocities [m/s].
         gap: Begin and end [s] of the longest time without a field, where it is more than twice the usual one; else None.
+        outages: How many fields had no value at all in the region, and were left out.
     """
 
     file: str | None
@@ -74,6 +78,7 @@ class FieldData:
     more: bool
     speed: float
     gap: tuple[float, float] | None
+    outages: int = 0
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -84,6 +89,8 @@ class FieldData:
             how = {"zero": "taken for 0", "nearest": "filled with the nearest value"}[self.request.fill]
             amount = f"{self.missing:,} of {self.values:,} values ({part:.2g} %)"
             sentences.append(f"{amount}, on land or below the sea floor, are missing: {how}")
+        if self.outages:
+            sentences.append(f"{self.outages:,} of the fields have no value there: the current goes straight over them")
         if self.gap is not None:
             begin, end = (f"{t / 3600.0:.4g}" for t in self.gap)
             sentences.append(
@@ -132,9 +139,21 @@ def checked(faults: Faults, request: FieldRequest) -> dict[str, Any]:
         faults.add("speed", request.speed, "says the region, and so does region", "leave one of them out")
     if request.speed is not None and request.duration is None:
         faults.add("speed", request.speed, "says no region without a duration", "give duration [s], or [run] duration")
+    check_attributes(faults, request.attributes)
     names = request.variables
     if names is not None and not (
         isinstance(names, list | tuple) and len(names) in (2, 3) and all(isinstance(n, str) for n in names)
     ):
         faults.add("variables", names, "are no two or three names", "give ['uo', 'vo'], or a third one for upward")
     return values
+
+
+def check_attributes(faults: Faults, attributes: Any) -> None:
+    """Note what is no table of attributes."""
+    if attributes is not None and not (
+        isinstance(attributes, dict)
+        and all(isinstance(k, str) and isinstance(v, str | int | float) for k, v in attributes.items())
+    ):
+        faults.add(
+            "attributes", attributes, "are no texts or numbers by name", "give {'uo.units': 'm s-1'} for instance"
+        )

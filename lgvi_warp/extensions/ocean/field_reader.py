@@ -44,7 +44,7 @@ def read_field(source: Any, request: FieldRequest, *, outside: str, around: Any 
     faults.raise_if_any()
     assert place is not None
     request = dataclasses.replace(request, **values)
-    with data_set(source) as ds:
+    with data_set(source, request.attributes) as ds:
         plane = LocalPlane(*map(float, request.origin))
         components = _components(ds, request, plane)
         region = _region(components[0].placed, request, place, outside)
@@ -54,10 +54,11 @@ def read_field(source: Any, request: FieldRequest, *, outside: str, around: Any 
         spacing = request.spacing if request.spacing is not None else _fine_spacing(components[0].placed, region)
         target = _regular(region, spacing)
         _check_memory(components[0].placed.grid.scenarios, count + 1, target)
-        if request.spacing is None and not components[0].placed.grid.rectilinear:
+        if request.spacing is None and components[0].placed.grid.turned:
             target = _refined(components, target, request.fill, window, count)
         reader = _FieldReader(components, target, request.fill)
-        velocities, times, error = reader.read(window, seconds, count)
+        velocities, times, error = reader.read(window, seconds)
+        seconds = seconds[~reader.outage]
     if request.checksum not in (None, reader.checksum):
         raise refusal("checksum", request.checksum, f"is not that of what is read, {reader.checksum}",
                       "leave it out to take this file")  # fmt: skip
@@ -73,7 +74,7 @@ def read_field(source: Any, request: FieldRequest, *, outside: str, around: Any 
     }
     data = FieldData(file, dataclasses.replace(request, **settled), velocities.shape[:5], reader.missing, reader.count,
                      error, float(seconds[-1]), more, float(np.sqrt(np.mean(np.sum(velocities**2, axis=-1)))),
-                     _gap(seconds))  # fmt: skip
+                     _gap(seconds), int(np.count_nonzero(reader.outage)))  # fmt: skip
     return FieldNumbers(velocities, target.origin, target.spacing, times, data)
 
 
@@ -86,12 +87,13 @@ class _Component:
 
     def within(self, region: np.ndarray) -> _Component:
         """The part of the grid that covers a region."""
-        latitude, longitude = self.placed.plane.geodetic(*edge_of(region))
+        middle = np.mean(region[:2], axis=1)
+        latitude, longitude = self.placed.plane.geodetic(
+            *(np.append(side, at) for side, at in zip(edge_of(region), middle, strict=True))
+        )
         about = self.placed.plane.longitude
         longitude = (longitude - about + 180.0) % 360.0 - 180.0 + about
-        middle = self.placed.plane.geodetic(*(np.mean(side) for side in region[:2]))[0]
-        grid = self.placed.grid.between(min(latitude.min(), middle), max(latitude.max(), middle), longitude.min(),
-                                        longitude.max()).levels(float(region[2, 1]))  # fmt: skip
+        grid = self.placed.grid.between(*self.placed.grid.extent(latitude, longitude)).levels(float(region[2, 1]))
         return _Component(self.along, Placed(grid, self.placed.plane))
 
 
@@ -100,11 +102,20 @@ def _components(ds: Any, request: FieldRequest, plane: LocalPlane) -> list[_Comp
     about, names = float(request.origin[1]), request.variables
 
     def component(along: str, quantity: cf.OceanQuantity, name: str) -> _Component:
-        return _Component(along, Placed(cf.gridded(ds, quantity, name, about), plane))
+        grid = cf.gridded(ds, quantity, name, about)
+        if grid.turned and along != "up" and not cf.says_along(ds, name, quantity):
+            word = quantity.standard_names[0]
+            other = (cf.ALONG_X if along == "east" else cf.EASTWARD).standard_names[0] if along in ("east", "x") else (
+                cf.ALONG_Y if along == "north" else cf.NORTHWARD).standard_names[0]  # fmt: skip
+            raise refusal(f"{name}.standard_name", ds[name].attrs.get("standard_name", ""),
+                          "does not say whether it is along the axes of its turned grid or to the east and north",
+                          f"give attributes = {{'{name}.standard_name': {word!r}}}, or {other!r}")  # fmt: skip
+        return _Component(along, Placed(grid, plane))
 
     if names is not None:
-        along_grid = str(getattr(ds.get(names[0]), "attrs", {}).get("standard_name", "")) in cf.ALONG_X.standard_names
-        pair = PAIRS[1] if along_grid else PAIRS[0]
+        known = [cf.variable_name(ds[[names[0]]], quantity) if names[0] in ds.data_vars else None
+                 for quantity in (cf.EASTWARD, cf.ALONG_X)]  # fmt: skip
+        pair = PAIRS[1] if known[0] is None and known[1] is not None else PAIRS[0]
         quantities = (*pair, ("up", cf.UPWARD))[: len(names)]
         return [component(along, quantity, str(cf.variable_name(ds, quantity, name)))
                 for (along, quantity), name in zip(quantities, names, strict=True)]  # fmt: skip
@@ -147,7 +158,7 @@ def _known_depths(placed: Placed) -> np.ndarray:
     """From the first level to the deepest [m]."""
     grid = placed.grid
     if grid.s_levels is not None:
-        return np.array([0.0, float(np.nanmax(np.asarray(grid.s_levels.floor.values)))])
+        return np.array([0.0, float(np.nanmax(grid.s_levels.floor))])
     return np.zeros(2) if grid.depth is None else grid.depth[[0, -1]]
 
 
@@ -183,7 +194,7 @@ def _fine_spacing(placed: Placed, region: np.ndarray) -> np.ndarray:
         level = float(np.diff(near).min()) if len(near) > 1 else 1.0
     least = float(region[2, 1] - region[2, 0]) / (MOST_LEVELS - 1)
     # North and east are turned from the axes of a curved grid: the finer of the two along both.
-    plane = (along_y, along_x) if grid.rectilinear else (horizontal, horizontal)
+    plane = (horizontal, horizontal) if grid.turned else (along_y, along_x)
     return np.array([d if d > 0.0 else 1.0 for d in (*plane, max(level, least))])
 
 
@@ -208,7 +219,7 @@ def _times(components: list[_Component], request: FieldRequest) -> tuple[range, 
     if time is None:
         return range(1), np.zeros(1), False
     seconds = cf.seconds_since(time, request.start)
-    span = f"{np.datetime_as_string(time[0], 's')} to {np.datetime_as_string(time[-1], 's')}"
+    span = " to ".join(str(one).split(".")[0] for one in time[[0, -1]])
     if not seconds[0] <= 0.0 <= seconds[-1]:
         raise refusal("start", str(request.start), f"is outside the data, {span}", "give a moment within")
     first = int(np.searchsorted(seconds, 0.0, side="right")) - 1
@@ -218,9 +229,9 @@ def _times(components: list[_Component], request: FieldRequest) -> tuple[range, 
 
 
 def _moment(components: list[_Component], request: FieldRequest) -> str | None:
-    """The moment of t = 0 as a text."""
+    """The moment of t = 0 as a text; None for the first of times that are not in the standard calendar."""
     time = components[0].placed.grid.time
-    if time is None:
+    if time is None or (request.start is None and time.dtype.kind != "M"):
         return None
     return str(np.datetime_as_string(time[0] if request.start is None else cf.instant("start", request.start)))
 
@@ -242,7 +253,9 @@ def _refined(components: list[_Component], target: Regular, fill: str, window: r
     most = MOST_FINE / (components[0].placed.grid.scenarios * (count + 1.0))
     while True:
         reader = _FieldReader(components, target, fill)
-        fields = [reader.field(0, window[i]) for i in sorted({0, len(window) // 2, len(window) - 1})]
+        read = [reader.field(0, window[i]) for i in sorted({0, len(window) // 2, len(window) - 1})]
+        if not (fields := [one for one in read if one is not None]):
+            return target
         rms = np.sqrt(max(np.mean(np.sum(velocities**2, axis=-1)) for velocities, _ in fields))
         finer = _regular(np.stack([target.origin, target.origin + target.spacing * (np.array(target.counts) - 1.0)], axis=1),
                          target.spacing * [0.5, 0.5, 1.0])  # fmt: skip
@@ -252,7 +265,10 @@ def _refined(components: list[_Component], target: Regular, fill: str, window: r
 
 
 class _FieldReader:
-    """Reads field by field. missing, count: values without a number, and all; checksum: of what is read."""
+    """Reads field by field.
+
+    missing, count: values without a number, and all; checksum: of what is read; outage: mask of the times without any value.
+    """
 
     def __init__(self, components: list[_Component], target: Regular, fill: str):
         self.components, self.target, self.fill = components, target, fill
@@ -263,27 +279,41 @@ class _FieldReader:
             next(i for i, other in enumerate(components) if _same_nodes(component, other)) for component in components
         ]
         self.missing = self.count = self.checksum = 0
+        self.outage = np.zeros(1, bool)
         for component in components:
             grid = component.placed.grid
             self._note(grid.latitude, grid.longitude, np.zeros(0) if grid.depth is None else grid.depth)
 
-    def read(self, window: range, seconds: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray | None, float]:
+    def read(self, window: range, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray | None, float]:
         """Velocities (s, t, x, y, z, 3), their first time and the time between two of them [s], and the largest change."""
         self._note(seconds)
         scenarios = self.components[0].placed.grid.scenarios
         velocities = np.empty((scenarios, len(window), *self.target.counts, 3))
         error = 0.0
+        self.outage = np.zeros(len(window), bool)
         for scenario in range(scenarios):
             for number, time in enumerate(window):
-                velocities[scenario, number], change = self.field(scenario, time)
-                error = max(error, change)
-        if len(window) == 1:
+                if (found := self.field(scenario, time)) is None:
+                    self.outage[number] = True
+                else:
+                    velocities[scenario, number] = found[0]
+                    error = max(error, found[1])
+        if self.outage.any():
+            velocities, seconds = velocities[:, ~self.outage], seconds[~self.outage]
+            name = self.components[0].placed.grid.name
+            if not len(seconds):
+                problem = "has no value there: land, or a field that is missing"
+                raise refusal("region", f"{name} at time {window[0]}", problem, "give a region in the water")
+            if not seconds[0] <= 0.0 <= seconds[-1]:
+                raise refusal("start", name, "has no value there at times before or after it, an outage",
+                              f"give a moment {seconds[0]:g} to {seconds[-1]:g} s from it")  # fmt: skip
+        if len(seconds) == 1:
             return velocities, None, error
-        times, velocities, change = _in_equal_steps(seconds, velocities, count)
+        times, velocities, change = _in_equal_steps(seconds, velocities, _steps_of_time(seconds))
         return velocities, times, error + change
 
-    def field(self, scenario: int, time: int) -> tuple[np.ndarray, float]:
-        """Velocities (x, y, z, 3) of one field, and the largest change."""
+    def field(self, scenario: int, time: int) -> tuple[np.ndarray, float] | None:
+        """Velocities (x, y, z, 3) of one field, and the largest change; None where a component has no value at all."""
         total = np.zeros((*self.target.counts, 3))
         changes: dict[int, list[Any]] = {}
         for group, component, onto, along in zip(self.group, self.components, self.onto, self.along, strict=True):
@@ -291,9 +321,21 @@ class _FieldReader:
             field = grid.values(scenario, time)
             self._note(field)
             depths = None if grid.s_levels is None else grid.s_levels.depths(time)
+            holes = np.isnan(field)
+            self.missing, self.count = self.missing + int(np.count_nonzero(holes)), self.count + field.size
+            if holes.all():
+                return None
+            if holes.any() and self.fill == "refuse":
+                when = f"{grid.name} at time {time}"
+                raise refusal("fill", self.fill, f"{np.count_nonzero(holes):,} of {field.size:,} values of {when} are missing",
+                              "give fill = 'nearest' or 'zero', or a region in open water")  # fmt: skip
+            spacing = component.placed.spacing()
+            if depths is not None:
+                # A column that is filled has the levels of the one that it is filled from.
+                depths = filled(np.where(holes.all(axis=0), np.nan, depths), spacing, "nearest")
+            field = filled(field, spacing, self.fill)
             if depths is not None and depths[0].mean() > depths[-1].mean():
                 field, depths = field[::-1], depths[::-1]
-            field = self._whole(grid, field, time)
             # In the plane's axes before values are taken between the nodes, where north is another.
             for axis in np.flatnonzero(np.any(along, axis=(0, 1))):
                 part = field * along[..., axis]
@@ -302,20 +344,6 @@ class _FieldReader:
                 change[axis] = change[axis] + onto.change(part, regular, depths)
                 total[..., axis] += regular
         return total, float(np.sum([_largest(change) for change in changes.values()]))
-
-    def _whole(self, grid: cf.Gridded, field: np.ndarray, time: int) -> np.ndarray:
-        """The field without holes, which are counted."""
-        holes = int(np.count_nonzero(np.isnan(field)))
-        self.missing, self.count = self.missing + holes, self.count + field.size
-        when = f"{grid.name} at time {time}"
-        if holes == field.size:
-            raise refusal(
-                "region", when, "has no value there: land, or a field that is missing", "give a region in the water"
-            )
-        if holes and self.fill == "refuse":
-            raise refusal("fill", self.fill, f"{holes:,} of {field.size:,} values of {when} are missing",
-                          "give fill = 'nearest' or 'zero', or a region in open water")  # fmt: skip
-        return filled(field, self.components[0].placed.spacing(), self.fill)
 
     def _note(self, *arrays: np.ndarray) -> None:
         for values in arrays:
@@ -327,7 +355,7 @@ def _same_nodes(single: _Component, compared: _Component) -> bool:
     first, second = single.placed.grid, compared.placed.grid
     pairs = ((first.latitude, second.latitude), (first.longitude, second.longitude), (first.depth, second.depth))
     none = np.zeros(0)
-    same = [np.array_equal(none if a is None else a, none if b is None else b) for a, b in pairs]
+    same = [np.array_equal(none if a is None else a, none if b is None else b, equal_nan=True) for a, b in pairs]
     return all(same) and first.shape == second.shape
 
 

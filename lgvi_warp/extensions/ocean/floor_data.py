@@ -16,10 +16,12 @@ from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.places import LocalPlane
 from lgvi_warp.extensions.ocean import cf
 from lgvi_warp.extensions.ocean.data_sets import data_set, regular_file
+from lgvi_warp.extensions.ocean.field_data import check_attributes
 from lgvi_warp.extensions.ocean.floor_request import FloorRequest
 from lgvi_warp.extensions.ocean.holes import filled
 from lgvi_warp.extensions.ocean.rasters import is_raster, open_raster
 from lgvi_warp.extensions.ocean.regrid import MARGIN, Onto, Placed, Regular, edge_of
+from lgvi_warp.extensions.ocean.units import positive
 
 # Nodes that a floor has at most: a scene holds them all.
 MOST_NODES = 4_000_000
@@ -63,6 +65,7 @@ def read_floor(file: Any, request: FloorRequest) -> FloorNumbers:
         faults.add("region", region, "ends before it begins", "give [[from, to], [from, to]]: north and east [m]")
     if spacing is not None and np.any(spacing <= 0.0):
         faults.add("spacing", spacing, "is not positive", "give numbers above 0 [m]")
+    check_attributes(faults, request.attributes)
     faults.raise_if_any()
     with _source(file, request, LocalPlane(*map(float, values["origin"])), region) as source:
         target = _target(source, region, source.spacing() if spacing is None else spacing)
@@ -92,7 +95,7 @@ def _source(file: Any, request: FloorRequest, plane: LocalPlane, region: np.ndar
                     raise refusal("variable", request.variable, "is asked of a raster, which has none", "leave it out")
                 yield stack.enter_context(open_raster(path, held, plane, request.positive or "up"))
                 return
-        yield _Gridded(stack.enter_context(data_set(file)), request, plane, region)
+        yield _Gridded(stack.enter_context(data_set(file, request.attributes)), request, plane, region)
 
 
 class _Gridded:
@@ -104,7 +107,7 @@ class _Gridded:
         if grid.depth is not None or grid.scenarios > 1:
             raise refusal("variable", name, "has levels or scenarios, which a floor has not", "name another variable")
         self.placed = Placed(_cut(grid, plane, region), plane)
-        said = str(ds[name].attrs.get("positive", "")).strip().lower()
+        said = positive(ds[name].attrs)
         # As `cf.gridded` has taken the numbers, to make depths of them.
         usual = "up" if quantity is cf.ELEVATION or said == "up" else "down"
         known = name in {cf.variable_name(ds[[name]], either) for either in (cf.FLOOR_DEPTH, cf.ELEVATION)}
@@ -123,7 +126,7 @@ class _Gridded:
 
     def spacing(self) -> np.ndarray:
         fine = np.array(self.placed.spacing())
-        return fine if self.placed.grid.rectilinear else np.full(2, fine.min())
+        return np.full(2, fine.min()) if self.placed.grid.turned else fine
 
     def depths(self, target: Regular) -> np.ndarray:
         return self.sign * Onto(self.placed, target)(self.placed.grid.values())[..., 0]
@@ -148,7 +151,7 @@ def _cut(grid: cf.Gridded, plane: LocalPlane, region: np.ndarray | None) -> cf.G
         return grid
     latitude, longitude = plane.geodetic(*edge_of(region))
     longitude = (longitude - plane.longitude + 180.0) % 360.0 - 180.0 + plane.longitude
-    return grid.between(latitude.min(), latitude.max(), longitude.min(), longitude.max())
+    return grid.between(*grid.extent(latitude, longitude))
 
 
 def _target(source: DepthSource, region: np.ndarray | None, spacing: np.ndarray) -> Regular:

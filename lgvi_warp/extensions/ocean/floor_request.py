@@ -25,6 +25,8 @@ class FloorRequest:
         positive: "up" where numbers are elevations, "down" where they are depths; by default "" what the variable says, and
             "up" of a raster.
         fill: What stands where values are missing: "refuse", the default, nothing; "nearest"; or "zero", land at the surface.
+        attributes: Attributes that a NetCDF file lacks or has wrong: a table of "variable.attribute" and their values, for
+            instance {"z.grid_mapping": "EPSG:3996"}.
     """
 
     origin: Any = array(shape=(2,), unit="deg")
@@ -33,3 +35,4 @@ class FloorRequest:
     variable: str | None = None
     positive: str = word("", known=POSITIVE)
     fill: str = word("refuse", known=FILLS)
+    attributes: Any = None

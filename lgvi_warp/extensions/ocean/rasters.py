@@ -12,6 +12,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import MissingExtra, SceneError, refusal
 from lgvi_warp.common.places import LocalPlane
+from lgvi_warp.extensions.ocean.projections import transformer_of
 from lgvi_warp.extensions.ocean.regrid import Regular, edge_of
 
 # How TIFF and BigTIFF begin, by the order of their bytes.
@@ -20,9 +21,6 @@ MAGIC = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 ROUND_OFF = 1e-6
 # Rows and columns that differ by less than this part from east and north count as along them.
 TURNED = 0.1
-# Words of a reference system that stand before the name of a file.
-NAMES_A_FILE = ("PARAMETERFILE", "GRIDS=", "EXTENSION[")
-
 
 # Neither sidecars (.msk, .ovr, .aux.xml) nor folders are looked at; the file is open, so that its name leads nowhere.
 OPTIONS = {"GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR", "GDAL_PAM_ENABLED": "NO"}
@@ -130,20 +128,19 @@ class Raster:
 
     def _transformer(self, crs: Any) -> tuple[Any, bool]:
         """From longitude and latitude [deg] to the raster's x and y, and whether those are degrees too."""
-        from pyproj import CRS, Transformer
+        from pyproj import CRS
         from pyproj.exceptions import ProjError
 
         try:
-            text = crs.to_wkt(version="WKT2_2019")
-            # A shift by a grid names the file that holds it.
-            named = any(word in text.upper().replace("GRIDS=@NULL", "") for word in NAMES_A_FILE)
-            system = CRS.from_wkt(text)
-            system = system.sub_crs_list[0] if system.is_compound else system
-            if not named and (system.is_geographic or system.is_projected):
-                return Transformer.from_crs(CRS.from_epsg(4326), system.to_2d(), always_xy=True), system.is_geographic
-            problem = "names a file of its own" if named else f"is a {system.type_name.lower()}"
+            transformer, geographic, _ = transformer_of(CRS.from_wkt(crs.to_wkt(version="WKT2_2019")))
+            return transformer, geographic
         except (ProjError, ValueError) as error:  # rasterio's errors of such systems are ValueErrors
-            problem = f"is not understood, {' '.join(str(error).split())[:100]}"
+            said = " ".join(str(error).split())[:100]
+            problem = (
+                said
+                if type(error) is ValueError and said.startswith(("names", "is a"))
+                else f"is not understood, {said}"
+            )
         raise refusal("file", self.path, f"has a coordinate reference system that {problem}",
                       "write one of latitudes and longitudes or a projection, by gdalwarp -t_srs EPSG:4326")  # fmt: skip
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.places import LocalPlane
 from lgvi_warp.extensions.ocean.cf import Gridded
 from lgvi_warp.extensions.ocean.curvilinear import CurvedGrid
@@ -19,6 +20,8 @@ ROUND_OFF = 1e-6
 MARGIN = 1e-6
 # Places along each side of a box.
 ON_EDGE = 21
+# The angle that a file tells and the directions of its own nodes may differ by so much [rad].
+MOST_OFF = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,22 +45,29 @@ class Placed:
     plane: LocalPlane
 
     @functools.cached_property
+    def known(self) -> np.ndarray:
+        """Mask of the nodes (y, x) that have a place."""
+        return np.isfinite(self.grid.places()[0])
+
+    @functools.cached_property
     def north_east(self) -> tuple[np.ndarray, np.ndarray]:
-        """The nodes in the plane (y, x) [m]."""
-        if self.grid.rectilinear:
-            return self.plane.local(*np.meshgrid(self.grid.latitude, self.grid.longitude, indexing="ij"))
-        return self.plane.local(self.grid.latitude, self.grid.longitude)
+        """The nodes in the plane (y, x) [m]; those without a place where the others go on to."""
+        north, east = self.plane.local(*self.grid.places())
+        return (north, east) if self.known.all() else (_extended(north, self.known), _extended(east, self.known))
 
     @functools.cached_property
     def curved(self) -> CurvedGrid:
         """The same as a grid of cells with four corners."""
-        return CurvedGrid(*self.north_east)
+        return CurvedGrid(*self.north_east, self.known)
 
     def fractions(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the row and of the column of places, with parts; beyond the grid too."""
         if not self.grid.rectilinear:
             return self.curved.fractions(north, east)
         latitude, longitude = self.plane.geodetic(north, east)
+        if self.grid.projection is not None:
+            x, y = self.grid.projection.plane(latitude, longitude)
+            return _numbered(y, self.grid.latitude), _numbered(x, self.grid.longitude)
         middle = 0.5 * (self.grid.longitude[0] + self.grid.longitude[-1])
         longitude = (longitude - middle + 180.0) % 360.0 - 180.0 + middle
         return _numbered(latitude, self.grid.latitude), _numbered(longitude, self.grid.longitude)
@@ -89,9 +99,11 @@ class Placed:
 
     def spacing(self) -> tuple[float, float]:
         """Least distance of neighbours along y and along x [m]; 0 along an axis of one node."""
-        steps = (np.hypot(*(np.diff(x, axis=axis) for x in self.north_east)) for axis in (0, 1))
-        along_y, along_x = (float(step.min()) if step.size else 0.0 for step in steps)
-        return along_y, along_x
+        north, east = (np.where(self.known, x, np.nan) for x in self.north_east)
+        steps = (np.hypot(np.diff(north, axis=axis), np.diff(east, axis=axis)) for axis in (0, 1))
+        # Nodes that a writer repeats, at a fold or a seam, are no neighbors.
+        along_y, along_x = (float(np.min(step, initial=np.inf, where=step > 0.0)) for step in steps)
+        return tuple(step if np.isfinite(step) else 0.0 for step in (along_y, along_x))  # type: ignore[return-value]
 
 
 class Onto:
@@ -131,19 +143,51 @@ class Onto:
 
 def directions(placed: Placed, along: str) -> np.ndarray:
     """Unit vectors (y, x, 3) at the nodes, in the inertial axes, of "east", "north", "up", or "x" or "y" of the grid."""
-    rows, columns = placed.grid.shape[3:]
+    grid, (rows, columns) = placed.grid, placed.grid.shape[3:]
     if along == "up":
         return np.broadcast_to(np.array([0.0, 0.0, -1.0]), (rows, columns, 3))
     vectors = np.zeros((rows, columns, 3))
-    if along in ("x", "y") and not placed.grid.rectilinear:
-        numbers = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
-        vectors[..., :2] = placed.curved.directions(*numbers)[along == "y"]
+    latitude, longitude = placed.plane.geodetic(*placed.north_east)
+    if along in ("x", "y") and grid.projection is not None:
+        first, last = (
+            np.array(placed.plane.local(*place)) for place in grid.projection.neighbors(latitude, longitude, along)
+        )
+        vectors[..., :2] = np.moveaxis((last - first) / np.linalg.norm(last - first, axis=0), 0, -1)
         return vectors
-    # From the plane's north to true north, towards the east.
-    angle = placed.plane.convergence(*placed.plane.geodetic(*placed.north_east))
-    first = (-np.sin(angle), np.cos(angle)) if along in ("east", "x") else (np.cos(angle), np.sin(angle))
-    vectors[..., 0], vectors[..., 1] = first
+    along_grid = along in ("x", "y") and not grid.rectilinear
+    if along_grid:
+        vectors[..., :2] = placed.curved.directions(1 if along == "x" else 0)
+        if grid.angle is None:
+            return vectors
+    # From the plane's north to true north, towards the east; and to the left from the east to the grid's x.
+    turn = placed.plane.convergence(latitude, longitude) - (
+        grid.angle if along_grid and grid.angle is not None else 0.0
+    )
+    unit = (-np.sin(turn), np.cos(turn)) if along in ("east", "x") else (np.cos(turn), np.sin(turn))
+    if along_grid:
+        off = np.arccos(np.clip(vectors[..., 0] * unit[0] + vectors[..., 1] * unit[1], -1.0, 1.0))[_water(placed)]
+        if (most := np.nanmax(off, initial=0.0)) > MOST_OFF:
+            remedy = "give attributes = {'angle.units': 'degrees'} if it is in degrees, or leave the variable out"
+            shown, problem = f"{np.rad2deg(most):.3g} degrees", f"is between it and the {along} of the grid"
+            raise refusal("angle", shown, problem, remedy)
+    vectors[..., 0], vectors[..., 1] = unit
     return vectors
+
+
+def _water(placed: Placed) -> np.ndarray:
+    """Mask of the nodes that have a place and are not on land."""
+    return placed.known if placed.grid.land is None else placed.known & ~placed.grid.land
+
+
+def _extended(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Numbers (y, x), those that are not known by a cubic in row and column through the others, and the nearest one's rest."""
+    from scipy.ndimage import distance_transform_edt
+
+    y, x = (np.linspace(-1.0, 1.0, n) for n in values.shape)
+    cubic = np.stack([np.outer(y**i, x**j) for i in range(4) for j in range(4 - i)], axis=-1)
+    fit = cubic @ np.linalg.lstsq(cubic[known], values[known], rcond=None)[0]
+    j, i = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return np.asarray(np.where(known, values, fit + (values - fit)[j, i]))
 
 
 def edge_of(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

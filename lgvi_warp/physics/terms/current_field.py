@@ -87,6 +87,7 @@ class CurrentField(InFile, Term):
         spacing: Any = None,
         fill: str = "nearest",
         checksum: int | None = None,
+        attributes: Mapping[str, Any] | None = None,
         outside: str = "stop",
         scenario: float = 0.0,
         name: str = "",
@@ -113,6 +114,8 @@ class CurrentField(InFile, Term):
             fill: What stands where values are missing, on land and below the sea floor: "nearest", the default, "zero", or
                 "refuse".
             checksum: That of the numbers of a file, so that another file is not taken for it; by default whatever is there.
+            attributes: Attributes that a file lacks or has wrong, for instance {"u.units": "m s-1"}; "name" alone is one of
+                the file itself.
             outside: As of the class, but "stop" by default.
             scenario: As of the class. Scenarios are the dimension `realization`, `member`, `ensemble` or `number`.
             name: As of `Term`.
@@ -144,7 +147,8 @@ class CurrentField(InFile, Term):
             0.9
         """
         wanted = {"origin": origin, "start": start, "region": region, "speed": speed, "duration": duration,
-                  "variables": variables, "spacing": spacing, "fill": fill, "checksum": checksum}  # fmt: skip
+                  "variables": variables, "spacing": spacing, "fill": fill, "checksum": checksum,
+                  "attributes": attributes}  # fmt: skip
         numbers = numbers_in(source, cls, wanted, outside=outside, around=around)
         known = {key: getattr(numbers, key) for key in OF_DATA}
         return _with_data(cls(**known, outside=outside, scenario=scenario, name=name), numbers.data)

@@ -75,6 +75,7 @@ class Floor(InFile, Event):
         variable: str | None = None,
         positive: str = "",
         fill: str = "refuse",
+        attributes: Mapping[str, Any] | None = None,
         clearance: Any = None,
         name: str = "",
     ) -> Self:
@@ -89,6 +90,7 @@ class Floor(InFile, Event):
             positive: "up" where the numbers are elevations, "down" where they are depths; by default what the variable says,
                 and "up" of a GeoTIFF.
             fill: What stands where depths are missing: "refuse", the default, nothing; "nearest"; or "zero", land.
+            attributes: Attributes that a NetCDF file lacks or has wrong, for instance {"z.grid_mapping": "EPSG:3996"}.
             clearance: How far above the floor members stop [m]; 0 where it is left out.
             name: As of `Event`.
 
@@ -112,7 +114,7 @@ class Floor(InFile, Event):
             25.0
         """
         wanted = {"origin": origin, "region": region, "spacing": spacing, "variable": variable, "positive": positive,
-                  "fill": fill}  # fmt: skip
+                  "fill": fill, "attributes": attributes}  # fmt: skip
         numbers = numbers_in(file, cls, wanted)
         at = {"depth": numbers.depth, "origin": numbers.origin, "spacing": numbers.spacing}
         return cls(**at, clearance=clearance, name=name)

@@ -344,7 +344,7 @@ class Term(Documented):
         """The same term in a scene, for one that follows from other terms as well; by default it does not.
 
         Args:
-            terms: All terms of the scene.
+            terms: All terms and events of the scene.
 
         Returns:
             A copy, or the term where nothing changes.

@@ -172,7 +172,7 @@ STRIPS = "its strips have {:.3g} times {}, {:.3g} {}: a unit, or another vehicle
 def steepness(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for waves that would break, and for waves that a current blocks."""
     for term in _waves(scene, p):
-        steep, blocked = term.steepness(own_numbers(term, p), p), term.components(own_numbers(term, p), p).blocked
+        steep, blocked = term.steepness(own_numbers(term, p), p), term.wave_table(own_numbers(term, p), p).blocked
         yield f"{term.key}.{term.height_field}", steep > term.breaks, _steep(term, steep)
         count = blocked.sum(axis=1)
         yield f"{term.key}.{term.periods_field}", count > 0, lambda i, count=count: BLOCKED.format(count[i])  # type: ignore[misc]
@@ -206,7 +206,7 @@ def doppler(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     varying = (term for term in scene.terms if term.type in fields and not term.carries)
     flows = [p[f"{term.key}.{fields[term.type]}"] for term in varying]
     for term in _waves(scene, p) if flows else ():
-        c = term.components(own_numbers(term, p), p)
+        c = term.wave_table(own_numbers(term, p), p)
         ratio = np.zeros(1)
         for flow in flows:
             rows = flow.reshape(len(flow), -1, 3)

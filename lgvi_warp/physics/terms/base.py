@@ -245,6 +245,8 @@ class Term(Documented):
     usual: ClassVar[Mapping[str, str | tuple[float, str]]] = {}
     depth_field: ClassVar[str] = ""
     floats: ClassVar[bool] = False
+    # Numbers in (0, 1) that each member of an ensemble draws by itself, unless they vary otherwise.
+    drawn: ClassVar[tuple[str, ...]] = ()
 
     name: str = ""
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -61,7 +61,7 @@ class WaveTerm(Term):
 
     Methods:
         sea: Amplitudes, frequencies, headings and phases of the components.
-        components: The components with their wavenumbers.
+        wave_table: The components with their wavenumbers.
         elevation: Height of the surface above still water.
         steepness: How steep the waves are.
     """
@@ -72,6 +72,7 @@ class WaveTerm(Term):
     height_field: ClassVar[str] = ""
     breaks: ClassVar[float] = 0.0
     too_steep: ClassVar[str] = ""
+    usual: ClassVar[Mapping[str, Any]] = {"depth": "seas have any depth"}
     # Uniform currents, and the flat floor whose depth is the sea's; set for a term of a scene.
     currents: ClassVar[tuple[Term, ...]] = ()
     floor: ClassVar[Any] = None
@@ -124,7 +125,7 @@ class WaveTerm(Term):
         """Whether the sea has a floor."""
         return self.floor is not None or (self.depth is not None and bool(np.isfinite(self.depth)))
 
-    def components(self, numbers: Numbers, parameters: Numbers) -> Components:
+    def wave_table(self, numbers: Numbers, parameters: Numbers) -> Components:
         """The components with their wavenumbers.
 
         Args:
@@ -177,7 +178,7 @@ class WaveTerm(Term):
             fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
             remedy = f"give gravity above 0, or leave {self.key} out"
             raise refusal("environment.gravity", float(g.min()), fault, remedy)
-        c = self.components(numbers, context.parameters)
+        c = self.wave_table(numbers, context.parameters)
         columns = c[: 8 + self.finite]
         rows = np.stack(columns, axis=-1)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
@@ -186,7 +187,7 @@ class WaveTerm(Term):
         # Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as at the surface, below the floor as there.
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
-        for j in range((components := self.components(numbers, parameters)).k.shape[1]):
+        for j in range((components := self.wave_table(numbers, parameters)).k.shape[1]):
             north, east, k, omega, phase, ahead, aside, down, f, *_ = (table[:, j] for table in components)
             theta = north * x + east * y + (phase - omega * time[:, None])
             e = np.exp(-k * np.maximum(depth, 0.0))
@@ -209,7 +210,7 @@ class WaveTerm(Term):
         """
         total = np.zeros(position.shape[:-1])
         x, y, _ = np.moveaxis(position, -1, 0)
-        c = self.components(numbers, parameters)
+        c = self.wave_table(numbers, parameters)
         for north, east, omega, phase, amplitude in zip(
             *(table.T for table in (c.north, c.east, c.omega, c.phase, c.amplitude)), strict=True
         ):
@@ -259,7 +260,7 @@ class Waves(WaveTerm, Harmonics):
     def steepness(self, numbers: Numbers, parameters: Numbers) -> Array:
         # Of many components the root of the sum of their squares. Those of one period and heading are one wave, whose
         # amplitude is the sum of theirs with their phases.
-        c = self.components(numbers, parameters)
+        c = self.wave_table(numbers, parameters)
         slopes, square = c.k * c.amplitude * np.exp(1j * c.phase), np.zeros(1)
         slopes = slopes / np.tanh(np.where(c.k > 0.0, c.k, 1.0) * self._depth(numbers, parameters))
         for j in range(slopes.shape[1]):
@@ -283,7 +284,7 @@ def pressure_rows(waves: Sequence[WaveTerm], parameters: Numbers) -> tuple[list[
     """Rows (n, rows) of each of some waves for device code that reads surface and pressure, and the count of components."""
     rows, count, finite = [], 0, water_of(waves) == "finite"
     for term in waves:
-        c = term.components(own(term, parameters), parameters)
+        c = term.wave_table(own(term, parameters), parameters)
         columns = (*c[:5], c.amplitude / (1.0 + c.decay**2), np.maximum(c.decay, DEEP))
         rows.append(np.stack(columns[: 6 + finite], axis=-1).reshape(len(c.k), -1))
         count += c.k.shape[1]

@@ -156,7 +156,9 @@ class SeaState(WaveTerm):
         edges = np.linspace(0.0, GROWN, INTERVALS + 1)
         energy = np.cumsum(_enhanced(_ratio(_middles()), numbers["peakedness"][:, None]), axis=1)
         below = np.concatenate([np.zeros((len(energy), 1)), energy / energy[:, -1:]], axis=1)
-        below, levels = (np.broadcast_to(x, (max(len(below), len(levels)), x.shape[1])) for x in (below, levels))
+        if len(below) == 1:
+            return _ratio(np.interp(levels, below[0], edges))
+        levels = np.broadcast_to(levels, (len(below), levels.shape[1]))
         return np.stack([_ratio(np.interp(*each, edges)) for each in zip(levels, below, strict=True)])
 
     def steepness(self, numbers: Numbers, parameters: Numbers) -> Array:

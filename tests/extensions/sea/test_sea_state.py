@@ -147,8 +147,8 @@ def test_same_bits_for_any_threads_and_subset():
 
 def said(scene):
     """Texts of `plausibility` on the waves of a scene."""
-    found = plausibility.of_ensemble(scene if isinstance(scene, lw.Ensemble) else lw.Ensemble.from_scene(scene))
-    return [text for text in found.texts if "sea_state" in text]
+    ensemble = scene if isinstance(scene, lw.Ensemble) else lw.Ensemble.from_scene(scene)
+    return [text for text in plausibility.of_ensemble(ensemble).messages(ensemble.members) if "sea_state" in text]
 
 
 def test_impossible_seas_are_flagged_by_member():

@@ -143,7 +143,7 @@ class SeaState(WaveTerm):
             # The sine of half the angle, from -1 to 1, has the density (1 - x^2)^(s - 1/2).
             s = numbers["spreading"][:, None] + 0.5
             heading = heading + 2.0 * np.arcsin(2.0 * betaincinv(s, s, levels[..., 2]) - 1.0)
-        amplitude = numbers["significant_height"][:, None] / np.sqrt(8.0 * count)
+        amplitude = numbers["significant_height"][:, None] / np.full(count, np.sqrt(8.0 * count))
         if self.amplitudes == "rayleigh":
             amplitude = amplitude * np.sqrt(-np.log(np.maximum(levels[..., -1], 1e-300)))
         omega = 2.0 * np.pi / numbers["peak_period"][:, None] * ratio

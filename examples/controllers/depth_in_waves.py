@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""REMUS 100 keeps 4 m of depth in head seas: waves at its origin alone, with their loads along its hull, by a pressure cell."""
+"""REMUS 100 keeps 4 m of depth in head seas: waves at its origin, loads along its hull, a pressure cell."""
 
 import sys
 from pathlib import Path
@@ -54,7 +54,8 @@ def plot(runs, path):
         for axes, values in ((above, depth), (below, pitch)):
             axes.plot(time[late], values[late, 0], style, color=color, label=name)
     above.set(
-        ylabel="depth [m]", title="Loads along the hull take a quarter of the pitch, a pressure cell more than half of the rest"
+        ylabel="depth [m]",
+        title="Loads along the hull take a quarter of the pitch, a pressure cell more than half of the rest",
     )
     above.invert_yaxis()
     below.set(xlabel="time [s]", ylabel="pitch [deg]", xlim=(60.0, 90.0))

@@ -17,7 +17,9 @@ sea = lw.terms.SeaState(
     heading_deg=FROM_DEG + 180.0,
     spreading=2.0 / np.radians(SPREAD_DEG) ** 2 - 1.0,
 )
-scene = lw.Scene.named("remus_100", terms=[sea], start={"position": [0.0, 0.0, 10.0]}, events=[lw.events.Floor(depth=20.0)])
+scene = lw.Scene.named(
+    "remus_100", terms=[sea], start={"position": [0.0, 0.0, 10.0]}, events=[lw.events.Floor(depth=20.0)]
+)
 sea = scene.terms[-1]
 
 

@@ -132,7 +132,9 @@ class Sensor(MeasuringPart):
             remedy = "leave it out" if not among(self.of, [RANGE]) else "give point"
             faults.add("place", self.place, f"has no meaning for a sensor of {self.of}", remedy)
         if self.reads == "pressure" and not among(self.of, ["depth"]):
-            faults.add("reads", self.reads, f"has no meaning for a sensor of {self.of}", 'leave it out, or give of = "depth"')
+            faults.add(
+                "reads", self.reads, f"has no meaning for a sensor of {self.of}", 'leave it out, or give of = "depth"'
+            )
 
     def beside(self, terms: Sequence[Term]) -> Any:
         # Knows the waves whose pressure it reads.

@@ -215,7 +215,11 @@ def doppler(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
                 u, v = (np.stack([each.min(axis=1), each.max(axis=1)], axis=1) for each in (u, v))
             ratio = ratio + _largest(c.north[:, None] * u + c.east[:, None] * v) / c.omega
         ratio = _largest((ratio * (c.amplitude > 0.0))[:, :, None])[:, 0]
-        yield f"{term.key}.{term.periods_field}", np.abs(ratio) > SHIFTED, lambda i, ratio=ratio: _shift(float(ratio[i]))  # type: ignore[misc]
+        yield (
+            f"{term.key}.{term.periods_field}",
+            np.abs(ratio) > SHIFTED,
+            lambda i, ratio=ratio: _shift(float(ratio[i])),
+        )  # type: ignore[misc]
 
 
 MOST_ROWS = 10_000

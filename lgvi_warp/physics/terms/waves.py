@@ -184,7 +184,7 @@ class WaveTerm(Term):
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 
     def water(self, numbers: Numbers, position: Array, time: Array, parameters: Numbers) -> Array:
-        # Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as at the surface, below the floor as there.
+        # Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as there, below the floor as there.
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
         for j in range((components := self.wave_table(numbers, parameters)).k.shape[1]):
@@ -294,7 +294,7 @@ def pressure_rows(waves: Sequence[WaveTerm], parameters: Numbers) -> tuple[list[
 def wavenumbers(omega: Array, drift: Any, depth: Any, gravity: Array) -> Array:
     """Wavenumbers k [1/m] with sqrt(g k tanh(k h)) + k U = omega (Peregrine 1976); NaN where an opposing current blocks them.
 
-    omega [rad/s], (n, k). drift: U, the current along each wave [m/s]. depth: h [m]; inf for deep water. gravity (n, 1) [m/s2].
+    omega [rad/s], (n, k). drift: U, the current along each wave [m/s]. depth: h [m]; inf for deep water. gravity [m/s2].
     """
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         # In deep water sigma + U sigma^2 / g = omega.

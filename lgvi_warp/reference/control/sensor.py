@@ -44,7 +44,13 @@ class Sensor(Part):
             arm = y.R @ self.place
             y = replace(y, position=y.position + (arm if count == 3 else arm * [0.0, 0.0, 1.0]))
         if self.reads == "pressure":
-            at = View(y.R, truth.position + (0.0 if self.place is None else y.R @ self.place), y.water_velocity, y.angular_velocity, y.t)
+            at = View(
+                y.R,
+                truth.position + (0.0 if self.place is None else y.R @ self.place),
+                y.water_velocity,
+                y.angular_velocity,
+                y.t,
+            )
             depth = y.position[2] + sum(wave.head(at) for wave in self.waves)
             y = replace(y, position=np.array([*y.position[:2], max(depth, 0.0)]))
         first, second = (self.drawn(y, stream) for stream in (0, 1))

@@ -87,7 +87,9 @@ CASES = {
     "surface buoyancy of a box": surface(SURFACE, "box"),
     "surface buoyancy of a ball": surface(BALL, "circle"),
     "surface buoyancy in waves": surface(BALL, "box", terms.Waves(**WAVES), Waves(**arrays(WAVES), gravity=GRAVITY)),
-    "surface buoyancy in shallow waves": surface(BALL, "circle", terms.Waves(**SHALLOW), Waves(**arrays(SHALLOW), gravity=GRAVITY)),
+    "surface buoyancy in shallow waves": surface(
+        BALL, "circle", terms.Waves(**SHALLOW), Waves(**arrays(SHALLOW), gravity=GRAVITY)
+    ),
     "stratification": Case(
         (terms.Stratification(**STRATIFICATION),),
         (Stratification(**STRATIFICATION, buoyancy=BUOYANCY, center_of_buoyancy=CENTER_OF_BUOYANCY),),

@@ -150,7 +150,10 @@ def profile(*velocity):
         ([profile(0.6, 4.0, 0.0)], 0.6),
         ([{"type": "current_profile", "depths": [0.0, 9.0], "velocities": [[0.2, 0.0, 0.0], [-0.5, 0.0, 0.0]]}], -0.5),
         (
-            [{"type": "current_harmonics", "amplitudes": [[0.3, 0.0, 0.0]], "periods": [900.0]}, profile(0.1, 0.0, 0.0)],
+            [
+                {"type": "current_harmonics", "amplitudes": [[0.3, 0.0, 0.0]], "periods": [900.0]},
+                profile(0.1, 0.0, 0.0),
+            ],
             0.4,
         ),
     ],

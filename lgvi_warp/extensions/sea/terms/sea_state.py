@@ -16,8 +16,8 @@ from lgvi_warp.physics.terms.base import Array, Numbers, Term, number
 from lgvi_warp.physics.terms.floor import Floor
 from lgvi_warp.physics.terms.waves import WaveTerm
 
-# Frequency over that of the peak beyond which the spectrum is cut: 1.5 % of a Pierson-Moskowitz sea lies there. Its slopes would
-# grow without bound.
+# Frequency over that of the peak beyond which the spectrum is cut: 1.5 % of a Pierson-Moskowitz sea lies there. Its slopes
+# would grow without bound.
 CUT = 3.0
 # Exponent of the spectrum below its peak, exp(-5/4 (fp / f)^4), and breadths of the peak below and above it.
 FALL, BREADTHS = 1.25, (0.07, 0.09)
@@ -39,14 +39,13 @@ class SeaState(WaveTerm):
     Args:
         significant_height: Significant wave height Hs [m], 4 times the standard deviation of the surface.
         peak_period: Period Tp of the spectrum's peak [s].
-        heading_deg: Mean direction in which the waves travel [deg] from north; forecasts say where they come from, 180 deg
-            less.
+        heading_deg: Mean direction in which the waves travel [deg] from north. Forecasts say where they come from: add 180.
         spectrum: "jonswap", the default (Hasselmann et al. 1973), of young seas; or "pierson_moskowitz", of fully grown ones.
         peakedness: Peak enhancement of a JONSWAP spectrum, from 1; 3.3 by default.
         spreading: Exponent s of the directions, spread as cos^2s of half the angle from the mean (Longuet-Higgins et al.
             1963), whose standard deviation is sqrt(2 / (s + 1)) rad; by default all waves have the mean direction.
-        amplitudes: "equal", the default, so that Hs is that of every member; or "rayleigh", random as those of a piece of a long
-            record.
+        amplitudes: "equal", the default, so that Hs is that of every member; or "rayleigh", random as those of a piece of a
+            long record.
         components: Number of waves; 20 by default.
         depth: Depth of the sea [m]; by default that of the scene's floor where it is flat, else the water is deep.
         periods_of: Who sees the periods where a uniform current acts: "ground", the default, a fixed place, as a moored buoy

@@ -154,7 +154,7 @@ class Sensor(MeasuringPart):
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         # The names of the numbers that matter for some member.
         acting = tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
-        placed = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
+        placed: tuple[str, ...] = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
         if self.reads == "pressure":
             placed += (water_of(self.waves) if self.waves else "still",)
         return (

@@ -632,7 +632,7 @@ class Ensemble(Summarized, Documented):
         return content | ({"explicit": sorted(explicit)} if explicit else {})
 
 
-def drawn_by_terms(scene: SceneLike, settings: EnsembleSettings, given: Collection[str]) -> dict[str, Any]:
+def drawn_by_terms(scene: SceneLike, settings: EnsembleSettings, fixed: Collection[str]) -> dict[str, Any]:
     """Distributions of what terms draw for each member by themselves, unless it is given, or varies otherwise."""
     drawn = [f"{term.key}.{name}" for term in scene.terms for name in term.drawn]
     if not drawn:
@@ -641,7 +641,7 @@ def drawn_by_terms(scene: SceneLike, settings: EnsembleSettings, given: Collecti
 
     sampled = [*settings.sampling.distributions(), *settings.sampling.own_values()]
     others = {target.name for key in [*settings.vary, *sampled] for target in variations.targets(key)}
-    return {name: Levels() for name in drawn if name not in others and name not in given}
+    return {name: Levels() for name in drawn if name not in others and name not in fixed}
 
 
 # Members that are drawn and checked before a run; the others are checked as the run comes to them.

@@ -173,13 +173,14 @@ def steepness(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for waves that would break, and for waves that a current blocks."""
     for term in _waves(scene, p):
         steep, blocked = term.steepness(own_numbers(term, p), p), term.wave_table(own_numbers(term, p), p).blocked
-        yield f"{term.key}.{term.height_field}", steep > term.breaks, _steep(term, steep)
+        yield f"{term.key}.{term.height_field}", steep > term.breaks, _worded(term.too_steep.format, steep, term.breaks)
         count = blocked.sum(axis=1)
-        yield f"{term.key}.{term.periods_field}", count > 0, lambda i, count=count: BLOCKED.format(count[i])  # type: ignore[misc]
+        yield f"{term.key}.{term.periods_field}", count > 0, _worded(BLOCKED.format, count)
 
 
-def _steep(term: WaveTerm, steep: np.ndarray) -> Callable[[int], str]:
-    return lambda i: term.too_steep.format(steep[i], term.breaks)
+def _worded(say: Callable[..., str], values: np.ndarray, *more: float) -> Callable[[int], str]:
+    """The text of a member's value."""
+    return lambda i: say(float(values[i]), *more)
 
 
 def _waves(scene: SceneLike, p: Numbers) -> list[WaveTerm]:
@@ -215,11 +216,7 @@ def doppler(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
                 u, v = (np.stack([each.min(axis=1), each.max(axis=1)], axis=1) for each in (u, v))
             ratio = ratio + _largest(c.north[:, None] * u + c.east[:, None] * v) / c.omega
         ratio = _largest((ratio * (c.amplitude > 0.0))[:, :, None])[:, 0]
-        yield (
-            f"{term.key}.{term.periods_field}",
-            np.abs(ratio) > SHIFTED,
-            lambda i, ratio=ratio: _shift(float(ratio[i])),
-        )  # type: ignore[misc]
+        yield f"{term.key}.{term.periods_field}", np.abs(ratio) > SHIFTED, _worded(_shift, ratio)
 
 
 MOST_ROWS = 10_000

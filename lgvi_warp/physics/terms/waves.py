@@ -63,7 +63,7 @@ class WaveTerm(Term):
         sea: Amplitudes, frequencies, headings and phases of the components.
         wave_table: The components with their wavenumbers.
         elevation: Height of the surface above still water.
-        steepness: How steep the waves are.
+        steepness: Steepness of the waves.
     """
 
     timed: ClassVar[bool] = True
@@ -109,7 +109,7 @@ class WaveTerm(Term):
         raise NotImplementedError
 
     def steepness(self, numbers: Numbers, parameters: Numbers) -> Array:
-        """How steep the waves are, to be compared with `breaks`.
+        """Steepness of the waves, to be compared with `breaks`.
 
         Args:
             numbers: The term's numbers by field, each of shape (n, ...).

@@ -146,7 +146,7 @@ def test_same_bits_for_any_threads_and_subset():
     assert len(np.unique(whole[-1, :, 0])) == 700
 
 
-def said(scene):
+def oddities(scene):
     """Texts of `plausibility` on the waves of a scene."""
     ensemble = scene if isinstance(scene, lw.Ensemble) else lw.Ensemble.from_scene(scene)
     return [text for text in plausibility.of_ensemble(ensemble).messages(ensemble.members) if "sea_state" in text]
@@ -154,12 +154,12 @@ def said(scene):
 
 def test_impossible_seas_are_flagged_by_member():
     # A wave of 3 s is 14.05 m long in deep water: no sea of 3 s is higher than 2.0 m.
-    assert said(scene_in(significant_height=2.0, peak_period=3.0)) == []
-    (text,) = said(scene_in(significant_height=2.01, peak_period=3.0))
+    assert oddities(scene_in(significant_height=2.0, peak_period=3.0)) == []
+    (text,) = oddities(scene_in(significant_height=2.01, peak_period=3.0))
     assert text.startswith("sea_state.significant_height")
     assert "0.143" in text
     vary = {"sea_state.peak_period": lw.distributions.Choice([2.0, 9.0])}
-    (text,) = said(lw.Ensemble(scene_in(), 100, 1, vary))
+    (text,) = oddities(lw.Ensemble(scene_in(), 100, 1, vary))
     assert "of 100 members" in text
 
 

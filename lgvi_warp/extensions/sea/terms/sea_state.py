@@ -77,7 +77,8 @@ class SeaState(WaveTerm):
     too_steep: ClassVar[str] = (
         "a steepness Hs / (g Tp^2 / 2 pi) of {:.3g} is beyond {:.3g}, at which waves break: a height or a period?"
     )
-    usual: ClassVar[Mapping[str, Any]] = WaveTerm.usual | {
+    usual: ClassVar[Mapping[str, Any]] = {
+        **WaveTerm.usual,
         "significant_height": (20.0, "no higher sea was ever measured: is it in feet, or a crest in mm?"),
         "peakedness": (10.0, "the most peaked seas have 7"),
         "spreading": (1000.0, "swell has 75 or less; is it an angle?"),

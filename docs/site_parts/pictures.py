@@ -117,6 +117,7 @@ MADE = {
     "guide/at_the_surface.png": of_script("examples/laws/at_the_surface.py"),
     "guide/beside_others.png": Made(("benchmarks/rows/bars.json", "benchmarks/bars_picture.py"), BARS),
     "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
+    "guide/forecast_sea.png": of_script("examples/laws/forecast_sea.py"),
     "guide/footprint.png": of_page("docs/guide/footprint.md", "footprint.png"),
     "guide/glider_by_its_battery.png": of_script("examples/laws/glider_by_its_battery.py"),
     "guide/glider_in_an_eddy.png": of_script("examples/studies/glider_in_an_eddy.py"),

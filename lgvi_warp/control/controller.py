@@ -214,7 +214,8 @@ class Controller(Documented):
         object.__setattr__(wired, "actuators", actuators)
         object.__setattr__(wired, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
         for section in ("sensors", "guidance"):
-            parts = tuple(part.in_scene(faults, events, wired.sensors) for part in getattr(self, section))
+            known = (part.beside((*terms, *events)) for part in getattr(self, section))
+            parts = tuple(part.in_scene(faults, events, wired.sensors) for part in known)
             object.__setattr__(wired, section, parts)
         faults.raise_if_any()
         channels = {key: term.channels for key, term in actuators.items()}

@@ -3,18 +3,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import copy
+from collections.abc import Collection, Sequence
 from dataclasses import Field, dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.control.base import READINGS, MeasuringPart
 from lgvi_warp.physics.given_draws import Stream
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.base import side_by_side as joined
 from lgvi_warp.physics.terms.noisy import key_of
+from lgvi_warp.physics.terms.waves import WaveTerm, pressure_rows, water_of, waves_of
 
 # Numbers of a sensor, in the order of its device code, with the value that has no effect; those of each axis, those of ticks.
 VECTORS = ("bias", "noise", "drift", "quantum", "outlier_std")
@@ -30,6 +34,8 @@ OF_A_PLACE = ("position", "depth")
 PLACED = "place"
 # What its device code has where the call gives its normals.
 GIVEN = "given"
+# What it has where it reads a depth by the pressure: in still water, below waves in deep water, and in water with a floor.
+PRESSURE = ("still", "waves", "finite")
 # What it has where an estimator takes its readings.
 HANDED = "handed"
 # Below any depth, within float32.
@@ -65,6 +71,8 @@ class Sensor(MeasuringPart):
         deepest: Depth of its place below which readings are lost, as those of GPS are [m]; inf by default.
         place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
             reads the position or the depth of this place.
+        reads: How a depth is read: "geometry", the default, the distance from the mean surface; or "pressure", as a pressure
+            cell: p / (rho g), which waves change by their linear theory, the less the deeper. It is 0 out of the water.
 
     The reading of the first tick always arrives, at once and whatever the depth: it stands for what was read before the run,
     on deck. A `DVL`, which needs the floor, has no such reading: its velocity is 0 before the first lock.
@@ -83,8 +91,10 @@ class Sensor(MeasuringPart):
     """
 
     type: ClassVar[str] = "sensor"
-    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, PLACED, GIVEN, HANDED)
+    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, PLACED, *PRESSURE, GIVEN, HANDED)
     handed_flags: ClassVar[int] = 1
+    # The waves whose pressure it reads; set for a part of a scene.
+    waves: ClassVar[tuple[WaveTerm, ...]] = ()
 
     of: str = ""
     noise: Any = number((3,), "unit", 0.0, least=0.0)
@@ -100,6 +110,7 @@ class Sensor(MeasuringPart):
     outlier: Any = number((), "1", None, least=0.0, most=1.0, optional=True)
     outlier_std: Any = number((3,), "unit", None, least=0.0, optional=True)
     place: Any = number((3,), "m", None, optional=True)
+    reads: str = word("geometry", known=("geometry", "pressure"))
 
     def __post_init__(self) -> None:
         if not among(self.of, [RANGE]):
@@ -141,6 +152,19 @@ class Sensor(MeasuringPart):
         if self.place is not None and not among(self.of, OF_A_PLACE):
             remedy = "leave it out" if not among(self.of, [RANGE]) else "give point"
             faults.add("place", self.place, f"has no meaning for a sensor of {self.of}", remedy)
+        if self.reads == "pressure" and not among(self.of, ["depth"]):
+            faults.add(
+                "reads", self.reads, f"has no meaning for a sensor of {self.of}", 'leave it out, or give of = "depth"'
+            )
+
+    def beside(self, terms: Sequence[Term]) -> Any:
+        # Knows the waves whose pressure it reads.
+        waves = waves_of(terms) if self.reads == "pressure" else ()
+        if waves == self.waves:
+            return self
+        sensor = copy.copy(self)
+        object.__setattr__(sensor, "waves", waves)
+        return sensor
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
         bad = super().unphysical(numbers)
@@ -157,7 +181,9 @@ class Sensor(MeasuringPart):
         given = {name: idle for name, idle in IDLE.items() if name in numbers}
         acting = tuple(name for name, idle in given.items() if np.any(_whole(name, numbers[name]) != idle))
         acting = tuple(name for name in acting if IDLE_WITHOUT.get(name, name) in acting)
-        placed = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
+        placed: tuple[str, ...] = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
+        if self.reads == "pressure":
+            placed += (water_of(self.waves) if self.waves else "still",)
         return (
             (*(name for name in acting if name != "latency"), *placed, HANDED) if self.is_handed else (*acting, *placed)
         )
@@ -218,6 +244,9 @@ class Sensor(MeasuringPart):
         rows = 9 if self.of == "attitude" else count
         kept = (sets + 1) * rows + 1 if chosen & KEEPING and not handed else 0
         memory = np.zeros((1, count * ("drift" in chosen) + ("burst" in chosen) + kept))
+        above, waves = pressure_rows(self.waves, context.parameters)
+        if above:
+            return Packed(values | {"sets": sets, "waves": waves}, joined(*above), memory)
         return Packed(values | {"sets": sets}, memory=memory)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.engine.states import into
 from lgvi_warp.scene.like import SceneLike
-from lgvi_warp.scene.plausibility import LIMITS, ends_at_the_surface, floats
+from lgvi_warp.scene.plausibility import LIMITS, ends_at_the_surface, floats, wave_periods
 
 # Looks in a period of the highest wave, and fewest steps between two of them.
 LOOKS, FEWEST = 8.0, 8
@@ -21,11 +21,10 @@ LOOKS, FEWEST = 8.0, 8
 
 def time_between_looks(scene: SceneLike) -> float | None:
     """Time [s] between two looks at the depth in waves; None where no waves are, or the surface is known."""
-    seas = [term for term in scene.terms if term.type == "waves" and np.any(term.amplitudes)]
-    if not seas or ends_at_the_surface(scene) or floats(scene):
+    periods = wave_periods(scene)
+    if not periods or ends_at_the_surface(scene) or floats(scene):
         return None
-    period = min(float(np.ravel(sea.periods)[np.argmax(np.ravel(sea.amplitudes))]) for sea in seas)
-    return period / LOOKS
+    return min(periods) / LOOKS
 
 
 class Heights:

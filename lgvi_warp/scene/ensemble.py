@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -212,6 +212,7 @@ class Ensemble(Summarized, Documented):
 
             settings = replace(settings, vary=all_by_key("ensemble.vary.", scene, settings.vary))
         self.scene, self.seed = scene, int(settings.seed)
+        settings = replace(settings, vary=drawn_by_terms(scene, settings, explicit) | dict(settings.vary))
         self.vary: dict[str, Any] = dict(settings.vary)
         self._draws = draws_of(scene, settings, explicit)
         # What keys the members' noise; None: their positions in the whole ensemble.
@@ -629,6 +630,18 @@ class Ensemble(Summarized, Documented):
         explicit = self._draws.explicit
         content = section(self._draws.total, self.seed, self.vary, self.sampling, self._draws.places)
         return content | ({"explicit": sorted(explicit)} if explicit else {})
+
+
+def drawn_by_terms(scene: SceneLike, settings: EnsembleSettings, fixed: Collection[str]) -> dict[str, Any]:
+    """Distributions of what terms draw for each member by themselves, unless it is given, or varies otherwise."""
+    drawn = [f"{term.key}.{name}" for term in scene.terms for name in term.drawn]
+    if not drawn:
+        return {}
+    from lgvi_warp.sampling.distributions.joint import Levels
+
+    sampled = [*settings.sampling.distributions(), *settings.sampling.own_values()]
+    others = {target.name for key in [*settings.vary, *sampled] for target in variations.targets(key)}
+    return {name: Levels() for name in drawn if name not in others and name not in fixed}
 
 
 # Members that are drawn and checked before a run; the others are checked as the run comes to them.

@@ -21,6 +21,7 @@ from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins
 from lgvi_warp.physics.terms.quadratic_form import QuadraticForm, drives
 from lgvi_warp.physics.terms.strips import StripTerm
+from lgvi_warp.physics.terms.waves import WaveTerm
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
@@ -282,7 +283,7 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
     yield "start.velocity", speed > limit, lambda i: f"a speed of {speed[i]:.4g} m/s is beyond {limit:g} m/s: a unit?"
     if not ends_at_the_surface(scene) and not floats(scene):
         yield "start.position", depth < LIMITS["depth"].value, _text(HIGH, depth)
-        if any(term.type == "waves" and np.any(term.amplitudes) for term in scene.terms):
+        if wave_periods(scene):
             length = hull_length(scene, members.parameters)
             yield "start.position", depth < length, _text(SHALLOW, *np.broadcast_arrays(depth, length))
     for term in scene.terms:
@@ -318,8 +319,14 @@ def beyond(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
 
 def own_flows(scene: SceneLike) -> list[Term]:
     """The user-defined terms that move the water. Waves are left out, too: in them water may be faster than in any current."""
-    known = (*CURRENTS, "waves")
-    return [term for term in scene.terms if term.type not in known and type(term).water is not Term.water]
+    known = [term for term in scene.terms if term.type not in CURRENTS and not isinstance(term, WaveTerm)]
+    return [term for term in known if type(term).water is not Term.water]
+
+
+def wave_periods(scene: SceneLike) -> list[float]:
+    """Return the period of the highest wave of each term that makes waves [s]."""
+    periods = (term.period for term in scene.terms if isinstance(term, WaveTerm))
+    return [period for period in periods if period is not None]
 
 
 def ends_at_the_surface(scene: SceneLike) -> bool:

@@ -163,7 +163,8 @@ class Scene(Summarized):
         terms = (term.beside_account(accounted) for term in self.terms)
         wired = tuple(term.driven_by(bus if term.key in driven else None) for term in terms)
         nominal = self._nominal()
-        object.__setattr__(self, "terms", tuple(term.beside(wired).of_vehicle(nominal) for term in wired))
+        every = (*wired, *self.events)
+        object.__setattr__(self, "terms", tuple(term.beside(every).of_vehicle(nominal) for term in wired))
 
     def _nominal(self) -> dict[str, np.ndarray]:
         """The numbers of the vehicle and its environment by name."""

@@ -17,7 +17,7 @@ from lgvi_warp.physics.terms.base import own as own_numbers
 from lgvi_warp.physics.terms.base import word_of
 from lgvi_warp.physics.terms.strips import StripTerm
 from lgvi_warp.physics.terms.thrusters import Thrusters
-from lgvi_warp.physics.terms.waves import components
+from lgvi_warp.physics.terms.waves import WaveTerm
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.oddities import OddityCheck
 
@@ -163,30 +163,29 @@ def thrusts(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
         yield f"{term.key}.coefficient", size > most * (1.0 + 1e-9), text
 
 
-# Steepness k a at which waves break (Stokes 1880, in deep water).
-BREAKS = 0.44
-STEEP = "a steepness k a of {:.3g} is beyond {:g}, at which waves break: a period or an amplitude?"
+BLOCKED = "{:g} of the waves cannot travel against the current, and are left out: a period, a heading or a current?"
 # Times the volume or the added mass of the vehicle that strips may have.
 MANY = 3.0
 STRIPS = "its strips have {:.3g} times {}, {:.3g} {}: a unit, or another vehicle?"
 
 
 def steepness(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for waves that would break; of many components by the root of the sum of their squares.
+    """Look for waves that would break, and for waves that a current blocks."""
+    for term in _waves(scene, p):
+        steep, blocked = term.steepness(own_numbers(term, p), p), term.wave_table(own_numbers(term, p), p).blocked
+        yield f"{term.key}.{term.height_field}", steep > term.breaks, _worded(term.too_steep.format, steep, term.breaks)
+        count = blocked.sum(axis=1)
+        yield f"{term.key}.{term.periods_field}", count > 0, _worded(BLOCKED.format, count)
 
-    Components of one period and heading are one wave, whose amplitude is the sum of theirs with their phases.
-    """
-    for term in scene.terms:
-        if term.type == "waves" and np.all(p["environment.gravity"] > 0.0):
-            numbers = {name: p[f"{term.key}.{name}"] for name in ("amplitudes", "periods", "phases", "headings_deg")}
-            k, phase = (components(numbers, p["environment.gravity"])[i] for i in (2, 4))
-            slopes, square = k * numbers["amplitudes"] * np.exp(1j * phase), np.zeros(1)
-            for j in range(slopes.shape[1]):
-                turned = np.cos(np.radians(numbers["headings_deg"] - numbers["headings_deg"][:, j : j + 1]))
-                same = (numbers["periods"] == numbers["periods"][:, j : j + 1]) & (turned > 1.0 - 1e-12)
-                square = square + (slopes[:, j] * np.conj((same * slopes).sum(axis=1))).real
-            steep = np.sqrt(np.maximum(square, 0.0))
-            yield f"{term.key}.amplitudes", steep > BREAKS, lambda i, steep=steep: STEEP.format(steep[i], BREAKS)  # type: ignore[misc]
+
+def _worded(say: Callable[..., str], values: np.ndarray, *more: float) -> Callable[[int], str]:
+    """The text of a member's value."""
+    return lambda i: say(float(values[i]), *more)
+
+
+def _waves(scene: SceneLike, p: Numbers) -> list[WaveTerm]:
+    """The waves of a scene that has gravity."""
+    return [term for term in scene.terms if isinstance(term, WaveTerm) and np.all(p["environment.gravity"] > 0.0)]
 
 
 # Fields of terms that hold velocities of water [m/s].
@@ -197,29 +196,27 @@ CURRENTS = {
 # Part of the orbit from which on it is said.
 SHIFTED = 1e-3
 DOPPLER = (
-    "periods are those at a fixed place and lengths those of still water, without a Doppler shift by the current: "
-    "k U / omega is up to {:.2g}, so orbits in the moving water are off by {}"
+    "periods and lengths are not shifted (Doppler) by a current that varies: k U / omega is up to {:.2g}, "
+    "so orbits in the moving water are off by {}"
 )
 
 
 def doppler(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for waves beside a current: the water's orbit is 1 / (1 - k U / omega) times that of waves in its own frame."""
+    """Look for waves beside a current that varies: the water's orbit is 1 / (1 - k U / omega) times that in its own frame."""
     fields = CURRENTS | {"current_field": "velocities"}
-    flows = [p[f"{term.key}.{fields[term.type]}"] for term in scene.terms if term.type in fields]
-    for term in scene.terms:
-        if term.type != "waves" or not flows or not np.all(p["environment.gravity"] > 0.0):
-            continue
-        numbers = {name: p[f"{term.key}.{name}"] for name in ("amplitudes", "periods", "phases", "headings_deg")}
-        north, east, _, omega = components(numbers, p["environment.gravity"])[:4]
+    varying = (term for term in scene.terms if term.type in fields and not term.carries)
+    flows = [p[f"{term.key}.{fields[term.type]}"] for term in varying]
+    for term in _waves(scene, p) if flows else ():
+        c = term.wave_table(own_numbers(term, p), p)
         ratio = np.zeros(1)
         for flow in flows:
             rows = flow.reshape(len(flow), -1, 3)
             u, v = (rows[..., i, None] for i in (0, 1))
             if rows.shape[1] > MOST_ROWS:  # of a field its corners bound it
                 u, v = (np.stack([each.min(axis=1), each.max(axis=1)], axis=1) for each in (u, v))
-            ratio = ratio + _largest(north[:, None] * u + east[:, None] * v) / omega
-        ratio = _largest((ratio * (numbers["amplitudes"] > 0.0))[:, :, None])[:, 0]
-        yield f"{term.key}.periods", np.abs(ratio) > SHIFTED, lambda i, ratio=ratio: _shift(float(ratio[i]))  # type: ignore[misc]
+            ratio = ratio + _largest(c.north[:, None] * u + c.east[:, None] * v) / c.omega
+        ratio = _largest((ratio * (c.amplitude > 0.0))[:, :, None])[:, 0]
+        yield f"{term.key}.{term.periods_field}", np.abs(ratio) > SHIFTED, _worded(_shift, ratio)
 
 
 MOST_ROWS = 10_000

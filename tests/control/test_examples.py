@@ -36,9 +36,16 @@ def test_depth_is_kept_whatever_the_ballast(tmp_path):
 
 @pytest.mark.slow
 def test_waves_along_the_hull_change_the_pitch_and_not_the_depth(tmp_path):
-    origin, hull = printed("controllers/depth_in_waves", tmp_path)
-    assert 0.6 < number(hull, "deg$") / number(origin, "deg$") < 0.85
+    picture = tmp_path / "depth_in_waves.png"
+    command = [sys.executable, ROOT / "examples" / "controllers" / "depth_in_waves.py", picture]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path).stdout.splitlines()
+    origin, hull, pressure, last = lines
+    assert last == str(picture)
+    assert 0.6 < number(hull, "deg;") / number(origin, "deg;") < 0.85
     assert abs(number(hull, "m, pitch") / number(origin, "m, pitch") - 1.0) < 0.05
+    # The pressure moves with the wave and against the vehicle; a cell by geometry reads the depth and its noise.
+    assert number(hull, "m$") ** 2 == pytest.approx(number(hull, "m, pitch") ** 2 + 0.02**2, rel=0.05)
+    assert number(pressure, "m$") < 0.9 * number(hull, "m$")
 
 
 @pytest.mark.slow

@@ -149,6 +149,6 @@ ALL = (
     "drag matrix", "current", "current field", "current profile", "current harmonics", "waves", "Gauss-Markov current",
     "energy use", "tether", "wrench", "wrench schedule", "wrench noise", "moving mass", "thrusters", "fins",
     "control fins with rates", "cross-flow", "hull loads", "body lift", "stratification", "ballast with pumps",
-    "buoyancy engine", "polar", "surface buoyancy", "quadratic form",
+    "buoyancy engine", "polar", "surface buoyancy", "quadratic form", "sea state",
 )  # fmt: skip
 CASES["all together"] = together(*(name for name in ALL if name in CASES))

@@ -5,6 +5,7 @@ import numpy as np
 
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.terms.noisy import channel
+from lgvi_warp.reference.terms.current import Current
 from lgvi_warp.reference.terms.current_field import CurrentField
 from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.reference.terms.waves import Waves
@@ -22,6 +23,9 @@ HARMONICS = dict(
 WAVES = dict(
     amplitudes=(0.4, 0.3, 0.1), periods=(5.0, 3.5, 2.5), headings_deg=(20.0, -110.0, 200.0), phases=(0.5, -0.9, 2.5)
 )
+# The vehicle of tests/laws/test_parity.py is at 8 m.
+SHALLOW = WAVES | {"depth": 11.0}
+FLOW = dict(velocity=(0.3, -0.2, 0.1))
 GAUSS_MARKOV = dict(standard_deviation=(0.3, 0.2, 0.05), time_constant=4.0)
 WRENCH_NOISE = dict(force=(1.0, 2.0, 0.5), torque=(0.1, 0.2, 0.3))
 # A quarter of the step of tests/laws/test_parity.py.
@@ -31,6 +35,15 @@ GRID = 0.005
 def arrays(numbers):
     """Numbers as the twins take them."""
     return {key: np.asarray(value) for key, value in numbers.items()}
+
+
+def waves(numbers, **beside):
+    """A Case of waves, alone or on a uniform current."""
+    currents = tuple(terms.Current(**beside) for _ in range(bool(beside)))
+    laws = (Waves(**arrays({k: v for k, v in numbers.items() if k != "periods_of"}), gravity=GRAVITY),
+            *(Current(**arrays(beside)) for _ in currents))  # fmt: skip
+    laws[0].periods_of = numbers.get("periods_of", "ground")
+    return Case((terms.Waves(**numbers), *currents), tuple(law.beside(laws) for law in laws))
 
 
 def noisy(host, twin, numbers, name="", noise_step=None):
@@ -56,7 +69,10 @@ CASES = {
         False,
     ),
     "current harmonics": case(terms.CurrentHarmonics, **HARMONICS),
-    "waves": Case((terms.Waves(**WAVES),), (Waves(**arrays(WAVES), gravity=GRAVITY),)),
+    "waves": waves(WAVES),
+    "waves in shallow water": waves(SHALLOW),
+    "waves on a current": waves(SHALLOW, **FLOW),
+    "waves that ride on a current": waves(WAVES | {"periods_of": "water"}, **FLOW),
     "Gauss-Markov current": noisy(terms.GaussMarkovCurrent, GaussMarkovCurrent, GAUSS_MARKOV),
     "wrench noise": noisy(terms.WrenchNoise, WrenchNoise, WRENCH_NOISE),
     "Gauss-Markov current on a grid": noisy(

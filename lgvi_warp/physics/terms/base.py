@@ -249,6 +249,8 @@ class Term(Documented):
     usual: ClassVar[Mapping[str, str | tuple[float, str]]] = {}
     depth_field: ClassVar[str] = ""
     floats: ClassVar[bool] = False
+    # Numbers in (0, 1) that each member of an ensemble draws by itself, unless they vary otherwise.
+    drawn: ClassVar[tuple[str, ...]] = ()
 
     name: str = ""
 
@@ -348,7 +350,7 @@ class Term(Documented):
         """The same term in a scene, for one that follows from other terms as well; by default it does not.
 
         Args:
-            terms: All terms of the scene.
+            terms: All terms and events of the scene.
 
         Returns:
             A copy, or the term where nothing changes.

@@ -1,36 +1,175 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear waves in deep water."""
+"""Linear waves: what every sea has, and waves whose components are given."""
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.base import Array, Numbers, Packed, PackingContext, Term, number, own
 from lgvi_warp.physics.terms.current_harmonics import Harmonics
+
+# Decay to the floor, e^(-k h), of deep water: its square is 0 in float32.
+DEEP = 1e-30
+# Steps of Newton's method for the wavenumber. From the deep-water value it never passes the root, and each step squares the
+# error: in 2 m to 2 km of water, on currents from -1 to 3 m/s, eight are enough for rounding.
+STEPS = 12
+# Part of the frequency by which a wavenumber may miss it: where it does, no wave of this frequency travels here.
+MISS = 1e-9
+
+
+class Components(NamedTuple):
+    """Components of a sea, (n, k) each; the first are the rows of lgvi_kernels/laws/waves.py.
+
+    north, east, k: wavenumber along the axes and in all [1/m]. omega: frequency at a fixed place [rad/s]. phase [rad].
+    ahead, aside, down: a sigma, sigma the frequency in the water, north, east and in all [m/s]; over 1 - decay^2.
+    decay: e^(-k h), h the depth of the sea; 0 in deep water. amplitude: of the surface [m], 0 where the current blocks a wave.
+    blocked: where an opposing current lets no wave of this frequency travel.
+    """
+
+    north: Array
+    east: Array
+    k: Array
+    omega: Array
+    phase: Array
+    ahead: Array
+    aside: Array
+    down: Array
+    decay: Array
+    amplitude: Array
+    blocked: Array
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Waves(Harmonics):
-    """A sum of linear waves in deep water, of wavenumber (2 pi / period)^2 / environment.gravity.
+class WaveTerm(Term):
+    """Linear waves, a sum of components. Abstract.
 
     Args:
-        amplitudes: Amplitudes of the surface, (k,) [m].
-        periods: Periods, (k,) [s], above 0.
-        phases: Phases at t = 0 at the inertial origin, (k,) [rad]; 0 by default.
-        headings_deg: Directions in which the waves travel, (k,) [deg] from north.
+        depth: Depth of the sea [m], above 0; inf for deep water.
+        periods_of: Who sees the periods where a uniform current acts: "ground", the default, a fixed place; "water", whoever
+            drifts with the current. The other one sees them shifted (Doppler).
 
-    Raises:
-        SceneError: Where a period is not above 0, and as `Term`.
+    Attributes:
+        period: Period of the highest wave [s]; None where there are no waves.
+        periods_field: The field that holds periods.
+
+    Methods:
+        sea: Amplitudes, frequencies, headings and phases of the components.
+        wave_table: The components with their wavenumbers.
+        elevation: Height of the surface above still water.
+        steepness: Steepness of the waves.
     """
 
-    type: ClassVar[str] = "waves"
+    timed: ClassVar[bool] = True
+    # The fields that hold periods and heights; the steepness from which on waves break, and what a check then says.
+    periods_field: ClassVar[str] = ""
+    height_field: ClassVar[str] = ""
+    breaks: ClassVar[float] = 0.0
+    too_steep: ClassVar[str] = ""
+    usual: ClassVar[Mapping[str, Any]] = {"depth": "seas have any depth"}
+    # Uniform currents, and the flat floor whose depth is the sea's; set for a term of a scene.
+    currents: ClassVar[tuple[Term, ...]] = ()
+    floor: ClassVar[Any] = None
 
-    amplitudes: Any = number(("k",), "m", least=0.0)
-    headings_deg: Any = number(("k",), "deg")
+    depth: Any = number((), "m", None, above=0.0, optional=True, infinite=True)
+    periods_of: str = word("ground", known=("ground", "water"))
+
+    def beside(self, terms: Sequence[Term]) -> Any:
+        # Knows the uniform currents, which shift frequencies.
+        return self._knowing(currents=tuple(other for other in terms if other.carries))
+
+    def _knowing(self, **others: Any) -> Any:
+        """The same term, knowing other terms of its scene."""
+        if all(getattr(self, name) == value for name, value in others.items()):
+            return self
+        term = copy.copy(self)
+        vars(term).update(others)
+        return term
+
+    @property
+    def period(self) -> float | None:
+        """Period of the highest wave [s]; None where there are no waves."""
+        raise NotImplementedError
+
+    def sea(self, numbers: Numbers) -> tuple[Array, Array, Array, Array]:
+        """Amplitudes [m], frequencies as `periods_of` says [rad/s], headings and phases [rad] of the components.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+
+        Returns:
+            (n, k) each.
+        """
+        raise NotImplementedError
+
+    def steepness(self, numbers: Numbers, parameters: Numbers) -> Array:
+        """Steepness of the waves, to be compared with `breaks`.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            parameters: All parameters of the scene, by name.
+
+        Returns:
+            (n,).
+        """
+        raise NotImplementedError
+
+    @property
+    def finite(self) -> bool:
+        """Whether the sea has a floor."""
+        return self.floor is not None or (self.depth is not None and bool(np.isfinite(self.depth)))
+
+    def wave_table(self, numbers: Numbers, parameters: Numbers) -> Components:
+        """The components with their wavenumbers.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            parameters: All parameters of the scene, by name.
+
+        Returns:
+            (n, k) each.
+        """
+        amplitude, omega, heading, phase = self.sea(numbers)
+        g = parameters["environment.gravity"][:, None]
+        along, across = np.cos(heading), np.sin(heading)
+        u = self._current(parameters)
+        drift = 0.0 if u is None else along * u[:, :1] + across * u[:, 1:2]
+        h = self._depth(numbers, parameters)
+        k = wavenumbers(omega, 0.0 if self.periods_of == "water" else drift, h, g)
+        shift = np.where(np.isnan(k), 0.0, k * drift)
+        omega, sigma = (omega + shift, omega) if self.periods_of == "water" else (omega, omega - shift)
+        blocked = np.isnan(k)
+        k, amplitude = np.where(blocked, 0.0, k), np.where(blocked, 0.0, amplitude)
+        decay = np.maximum(np.exp(-k * h), DEEP) if self.finite else np.zeros_like(k)
+        speed = amplitude * sigma / (1.0 - np.where(blocked, 0.0, decay) ** 2)
+        rows = (k * along, k * across, k, omega, phase, speed * along, speed * across, speed, decay, amplitude, blocked)
+        return Components(*np.broadcast_arrays(*rows))
+
+    def _current(self, parameters: Numbers) -> Array | None:
+        """Velocity (n, 3) [m/s] of the uniform currents; None where there are none."""
+        flows = []
+        for term in self.currents:
+            numbers = own(term, parameters)
+            here = np.zeros((1, max(map(len, numbers.values()), default=1), 3))
+            flows.append(term.water(numbers, here, np.zeros(1), parameters))
+        known = [flow[0] for flow in flows if flow is not None]
+        return np.asarray(sum(known[1:], known[0])) if known else None
+
+    def _depth(self, numbers: Numbers, parameters: Numbers) -> Any:
+        """Depth of the sea (n, 1) [m]."""
+        if not self.finite:
+            return np.inf
+        depth = parameters[f"{self.floor.key}.depth"] if self.floor is not None else numbers["depth"]
+        return depth[:, None]
+
+    def device_in(self, aligned: bool) -> str:
+        return "waves_finite" if self.finite else "waves"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Device rows of each component; raises SceneError where there is no gravity, hence no wavenumber.
@@ -39,29 +178,135 @@ class Waves(Harmonics):
             fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
             remedy = f"give gravity above 0, or leave {self.key} out"
             raise refusal("environment.gravity", float(g.min()), fault, remedy)
-        rows = np.stack(np.broadcast_arrays(*components(numbers, g)), axis=-1)
+        c = self.wave_table(numbers, context.parameters)
+        columns = c[: 8 + self.finite]
+        rows = np.stack(columns, axis=-1)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))
 
-    def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:
-        # Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as at the surface.
-        gravity = parameters["environment.gravity"]
+    def water(self, numbers: Numbers, position: Array, time: Array, parameters: Numbers) -> Array:
+        # Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as there, below the floor as there.
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
-        for j in range(numbers["periods"].shape[1]):
-            north, east, k, omega, phase, *speed = (table[:, j] for table in components(numbers, gravity))
+        for j in range((components := self.wave_table(numbers, parameters)).k.shape[1]):
+            north, east, k, omega, phase, ahead, aside, down, f, *_ = (table[:, j] for table in components)
             theta = north * x + east * y + (phase - omega * time[:, None])
             e = np.exp(-k * np.maximum(depth, 0.0))
-            cosine, sine = e * np.cos(theta), e * np.sin(theta)
-            total = total + np.stack([cosine * speed[0], cosine * speed[1], -sine * speed[2]], axis=-1)
+            e, z = (np.maximum(e, f), f**2 / np.maximum(e, f)) if self.finite else (e, 0.0)
+            cosine, sine = (e + z) * np.cos(theta), (e - z) * np.sin(theta)
+            total = total + np.stack([cosine * ahead, cosine * aside, -sine * down], axis=-1)
+        return total
+
+    def elevation(self, numbers: Numbers, position: Array, time: Array, parameters: Numbers) -> Array:
+        """Height of the surface above still water.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            position: Positions (k, n, 3) [m] in inertial axes, whose depths do not count.
+            time: Times (k,) [s].
+            parameters: All parameters of the scene, by name.
+
+        Returns:
+            Heights (k, n) [m].
+        """
+        total = np.zeros(position.shape[:-1])
+        x, y, _ = np.moveaxis(position, -1, 0)
+        c = self.wave_table(numbers, parameters)
+        for north, east, omega, phase, amplitude in zip(
+            *(table.T for table in (c.north, c.east, c.omega, c.phase, c.amplitude)), strict=True
+        ):
+            total = total + amplitude * np.cos(north * x + east * y + (phase - omega * time[:, None]))
         return total
 
 
-def components(numbers: Numbers, gravity: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Components of each wave.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Waves(WaveTerm, Harmonics):
+    """A sum of linear waves, whose frequency in the water is sqrt(g k tanh(k depth)).
 
-    Wavenumber north, east and in all, omega, phase, and speed at the surface likewise: (n, k) each.
+    Args:
+        amplitudes: Amplitudes of the surface, (k,) [m].
+        periods: Periods, (k,) [s], above 0.
+        phases: Phases at t = 0 at the inertial origin, (k,) [rad]; 0 by default.
+        headings_deg: Directions in which the waves travel, (k,) [deg] from north.
+        depth: Depth of the sea [m], above 0; by default the water is deep.
+        periods_of: Who sees the periods where a uniform current acts: "ground", the default, a fixed place; or "water",
+            whoever drifts with the current.
+
+    Raises:
+        SceneError: Where a period is not above 0, and as `Term`.
     """
-    omega, heading = 2.0 * np.pi / numbers["periods"], np.radians(numbers["headings_deg"])
-    k = omega**2 / gravity[:, None]
-    speed, along, across = numbers["amplitudes"] * omega, np.cos(heading), np.sin(heading)
-    return k * along, k * across, k, omega, numbers["phases"], speed * along, speed * across, speed
+
+    type: ClassVar[str] = "waves"
+    periods_field: ClassVar[str] = "periods"
+    height_field: ClassVar[str] = "amplitudes"
+    # Stokes 1880, in deep water; Miche 1944: times tanh(k depth).
+    breaks: ClassVar[float] = 0.44
+    too_steep: ClassVar[str] = (
+        "a steepness k a of {:.3g} is beyond {:g}, at which waves break: a period or an amplitude?"
+    )
+
+    amplitudes: Any = number(("k",), "m", least=0.0)
+    headings_deg: Any = number(("k",), "deg")
+
+    @property
+    def period(self) -> float | None:
+        if not np.any(self.amplitudes):
+            return None
+        return float(np.ravel(self.periods)[np.argmax(np.ravel(self.amplitudes))])
+
+    def sea(self, numbers: Numbers) -> tuple[Array, Array, Array, Array]:
+        omega = 2.0 * np.pi / numbers["periods"]
+        return numbers["amplitudes"], omega, np.radians(numbers["headings_deg"]), numbers["phases"]
+
+    def steepness(self, numbers: Numbers, parameters: Numbers) -> Array:
+        # Of many components the root of the sum of their squares. Those of one period and heading are one wave, whose
+        # amplitude is the sum of theirs with their phases.
+        c = self.wave_table(numbers, parameters)
+        slopes, square = c.k * c.amplitude * np.exp(1j * c.phase), np.zeros(1)
+        slopes = slopes / np.tanh(np.where(c.k > 0.0, c.k, 1.0) * self._depth(numbers, parameters))
+        for j in range(slopes.shape[1]):
+            turned = np.cos(np.radians(numbers["headings_deg"] - numbers["headings_deg"][:, j : j + 1]))
+            same = (numbers["periods"] == numbers["periods"][:, j : j + 1]) & (turned > 1.0 - 1e-12)
+            square = square + (slopes[:, j] * np.conj((same * slopes).sum(axis=1))).real
+        return np.sqrt(np.maximum(square, 0.0))
+
+
+def waves_of(terms: Sequence[Term]) -> tuple[WaveTerm, ...]:
+    """The waves among the terms and events of a scene, knowing the others."""
+    return tuple(term.beside(terms) for term in terms if isinstance(term, WaveTerm))
+
+
+def water_of(waves: Sequence[WaveTerm]) -> str:
+    """The water of some waves, as a feature of device code: "finite" where it has a floor anywhere, else "waves"."""
+    return "finite" if any(term.finite for term in waves) else "waves"
+
+
+def pressure_rows(waves: Sequence[WaveTerm], parameters: Numbers) -> tuple[list[Array], int]:
+    """Rows (n, rows) of each of some waves for device code that reads surface and pressure, and the count of components."""
+    rows, count, finite = [], 0, water_of(waves) == "finite"
+    for term in waves:
+        c = term.wave_table(own(term, parameters), parameters)
+        columns = (*c[:5], c.amplitude / (1.0 + c.decay**2), np.maximum(c.decay, DEEP))
+        rows.append(np.stack(columns[: 6 + finite], axis=-1).reshape(len(c.k), -1))
+        count += c.k.shape[1]
+    return rows, count
+
+
+def wavenumbers(omega: Array, drift: Any, depth: Any, gravity: Array) -> Array:
+    """Wavenumbers k [1/m] with sqrt(g k tanh(k h)) + k U = omega (Peregrine 1976); NaN where an opposing current blocks them.
+
+    omega [rad/s], (n, k). drift: U, the current along each wave [m/s]. depth: h [m]; inf for deep water. gravity [m/s2].
+    """
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        # In deep water sigma + U sigma^2 / g = omega.
+        sigma = 2.0 * omega / (1.0 + np.sqrt(1.0 + 4.0 * drift * omega / gravity))
+        k = sigma**2 / gravity
+        if np.all(np.isinf(depth)):
+            return np.asarray(k)
+        for _ in range(STEPS):
+            held = np.tanh(k * depth)
+            sigma = np.sqrt(gravity * k * held)
+            # Group velocity.
+            slope = 0.5 * gravity * (held + k * depth * (1.0 - held**2)) / sigma + drift
+            k = np.where(np.isinf(depth), k, k - (sigma + k * drift - omega) / slope)
+        missed = np.abs(np.sqrt(gravity * k * np.tanh(k * depth)) + k * drift - omega) > MISS * omega
+        return np.where(missed, np.nan, k)

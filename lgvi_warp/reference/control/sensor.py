@@ -11,6 +11,7 @@ from lgvi_warp.reference.control import Measurement, Part
 from lgvi_warp.reference.control.readings import shifted, values, with_values
 from lgvi_warp.reference.random import normals
 from lgvi_warp.reference.rotation import Array
+from lgvi_warp.reference.terms import View
 
 
 def chance_of(z: float) -> float:
@@ -44,6 +45,8 @@ class Sensor(Part):
     key, handed = "sensor", None
     noise = bias = drift = quantum = dropout = burst = outlier = outlier_std = 0.0
     deepest, place = math.inf, None
+    reads: str = "geometry"
+    waves: Any = ()
     every, latency = 1, 0
     seed0 = seed1 = channel = 0
 
@@ -63,6 +66,16 @@ class Sensor(Part):
         if self.place is not None:
             arm = y.R @ self.place
             y = replace(y, position=y.position + (arm if count == 3 else arm * [0.0, 0.0, 1.0]))
+        if self.reads == "pressure":
+            at = View(
+                y.R,
+                truth.position + (0.0 if self.place is None else y.R @ self.place),
+                y.water_velocity,
+                y.angular_velocity,
+                y.t,
+            )
+            depth = y.position[2] + sum(wave.head(at) for wave in self.waves)
+            y = replace(y, position=np.array([*y.position[:2], max(depth, 0.0)]))
         first, second, third = (self.drawn(y, stream) for stream in (0, 1, 2))
         stray = self.outlier_std * third[:count] * (chance_of(third[3]) < self.outlier)
         z = shifted(y, self.of, self.bias + self.walk + self.noise * first[:count] + stray)

@@ -1,44 +1,134 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linear waves in deep water."""
+"""Linear waves."""
 
 import math
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
+from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.terms import STILL, Flow, Law, View
+from lgvi_warp.reference.terms.current import Current
+
+
+class Wave(NamedTuple):
+    """One component: amplitude [m], wavenumber [1/m], frequency at a fixed place and in the water [rad/s], heading (3,)."""
+
+    a: float
+    k: float
+    omega: float
+    sigma: float
+    along: Array
+    phase: float
 
 
 class Waves(Law):
-    """Numbers as those of `lw.terms.Waves`; gravity [m/s2]."""
+    """Numbers as those of `lw.terms.Waves`; gravity [m/s2]; current (3,) [m/s], the uniform one of the scene."""
 
-    def flow(self, view: View) -> Flow:
-        """The sum of the components (Faltinsen 1990, table 2.1)."""
-        components = zip(self.amplitudes, self.periods, self.headings_deg, self.phases, strict=True)
-        return sum((self.component(view, *numbers) for numbers in components), STILL)
+    depth, periods_of = math.inf, "ground"
+    current = np.zeros(3)
 
-    def component(self, view: View, a: float, period: float, heading_deg: float, phase: float) -> Flow:
-        """One wave: u = Re (heading, -i down)^T a omega e^(-k depth) e^(-i theta), and its derivatives.
+    def beside(self, laws: tuple[Law, ...]) -> Law:
+        """The same law on the uniform currents among some laws."""
+        current = sum((law.velocity for law in laws if isinstance(law, Current)), np.zeros(3))
+        return type(self)(**vars(self) | {"current": current})
 
-        docs/theory/water.md, (W7).
-        """
-        omega, heading = 2.0 * math.pi / period, math.radians(heading_deg)
-        k = omega**2 / self.gravity
-        along = np.array([math.cos(heading), math.sin(heading), 0.0])
-        depth = view.b[2]
-        theta = k * along @ view.b - omega * view.t + phase
-        wave = (
-            (along - 1j * np.array([0.0, 0.0, 1.0])) * a * omega * math.exp(-k * max(depth, 0.0)) * np.exp(-1j * theta)
-        )
-        by_place = -1j * k * along + np.array([0.0, 0.0, -k if depth > 0.0 else 0.0])
-        return Flow(wave.real, (1j * omega * wave).real, np.outer(wave, by_place).real)
-
-    def elevation(self, view: View) -> float:
-        """Height of the surface above still water at view.b [m]."""
-        total = 0.0
+    def components(self) -> Iterator[Wave]:
+        """The components whose waves can travel on the current."""
         for a, period, heading_deg, phase in zip(
             self.amplitudes, self.periods, self.headings_deg, self.phases, strict=True
         ):
-            omega, heading = 2.0 * math.pi / period, math.radians(heading_deg)
-            along = math.cos(heading) * view.b[0] + math.sin(heading) * view.b[1]
-            total += a * math.cos(omega**2 / self.gravity * along - omega * view.t + phase)
-        return float(total)
+            heading, frequency = math.radians(heading_deg), 2.0 * math.pi / period
+            along = np.array([math.cos(heading), math.sin(heading), 0.0])
+            drift = float(along @ self.current)
+            k = wavenumber(frequency, 0.0 if self.periods_of == "water" else drift, self.depth, self.gravity)
+            if k is not None:
+                shift = k * drift
+                omega, sigma = (
+                    (frequency + shift, frequency) if self.periods_of == "water" else (frequency, frequency - shift)
+                )
+                yield Wave(a, k, omega, sigma, along, phase)
+
+    def flow(self, view: View) -> Flow:
+        """The sum of the components (Faltinsen 1990, table 2.1)."""
+        return sum((self.component(view, wave) for wave in self.components()), STILL)
+
+    def component(self, view: View, wave: Wave) -> Flow:
+        """One wave: u = Re (C heading, -i S down)^T a sigma e^(-i theta), and its derivatives; C, S by `profiles`.
+
+        docs/theory/water.md, (W7).
+        """
+        k, depth = wave.k, view.b[2]
+        C, S = profiles(k, depth, self.depth)
+        size = wave.a * wave.sigma * np.exp(-1j * theta(wave, view))
+        u = (C * wave.along - 1j * S * DOWN) * size
+        inside = k if 0.0 < depth < self.depth else 0.0
+        by_place = np.outer(u, -1j * k * wave.along) + np.outer(-inside * (S * wave.along - 1j * C * DOWN) * size, DOWN)
+        return Flow(u.real, (1j * wave.omega * u).real, by_place.real)
+
+    def elevation(self, view: View) -> float:
+        """Height of the surface above still water at view.b [m]."""
+        return sum((wave.a * math.cos(theta(wave, view)) for wave in self.components()), 0.0)
+
+    def acceleration(self, view: View) -> Array:
+        """Acceleration of the water at view.b, in its own frame [m/s2], without what is of second order."""
+        total = np.zeros(3)
+        for wave in self.components():
+            C, S = profiles(wave.k, view.b[2], self.depth)
+            angle = theta(wave, view)
+            total = total + wave.a * wave.sigma**2 * (C * math.sin(angle) * wave.along + S * math.cos(angle) * DOWN)
+        return total
+
+    def head(self, view: View) -> float:
+        """Pressure of the waves at view.b over rho g [m]: a cosh k(h - depth) / cosh k h."""
+        total = 0.0
+        for wave in self.components():
+            held = 1.0 if math.isinf(self.depth) else math.tanh(wave.k * self.depth)
+            total += wave.a * held * profiles(wave.k, view.b[2], self.depth)[0] * math.cos(theta(wave, view))
+        return total
+
+
+DOWN = np.array([0.0, 0.0, 1.0])
+
+
+def theta(wave: Wave, view: View) -> float:
+    """Phase of a component at a place and time."""
+    return float(wave.k * wave.along @ view.b - wave.omega * view.t + wave.phase)
+
+
+def profiles(k: float, depth: float, h: float) -> tuple[float, float]:
+    """cosh k(h - depth) / sinh k h and sinh k(h - depth) / sinh k h, held above the surface and below the floor."""
+    z = min(max(depth, 0.0), h)
+    if math.isinf(h):
+        return math.exp(-k * z), math.exp(-k * z)
+    return math.cosh(k * (h - z)) / math.sinh(k * h), math.sinh(k * (h - z)) / math.sinh(k * h)
+
+
+def wavenumber(omega: float, drift: float, h: float, g: float) -> float | None:
+    """The k with sqrt(g k tanh k h) + k U = omega, by halving an interval; None where there is none.
+
+    The left side rises up to where waves stand still against the current.
+    """
+
+    def beyond(k: float) -> float:
+        return math.sqrt(g * k * math.tanh(min(k * h, 400.0))) + k * drift - omega
+
+    def standing(k: float) -> float:
+        step = 1e-6 * k
+        return beyond(k - step) - beyond(k + step)
+
+    high = 1e-9
+    while beyond(high) < 0.0 and standing(high) < 0.0:
+        high *= 2.0
+    if drift < 0.0 and standing(high) > 0.0:
+        high = halved(standing, 0.5 * high, high)
+    return None if beyond(high) < 0.0 else halved(beyond, 0.0, high)
+
+
+def halved(f, low: float, high: float) -> float:  # type: ignore[no-untyped-def]
+    """The root of a function that is negative at low and positive at high."""
+    for _ in range(200):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if f(middle) > 0.0 else (middle, high)
+    return 0.5 * (low + high)

@@ -23,7 +23,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import StopTime
 from lgvi_warp.physics.terms.noisy import NoisyTerm
-from lgvi_warp.physics.terms.waves import Waves
+from lgvi_warp.physics.terms.waves import WaveTerm
 from lgvi_warp.runs.request import Request
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -206,7 +206,7 @@ class MotionBench:
 def calm(scene: Any, purpose: str) -> None:
     """Refuse a scene in which something acts by chance or in waves: no motion of it is steady."""
     for term in scene.terms:
-        if isinstance(term, NoisyTerm | Waves):
+        if isinstance(term, NoisyTerm | WaveTerm):
             problem = f"lets no motion be steady, as {purpose} need it"
             raise refusal("terms", term.key, problem, "leave it out of this scene")
 

@@ -43,7 +43,7 @@ class Distribution(Documented):
             "basic": ("normal", "uniform", "lognormal", "truncated_normal", "choice"),
             "joint": (
                 *("correlated_normal", "rotation_normal", "uniform_rotation"),
-                *("positive_definite", "physical_inertia"),
+                *("positive_definite", "physical_inertia", "levels"),
             ),
             "named": ("scipy", "histogram", "own"),
             "density": ("kernel_density",),

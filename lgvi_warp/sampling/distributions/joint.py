@@ -137,6 +137,19 @@ class JointLaw(Distribution):
 
 
 @dataclass(frozen=True)
+class Levels(JointLaw):
+    """Independent uniform numbers in (0, 1), all those of a number as one factor: what a term draws by itself."""
+
+    kind: ClassVar[str] = "levels"
+
+    def size(self, bases: Sequence[np.ndarray]) -> int:
+        return components([base.shape for base in bases])
+
+    def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
+        return split(u, bases)
+
+
+@dataclass(frozen=True)
 class CorrelatedNormal(JointLaw):
     """Normal distribution with a covariance between the entries of one quantity, or of several, named "a, b" in `vary`.
 

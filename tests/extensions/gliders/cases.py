@@ -11,7 +11,7 @@ from lgvi_warp.extensions.gliders.twin.stratification import Stratification
 from lgvi_warp.extensions.gliders.twin.surface_buoyancy import SurfaceBuoyancy
 from lgvi_warp.reference.terms.waves import Waves
 from tests.laws.case import Case, case
-from tests.laws.cases_water import GRAVITY, WAVES, arrays
+from tests.laws.cases_water import GRAVITY, SHALLOW, WAVES, arrays
 
 # The environment of tests/laws/test_parity.py.
 WATER = dict(density=1025.0, gravity=9.8)
@@ -87,6 +87,9 @@ CASES = {
     "surface buoyancy of a box": surface(SURFACE, "box"),
     "surface buoyancy of a ball": surface(BALL, "circle"),
     "surface buoyancy in waves": surface(BALL, "box", terms.Waves(**WAVES), Waves(**arrays(WAVES), gravity=GRAVITY)),
+    "surface buoyancy in shallow waves": surface(
+        BALL, "circle", terms.Waves(**SHALLOW), Waves(**arrays(SHALLOW), gravity=GRAVITY)
+    ),
     "stratification": Case(
         (terms.Stratification(**STRATIFICATION),),
         (Stratification(**STRATIFICATION, buoyancy=BUOYANCY, center_of_buoyancy=CENTER_OF_BUOYANCY),),

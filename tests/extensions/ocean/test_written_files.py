@@ -273,7 +273,7 @@ REFUSALS = {
     "a bad calendar": (
         "roms",
         {"ocean_time": {"calendar": "none"}},
-        r"u.ocean_time = .*is no time of the standard calendar.*; give attributes = {'ocean_time.units': ",
+        r"u.ocean_time = .*is not a time of the standard calendar.*; give attributes = {'ocean_time.units': ",
     ),
     "no system": (
         "delft3d",

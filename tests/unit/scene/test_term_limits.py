@@ -137,27 +137,35 @@ def flow(*velocity):
     return {"type": "current", "velocity": list(velocity)}
 
 
+def profile(*velocity):
+    """A current that may vary with depth, and does not."""
+    return {"type": "current_profile", "depths": [0.0, 9.0], "velocities": [list(velocity)] * 2}
+
+
 @pytest.mark.parametrize(
     ("currents", "ratio"),
     [
-        ([flow(1.0, 0.0, 0.0)], 1.0),
-        ([flow(-1.0, 0.0, 0.0)], -1.0),
-        ([flow(0.6, 4.0, 0.0)], 0.6),
+        ([profile(1.0, 0.0, 0.0)], 1.0),
+        ([profile(-1.0, 0.0, 0.0)], -1.0),
+        ([profile(0.6, 4.0, 0.0)], 0.6),
         ([{"type": "current_profile", "depths": [0.0, 9.0], "velocities": [[0.2, 0.0, 0.0], [-0.5, 0.0, 0.0]]}], -0.5),
         (
-            [{"type": "current_harmonics", "amplitudes": [[0.3, 0.0, 0.0]], "periods": [900.0]}, flow(0.1, 0.0, 0.0)],
+            [
+                {"type": "current_harmonics", "amplitudes": [[0.3, 0.0, 0.0]], "periods": [900.0]},
+                profile(0.1, 0.0, 0.0),
+            ],
             0.4,
         ),
     ],
 )
-def test_waves_beside_a_current_have_no_doppler_shift(currents, ratio):
+def test_waves_beside_a_current_that_varies_have_no_doppler_shift(currents, ratio):
     """By k U / omega: the orbit of water that moves along is 1 / (1 - k U / omega) times that of waves in its frame."""
     share = ratio * 2.0 * np.pi / 4.0 / 9.80665
     (text,) = said(beside(*currents))
     says(
         text,
         "waves.periods",
-        "without a Doppler shift",
+        "not shifted (Doppler)",
         f"{share:.2g}",
         f"{100.0 * (1.0 / (1.0 - share) - 1.0):+.2g} %",
     )
@@ -165,12 +173,21 @@ def test_waves_beside_a_current_have_no_doppler_shift(currents, ratio):
 
 def test_currents_across_waves_and_still_water_shift_nothing():
     assert said(beside()) == ()
-    assert said(beside(flow(0.0, 1.0, 0.0))) == ()
-    assert said(beside(flow(0.0, 0.0, 0.0))) == ()
-    fleet = lw.Ensemble(
-        beside(flow(0.1, 0.0, 0.0)), 50, 1, {"current.velocity[0]": lw.distributions.Uniform(low=-1.0, high=1.0)}
-    )
+    assert said(beside(profile(0.0, 1.0, 0.0))) == ()
+    assert said(beside(profile(0.0, 0.0, 0.0))) == ()
+    vary = {"current_profile.velocities[0,0]": lw.distributions.Uniform(low=-1.0, high=1.0)}
+    fleet = lw.Ensemble(beside(profile(0.1, 0.0, 0.0)), 50, 1, vary)
     assert "50 of 50" in said(fleet)[0] or "all 50" in said(fleet)[0]
+
+
+def test_a_uniform_current_shifts_waves_and_nothing_is_said_until_it_blocks_them():
+    """4 s waves against a current are blocked where 4 U omega / g > 1: beyond 1.56 m/s."""
+    assert said(beside(flow(1.0, 0.0, 0.0))) == said(beside(flow(-1.5, 0.0, 0.0))) == ()
+    (text,) = said(beside(flow(-1.6, 0.0, 0.0)))
+    says(text, "waves.periods", "1 of the waves cannot travel against the current")
+    vary = {"current.velocity[0]": lw.distributions.Choice([-1.0, -1.7])}
+    (text,) = said(lw.Ensemble(beside(flow(0.0, 0.0, 0.0)), 50, 1, vary))
+    says(text, "waves.periods", "of 50 members")
 
 
 @pytest.mark.kernel
@@ -181,7 +198,7 @@ def test_the_percentage_is_that_of_a_run(U):
     k = w * w / 9.80665
     body = {"mass": 10.0, "inertia": [0.1] * 3, "added_mass": [5.0] * 3, "buoyancy": 98.0665}
     start = {"position": [0.0, 0.0, 3.0], "velocity": [U + a * w * np.exp(-3.0 * k), 0.0, 0.0]}
-    scene = beside(flow(U, 0.0, 0.0))
+    scene = beside(profile(U, 0.0, 0.0))
     moving = lw.Scene.from_dict(scene.to_dict() | {"vehicle": body, "start": start})
     z = lw.solve(moving, "rk4", h=0.02, t1=40.0, save=lw.SaveAt(every=0.1)).position[:, 0, 2]
     radius = np.ptp(z) / 2.0 / a / np.exp(-3.0 * k)

@@ -10,10 +10,13 @@ from lgvi_kernels import device
 from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.readings import make_reading, remember3, remembered3
+from lgvi_kernels.swell import head, head_finite
 
 # Features that draw random numbers, and those by which a reading is not that of its own tick.
 DRAWING = ("noise", "drift", "dropout", "outlier")
 KEEPING = ("every", "latency", "dropout", "deepest")
+# Those by which a depth is read by the pressure: of still water, of waves in deep water and in water with a floor.
+PRESSURE = {"still": None, "waves": head, "finite": head_finite}
 
 
 # Not inlined, for the sake of the compiler: a scene may have many sensors.
@@ -155,6 +158,9 @@ def made(features):
     """
     of, *others = features
     handed, deep, placed = (name in others for name in ("handed", "deepest", "place"))
+    by_pressure = [name for name in others if name in PRESSURE]
+    in_waves = by_pressure not in ([], ["still"])
+    head_of = PRESSURE[by_pressure[0]] if in_waves else head
     reading = make_reading(of)
     count, values, with_values, shifted = reading.count, reading.values, reading.with_values, reading.shifted
     biased, noisy, drifting, quantised, rare, late, lossy, bursting, wild = (
@@ -184,6 +190,7 @@ def made(features):
             key = {"key": given_ticks()}
         words = {"memory": wp.int32, "sets": wp.int32} | ({"handed": wp.int32} if handed else {})
         vectors |= {"place": Lane3} if placed else {}
+        words |= {"first": wp.int32, "waves": wp.int32} if in_waves else {}
         return vectors | lanes | key | words
 
     def params(width, real):
@@ -210,11 +217,18 @@ def made(features):
         zero = unity - unity
         if wp.static(handed):
             before = y
+        at = y.b
         if wp.static(placed):
             arm = to_inertial(y, p.place)
+            at = at + arm
             if wp.static(count == 1):
                 arm = vec3(zero, zero, arm.z)
             y.position = y.position + arm
+        if wp.static(len(by_pressure) > 0):
+            depth = y.position.z
+            if wp.static(in_waves):
+                depth = depth + head_of(y, p.first, p.waves, at)
+            y.position = vec3(y.position.x, y.position.y, greatest(depth, zero))
         e = vec3(zero, zero, zero)
         lost = zero
         if wp.static(biased):

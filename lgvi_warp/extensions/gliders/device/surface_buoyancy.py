@@ -16,12 +16,11 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.law import *
+from lgvi_kernels.swell import swell, swell_finite
 
 # Rows of a part: place along the hull [m], buoyancy [N], half of its height [m] and the inverse of it; of its extent,
 # c^2 = 1 - a^2 (tilt - stretch a^2), tilt and stretch, a the sine of the hull's pitch.
 ROWS = 6
-# Rows of a wave: wavenumber north, east and in all [1/m], omega [rad/s], phase [rad], amplitude [m].
-WAVE_ROWS = 6
 
 
 @functools.cache
@@ -48,30 +47,9 @@ def circle_lost(u: Any):
     return lost, u.dtype(wp.static(2.0 / (3.0 * math.pi))) * (ww * w)
 
 
-@wp.func
-def swell(view: Any, p: Any, b: Any):
-    """Elevation of the surface above b, and the acceleration of the waves' water there over gravity, inertial axes."""
-    zero = b.z - b.z
-    below = greatest(b.z, zero)
-    elevation = zero
-    lean = vec3(zero, zero, zero)
-    for j in range(p.waves):
-        at = p.first + wp.static(ROWS) * p.count + wp.static(WAVE_ROWS) * j
-        north = row1(view, at)
-        east = row1(view, at + 1)
-        k = row1(view, at + 2)
-        amplitude = row1(view, at + 5)
-        theta = north * b.x + east * b.y + fused(-(view.t * ones(k)), row1(view, at + 3), row1(view, at + 4))
-        crest = amplitude * cosine(theta)
-        decayed = exponential(-(k * below))
-        s = decayed * (amplitude * sine(theta))
-        elevation = elevation + crest
-        lean = lean + vec3(north * s, east * s, k * (decayed * crest))
-    return elevation, lean
-
-
-def make_law(lost_of, waves):
-    """The law of a section, below waves or still water."""
+def make_law(lost_of, swell_of):
+    """The law of a section, below waves (see lgvi_kernels/swell.py) or still water, None."""
+    waves = swell_of is not None
 
     @wp.func
     def surface_law(w: Any, view: Any, p: Any):
@@ -96,7 +74,7 @@ def make_law(lost_of, waves):
             lean = force - force
             if wp.static(waves):
                 b = view.b + to_inertial(view, p.center + x * p.axis)
-                elevation, lean = swell(view, p, b)
+                elevation, lean = swell_of(view, p.first + wp.static(ROWS) * p.count, p.waves, b)
                 depth = depth + elevation
             u = clamp(depth * (inverse * row1(view, at + 3)), -unity, unity)
             lost, m = lost_of(u)
@@ -141,15 +119,16 @@ def make_energy(lost_of):
     return surface_energy
 
 
+SWELL = {"waves": swell, "finite": swell_finite}
 LOST = {"box": box_lost, "circle": circle_lost}
 
 
 @functools.cache
 def made(features):
-    """The law of a section, "box" or "circle"; "waves": below waves, where it has no potential."""
-    lost_of = LOST[features[0]]
-    if "waves" in features:
-        return device(__name__, features, params=params, law=make_law(lost_of, True))
+    """The law of a section, "box" or "circle"; "waves" or "finite": below waves, where it has no potential."""
+    lost_of, above = LOST[features[0]], SWELL.get(features[-1])
+    if above is not None:
+        return device(__name__, features, params=params, law=make_law(lost_of, above))
     energy = make_energy(lost_of)
-    functions = {"law": make_law(lost_of, False), "energy": energy, "supply": energy}
+    functions = {"law": make_law(lost_of, None), "energy": energy, "supply": energy}
     return device(__name__, features, params=params, POTENTIAL=True, **functions)

@@ -16,7 +16,7 @@ from lgvi_warp.extensions.gliders import DEVICE
 from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, PackingContext, Term, number, rows_of
 from lgvi_warp.physics.terms.base import side_by_side as joined
 from lgvi_warp.physics.terms.cross_flow import GAUSS
-from lgvi_warp.physics.terms.waves import Waves, components
+from lgvi_warp.physics.terms.waves import pressure_rows, water_of, waves_of
 
 AXIS = np.array([[1.0, 0.0, 0.0]])
 # Of a slice of length l the square of the vertical extent, over that of a section of height H, is this times (l / H)^2
@@ -78,8 +78,8 @@ class SurfaceBuoyancy(Term):
         return bad | {"heights": bad["heights"] | _no_volume(numbers["heights"])}
 
     def beside(self, terms: Sequence[Term]) -> Any:
-        # Knows the waves by their names, whose numbers it reads when it is packed.
-        waves = tuple(other.key for other in terms if isinstance(other, Waves))
+        # Knows the waves, whose numbers it reads when it is packed.
+        waves = waves_of(terms)
         if waves == vars(self)["waves"]:
             return self
         term = copy.copy(self)
@@ -96,7 +96,7 @@ class SurfaceBuoyancy(Term):
         return frozenset() if self.timed else CONSERVED
 
     def device_in(self, aligned: bool) -> str:
-        return f"{self.device}:{self.section}" + (",waves" if self.timed else "")
+        return f"{self.device}:{self.section}" + (f",{water_of(vars(self)['waves'])}" if self.timed else "")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Rows of the parts, and of the waves above them.
@@ -104,15 +104,8 @@ class SurfaceBuoyancy(Term):
         center = context.frame.point(p["vehicle.center_of_buoyancy"])
         values = {"axis": context.frame.vector(AXIS), "center": center}
         parts = self.parts(numbers, p["vehicle.buoyancy"])
-        rows = [parts.reshape(len(parts), -1)]
-        count = 0
-        for key in vars(self)["waves"]:
-            own = {name: p[f"{key}.{name}"] for name in ("amplitudes", "periods", "headings_deg", "phases")}
-            waves = np.stack(
-                np.broadcast_arrays(*components(own, p["environment.gravity"])[:5], own["amplitudes"]), axis=-1
-            )
-            rows.append(waves.reshape(len(waves), -1))
-            count += waves.shape[1]
+        waves, count = pressure_rows(vars(self)["waves"], p)
+        rows = [parts.reshape(len(parts), -1), *waves]
         return Packed(values | {"count": parts.shape[1], "waves": count}, joined(*rows))
 
     def parts(self, numbers: Numbers, buoyancy: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ class SurfaceBuoyancy(Law):
 
     def beside(self, laws: tuple[Law, ...]) -> Law:
         """The same law below the waves among some laws."""
-        return type(self)(**vars(self) | {"waves": tuple(law for law in laws if isinstance(law, Waves))})
+        return type(self)(**vars(self) | {"waves": tuple(law.beside(laws) for law in laws if isinstance(law, Waves))})
 
     def parts(self) -> Iterator[tuple[float, float, float, float]]:
         """Parts of the hull: place from the centre of buoyancy [m], buoyancy [N], height [m], and length [m]; 0: of any."""
@@ -67,7 +67,7 @@ class SurfaceBuoyancy(Law):
         elevation, acceleration = 0.0, np.zeros(3)
         for wave in self.waves:
             place = View(view.R, view.b + view.R @ point, view.nu, view.Om, view.t)
-            acceleration = acceleration + wave.flow(place).rate / wave.gravity
+            acceleration = acceleration + wave.acceleration(place) / wave.gravity
             elevation += wave.elevation(place)
         return elevation, acceleration
 

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A random sea of a forecast."""
+
+import math
+
+import numpy as np
+from scipy import stats
+
+from lgvi_warp.reference.rotation import Array
+from lgvi_warp.reference.terms.waves import Waves
+
+CUT, INTERVALS = 3.0, 1024
+
+
+class SeaState(Waves):
+    """Numbers as those of `lw.terms.SeaState`; gravity [m/s2]."""
+
+    spectrum, amplitudes_are, peakedness, spreading = "jonswap", "equal", 3.3, None
+
+    def enhanced(self, x: float) -> float:
+        """JONSWAP over Pierson-Moskowitz at a frequency over that of the peak (Hasselmann et al. 1973)."""
+        if self.spectrum != "jonswap":
+            return 1.0
+        return float(self.peakedness ** math.exp(-((x - 1.0) ** 2) / (2.0 * (0.07 if x <= 1.0 else 0.09) ** 2)))
+
+    def ratios(self) -> Array:
+        """Frequencies over that of the peak: the energy up to each, in parts of a fully grown sea's, exp(-5/4 x^-4)."""
+        most, parts = math.exp(-1.25 * CUT**-4), [0.0]
+        for i in range(INTERVALS):
+            parts.append(parts[-1] + self.enhanced(_ratio(most * (i + 0.5) / INTERVALS)))
+        found = []
+        for j, level in enumerate(self.levels[:, 0]):
+            wanted = (j + level) / len(self.levels) * parts[-1]
+            i = min(int(np.searchsorted(parts, wanted, side="right")) - 1, INTERVALS - 1)
+            rest = (wanted - parts[i]) / (parts[i + 1] - parts[i])
+            found.append(_ratio(most * (i + rest) / INTERVALS))
+        return np.array(found)
+
+    @property
+    def periods(self) -> Array:
+        """Periods of the waves [s]."""
+        return self.peak_period / self.ratios()
+
+    @property
+    def phases(self) -> Array:
+        """Phases of the waves [rad]."""
+        return 2.0 * math.pi * self.levels[:, 1]
+
+    @property
+    def headings_deg(self) -> Array:
+        """Headings of the waves [deg]; the sine of half the angle from the mean is that of a beta distribution on (-1, 1)."""
+        if self.spreading is None:
+            return np.full(len(self.levels), self.heading_deg)
+        half = np.arcsin(stats.beta(self.spreading + 0.5, self.spreading + 0.5, -1.0, 2.0).ppf(self.levels[:, 2]))
+        return np.asarray(self.heading_deg + 2.0 * np.degrees(half))
+
+    @property
+    def amplitudes(self) -> Array:
+        """Amplitudes of the waves [m], whose squares sum up to Hs^2 / 8."""
+        count = len(self.levels)
+        equal = np.full(count, self.significant_height / math.sqrt(8.0 * count))
+        return equal * np.sqrt(-np.log(self.levels[:, -1])) if self.amplitudes_are == "rayleigh" else equal
+
+
+def _ratio(part: float) -> float:
+    return float((1.25 / -math.log(part)) ** 0.25)

@@ -21,7 +21,15 @@ NEAR = 10.0  # deg
 def scene():
     """The vehicle turns by 60 degrees within the first 20 s; its rudder has all kinds of faults, one a member."""
     fault = lw.control.Fault(
-        name="rudder", of="control_fins", kind=KINDS, time=5.0, until=7.0, time_constant=5.0, delay=2.0, duty=0.5, period=2.0
+        name="rudder",
+        of="control_fins",
+        kind=KINDS,
+        time=5.0,
+        until=7.0,
+        time_constant=5.0,
+        delay=2.0,
+        duty=0.5,
+        period=2.0,
     )
     controller = lw.Controller(
         period=0.1,  # s between ticks
@@ -31,9 +39,7 @@ def scene():
             lw.control.DepthPID(kp=0.1, ki=0.001, pitch_limit=0.5, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0),
             lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
         ],
-        allocation=[
-            lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
-        ],
+        allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
         faults=[fault],
     )
     start = {"velocity": [1.54, 0.0, 0.0], "position": [0.0, 0.0, 10.0]}
@@ -48,7 +54,10 @@ def swept(members):
         }
         for i, kind in enumerate(KINDS) for onset in ONSETS for lasts in LASTS
     }  # fmt: skip
-    vary = {"vehicle.buoyancy": lw.distributions.Uniform(297.0, 302.0), "heading_pid.kp": lw.distributions.Uniform(0.7, 1.3)}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Uniform(297.0, 302.0),
+        "heading_pid.kp": lw.distributions.Uniform(0.7, 1.3),
+    }
     return lw.sweep(
         scene(), cases=cases, members=members, seed=1, vary=vary, t1=END, h=0.05,
         metrics=[lw.metrics.IAE("heading")], success={"status": "ok", "iae heading": {"below": ALLOWED}},

@@ -91,7 +91,9 @@ class Fault(Sending):
     every_feature: ClassVar[tuple[str, ...]] = ("until", "duty", "held", "placed", "late", "lost")
 
     of: str = text("is not a text", "give the name of an actuator or of a sensor", "")
-    channel: int | str = checked(_is_channel, "is not a whole number", 'give the number of a channel, from 0, or "all"', 0)
+    channel: int | str = checked(
+        _is_channel, "is not a whole number", 'give the number of a channel, from 0, or "all"', 0
+    )
     kind: Any = declared(_kinds, "gain")
     choice: Any = number((), "1", 0.0, least=0.0)
     time: Any = number((), "s", 0.0, least=0.0, infinite=True)

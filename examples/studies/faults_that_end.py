@@ -3,8 +3,8 @@
 
     python examples/studies/faults_that_end.py [members]
 
-It prints, for each kind and duration, how many vehicles stay within 10 degrees of the heading that they would have had at the
-end, and a last line with the worst of them.
+It prints, for each kind, onset and duration, how many vehicles hold: the integral of their heading's error over the minute
+stays below a bound. The last line tells the worst of them.
 """
 
 import sys
@@ -15,13 +15,13 @@ import lgvi_warp as lw
 
 KINDS = ["stuck", "slow", "delay", "intermittent"]
 ONSETS, LASTS, END = [0.5, 2.0], [1.0, 3.0, 10.0], 60.0  # s
-NEAR = 10.0  # deg
+ALLOWED = 4.5  # rad s, of the integral of the heading's error
 
 
 def scene():
-    """The vehicle turns by 60 degrees within the first 20 s; its rudder has all kinds of faults, one a member."""
+    """The vehicle turns by 60 degrees within some 7 s; its rudder has one of the kinds, as the sweep chooses."""
     fault = lw.control.Fault(
-        name="rudder", of="control_fins", kind=KINDS, time=5.0, until=7.0, time_constant=5.0, delay=2.0, duty=0.5, period=2.0
+        name="rudder", of="control_fins", kind=KINDS, time=5.0, until=7.0, time_constant=5.0, delay=2.0, period=2.0
     )
     controller = lw.Controller(
         period=0.1,  # s between ticks
@@ -31,9 +31,7 @@ def scene():
             lw.control.DepthPID(kp=0.1, ki=0.001, pitch_limit=0.5, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0),
             lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
         ],
-        allocation=[
-            lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
-        ],
+        allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
         faults=[fault],
     )
     start = {"velocity": [1.54, 0.0, 0.0], "position": [0.0, 0.0, 10.0]}
@@ -48,15 +46,15 @@ def swept(members):
         }
         for i, kind in enumerate(KINDS) for onset in ONSETS for lasts in LASTS
     }  # fmt: skip
-    vary = {"vehicle.buoyancy": lw.distributions.Uniform(297.0, 302.0), "heading_pid.kp": lw.distributions.Uniform(0.7, 1.3)}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Uniform(297.0, 302.0),
+        "heading_pid.kp": lw.distributions.Uniform(0.7, 1.3),
+    }
     return lw.sweep(
         scene(), cases=cases, members=members, seed=1, vary=vary, t1=END, h=0.05,
         metrics=[lw.metrics.IAE("heading")], success={"status": "ok", "iae heading": {"below": ALLOWED}},
     )  # fmt: skip
 
-
-# Integral of the error of the heading that a mission bears [rad s].
-ALLOWED = 12.0
 
 if __name__ == "__main__":
     found = swept(int(sys.argv[1]) if len(sys.argv) > 1 else 200)

@@ -3,8 +3,8 @@
 
     python examples/studies/faults_that_end.py [members]
 
-It prints, for each kind and duration, how many vehicles stay within 10 degrees of the heading that they would have had at the
-end, and a last line with the worst of them.
+It prints, for each kind, onset and duration, how many vehicles hold: the integral of their heading's error over the minute
+stays below a bound. The last line tells the worst of them.
 """
 
 import sys
@@ -15,21 +15,13 @@ import lgvi_warp as lw
 
 KINDS = ["stuck", "slow", "delay", "intermittent"]
 ONSETS, LASTS, END = [0.5, 2.0], [1.0, 3.0, 10.0], 60.0  # s
-NEAR = 10.0  # deg
+ALLOWED = 4.5  # rad s, of the integral of the heading's error
 
 
 def scene():
-    """The vehicle turns by 60 degrees within the first 20 s; its rudder has all kinds of faults, one a member."""
+    """The vehicle turns by 60 degrees within some 7 s; its rudder has one of the kinds, as the sweep chooses."""
     fault = lw.control.Fault(
-        name="rudder",
-        of="control_fins",
-        kind=KINDS,
-        time=5.0,
-        until=7.0,
-        time_constant=5.0,
-        delay=2.0,
-        duty=0.5,
-        period=2.0,
+        name="rudder", of="control_fins", kind=KINDS, time=5.0, until=7.0, time_constant=5.0, delay=2.0, period=2.0
     )
     controller = lw.Controller(
         period=0.1,  # s between ticks
@@ -63,9 +55,6 @@ def swept(members):
         metrics=[lw.metrics.IAE("heading")], success={"status": "ok", "iae heading": {"below": ALLOWED}},
     )  # fmt: skip
 
-
-# Integral of the error of the heading that a mission bears [rad s].
-ALLOWED = 12.0
 
 if __name__ == "__main__":
     found = swept(int(sys.argv[1]) if len(sys.argv) > 1 else 200)

@@ -26,7 +26,7 @@ sea = scene.terms[-1]
 def waves(members, time):
     """Surface (k, n) [m] at one place, and speed of the water (depths, k, n) [m/s] below it, of so many members."""
     p = lw.Ensemble(scene, members, seed=1).parameters(0, members)
-    numbers = lw.Ensemble.own(sea, p)
+    numbers = {key.removeprefix("sea_state."): value for key, value in p.items() if key.startswith("sea_state.")}
     places = [np.broadcast_to([0.0, 0.0, z], (len(time), members, 3)) for z in (0.0, *DEPTHS)]
     speeds = [np.linalg.norm(sea.water(numbers, place, time, p), axis=-1) for place in places[1:]]
     return sea.elevation(numbers, places[0], time, p), np.array(speeds)

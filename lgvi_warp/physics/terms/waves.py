@@ -80,12 +80,13 @@ class WaveTerm(Term):
     depth: Any = number((), "m", None, above=0.0, optional=True, infinite=True)
     periods_of: str = word("ground", known=("ground", "water"))
 
+    def known_of(self, terms: Sequence[Term]) -> dict[str, Any]:
+        """What it knows of the other terms of its scene, by attribute."""
+        return {"currents": tuple(other for other in terms if other.carries)}
+
     def beside(self, terms: Sequence[Term]) -> Any:
         # Knows the uniform currents, which shift frequencies.
-        return self._knowing(currents=tuple(other for other in terms if other.carries))
-
-    def _knowing(self, **others: Any) -> Any:
-        """The same term, knowing other terms of its scene."""
+        others = self.known_of(terms)
         if all(getattr(self, name) == value for name, value in others.items()):
             return self
         term = copy.copy(self)

@@ -104,11 +104,10 @@ class SeaState(WaveTerm):
     def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
         return self._shape if item.name == "levels" else super().shape_of(item)
 
-    def beside(self, terms: Sequence[Term]) -> Any:
+    def known_of(self, terms: Sequence[Term]) -> dict[str, Any]:
         # Knows the floor, too, where it is flat.
-        term = super().beside(terms)
         flat = [other for other in terms if isinstance(other, Floor) and not other.on_grid]
-        return term._knowing(floor=flat[0] if flat and self.depth is None else None)
+        return super().known_of(terms) | {"floor": flat[0] if flat and self.depth is None else None}
 
     @property
     def unused(self) -> tuple[str, ...]:

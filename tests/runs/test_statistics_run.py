@@ -545,7 +545,7 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
     ({"until": 3}, "not a table"),
     ({"statistics": [Mean()]}, "mean.of"),
     ({"until": lw.Until("median depth", 1.0)}, "not a statistic of the run"),
-    ({"until": {"statistic": "mean depth"}}, "half_width"), ({"until": lw.Until("mean depth", 1.0, at=0.3)}, "not a sample time"),
+    ({"until": {"statistic": "mean depth"}}, "half_width"), ({"until": lw.Until("mean depth", 1.0, at=0.3)}, "sample time"),
     ({"statistics": [Extremes("depth")], "until": lw.Until("extremes depth", 1.0)}, "no interval"),
 ])  # fmt: skip
 def test_what_a_run_refuses(scene, inputs, text):

@@ -105,7 +105,7 @@ def test_what_was_not_kept_is_named():
     with pytest.raises(lw.SceneError, match=r'no samples of all were kept; run with keep="all"'):
         lw.gather(none, [lw.statistics.Mean("depth")])
     assert lw.gather(none, [lw.statistics.Outcome("floor")])["outcome floor"].value[-1] >= 0.0
-    with pytest.raises(lw.SceneError, match="no outcome of this scene"):
+    with pytest.raises(lw.SceneError, match="not an outcome of this scene"):
         lw.gather(none, [lw.statistics.Outcome("flor")])
     with pytest.raises(lw.SceneError, match="is not a result"):
         lw.gather(fleet_of(2), [lw.statistics.Mean("depth")])

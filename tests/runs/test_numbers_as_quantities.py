@@ -77,15 +77,15 @@ def test_a_set_point_is_taken_from_a_depth():
 @pytest.mark.parametrize(
     ("of", "words"),
     [
-        ("vehicle.buoyanci", ["no number of this scene", "vehicle.buoyancy"]),
-        ("control_fins.position", ["no single number", "(2, 3)", "control_fins.position[0,0]"]),
-        ("drag_matrix.linear[6,0]", ["no single number", "drag_matrix.linear[5,5]"]),
-        ("vehicle.buoyancy[0]", ["no single number", "give 'vehicle.buoyancy'"]),
+        ("vehicle.buoyanci", ["not a number of this scene", "vehicle.buoyancy"]),
+        ("control_fins.position", ["not a single number", "(2, 3)", "control_fins.position[0,0]"]),
+        ("drag_matrix.linear[6,0]", ["not a single number", "drag_matrix.linear[5,5]"]),
+        ("vehicle.buoyancy[0]", ["not a single number", "give 'vehicle.buoyancy'"]),
         ("start.velocity[0]", ["does not vary"]),
         ("controller.sensors[0].bias", ["names a part by its place"]),
         ("depth - vehicle.buoyancy", ["[m]", "[N]", "one unit"]),
         ("vehicle.buoyancy - environment.gravity", ["[N]", "[m/s2]"]),
-        ("horizontal(velocity)", ["no vector in inertial axes", "velocity_inertial"]),
+        ("horizontal(velocity)", ["not a vector in inertial axes", "velocity_inertial"]),
     ],
 )
 def test_what_names_no_number_is_told_with_the_remedy(fleet, of, words):

@@ -539,13 +539,13 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
 
 
 @pytest.mark.parametrize(("inputs", "text"), [
-    ({"statistics": "mean"}, "no list"), ({"statistics": [3]}, "no statistic"), ({"keep": "some"}, "keep"),
+    ({"statistics": "mean"}, "not a list"), ({"statistics": [3]}, "not a statistic"), ({"keep": "some"}, "keep"),
     ({"keep": [5]}, "is none of the"), ({"keep": [-1]}, "is negative"), ({"keep": 3}, "is not a list of members"),
     ({"statistics": [Mean("depth"), Mean("depth")]}, "name of 2 statistics"),
-    ({"until": 3}, "no table"),
+    ({"until": 3}, "not a table"),
     ({"statistics": [Mean()]}, "mean.of"),
-    ({"until": lw.Until("median depth", 1.0)}, "none of the run's statistics"),
-    ({"until": {"statistic": "mean depth"}}, "half_width"), ({"until": lw.Until("mean depth", 1.0, at=0.3)}, "no sample time"),
+    ({"until": lw.Until("median depth", 1.0)}, "not a statistic of the run"),
+    ({"until": {"statistic": "mean depth"}}, "half_width"), ({"until": lw.Until("mean depth", 1.0, at=0.3)}, "sample time"),
     ({"statistics": [Extremes("depth")], "until": lw.Until("extremes depth", 1.0)}, "no interval"),
 ])  # fmt: skip
 def test_what_a_run_refuses(scene, inputs, text):

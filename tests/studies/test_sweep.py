@@ -318,7 +318,7 @@ baseline = "stiff"
     ({"success": {"overshot": {"below": 1.0}}}, "is not a metric of this sweep"),
     ({"success": {"way": {"under": 1.0}}}, "is not a condition"), ({"success": {"status": "fine"}}, "success.status"),
     ({"metrics": ["overshoot headin"]}, "did you mean 'heading'"), ({"cases": [{"set": {}}]}, "has no name"),
-    ({"grid": {"controller.delay": []}}, "no list of values"), ({"baseline": "hard"}, "baseline"),
+    ({"grid": {"controller.delay": []}}, "not a list of values"), ({"baseline": "hard"}, "baseline"),
     ({"interval": "wald"}, "interval"),
     ({"keep": "all"}, "is what a sweep decides"),
 ])  # fmt: skip

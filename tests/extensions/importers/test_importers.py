@@ -322,7 +322,7 @@ REFUSED = {
     ),
     "several links": (link(outside=ARMS), ("several: x::a, y::a",), {"link": "a"}),
     "frames in a circle": (link(outside=LOOP + PLACED), ("relative to itself",)),
-    "a frame that there is not": (link(outside=PLACED.replace('"f"', '"nowhere"')), ("no frame of the model",)),
+    "a frame that there is not": (link(outside=PLACED.replace('"f"', '"nowhere"')), ("not a frame of the model",)),
     "frames without end": (link(outside=CHAIN + PLACED.replace('"f"', '"f0"')), ("relative",)),
     "a joint to itself": circle("a"),
     "two joints in a circle": circle("ab"),

@@ -80,7 +80,7 @@ def test_contents_of_a_folder(tmp_path):
     assert contents(tmp_path / "none.zarr") == [Content("store", tmp_path / "none.zarr")]
     for name, words in (("none", "is not there"), ("c.zarr/..", "contains no results of a command")):
         (tmp_path / "empty").mkdir(exist_ok=True)
-        place = tmp_path / ("empty" if "nothing" in words else name)
+        place = tmp_path / ("empty" if "results" in words else name)
         with pytest.raises(lw.SceneError) as caught:
             contents(place)
         assert str(caught.value) == f"{place}: {words}; give the folder of a run or of a study"

@@ -68,7 +68,7 @@ def policy(tmp_path, arrays=ONE, **words):
 
 @pytest.mark.parametrize(("arrays", "words", "output"), [
     (ONE, {"inputs": ["dept_error"]}, r"policy.inputs\[0\] = 'dept_error'.*depth_error"),
-    (ONE, {"inputs": "depth"}, "policy.inputs.*no list of names"),
+    (ONE, {"inputs": "depth"}, "policy.inputs.*not a list of names"),
     (ONE, {"inputs": ["velocity"]}, "policy.inputs.*are 3 numbers.*name the 1 of"),
     (ONE, {"outputs": ["Z", "Z"]}, r"policy.outputs\[1\].*named twice"),
     (ONE, {"outputs": ["Z", "N"]}, "policy.outputs.*are 2 numbers"),

@@ -497,7 +497,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"sobol": {}, "halton": {}}, 8, ["is not a sampling"]),
         ({"sobol": 3}, 8, ["is not a table"]),
         ({"sobol": {"scramble": True}}, 8, ["unknown key"]),
-        ({"sobol": {"replicates": 12}}, 24, ["ensemble.sampling.sobol.replicates = 12", "no power of two", "give 8, 16"]),
+        ({"sobol": {"replicates": 12}}, 24, ["ensemble.sampling.sobol.replicates = 12", "not a power of two", "give 8, 16"]),
         ({"sobol": {"replicates": 128}}, 128, ["replicates = 128"]),
         ({"halton": {"replicates": True}}, 8, ["replicates = True"]),
         ({"halton": {"replicate": 8}}, 8, ["did you mean 'replicates'?"]),
@@ -516,13 +516,13 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"morris": {"levels": True}}, 7, ["levels = True"]),
         ({"grid": {"vehicle.mass": -3}}, None, ["whole number from 1"]),
         ({"grid": {"vehicle.mass": True}}, None, ["not numeric"]),
-        ({"latin_hypercube": {"group": 30}}, 80, ["no whole number of groups of 30", "60 or 90"]),
+        ({"latin_hypercube": {"group": 30}}, 80, ["not a whole number of groups of 30", "60 or 90"]),
         ("saltelli", 13, ["groups of 14", "give 14"]),
         ({"saltelli": {"second_order": 1}}, 14, ["second_order = 1"]),
         ("morris", 20, ["groups of 7", "14 or 21"]),
         ({"morris": {"levels": 5}}, 7, ["levels = 5"]),
         ({"grid": {}}, None, ["names nothing"]),
-        ({"grid": {"vehicle.mass": []}}, None, ["no list of values"]),
+        ({"grid": {"vehicle.mass": []}}, None, ["not a list of values"]),
         ({"grid": {"vehicle.mass": 0}}, None, ["whole number from 1"]),
         ({"grid": {"environment.gravity": 3}}, None, ["has no distribution"]),
         ({"grid": {"environment.gravity": [9.8, 9.9]}}, 3, ["is not the 2 of the grid"]),
@@ -538,7 +538,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"table": {"values": {"id": [1.0], "environment.gravity": [9.8]}}}, None, ['leave it out: ignore = ["id"]']),
         ({"table": {"values": {"environment.gravity": [9.8]}, "columns": ["gravity"]}}, None,
          ["columns = 'gravity'", "did you mean 'environment.gravity'?"]),
-        ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": ["id"]}}, None, ["ignore = 'id'", "no column"]),
+        ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": ["id"]}}, None, ["ignore = 'id'", "not a column"]),
         ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": "id"}}, None, ["is not a list of names"]),
         ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": ["environment.gravity"]}}, None,
          ["leaves no column"]),
@@ -594,7 +594,7 @@ def test_files_that_are_none(scene, tmp_path):
     path = tmp_path / "members.csv"
     assert "No such file" in faults(Table, path)[0]
     path.write_bytes(b"x\n120\xb0\n")
-    assert "no text in UTF-8" in faults(Table, path)[0]
+    assert "not a text in UTF-8" in faults(Table, path)[0]
     path.write_text("vehicle.mass [kg],vehicle.buoyancy\n120,1000\n")
     (fault,) = faults(lw.Ensemble, scene, sampling=Table(path))
     says(fault, '"vehicle.mass [kg]"', "did you mean 'vehicle.mass'?")
@@ -658,7 +658,7 @@ def test_attitudes_that_are_no_rotations(scene):
     R[2, 0] *= -1.0
     for sampling_, vary in ((Grid({"start.attitude": R}), None), ("random", {"start.attitude": Choice(R)})):
         (fault,) = faults(lw.Ensemble, scene, None, 0, vary, sampling_)
-        says(fault, 'vary."start.attitude"', "no rotation to 1e-9 (number 3)")
+        says(fault, 'vary."start.attitude"', "not a rotation to 1e-9 (number 3)")
     assert "by entry" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": Choice([0.0, 1.0])})[0]
     assert "shape (2, 2)" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": Choice([np.eye(2)])})[0]
 

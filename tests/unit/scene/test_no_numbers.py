@@ -116,7 +116,7 @@ def test_a_law_without_its_numbers_is_refused(scene, name):
                  lambda: lw.uq.sobol(scene, "depth", vary={"vehicle.mass": law}, h=0.01, t1=0.1)):  # fmt: skip
         message = refused(make)
         assert f"scipy.stats.{name}" in message
-        says(message, "no frozen distribution", "loc=...")
+        says(message, "not a frozen distribution", "loc=...")
     assert ("scale=..." in message) == (name != "poisson")
 
 

@@ -190,7 +190,7 @@ def test_the_users_own_sees_each_tick():
     (lambda: lw.metrics.RiseTime("depth", limits=(0.9, 0.1)), "two rising parts"),
     (lambda: lw.metrics.Effort("speed"), "signal of actuators"),
     (lambda: lw.metrics.SteadyStateError("depth", share=0.0), "part of the run"),
-    (lambda: lw.metrics.CustomMetric("depth"), "no function"),
+    (lambda: lw.metrics.CustomMetric("depth"), "not a function"),
     (lambda: lw.metrics.CustomMetric(len, fields=("dept",)), "fields"),
     (lambda: lw.metrics.IAE("depth", stopped="held"), "no meaning"),
     (lambda: lw.metrics.IAE("depth", at="floor"), "one moment"), (lambda: lw.metrics.ActuatorEnergy("depth"), "leave it out"),

@@ -102,7 +102,7 @@ def test_other_members_and_groups_are_not_ours():
         with pytest.raises(NotOursError, match="groups that no run has"):
             read(arrays(), groups)
     for name in ("../x", "a/b/c", "explicit/..", "C:", "nul\n", "x" * 300):
-        with pytest.raises(NotOursError, match="no name of an array"):
+        with pytest.raises(NotOursError, match="not a name of an array"):
             read(arrays() | {name: arrays()["step"]})
     with pytest.raises(NotOursError):
         read(arrays() | {"speeds": arrays()["status"]})

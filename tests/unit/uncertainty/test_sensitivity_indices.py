@@ -263,8 +263,8 @@ def test_groups_that_are_none(groups, words):
 
 def test_samples_are_shared_among_replicates():
     for samples, words in (
-        (20, "no multiple of replicates = 8; give 16 or 24"),
-        (4, "no multiple of replicates = 8; give 8"),
+        (20, "not a multiple of replicates = 8; give 16 or 24"),
+        (4, "not a multiple of replicates = 8; give 8"),
     ):
         with pytest.raises(lw.SceneError, match=words):
             analyses.sobol(BARE, "depth", samples=samples, vary=VARY)

@@ -13,8 +13,8 @@ PUBLIC = NAMED | {
     f"{door}.{name}": getattr(getattr(lw, door), name) for door in ("plots", "uq") for name in getattr(lw, door).__all__
 }
 # Those whose kernels no other quick test needs, or that search.
-LONG = {"IAE", "Overshoot", "Until", "linearize", "lqr", "stability_map", "sweep", "margins", "term_cost", "tradeoff", "trim",
-        "tune_gains", "worst_case"}  # fmt: skip
+LONG = {"IAE", "Overshoot", "Until", "linearize", "lqr", "stability_map", "sweep", "loop", "margins", "term_cost", "tradeoff",
+        "trim", "tune_gains", "worst_case"}  # fmt: skip
 
 
 def examples() -> dict[str, doctest.DocTest]:

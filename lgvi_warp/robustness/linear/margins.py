@@ -454,7 +454,7 @@ def _of_frequencies(
     """Disk margins and peak gains by name (n,) of loops with delays in steps; NaN where they do not settle."""
     values: dict[str, np.ndarray] = {}
     for opened in sampled.opened(delays, np.flatnonzero(settled)):
-        found = phases(sampled.seen(opened), period) if "phase" in of else {}
+        found = phases(sampled.observed(opened), period) if "phase" in of else {}
         found |= disks(opened, skew, period) if "disk" in of else {}
         found |= peaks(opened, list(outputs.values()), list(outputs), period) if "peak" in of else {}
         for name, column in found.items():

@@ -250,7 +250,7 @@ def loop(
             for opened in of_commands if chosen else sampled.opened(loops.delay, every):
                 if at in COMPONENTS:
                     opened = opened.at(study.components.index(COMPONENTS.index(at)))
-                for i, model in zip(loops.places[opened.some], sampled.seen(opened), strict=True):
+                for i, model in zip(loops.places[opened.some], sampled.observed(opened), strict=True):
                     models[i] = (*model[:2], -model[2])
     names = [commands[i] for i in chosen] or ([at] if at in COMPONENTS else _named(study.components))
     texts = (*study.bench.plan.grid.messages, *messages)

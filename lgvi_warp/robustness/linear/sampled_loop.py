@@ -196,7 +196,7 @@ class SampledLoop:
             A[:, commands] = 0.0
             yield Opened(some, A, np.tile(np.eye(A.shape[1])[:, commands], (len(some), 1, 1)), rows)
 
-    def seen(self, opened: Opened) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def observed(self, opened: Opened) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """A, B, C of each of some opened loops in what laws see, which is all that their demands depend on."""
         base = self._s + self._m
         for i, A, B, C in zip(*opened, strict=True):

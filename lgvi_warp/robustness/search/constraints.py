@@ -69,10 +69,10 @@ class Constraint:
         return float(values[np.argmin(self.slack(values))])
 
 
-def constraints_of(faults: Faults, given: Any, controller: Any) -> tuple[Constraint, ...]:
+def constraints_of(faults: Faults, texts: Any, controller: Any) -> tuple[Constraint, ...]:
     """Read constraints, such as "disk above 0.5"."""
     read = []
-    for text in listed("constraints", given, "texts"):
+    for text in listed("constraints", texts, "texts"):
         found = ABOVE_OR_BELOW.fullmatch(text.strip()) if isinstance(text, str) else None
         if found is None:
             faults.add("constraints", text, "is no number with a bound", EXAMPLE)

@@ -135,6 +135,7 @@ FUNCTIONS = {
     "solve": lw.solve, "prepare": lw.prepare, "predict": lw.predict, "sweep": lw.sweep, "rare_event": lw.rare_event,
     "estimate": lw.estimate, "stability_map": lw.stability_map, "worst_case": lw.worst_case, "tune_gains": lw.tune_gains,
     "derivatives": lw.derivatives, "margins": lw.linear.margins, "trim": lw.linear.trim, "linearize": lw.linear.linearize,
+    "loop": lw.linear.loop,
 }  # fmt: skip
 ELSEWHERE = {"dt": "h", "timestep": "h", "Metod": "method", "H": "h"}
 

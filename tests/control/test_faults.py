@@ -389,7 +389,7 @@ REFUSED = {
     "period": (dict(period=0.0), "fault.period = 0.0"),
     "delay": (dict(kind="delay", delay=-1.0), "fault.delay = -1.0"),
     "known": (dict(known=True, until=9.0), "leaves the channel out for good"),
-    "channel": (dict(channel="both"), "fault.channel = 'both': is no whole number"),
+    "channel": (dict(channel="both"), "fault.channel = 'both': is not a whole number"),
 }
 
 

@@ -110,7 +110,7 @@ def test_constraints_that_are_none():
     for text, words in (
         ("disk", "is no number with a bound"), ("disk >= 0.5", 'write "disk above 0.5"'),
         ("disk depth_pid above 0.5", "names depth_pid, which is no law of the controller"),
-        (5.0, "is no list"), ([5.0], "is no number with a bound"),
+        (5.0, "is not a list"), ([5.0], "is no number with a bound"),
     ):  # fmt: skip
         says(refused(lw.tune_gains, fleet, OVER, "iae heading", constraints=text, **RUN), "constraints", words)
     open_ = dataclasses.replace(fleet.scene, controller=None)

@@ -430,7 +430,7 @@ def test_a_channel_beyond_those_of_a_sensor_of_a_filter_is_refused():
     for of, count in (("dvl", 4), ("imu", 6), ("cell", 1)):
         with pytest.raises(lw.SceneError, match=f"is beyond the {count} of {of}"):
             scene(parts(("depth",)), [lw.control.Fault(of=of, channel=count, time=1.0)], PERIOD)
-    with pytest.raises(lw.SceneError, match="is no actuator and no sensor"):
+    with pytest.raises(lw.SceneError, match="is not an actuator and no sensor"):
         scene(parts(("depth",)), [lw.control.Fault(of="error_state_filter", time=1.0)], PERIOD)
 
 

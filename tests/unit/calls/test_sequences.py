@@ -52,13 +52,20 @@ ELSEWHERE = {
     "statistics.Quantity": {"entries"}, "studies.Line": {"values"}, "studies.Suggestion": {"rivals", "worst", "messages"},
     "studies.Tradeoff": {"measurements", "messages"}, "uq.FailedMembers": {"faults"},
     "uq.Outputs": {"values", "labels", "failed"},
-    "control.Altimeter": {"bias", "drift", "noise", "place", "quantum"}, "control.Trajectory": {"speed"},
+    "control.Altimeter": {"bias", "drift", "noise", "outlier_std", "place", "quantum"}, "control.Trajectory": {"speed"},
     "control.Waypoints": {"loiter_time", "loiter_turns"},
     "terms.MovingMass": {"limit", "rate_limit", "time_constant", "slide_direction", "turn_axis", "turn_center"},
     "notation.repeated": {"arrays"}, "designs.Table": {"ignore"}, "metrics.CustomMetric": {"last"},
     "studies.InnovationTest": {"mean", "mean_band", "ratio_band"},
 }  # fmt: skip
-RECORDS = {"uq.Indices", "uq.MorrisEffects", "uq.SobolIndices", "studies.Footprint", "studies.Region"}
+RECORDS = {
+    "uq.Indices",
+    "uq.MorrisEffects",
+    "uq.SobolIndices",
+    "studies.Footprint",
+    "studies.Region",
+    "linear.OpenLoops",
+}
 RUN = {"solve": {"statistics", "keep", "tangents"}, "prepare": {"vary", "of", "statistics"}, "gather": {"statistics"},
        "uq.model": {"vary", "of"}, "uq.evaluate": {"of"}, "uq.given_data": {"of"}}  # fmt: skip
 

@@ -101,3 +101,16 @@ def test_the_likeliest_hit_of_the_floor_is_run_again(tmp_path):
     assert picture.with_suffix(".rrd").stat().st_size > 10_000
     assert last == str(picture)
     assert picture.stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_a_rudder_that_jams_in_a_turn_is_the_worst_fault(tmp_path):
+    """Errors do not fall with the duration of a lag or a delay, and the last line names the worst."""
+    command = [sys.executable, ROOT / "examples" / "studies" / "faults_that_end.py", "40"]
+    *lines, last = subprocess.run(command, check=True, capture_output=True, text=True, cwd=tmp_path).stdout.splitlines()
+    errors = {line.partition(":")[0]: number(line, "rad s") for line in lines}
+    assert len(errors) == 24
+    assert last.startswith("Worst of 24: stuck for 10 s from")
+    for kind in ("stuck", "slow", "delay"):
+        assert errors[f"{kind} for 10 s from 2 s"] > errors[f"{kind} for 1 s from 2 s"]
+    assert errors["stuck for 10 s from 2 s"] > 2.0 * errors["slow for 10 s from 2 s"]

@@ -335,7 +335,7 @@ class _Costs:
         return np.moveaxis(numbers, 2, 0)
 
     def bounded(self, candidates: np.ndarray, numbers: np.ndarray, good: np.ndarray) -> list[np.ndarray]:
-        """Find the numbers that constraints bound, each (k, members): margins of good candidates (k,) alone, else NaN."""
+        """Numbers that the constraints bound, each (k, members); margins of the good candidates (k,) alone, else NaN."""
         others, found = iter(numbers), dict[str, np.ndarray]()
         if good.any() and any(one.margin for one in self._constraints):
             _, states, parameters = self._members_with(candidates[good])

@@ -82,9 +82,9 @@ class WaveTerm(Term):
 
     def beside(self, terms: Sequence[Term]) -> Any:
         # Knows the uniform currents, which shift frequencies.
-        return self._knowing(currents=tuple(other for other in terms if other.carries))
+        return self.knowing(currents=tuple(other for other in terms if other.carries))
 
-    def _knowing(self, **others: Any) -> Any:
+    def knowing(self, **others: Any) -> Any:
         """The same term, knowing other terms of its scene."""
         if all(getattr(self, name) == value for name, value in others.items()):
             return self

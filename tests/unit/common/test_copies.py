@@ -127,6 +127,7 @@ OTHERS = {
     "PositiveDefinite": lambda: lw.distributions.PositiveDefinite(sigma=0.1),
     "QuadraticForm": lambda: lw.terms.QuadraticForm(products=["X_u|u|"], values=[-1.0]),
     "SurfaceBuoyancy": lambda: lw.terms.SurfaceBuoyancy(heights=0.3),
+    "SeaState": lambda: lw.terms.SeaState(significant_height=1.0, peak_period=6.0, heading_deg=30.0),
     "RotationNormal": lambda: lw.distributions.RotationNormal(std=0.1),
     "Histogram": lambda: lw.statistics.Histogram("depth", edges=[0.0, 1.0]),
     "Derived": lambda: lw.distributions.Derived({"vehicle.mass": scaled}, k=lw.distributions.Normal(std=0.1)),

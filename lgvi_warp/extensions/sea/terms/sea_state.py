@@ -108,7 +108,7 @@ class SeaState(WaveTerm):
         # Knows the floor, too, where it is flat.
         term = super().beside(terms)
         flat = [other for other in terms if isinstance(other, Floor) and not other.on_grid]
-        return term._knowing(floor=flat[0] if flat and self.depth is None else None)
+        return term.knowing(floor=flat[0] if flat and self.depth is None else None)
 
     @property
     def unused(self) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from lgvi_kernels.law import (  # noqa: F401
     fused,
     greatest,
     mul,
+    neg,
     ones,
     row1,
     sine,

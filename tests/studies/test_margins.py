@@ -187,7 +187,7 @@ def test_edges_beside_known_ones():
 
 
 @pytest.mark.parametrize(("words", "message"), [
-    ({"loop": "heding_pid"}, "did you mean 'heading_pid'"), ({"of": "phase"}, "of = 'phase'"),
+    ({"loop": "heding_pid"}, "did you mean 'heading_pid'"), ({"of": "gains"}, "of = 'gains'"),
     ({"by": "guess"}, "by = 'guess'"), ({"seconds": 0.0}, "seconds"), ({"seconds": 1.0}, "is less than 30 ticks"),
 ])  # fmt: skip
 def test_bad_arguments(words, message):

@@ -210,7 +210,7 @@ def loop(
         >>> scene = lw.Scene(vehicle, terms=[lw.terms.ControlWrench(), drag], controller=controller)
         >>> opened = lw.linear.loop(scene, "heading_pid", method="rk4", h=0.02)
         >>> abs(opened.response([0.1, 1.0]))[0, :, 0, 0].round(3)
-        array([1.696, 0.3  ])
+        array([2.542, 0.448])
     """
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene

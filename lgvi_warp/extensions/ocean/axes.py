@@ -97,7 +97,7 @@ def _word(coordinate: Any, attribute: str) -> str:
     return str(coordinate.attrs.get(attribute, "")).strip().lower()
 
 
-def _said(variable: Any, attribute: str) -> str:
+def _attribute(variable: Any, attribute: str) -> str:
     """An attribute that xarray may have read and put aside (CF 1.11, section 5)."""
     return str(variable.attrs.get(attribute, variable.encoding.get(attribute, "")))
 
@@ -116,7 +116,7 @@ def _grid(
 ) -> tuple[tuple[Hashable, Hashable], np.ndarray, np.ndarray, Projection | None]:
     """Dimensions along y and x, latitudes and longitudes or y and x, and the projection of a variable."""
     variable = ds[name]
-    named = _said(variable, "coordinates").split()
+    named = _attribute(variable, "coordinates").split()
     axes = [_first(coordinates, named, words) for words in PROJECTED.values()]
     if any(c is None for c in axes):
         pairs = [[c for c in coordinates.values() if c.name == letter and c.dims == (letter,)] for letter in PROJECTED]
@@ -134,11 +134,11 @@ def _grid(
             dims = _horizontal(name, latitude, longitude)
             if latitude.ndim == 2 and longitude.dims != latitude.dims:
                 longitude = longitude.transpose(*latitude.dims)
-            places = _known(_degrees(name, latitude, 90.0), _degrees(name, longitude, 720.0))
+            places = _without_places(_degrees(name, latitude, 90.0), _degrees(name, longitude, 720.0))
             if np.isfinite(places[0]).any():
                 return dims, *places, None
         if (found := places_at(ds, variable)) is not None:
-            return found[0], *_known(*found[1:]), None
+            return found[0], *_without_places(*found[1:]), None
         if y is not None and x is not None and not mapped and _word(y, "units") == _word(x, "units") == "degrees":
             # As GMT writes latitudes and longitudes.
             return _horizontal(name, y, x), _degrees(name, y, 90.0), _degrees(name, x, 720.0), None
@@ -154,13 +154,15 @@ def _grid(
     places = _metres(name, y, plane), _metres(name, x, plane)
     if y.ndim == 1:
         return dims, *places, plane
-    north, east = _known(places[0], places[1] if x.dims == y.dims else places[1].T)
+    north, east = _without_places(places[0], places[1] if x.dims == y.dims else places[1].T)
     return dims, *plane.geodetic(east, north), plane
 
 
 def _mapping(*variables: Any) -> str:
     """The name of a grid mapping that a variable or its axes say; of the longer form the first (CF 1.11, section 5.6)."""
-    return next((text.split(":")[0].split()[0] for v in variables if (text := _said(v, "grid_mapping")).strip()), "")
+    return next(
+        (text.split(":")[0].split()[0] for v in variables if (text := _attribute(v, "grid_mapping")).strip()), ""
+    )
 
 
 def _projection(ds: Any, name: str, mapped: str) -> Projection:
@@ -168,7 +170,7 @@ def _projection(ds: Any, name: str, mapped: str) -> Projection:
     if mapped in ds.variables:
         return projection(mapped, ds[mapped].attrs)
     if mapped.upper() == "EPSG":
-        return projection(f"{name}.grid_mapping", {"epsg": _said(ds[name], "grid_mapping")})
+        return projection(f"{name}.grid_mapping", {"epsg": _attribute(ds[name], "grid_mapping")})
     raise refusal(f"{name}.grid_mapping", mapped, "names no projection of its x and y",
                   f"give attributes = {{'{name}.grid_mapping': 'EPSG:32631'}}, with the number of its system")  # fmt: skip
 
@@ -190,7 +192,7 @@ def _metres(name: str, axis: Any, plane: Projection) -> np.ndarray:
     return values
 
 
-def _known(latitude: np.ndarray, longitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _without_places(latitude: np.ndarray, longitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same, of two dimensions NaN for nodes without a place: those of a model's processors on land, and of dry cells.
 
     Writers leave them out, or as zeros: more than one node at 0, 0 is none.

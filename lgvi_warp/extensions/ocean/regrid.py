@@ -45,7 +45,7 @@ class Placed:
     plane: LocalPlane
 
     @functools.cached_property
-    def known(self) -> np.ndarray:
+    def placed_nodes(self) -> np.ndarray:
         """Mask of the nodes (y, x) that have a place."""
         return np.isfinite(self.grid.places()[0])
 
@@ -53,12 +53,16 @@ class Placed:
     def north_east(self) -> tuple[np.ndarray, np.ndarray]:
         """The nodes in the plane (y, x) [m]; those without a place where the others go on to."""
         north, east = self.plane.local(*self.grid.places())
-        return (north, east) if self.known.all() else (_extended(north, self.known), _extended(east, self.known))
+        return (
+            (north, east)
+            if self.placed_nodes.all()
+            else (_extended(north, self.placed_nodes), _extended(east, self.placed_nodes))
+        )
 
     @functools.cached_property
     def curved(self) -> CurvedGrid:
         """The same as a grid of cells with four corners."""
-        return CurvedGrid(*self.north_east, self.known)
+        return CurvedGrid(*self.north_east, self.placed_nodes)
 
     def fractions(self, north: np.ndarray, east: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Numbers of the row and of the column of places, with parts; beyond the grid too."""
@@ -99,7 +103,7 @@ class Placed:
 
     def spacing(self) -> tuple[float, float]:
         """Least distance of neighbours along y and along x [m]; 0 along an axis of one node."""
-        north, east = (np.where(self.known, x, np.nan) for x in self.north_east)
+        north, east = (np.where(self.placed_nodes, x, np.nan) for x in self.north_east)
         steps = (np.hypot(np.diff(north, axis=axis), np.diff(east, axis=axis)) for axis in (0, 1))
         # Nodes that a writer repeats, at a fold or a seam, are no neighbors.
         along_y, along_x = (float(np.min(step, initial=np.inf, where=step > 0.0)) for step in steps)
@@ -176,18 +180,18 @@ def directions(placed: Placed, along: str) -> np.ndarray:
 
 def _water(placed: Placed) -> np.ndarray:
     """Mask of the nodes that have a place and are not on land."""
-    return placed.known if placed.grid.land is None else placed.known & ~placed.grid.land
+    return placed.placed_nodes if placed.grid.land is None else placed.placed_nodes & ~placed.grid.land
 
 
-def _extended(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+def _extended(values: np.ndarray, usable: np.ndarray) -> np.ndarray:
     """Numbers (y, x), those that are not known by a cubic in row and column through the others, and the nearest one's rest."""
     from scipy.ndimage import distance_transform_edt
 
     y, x = (np.linspace(-1.0, 1.0, n) for n in values.shape)
     cubic = np.stack([np.outer(y**i, x**j) for i in range(4) for j in range(4 - i)], axis=-1)
-    fit = cubic @ np.linalg.lstsq(cubic[known], values[known], rcond=None)[0]
-    j, i = distance_transform_edt(~known, return_distances=False, return_indices=True)
-    return np.asarray(np.where(known, values, fit + (values - fit)[j, i]))
+    fit = cubic @ np.linalg.lstsq(cubic[usable], values[usable], rcond=None)[0]
+    j, i = distance_transform_edt(~usable, return_distances=False, return_indices=True)
+    return np.asarray(np.where(usable, values, fit + (values - fit)[j, i]))
 
 
 def edge_of(box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

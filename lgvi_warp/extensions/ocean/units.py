@@ -15,7 +15,7 @@ UNITS = {
     "s": {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0},
 }  # fmt: skip
 PREFIXES = {"centi": "c", "milli": "m", "deci": "d", "kilo": "k"}
-WORDS = ((r"\b(centi|milli|deci|kilo|)met(?:er|re)s?\b", lambda found: PREFIXES.get(found[1], "") + "m"),
+WORDS = ((r"\b(centi|milli|deci|kilo|)met(?:er|re)s?\b", lambda match: PREFIXES.get(match[1], "") + "m"),
          (r"\bseconds?\b|\bsecs?\b", "s"), (r"\bminutes?\b|\bmins\b", "min"), (r"\bhours?\b|\bhrs?\b", "h"),
          (r"\bdays?\b", "d"), (r"\bknots\b", "knot"))  # fmt: skip
 # A direction that some writers put behind the unit: "meters, positive up".

@@ -66,7 +66,7 @@ def nodes(field):
     return np.meshgrid(*axes, indexing="ij")
 
 
-def known(origin, north, east, depth, seconds):
+def closed_form(origin, north, east, depth, seconds):
     """Velocities to the north and the east of the plane, by a geodesic from the origin to each place."""
     bearing, distance = np.rad2deg(np.arctan2(east, north)), np.hypot(north, east)
     lon, lat, back = GEOD.fwd(np.full(north.shape, origin[1]), np.full(north.shape, origin[0]), bearing, distance)
@@ -87,7 +87,7 @@ def test_values_are_those_of_the_closed_form(kind, tmp_path):
     assert field.velocities.shape[1] > 1
     assert np.prod(field.velocities.shape[2:4]) >= 12
     for number in range(field.velocities.shape[1]):
-        expected = known(origin, *nodes(field), field.times[0] + number * field.times[1])
+        expected = closed_form(origin, *nodes(field), field.times[0] + number * field.times[1])
         np.testing.assert_allclose(
             field.velocities[0, number, ..., :2], np.stack(expected, axis=-1), rtol=0.0, atol=most
         )
@@ -370,7 +370,7 @@ def test_degrees_of_gmt_along_x_and_y(tmp_path):
 
 @pytest.mark.parametrize("falls", [False, True])
 def test_rows_from_the_north_of_a_projection_turn_no_velocity(falls):
-    """As MET Norway writes: x and y of a projection along the rows, and latitudes and longitudes of each node."""
+    """Files of MET Norway: x and y of a projection along the rows, and latitudes and longitudes of each node."""
     y, x = -2520000.0 + 4000.0 * np.arange(12), -20000.0 + 4000.0 * np.arange(14)
     places = ocean_files.turned_places(ocean_files.STEREO, np.arange(12.0), np.arange(14.0), 4000.0, (x[0], y[0]), 0.0)
     bend = ocean_files.angle_of(ocean_files.STEREO, np.arange(12.0), np.arange(14.0), 4000.0, (x[0], y[0]), 0.0)
@@ -394,7 +394,7 @@ def test_rows_from_the_north_of_a_projection_turn_no_velocity(falls):
         ds.isel(Y=slice(None, None, -1)) if falls else ds, origin, **box(8e3, 0.0, 0.0), spacing=[1e3, 1e3, 1.0]
     )
     np.testing.assert_allclose(
-        field.velocities[0, 0, ..., :2], np.stack(known(origin, *nodes(field), 0.0), axis=-1), atol=1e-6
+        field.velocities[0, 0, ..., :2], np.stack(closed_form(origin, *nodes(field), 0.0), axis=-1), atol=1e-6
     )
 
 

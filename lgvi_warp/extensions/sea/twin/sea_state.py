@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """A random sea of a forecast."""
 
+import functools
 import math
 
 import numpy as np
-from scipy import stats
 
 from lgvi_warp.reference.rotation import Array
-from lgvi_warp.reference.terms.waves import Waves
+from lgvi_warp.reference.terms.waves import Waves, halved
 
 CUT, INTERVALS = 3.0, 1024
+# Of Gauss, for what is smooth.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(100)
 
 
 class SeaState(Waves):
@@ -36,7 +38,7 @@ class SeaState(Waves):
             found.append(_ratio(most * (i + rest) / INTERVALS))
         return np.array(found)
 
-    @property
+    @functools.cached_property
     def periods(self) -> Array:
         """Periods of the waves [s]."""
         return self.peak_period / self.ratios()
@@ -46,13 +48,21 @@ class SeaState(Waves):
         """Phases of the waves [rad]."""
         return 2.0 * math.pi * self.levels[:, 1]
 
-    @property
+    @functools.cached_property
     def headings_deg(self) -> Array:
-        """Headings of the waves [deg]; the sine of half the angle from the mean is that of a beta distribution on (-1, 1)."""
+        """Headings of the waves [deg]: the integral of cos^2s of half the angle from the mean is the level."""
         if self.spreading is None:
             return np.full(len(self.levels), self.heading_deg)
-        half = np.arcsin(stats.beta(self.spreading + 0.5, self.spreading + 0.5, -1.0, 2.0).ppf(self.levels[:, 2]))
+        total = self.below(0.5 * math.pi)
+        half = [
+            halved(lambda x, u=u: self.below(x) - u * total, -0.5 * math.pi, 0.5 * math.pi) for u in self.levels[:, 2]
+        ]
         return np.asarray(self.heading_deg + 2.0 * np.degrees(half))
+
+    def below(self, x: float) -> float:
+        """Integral of cos^2s from -pi / 2 to x."""
+        middle, reach = 0.5 * (x - 0.5 * math.pi), 0.5 * (x + 0.5 * math.pi)
+        return float(reach * WEIGHTS @ np.cos(middle + reach * NODES) ** (2.0 * self.spreading))
 
     @property
     def amplitudes(self) -> Array:

@@ -122,7 +122,7 @@ def test_nothing_of_the_product_uses_the_reference():
 
 
 @pytest.mark.parametrize(("folder", "allowed"), [
-    (DEVICE_OF_EXTENSIONS, {"lgvi_kernels", "warp"}), (TWIN_OF_EXTENSIONS, {"lgvi_warp.reference", "numpy", "scipy"}),
+    (DEVICE_OF_EXTENSIONS, {"lgvi_kernels", "warp"}), (TWIN_OF_EXTENSIONS, {"lgvi_warp.reference", "numpy"}),
 ])  # fmt: skip
 def test_device_code_and_twins_of_an_extension_import_what_others_do(folder, allowed):
     known = allowed | sys.stdlib_module_names

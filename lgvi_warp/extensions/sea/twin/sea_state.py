@@ -62,7 +62,7 @@ class SeaState(Waves):
     def below(self, x: float) -> float:
         """Integral of cos^2s from -pi / 2 to x."""
         middle, reach = 0.5 * (x - 0.5 * math.pi), 0.5 * (x + 0.5 * math.pi)
-        return float(reach * WEIGHTS @ np.cos(middle + reach * NODES) ** (2.0 * self.spreading))
+        return float(reach * WEIGHTS @ np.cos(middle + reach * NODES) ** (2.0 * (self.spreading or 0.0)))
 
     @property
     def amplitudes(self) -> Array:

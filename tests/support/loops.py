@@ -84,7 +84,9 @@ def twin_loop(scene, numbers, every, h):
     given = [twin_of(part, numbers, scene) for part in loops.allocation if part.type == "matrix"]
     parts += given or [PseudoInverse(to="control_wrench", effect=np.eye(6))]
     faults = [
-        Fault(one.of, int(one.channel), kind=one.kind, **{name: float(value) for name, value in one.parameters().items()})
+        Fault(
+            one.of, int(one.channel), kind=one.kind, **{name: float(value) for name, value in one.parameters().items()}
+        )
         for one in loops.faults
     ]
     loop = Loop(parts, {"control_wrench": actuator}, every, round(float(loops.delay) / h), faults)

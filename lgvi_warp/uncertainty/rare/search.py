@@ -27,7 +27,7 @@ from lgvi_warp.uncertainty.rare.mixture import (
 )  # fmt: skip
 from lgvi_warp.uncertainty.rare.plain import sampled
 from lgvi_warp.uncertainty.rare.subset import SHARE, Limit, NoProgress, SubsetRun, climb, levels_of
-from lgvi_warp.uncertainty.rare.witness import Surroundings, Witness, grown, wide_of, witnessed
+from lgvi_warp.uncertainty.rare.witness import Surroundings, Witness, grown, pooled, wide_of, witnessed
 
 # Independent runs of chains; the members of a level in the first ones, and at least and at most in those that follow.
 RUNS, FIRST_SIZE, LEAST_SIZE, LARGEST_SIZE = 4, 500, 1000, 200_000
@@ -47,6 +47,8 @@ BEYOND_THREE = 0.00135
 LEAST = 1e-15
 # Independent members of the second look times the error asked: what they do not see is then below half of that error.
 LOOKED = 3.5
+# Looks that follow a second look which refutes an answer, before it is believed.
+MORE_LOOKS = 3
 # The least part of the second look's members that makes a failure mode which the chains passed by.
 LEAST_MISSED = 0.03
 BLIND = (
@@ -230,6 +232,8 @@ class RareSearch:
     _expected: float = 8.0 * RUNS * FIRST_SIZE
     _fraction: float = 0.0
     _beside: tuple[float, float] = (0.0, 0.0)
+    _wide: float = 0.0
+    _looks: list[Witness] = field(default_factory=list)
 
     def answer(self) -> RareAnswer:
         """The probability. Raises NoProgress."""
@@ -322,13 +326,26 @@ class RareSearch:
         if self.d > MOST_NORMALS:
             self.notes.append(BLIND.format(self.d, MOST_NORMALS))
             return None
-        rng = generator(self.seed, "rare witness")
         # Chains that did not arrive know no probability: an event of one in a million is looked for.
-        lookers = math.ceil(LOOKED / self.relative_error)
-        seen = witnessed(self._happens, self.d, wide_of(probability or 1e-6), rng, lookers)
+        self._wide = wide_of(probability or 1e-6)
+        seen = self._look()
         if not len(seen.u) and probability is not None:
             self.notes.append("the second look for other failure modes met no failing member, so it is inconclusive")
         return seen
+
+    def _look(self, *again: int) -> Witness:
+        lookers = math.ceil(LOOKED / self.relative_error)
+        return witnessed(self._happens, self.d, self._wide, generator(self.seed, "rare witness", *again), lookers)
+
+    def _refuted(self, seen: Witness, probability: float, spread: float) -> Witness | None:
+        """The second look, with others beside it, where all of them give more than this probability beyond chance.
+
+        One look has the effect of a dozen members: alone it is too often far from the truth to decide.
+        """
+        if beyond(seen, probability, spread):
+            self._looks = self._looks or [self._look(again) for again in range(1, MORE_LOOKS + 1)]
+            seen = pooled([seen, *self._looks])
+        return seen if beyond(seen, probability, spread) else None
 
     def _happens(self, u: np.ndarray) -> np.ndarray:
         limit = self.witness or self.limit
@@ -402,8 +419,8 @@ class RareSearch:
             places = [*(run.failing for run in runs), *[missed] * bool(len(missed))]
             known, error = chains or (None, 0.0)
             reasons = doubts(found, mixture, known, error, places, self.relative_error, inside)
-            if beyond(seen, found.probability, found.spread):
-                reasons.append(f"a second look gives {seen.probability:.2e}")
+            if refuting := self._refuted(seen, found.probability, found.spread):
+                reasons.append(f"a second look gives {refuting.probability:.2e}")
             self._beside = 0.0, 0.0
             if (outside := found.weights[~inside]).sum() > 0.0:
                 self._beside = found.probability * outside.sum(), math.sqrt((outside**2).sum()) / outside.sum()
@@ -467,7 +484,8 @@ class RareSearch:
             self._note_beside(probability + beside)
             spread = math.hypot(probability * spread, beside * its_spread) / (probability + beside)
             probability, degrees = probability + beside, min(degrees, 15.0)
-        if seen is not None and beyond(seen, probability, spread):
+        if seen is not None and (refuting := self._refuted(seen, probability, spread)):
+            seen = refuting
             text = f"chains give {probability:.2e}, and a second look for other failure modes {seen.probability:.2e}"
             self.notes.append(f"{text}, which is the answer; the failing members are those of the chains")
             bounds = probability * math.exp(-2.0 * spread), min(1.0, seen.probability * math.exp(2.0 * seen.spread))

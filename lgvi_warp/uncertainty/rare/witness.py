@@ -47,6 +47,16 @@ class Witness:
     spread: float
 
 
+def pooled(looks: Sequence[Witness]) -> Witness:
+    """Independent looks as one; its spread is the larger of what they say and of how they differ."""
+    told = np.array([each.probability for each in looks])
+    mean = float(told.mean())
+    own = math.sqrt(sum((each.probability * each.spread) ** 2 for each in looks if each.probability))
+    between = math.sqrt(float(((told - mean) ** 2).sum() * len(looks) / (len(looks) - 1)))
+    u, lookers = (np.concatenate(parts) for parts in ([w.u for w in looks], [w.lookers for w in looks]))
+    return Witness(u, lookers, mean, max(own, between) / (len(looks) * mean) if mean else math.inf)
+
+
 class Surroundings:
     """Places that independent runs reached: apart if farther from their members than these are from another run.
 

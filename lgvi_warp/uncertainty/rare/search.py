@@ -233,6 +233,7 @@ class RareSearch:
     _fraction: float = 0.0
     _beside: tuple[float, float] = (0.0, 0.0)
     _wide: float = 0.0
+    _cost: int = 0
     _looks: list[Witness] = field(default_factory=list)
 
     def answer(self) -> RareAnswer:
@@ -334,8 +335,10 @@ class RareSearch:
         return seen
 
     def _look(self, *again: int) -> Witness:
-        lookers = math.ceil(LOOKED / self.relative_error)
-        return witnessed(self._happens, self.d, self._wide, generator(self.seed, "rare witness", *again), lookers)
+        before, lookers = self.members, math.ceil(LOOKED / self.relative_error)
+        seen = witnessed(self._happens, self.d, self._wide, generator(self.seed, "rare witness", *again), lookers)
+        self._cost = self.members - before
+        return seen
 
     def _refuted(self, seen: Witness, probability: float, spread: float) -> Witness | None:
         """The second look, with others beside it, where all of them give more than this probability beyond chance.
@@ -343,7 +346,8 @@ class RareSearch:
         One look has the effect of a dozen members: alone it is too often far from the truth to decide.
         """
         if beyond(seen, probability, spread):
-            self._looks = self._looks or [self._look(again) for again in range(1, MORE_LOOKS + 1)]
+            while len(self._looks) < MORE_LOOKS and self.members + self._cost <= self.most:
+                self._looks.append(self._look(1 + len(self._looks)))
             seen = pooled([seen, *self._looks])
         return seen if beyond(seen, probability, spread) else None
 

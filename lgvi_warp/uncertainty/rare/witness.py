@@ -52,7 +52,7 @@ def pooled(looks: Sequence[Witness]) -> Witness:
     told = np.array([each.probability for each in looks])
     mean = float(told.mean())
     own = math.sqrt(sum((each.probability * each.spread) ** 2 for each in looks if each.probability))
-    between = math.sqrt(float(((told - mean) ** 2).sum() * len(looks) / (len(looks) - 1)))
+    between = math.sqrt(float(((told - mean) ** 2).sum() * len(looks) / max(len(looks) - 1, 1)))
     u, lookers = (np.concatenate(parts) for parts in ([w.u for w in looks], [w.lookers for w in looks]))
     return Witness(u, lookers, mean, max(own, between) / (len(looks) * mean) if mean else math.inf)
 

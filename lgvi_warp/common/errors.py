@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import math
+import re
 import reprlib
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -20,6 +21,14 @@ MOST_FAULTS = 20
 HEAD, END = 1500, 500
 # Most characters of a value, and of a name, in a message.
 LONGEST_VALUE, LONGEST_NAME = 80, 200
+# First words of a problem that is the predicate of its sentence: the key with its value is the subject.
+PREDICATES = frozenset(
+    "acts are begin begins belongs cannot changes creates did differs do does draws end ends estimates gave gives goes has "
+    "have holds is keeps leaves lies make maps may moves name names needs passes repeats runs say says scales sets stands "
+    "takes varies was weigh were would".split()
+)
+# A word, no name of the program.
+WORD = re.compile(r"[a-z]+(?=[ ,:]|$)")
 
 
 class SceneError(ValueError):
@@ -39,7 +48,7 @@ class SceneError(ValueError):
         ...     lw.Vehicle(mass=-1.0, inertia=[0.1, 0.1, 0.1])
         ... except lw.SceneError as error:
         ...     print(error)
-        vehicle.mass = -1.0: is not positive; give a number above 0 [kg]
+        vehicle.mass = -1.0 is not positive. Give a number above 0 [kg].
     """
 
     def __init__(self, faults: Iterable[str], more: int = 0):
@@ -68,7 +77,14 @@ class SceneError(ValueError):
 
 def refusal(key: str, value: Any, problem: str, remedy: str) -> SceneError:
     """Make the error of a single fault."""
-    return SceneError([f"{cut(key)} = {brief(value)}: {problem}; {remedy}"])
+    return SceneError([sentences(f"{cut(key)} = {brief(value)}", problem, remedy)])
+
+
+def sentences(subject: str, problem: str, remedy: str) -> str:
+    """Say what is wrong with a subject, and the remedy: "vehicle.mass = -1.0 is not positive. Give a number above 0 [kg]"."""
+    colon = "" if problem.partition(" ")[0].rstrip(",") in PREDICATES else ":"
+    # A remedy may begin with a name of the program: save=..., lw.solve.
+    return f"{subject}{colon} {problem}. {remedy[:1].upper() + remedy[1:] if WORD.match(remedy) else remedy}"
 
 
 class NoSuchMembers(SceneError, IndexError):  # noqa: N818
@@ -215,11 +231,12 @@ def cut(name: Any) -> str:
 
 
 def one_line(fault: str) -> str:
-    """Put a fault on one printable line of limited length.
+    """Put a fault on one printable line of limited length, with the stop of its last sentence.
 
     A file may hold line ends, or control codes that a terminal would obey.
     """
-    return printable(fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}")
+    stop = "." * (not fault.endswith((".", "?", "!")))
+    return printable(fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}") + stop
 
 
 def printable(text: str, kept: str = "") -> str:
@@ -243,12 +260,12 @@ class Faults:
         self._prefix, self._found, self._more = prefix, list[str](), 0
 
     def add(self, key: str, value: Any, problem: str, remedy: str | Callable[[], str]) -> None:
-        """Note one fault, as "key = value: what is wrong; the remedy"."""
+        """Note one fault, as "key = value is wrong in this way. The remedy"."""
         if len(self._found) >= MOST_FAULTS:
             self._more += 1
             return
         words = remedy if isinstance(remedy, str) else remedy()
-        self._found.append(f"{self._prefix}{cut(key)} = {brief(value)}: {problem}; {words}")
+        self._found.append(sentences(f"{self._prefix}{cut(key)} = {brief(value)}", problem, words))
 
     @contextlib.contextmanager
     def including(self) -> Iterator[None]:

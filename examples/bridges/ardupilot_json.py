@@ -122,13 +122,13 @@ def serve(vehicle, door, most=None):
 if __name__ == "__main__":
     text = sys.argv[1] if len(sys.argv) > 1 else "9002"
     if not (text.isdecimal() and 0 < int(text) < 65536):
-        sys.exit(f"port = {text!r}: is not a port; give a number from 1 to 65535, such as 9002")
+        sys.exit(f"port = {text!r} is not a port. Give a number from 1 to 65535, such as 9002")
     port = int(text)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as door:
         try:
             door.bind(("127.0.0.1", port))
         except OSError as error:
-            sys.exit(f"port = {port}: {error.strerror}; give another, or end the program that has it")
+            sys.exit(f"port = {port}: {error.strerror}. Give another, or end the program that has it")
         vehicle = Vehicle()
         print(f"BlueROV2 heavy waits for ArduSub on port {port}, {vehicle.rate} periods a second")
         with contextlib.suppress(KeyboardInterrupt):

@@ -51,7 +51,7 @@ class FmuLaw:
 
     def __init__(self, file, period, inputs, outputs, parameters=None):
         if not zipfile.is_zipfile(file):
-            raise ValueError(f"{file}: is not an FMU, or not there; give the path of one")
+            raise ValueError(f"{file} is not an FMU, or not there. Give the path of one")
         self.made_of = file, period, inputs, outputs, parameters
         self.version = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         self.period, self.inputs, self.parameters = period, inputs, parameters or {}
@@ -63,7 +63,7 @@ class FmuLaw:
         }
         for name in (*inputs, *outputs.values(), *self.parameters):
             if name not in self.places:
-                raise ValueError(f"{file}: has no real variable {name!r}; it has {', '.join(self.places)}")
+                raise ValueError(f"{file} has no real variable {name!r}. It has {', '.join(self.places)}")
         self.columns = [COMPONENTS.index(name) for name in outputs]
         self.wanted = [self.places[name] for name in outputs.values()]
         self.instances, self.lock = {}, threading.Lock()

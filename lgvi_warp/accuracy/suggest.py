@@ -15,6 +15,7 @@ from lgvi_warp.accuracy.tradeoff import chosen_methods, growth_of, growth_text, 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.summaries import few_digits, plural
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors import check_threads
@@ -212,7 +213,7 @@ def suggestion_on(
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
     if sample.noise(taken[0]) == "free":
         problem = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
-        raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
+        raise SceneError([f"{problem}. Use lgvi-warp tradeoff, which compares statistics"])
 
     def reference_on(sample: Sample) -> Reference:
         return checked_reference(sample, compared, error, seconds, taken, make_reference=make_reference)
@@ -326,9 +327,9 @@ def searched(
         return [trial.candidate for trial in ladders.cheapest()[:FINALISTS]]
     problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
     if ladders.budget.over:
-        cause = f"{seconds:g} s were over before a step was short enough; try seconds={rounded_up(4.0 * seconds):g}"
-        raise SceneError([f"{cause}. {problem}; or ask for a larger error or a shorter t1"])
-    raise SceneError([f"{problem}; ask for a larger error or a shorter t1"])
+        cause = f"{seconds:g} s were over before a step was short enough. Try seconds={rounded_up(4.0 * seconds):g}"
+        raise SceneError([f"{cause}. {problem}. Or ask for a larger error or a shorter t1"])
+    raise SceneError([f"{problem}. Ask for a larger error or a shorter t1"])
 
 
 def checked(candidates: Sequence[Candidate], reference: Reference, of: str, error: float) -> list[tuple[Trial, float]]:
@@ -387,12 +388,16 @@ def checked_reference(
     differ = f"{reference.text} differ by {apart:.1e} {of.unit}"
     if reference.more:
         cause, remedy = time_over(seconds, reference.more, SHARE)
-        raise SceneError([f"{cause}; {remedy}. {problem} yet: {differ}; or ask for a larger error or a shorter t1"])
+        raise SceneError(
+            [f"{cause}. {capital(remedy)}. {problem} yet: {differ}. Or ask for a larger error or a shorter t1"]
+        )
     until = sample.times[reference.reaches(of.name, 0.1 * error)]
     remedy = f"ask for t1 (--duration) up to {until:g} s" if until > 0.0 else "ask for a shorter t1 (--duration)"
     grows = growth_text(grown(reference.sample, taken, reference))
     raise SceneError(
-        [f"{problem}: {differ}, and agree no better with shorter steps; {grows}; {remedy}, or for a larger error"]
+        [
+            f"{problem}: {differ}, and agree no better with shorter steps; {grows}. {capital(remedy)}, or for a larger error"
+        ]
     )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.summaries import few_digits
 from lgvi_warp.criteria.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.measuring import comparison, cost
@@ -398,8 +399,8 @@ def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
         problem = f"no reference: {reference.text} differ by {apart:.2g} {of.unit} after {end:g} s"
         if reference.more:
             cause, remedy = time_over(seconds, reference.more, SHARE)
-            raise SceneError([f"{cause}; {remedy}. There is {problem}; or give a shorter t1 (--duration)"])
-        raise SceneError([f"{problem}, and agree no better with shorter steps; give a shorter t1 (--duration)"])
+            raise SceneError([f"{cause}. {capital(remedy)}. There is {problem}. Or give a shorter t1 (--duration)"])
+        raise SceneError([f"{problem}, and agree no better with shorter steps. Give a shorter t1 (--duration)"])
     return until
 
 

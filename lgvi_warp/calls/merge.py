@@ -60,16 +60,16 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
     for further in parts[1:]:
         mismatches = same_run(further.provenance, first.provenance, str(further.path), str(first.path))
         if mismatches or further.recipe != first.recipe:
-            remedy = "these are parts of different runs; merge parts of one run"
+            remedy = "these are parts of different runs. Merge parts of one run"
             raise SceneError(f"{text}: {remedy}" for text in mismatches or ["another recipe"])
     if target.suffix != ".zarr":
         if os.path.lexists(target) and not target.is_dir():
-            raise SceneError([f"{target}: is a file; give a folder"])
+            raise SceneError([f"{target} is a file. Give a folder"])
         safe_files.inside(target, first.path.name)
         target /= first.path.name
     with disk_error_with_remedy(target), held(target):
         if os.path.lexists(target) and not overwrite:
-            raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
+            raise SceneError([f"{target} holds a run already. Give --overwrite, or another folder"])
         refuse_foreign(target)
         again = _put_together(parts, Path(os.path.realpath(target)))
     if again:
@@ -85,7 +85,7 @@ def _undamaged(parts: Sequence[Folder]) -> Folder:
     for part in parts:
         if not (faults := part.damage()):
             return part
-        damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in faults]
+        damage += [f"{part.path}: {text}. `lgvi-warp resume {part.path}` first" for text in faults]
     raise SceneError(damage)
 
 
@@ -109,7 +109,7 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Co
         if sums is None:
             continue
         if unfit := block_files.unfit(block, sums, part.layout.times, part.recipe["keepers"]):
-            damage += [f"{part.path}: {text}; `lgvi-warp resume {part.path}` first" for text in unfit]
+            damage += [f"{part.path}: {text}. `lgvi-warp resume {part.path}` first" for text in unfit]
             continue
         files = durable.Files(target)
         for key, wanted in sums.items():
@@ -118,7 +118,7 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Co
             except FileNotFoundError:
                 files.write(key, b"")
             if files.sums[key] != wanted:
-                damage.append(f"{part.path / key}: is torn, missing or changed; `lgvi-warp resume {part.path}` first")
+                damage.append(f"{part.path / key} is torn, missing or changed. `lgvi-warp resume {part.path}` first")
                 files.drop()
                 break
         else:

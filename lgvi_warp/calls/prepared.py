@@ -17,6 +17,7 @@ from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.physics.given_draws import GivenDraws, NoiseDraws
@@ -466,7 +467,7 @@ def _columns(
             remedy = "give levels=True, or let members be drawn: run(seed=...)"
             return (
                 (),
-                f'vary."{joint[0].key}" is a joint distribution, whose values are not single numbers; {remedy}',
+                f'vary."{joint[0].key}" is a joint distribution, whose values are not single numbers. {capital(remedy)}',
                 None,
             )
         cube_columns = [column for variation in described for column in columns_of(full.space, variation.key)]

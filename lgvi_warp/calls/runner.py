@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.engine import single_block
@@ -72,7 +73,7 @@ class Outputs:
         """
         causes = ", ".join(f"{name} {number}" for name, number in self.counts.items() if name != "ok")
         first, count = int(np.argmax(self.failed)), f"{int(self.failed.sum())} of {len(self.failed)}"
-        return f"{count} members failed ({causes}; the first: member {first}); {remedy}"
+        return f"{count} members failed ({causes}; the first: member {first}). {capital(remedy)}"
 
 
 class Runner:
@@ -229,8 +230,8 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
     if every is None and of_samples and not paths and scene.controller is not None:
         every = float(scene.controller.period)  # as of a sweep
     if (paths or of_samples) and every is None:
-        problem = f"save = None: is missing, and {[*paths, *of_samples][0]} is taken over the whole path"
-        raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or run.save_every (--set run.save_every=1.0)"])
+        problem = f"save = None is missing, and {[*paths, *of_samples][0]} is taken over the whole path"
+        raise SceneError([f"{problem}. Give save=lw.SaveAt(every=...) or run.save_every (--set run.save_every=1.0)"])
     if paths or of_samples or any(each.is_function for each in of):
         return SaveAt(every=every, fields=fields)
     times = sorted({each.when for each in of if isinstance(each, EndQuantity) and each.when is not None})

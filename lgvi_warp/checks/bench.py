@@ -14,6 +14,7 @@ from lgvi_kernels.advance.examine import COLUMNS, OUT_FIELDS, make_examine
 from lgvi_warp.common import warp_setup
 from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.common.machine import register_width
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, put_rows
@@ -232,7 +233,9 @@ def built(term: Term, module: Any, width: int, make: Callable[..., Any], remedy:
     except TypeError:
         advice = "give a module, or a class that holds the functions"
         raise SceneError(
-            [f"{term.key}.device = {module!r}: is not hashable, as the key of a compiled kernel must be; {advice}"]
+            [
+                f"{term.key}.device = {module!r} is not hashable, as the key of a compiled kernel must be. {capital(advice)}"
+            ]
         ) from None
     try:
         examine = make(module, declared(term, module), width, wp.float64)
@@ -241,7 +244,7 @@ def built(term: Term, module: Any, width: int, make: Callable[..., Any], remedy:
         raise
     except Exception as error:
         words = " ".join(str(error).split())
-        raise SceneError([f"{term.key}.device = {module!r}: does not compile: {words}; {remedy}"]) from error
+        raise SceneError([f"{term.key}.device = {module!r} does not compile: {words}. {capital(remedy)}"]) from error
     return examine
 
 

@@ -97,7 +97,7 @@ def check_law(
         True
     """
     if not isinstance(term, Term):
-        raise SceneError([f"term = {term!r}: is not a term; give an object such as lw.terms.Drag(...), not its class"])
+        raise SceneError([f"term = {term!r} is not a term. Give an object such as lw.terms.Drag(...), not its class"])
     term = term.beside_account(True)  # else terms leave their power out
     module = kernel_choice.device_module(term, term.device_in(False), built_in)
     packets = -(-whole_number("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))
@@ -136,7 +136,7 @@ def _finite(bench: Bench, step: float) -> Iterator[Check]:
     at_random = _all_finite("finite", here, bench.views)
     yield first_wrong(_all_finite("finite at rest, along axes", bench.at(views), views) for views in bench.corners)
     asleep = not any(np.any(value) for value in here.values())
-    note = "note: zero at every view, so little was checked; give a scene that starts where the law acts"
+    note = "note: zero at every view, so little was checked. Give a scene that starts where the law acts"
     yield at_random._replace(text=note) if asleep else at_random
 
 

@@ -38,6 +38,7 @@ from lgvi_warp.checks.report import (
 )
 from lgvi_warp.common.arguments import whole_number
 from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.control.base import SECTIONS, Allocation, MeasuringPart, Part
 from lgvi_warp.control.controller import Controller
 from lgvi_warp.control.heading_pid import HeadingPID
@@ -130,7 +131,7 @@ def check_controller(
     """
     if not isinstance(part, Part) or part.section not in SECTIONS:
         remedy = "give an object such as lw.control.HeadingPID(kp=1.0), not its class; lw.laws.check_law checks terms"
-        raise SceneError([f"part = {part!r}: is not a part of a controller; {remedy}"])
+        raise SceneError([f"part = {part!r} is not a part of a controller. {capital(remedy)}"])
     if twin is not None:
         roles = [role for role in TWIN_ROLES if callable(getattr(twin, role, None))]
         if not roles or isinstance(twin, type):
@@ -196,7 +197,7 @@ def _finite(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     name = f"{_name(bench)}: finite"
     at_random = finite(name, here.all(), bench.ticks)
     asleep = not _does(bench, here)
-    note = "note: changes nothing at any tick, so little was checked; give a scene in which it acts"
+    note = "note: changes nothing at any tick, so little was checked. Give a scene in which it acts"
     yield at_random._replace(text=note) if asleep and at_random.ok else at_random
     corners = f"{name} without error, half a turn away, at rest"
     yield first_wrong(finite(corners, bench.answers(packed, ticks).all(), ticks) for ticks in corner_ticks(bench.ticks))

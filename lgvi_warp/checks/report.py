@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.engine.arrays import FIELDS
 from lgvi_warp.physics.terms.base import Packed, Term
 
@@ -81,7 +82,7 @@ def judged(
         ratio = np.where(np.isfinite(worst), ratio, np.inf)
     i, j = np.unravel_index(ratio.argmax(), ratio.shape)
     good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
-    text = "" if good else f"{views.description(int(i))}; {remedy}"
+    text = "" if good else f"{views.description(int(i))}. {capital(remedy)}"
     return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
 
 
@@ -118,7 +119,7 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
         remedy = (
             "write packed(self, numbers, context) that returns lw.laws.Packed({name: numbers}), names as in params()"
         )
-        return None, [Check("packed", 1.0, 0.0, False, f"{text}; {remedy}")]
+        return None, [Check("packed", 1.0, 0.0, False, f"{text}. {capital(remedy)}")]
     places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
     first_law = Params["own"]
     fields = (first_law["own"] if first_law.names == FIELDS else first_law).names
@@ -131,5 +132,5 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
 
 def unpacked(problem: str) -> Check:
     """The check of numbers that the device cannot take."""
-    text = f"{problem}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
+    text = f"{problem}. Give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
     return Check("packed", 1.0, 0.0, False, text)

@@ -35,6 +35,7 @@ from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import closest
 from lgvi_warp.common.near import ELSEWHERE
+from lgvi_warp.common.sentences import capital
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, estimate, sensitivity, stability, sweep, rare,
@@ -91,7 +92,7 @@ class Parser(argparse.ArgumentParser):
         """Print the usage and the fault, and end with exit code 2."""
         if wrong := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message):
             names = re.findall(r"[\w-]+", wrong[2])
-            message = f"{message[: wrong.start()]}{wrong[1]!r} is not known; {closest(wrong[1], names)}"
+            message = f"{message[: wrong.start()]}{wrong[1]!r} is not known. {capital(closest(wrong[1], names))}"
         super().error(message)
 
 
@@ -103,8 +104,10 @@ def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         verb = top.verbs[chosen.verb]
         options = re.findall(r"--[\w-]+", verb.format_help())
         wrong = [word for word in unknown if word.startswith("-")] or unknown
-        texts = [f"{word!r} is not known" + (f"; {_suggestion(word.partition('=')[0], options)}" if word[:1] == "-" else "")
-                 for word in wrong]  # fmt: skip
+        known = [
+            f". {capital(_suggestion(word.partition('=')[0], options))}" if word[:1] == "-" else "" for word in wrong
+        ]
+        texts = [f"{word!r} is not known{remedy}" for word, remedy in zip(wrong, known, strict=True)]
         verb.error("; ".join(texts))
     chosen.parser = top
     return chosen

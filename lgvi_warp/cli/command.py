@@ -57,7 +57,7 @@ def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) 
         where = f"{error.filename}: " if error.filename else ""
         text, code = f"{where}{error.strerror or error}", 1
     elif isinstance(error, MemoryError):
-        text, code = f"{str(error) or 'out of memory'}; run fewer members or keep fewer samples", 1
+        text, code = f"{str(error) or 'out of memory'}. Run fewer members or keep fewer samples", 1
     else:
         raise error
     signals.said = True

@@ -83,14 +83,14 @@ def contents(folder: Path) -> list[Content]:
     patterns = {"result": "result*.npz", **study_files()}
     studies: list[Content] = []
     if folder.suffix != ".zarr" and not folder.exists():
-        raise SceneError([f"{folder}: is not there; give the folder of a run or of a study"])
+        raise SceneError([f"{folder} is not there. Give the folder of a run or of a study"])
     if folder.suffix != ".zarr" and folder.is_dir():
         studies = [Content(kind, path) for kind, pattern in patterns.items() for path in sorted(folder.glob(pattern))]
         for content in studies:
             inside(folder, content.path.name)
         stores = list(folder.glob("*.zarr"))
         if not studies and not stores:
-            raise SceneError([f"{folder}: contains no results of a command; give the folder of a run or of a study"])
+            raise SceneError([f"{folder} contains no results of a command. Give the folder of a run or of a study"])
         if not stores:
             return studies
     from lgvi_warp.store.open import folder_of

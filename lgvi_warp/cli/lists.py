@@ -86,7 +86,7 @@ def new(chosen: argparse.Namespace) -> int:
 
     content = vehicle_tables(chosen.vehicle)
     if os.path.lexists(place_of(chosen.scene)):
-        raise SceneError([f"{chosen.scene}: is there already; give another name, or remove it"])
+        raise SceneError([f"{chosen.scene} is there already. Give another name, or remove it"])
     types = [term["type"] for term in content.get("terms", ())]
     name, buoyancy = chosen.vehicle, f"{content['vehicle'].get('buoyancy', 0.0):g}"
     text = NEW_SCENE.format(

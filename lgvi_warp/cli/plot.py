@@ -62,7 +62,7 @@ def _draw(content: Content, written: Written, out: Path) -> None:
     from lgvi_warp import plots
 
     if not hasattr(plots, content.kind):
-        written.empty.append(f"{content.path}: has no picture; lgvi-warp info shows what it holds")
+        written.empty.append(f"{content.path} has no picture. lgvi-warp info shows what it holds")
         return
     with content.understood():
         written.draw(getattr(plots, content.kind), numbers, out / content.path.with_suffix(".png").name)
@@ -83,7 +83,7 @@ def footprint(chosen: argparse.Namespace) -> int:
     """Run the verb footprint: where the members of a run are, as numbers, a picture, and a map where the origin is known."""
     runs = [content for content in contents(chosen.dir) if content.kind in ("store", "result")]
     if len(runs) != 1:
-        raise SceneError([f"{chosen.dir}: holds {len(runs) or 'no'} runs; give the folder of one run, or its store"])
+        raise SceneError([f"{chosen.dir} holds {len(runs) or 'no'} runs. Give the folder of one run, or its store"])
     from lgvi_warp import plots
     from lgvi_warp.store.export import export
     from lgvi_warp.uncertainty.footprint.footprint import footprint as footprint_of

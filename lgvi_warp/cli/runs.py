@@ -146,18 +146,16 @@ def end_of_run(chosen: argparse.Namespace) -> Any:
     if chosen.start is None:
         return None
     if chosen.error is not None:
-        raise SceneError(
-            [f"--start {chosen.start}: does not go with --error, which looks at whole runs; give the step"]
-        )
+        raise SceneError([f"--start {chosen.start} does not go with --error, which looks at whole runs. Give the step"])
     from lgvi_warp.results.result import Result
     from lgvi_warp.views.pages.report import run_in
 
     path = chosen.start
     held = (Result.load(path), path) if path.suffix == ".npz" else run_in(path)
     if held is None:
-        raise SceneError([f"--start {path}: holds no run; give a folder that lgvi-warp run wrote"])
+        raise SceneError([f"--start {path} holds no run. Give a folder that lgvi-warp run wrote"])
     if held[0].end is None:
-        raise SceneError([f"--start {path}: has no final states; run it again with the samples of all members"])
+        raise SceneError([f"--start {path} has no final states. Run it again with the samples of all members"])
     return held[0].final
 
 
@@ -165,10 +163,10 @@ def live_address(scene: Any, chosen: argparse.Namespace, viewer: Part = None) ->
     """Find the address of the viewer of --live, before anything runs; None without --live."""
     if not chosen.live:
         if chosen.viewer is not None:
-            raise SceneError([f"--viewer {chosen.viewer}: has no effect without --live; add --live"])
+            raise SceneError([f"--viewer {chosen.viewer} has no effect without --live. Add --live"])
         return None
     if not (isinstance(scene.run.keep, str) and scene.run.keep == "all"):
-        raise SceneError(["--live: shows members as they are done, and the run keeps none; add --keep all"])
+        raise SceneError(["--live shows members as they are done, and the run keeps none. Add --keep all"])
     from lgvi_warp.views.recording.viewer import opened
 
     try:
@@ -216,15 +214,15 @@ def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> 
     """Choose method, step and precision for --error, and print them; None without --error."""
     if chosen.error is None:
         if chosen.of is not None:
-            raise SceneError([f"--of {chosen.of}: has no effect without --error; add --error 1e-3"])
+            raise SceneError([f"--of {chosen.of} has no effect without --error. Add --error 1e-3"])
         return None
     if not (isinstance(scene.run.keep, str) and scene.run.keep == "all") or scene.run.until is not None:
-        fault = 'is checked on samples of all members; give run.keep="all", no run.until'
+        fault = 'is checked on samples of all members. Give run.keep="all", no run.until'
         raise SceneError([f"--error {chosen.error:g}: {fault}"])
     for name in ("step", "dtype"):
         if getattr(chosen, name) is not None:
-            text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
-            raise SceneError([f"{text}; leave out --{name} or --error"])
+            text = f"--{name} {getattr(chosen, name)} is what --error chooses"
+            raise SceneError([f"{text}. Leave out --{name} or --error"])
     from lgvi_warp.accuracy import suggest as study
 
     settings = {"methods": [chosen.method] if chosen.method else None, "threads": chosen.threads}
@@ -244,7 +242,7 @@ def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namesp
     measured = f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g}"
     text = f"{measured} ({members} members again at half the step, those with the largest errors among them)"
     if not error <= suggested.error:
-        return [f"{text}: missed; ask for a smaller one"]
+        return [f"{text}: missed. Ask for a smaller one"]
     say(chosen, f"checked     {text}")
     return []
 

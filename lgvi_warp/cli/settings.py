@@ -97,7 +97,7 @@ def writable(out: Path) -> Path:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
-        raise SceneError([f"--out {out}: is a file; give a folder"]) from None
+        raise SceneError([f"--out {out} is a file. Give a folder"]) from None
     if not os.access(out, os.W_OK | os.X_OK):
         fault = f"{os.strerror(errno.EACCES)}: choose a folder that can be written"
         raise PermissionError(errno.EACCES, fault, str(out))
@@ -110,7 +110,7 @@ def store_settings(chosen: argparse.Namespace) -> Any:
         names = ("store_dtype", "blocks", "overwrite", "resume")
         options = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name, None)]
         if options:
-            raise SceneError([f"{' and '.join(options)}: is for runs in a store; add --store zarr, or leave it out"])
+            raise SceneError([f"{' and '.join(options)} is for runs in a store. Add --store zarr, or leave it out"])
         return None
     from lgvi_warp.store.settings import Store
 
@@ -124,6 +124,6 @@ def block_range(chosen: argparse.Namespace) -> range | None:
         return None
     first, colon, stop = chosen.blocks.partition(":")
     if not (colon and first.isdigit() and stop.isdigit()):
-        fault = "is not a range of blocks; write --blocks 0:100 for the first hundred"
+        fault = "is not a range of blocks. Write --blocks 0:100 for the first hundred"
         raise SceneError([f"--blocks {chosen.blocks}: {fault}"])
     return range(int(first), int(stop))

@@ -40,8 +40,8 @@ def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
     tell(chosen, lambda: document, lambda: f"{file_line(folder.path)}" + (", complete" if folder.complete else ""))
     if not folder.complete:
         of_all = f"{missing_blocks} of {len(folder.runs)} blocks"
-        missing = f"{of_all} are in none of the folders; lgvi-warp resume {folder.path} runs them"
-        kept = f"the members that it keeps are missing; lgvi-warp resume {folder.path} runs them, or says why not"
+        missing = f"{of_all} are in none of the folders. lgvi-warp resume {folder.path} runs them"
+        kept = f"the members that it keeps are missing. lgvi-warp resume {folder.path} runs them, or says why not"
         print_faults([f"{folder.path}: {missing if missing_blocks else kept}"])
     return 0 if folder.complete else 1
 
@@ -91,7 +91,7 @@ def _members(text: str | None) -> slice | list[int] | None:
         return indices(text)
     words = [word.strip() for word in text.split(":")]
     if len(words) > 3 or not all(word.isdigit() for word in words if word) or words[2:] in ([""], ["0"]):
-        raise SceneError([f"--members {text}: is not a list of members; write --members 3,17 or --members 0:100"])
+        raise SceneError([f"--members {text} is not a list of members. Write --members 3,17 or --members 0:100"])
     return slice(*(int(word) if word else None for word in words))
 
 
@@ -102,7 +102,7 @@ def _origin(text: str | None) -> list[float] | None:
     try:
         latitude, longitude = map(float, text.split(","))
     except ValueError:
-        raise SceneError([f"--origin {text}: is not a place; write --origin=63.44,10.40"]) from None
+        raise SceneError([f"--origin {text} is not a place. Write --origin=63.44,10.40"]) from None
     return [latitude, longitude]
 
 

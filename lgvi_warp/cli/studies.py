@@ -41,7 +41,7 @@ RECIPE = Form("FILE", _recipe, remedy="give the estimate.json of an answer")
 
 def _unmeasured(answer: Any) -> list[str]:
     """Faults of a trade-off: methods that were asked for and have no measurement."""
-    return [f"--methods {name}: has no measurement: {why}" for name, why in answer.missing.items()]
+    return [f"--methods {name} has no measurement: {why}" for name, why in answer.missing.items()]
 
 
 tradeoff = as_study("tradeoff", "accuracy.tradeoff:tradeoff", shared="--seed --set", picture=True, faults=_unmeasured)
@@ -148,8 +148,8 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
     Returns: The exit code: 1 if a file failed, otherwise 0. Raises Ended: interrupted after a map was finished.
     """
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
-        fault = "names the same axes as --x and --y; leave out --grid, or both of them"
-        raise SceneError([f"--grid {chosen.grid}: {fault}"])
+        fault = "names the same axes as --x and --y. Leave out --grid, or both of them"
+        raise SceneError([f"--grid {chosen.grid} {fault}"])
     scene, stability_map, values = STABILITY.call_of(chosen)
     out = folder(chosen, "_stability")
     from lgvi_warp import plots

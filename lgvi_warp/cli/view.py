@@ -45,7 +45,7 @@ def view(chosen: argparse.Namespace, *, viewer: Part = None, log: Part = None) -
             if chosen.out is not None:
                 (log or record)(result, chosen.out, members=members)
             if chosen.movie is not None and movie.write(result, chosen.movie, members=members) == "plot":
-                notes.append(f"{chosen.movie}: is drawn plainly, since the viewer cannot draw on this machine")
+                notes.append(f"{chosen.movie} is drawn plainly, since the viewer cannot draw on this machine")
     except NothingToDraw as error:
         raise SceneError([str(error)]) from None
     tell(chosen, lambda: {"files": files}, lambda: "\n".join(map(file_line, files)))
@@ -58,7 +58,7 @@ def run_in(path: Path) -> Content:
     held = [Content("result", path)] if path.suffix == ".npz" else contents(path)
     runs = [content for content in held if content.kind in ("result", "store")]
     if not runs:
-        raise SceneError([f"{path}: holds a study, and no run; give the folder of a run"])
+        raise SceneError([f"{path} holds a study, and no run. Give the folder of a run"])
     return runs[-1]
 
 
@@ -68,5 +68,5 @@ def indices(text: str | None) -> list[int] | None:
         return None
     words = [word.strip() for word in text.split(",")]
     if not all(word.isdigit() for word in words):
-        raise SceneError([f"--members {text}: is not a list of members; write --members 3,17"])
+        raise SceneError([f"--members {text} is not a list of members. Write --members 3,17"])
     return [int(word) for word in words]

@@ -13,6 +13,7 @@ from typing import Any
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw, install
 from lgvi_warp.common.files import place_of
+from lgvi_warp.common.sentences import capital
 
 # Longest delay of a signal that arrives just before the main thread begins to wait [s].
 PERIOD = 0.2
@@ -56,7 +57,7 @@ class Written:
         extras = ",".join(dict.fromkeys(error.extra for error in errors))
         libraries = " and ".join(dict.fromkeys(error.library for error in errors))
         remedy = f"to have pictures: {install(extras)}"
-        return [f"note        {files}: not made without {libraries}; {remedy}"]
+        return [f"note        {files}: not made without {libraries}. {capital(remedy)}"]
 
 
 def side_by_side(

@@ -32,13 +32,14 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
         if name not in places:
             from lgvi_warp.common.extensions import load
             from lgvi_warp.common.nearest import meant
+            from lgvi_warp.common.sentences import capital
 
             # A class: what else is asked for is a module of a room, mostly.
             if name[:1].isupper() and (kind := load(table, name)) is not None:
                 return kind
             # What asks for private names asks whether a module has them.
             near = "" if name.startswith("_") else behind_another(name, door) or meant(name, tuple(listed()))
-            raise AttributeError(f"module {door!r} has no attribute {name!r}{'; ' * bool(near)}{near}")
+            raise AttributeError(f"module {door!r} has no attribute {name!r}{'. ' * bool(near)}{capital(near)}")
         home, name_there = places[name]
         # What a door holds of itself is a module.
         value = import_module(f"{door}.{name}") if home == door else getattr(import_module(home), name_there)

@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import math
-import re
 import reprlib
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.real_numbers import NotReal, holds_words, plain, real_numbers
+from lgvi_warp.common.sentences import sentences
 
 # Most faults in one message; the rest are only counted, since a file may have a million of them.
 MOST_FAULTS = 20
@@ -21,14 +21,6 @@ MOST_FAULTS = 20
 HEAD, END = 1500, 500
 # Most characters of a value, and of a name, in a message.
 LONGEST_VALUE, LONGEST_NAME = 80, 200
-# First words of a problem that is the predicate of its sentence: the key with its value is the subject.
-PREDICATES = frozenset(
-    "acts are begin begins belongs cannot changes creates did differs do does draws end ends estimates gave gives goes has "
-    "have holds is keeps leaves lies make maps may moves name names needs passes repeats runs say says scales sets stands "
-    "takes varies was weigh were would".split()
-)
-# A word, no name of the program.
-WORD = re.compile(r"[a-z]+(?=[ ,:]|$)")
 
 
 class SceneError(ValueError):
@@ -78,13 +70,6 @@ class SceneError(ValueError):
 def refusal(key: str, value: Any, problem: str, remedy: str) -> SceneError:
     """Make the error of a single fault."""
     return SceneError([sentences(f"{cut(key)} = {brief(value)}", problem, remedy)])
-
-
-def sentences(subject: str, problem: str, remedy: str) -> str:
-    """Say what is wrong with a subject, and the remedy: "vehicle.mass = -1.0 is not positive. Give a number above 0 [kg]"."""
-    colon = "" if problem.partition(" ")[0].rstrip(",") in PREDICATES else ":"
-    # A remedy may begin with a name of the program: save=..., lw.solve.
-    return f"{subject}{colon} {problem}. {remedy[:1].upper() + remedy[1:] if WORD.match(remedy) else remedy}"
 
 
 class NoSuchMembers(SceneError, IndexError):  # noqa: N818

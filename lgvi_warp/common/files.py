@@ -219,7 +219,7 @@ def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None =
     target = Path(os.path.realpath(path)) if root is None else safe_files.inside(root, path.absolute())
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         if problem := safe_files.kind(os.lstat(target).st_mode):
-            raise SceneError([f"{path}: {problem}, which is not replaced; give the name of a file"])
+            raise SceneError([f"{path}: {problem}, which is not replaced. Give the name of a file"])
     return target
 
 

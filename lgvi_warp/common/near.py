@@ -7,6 +7,8 @@ import functools
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
+from lgvi_warp.common.sentences import capital
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Of the flags of a function's code: it takes any keyword.
@@ -87,4 +89,4 @@ def refuse_unknown(call: Any, settings: Iterable[str], names: Iterable[str] | No
     word = next(name for name in settings if name not in names)
     meant = next((name for name in names if word.casefold() in ELSEWHERE.get(name, ())), None) or nearest(word, names)
     remedy = f"did you mean {meant!r}?" if meant else f"known: {', '.join(names)}"
-    raise UnknownArgument([f"{call.__qualname__}() got an unexpected keyword argument {word!r}; {remedy}"])
+    raise UnknownArgument([f"{call.__qualname__}() got an unexpected keyword argument {word!r}. {capital(remedy)}"])

@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 from lgvi_warp.common import safe_files
 from lgvi_warp.common.arguments import of_a_file, path_of
 from lgvi_warp.common.errors import NothingToDraw, SceneError
+from lgvi_warp.common.sentences import capital
 
 # Largest size of each kind of file [bytes]. Scenes and coefficients (YAML, XML) are written by hand or by a script; parsers
 # read one or two megabytes a second of TOML, and a tenth of that of YAML. A table may hold millions of numbers; arrays are
@@ -32,7 +33,7 @@ class UnreadableError(ValueError):
     """A file is not read."""
 
     def __init__(self, problem: str, remedy: str):
-        super().__init__(f"{problem}; {remedy}")
+        super().__init__(f"{problem}. {capital(remedy)}")
         self.what, self.remedy = problem, remedy
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -131,12 +132,12 @@ def corrupt_file_as_scene_error(path: str | os.PathLike[str], otherwise: str, re
     except SceneError as error:
         raise error if all(name in text for text in error.faults) else error.prefixed(f"{name}: ") from error
     except UnreadableError as error:
-        raise SceneError([f"{name}: {error.what}; {remedy}"]) from error
+        raise SceneError([f"{name}: {error.what}. {capital(remedy)}"]) from error
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise SceneError([f"{name}: is damaged, or {otherwise}: {reason}; {remedy}"]) from error
+        raise SceneError([f"{name} is damaged, or {otherwise}: {reason}. {capital(remedy)}"]) from error
     except MemoryError:
-        raise SceneError([f"{name}: does not fit into memory; read it on a larger machine"]) from None
+        raise SceneError([f"{name} does not fit into memory. Read it on a larger machine"]) from None
     finally:
         of_a_file.reset(before)
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.sentences import capital
 
 # Most bytes of a JSON file: a store's has a few kilobytes, with millions of indices some tens of megabytes; and most tables
 # and lists within each other: a scene has up to 24, which a study's file holds in some more.
@@ -29,7 +30,7 @@ _FOLDER = getattr(os, "O_DIRECTORY", 0) | os.O_RDONLY | _PLAIN
 def refused(path: Path, problem: str) -> SceneError:
     """Make the error for a file that a store never holds."""
     remedy = "take it away, and what it leads to is left alone" if problem == "is a link" else "take it away"
-    return SceneError([f"{path}: {problem}, where a run has plain files and folders only; {remedy}"])
+    return SceneError([f"{path}: {problem}, where a run has plain files and folders only. {capital(remedy)}"])
 
 
 KINDS = {
@@ -52,7 +53,7 @@ def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
     home, path = (Path(os.path.realpath(place)) for place in (root, Path(root) / name))
     if not path.is_relative_to(home):
         remedy = "put a copy in its place, or name that file yourself"
-        raise SceneError([f"{Path(root) / name}: leads out of its folder, to {path}; {remedy}"])
+        raise SceneError([f"{Path(root) / name}: leads out of its folder, to {path}. {capital(remedy)}"])
     return path
 
 
@@ -131,7 +132,7 @@ def read(root: Path, key: str, most: int) -> bytes:
         size = os.fstat(file.fileno()).st_size
         if size > most:
             raise SceneError(
-                [f"{root / key}: has {size:,} bytes, where {most:,} are the most; it is not a file of a run"]
+                [f"{root / key} has {size:,} bytes, where {most:,} are the most. It is not a file of a run"]
             )
         return file.read(size)
 
@@ -183,7 +184,7 @@ MOST_DEEP = 8
 def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
     """(path from the root, directory entry) of everything below a root, in order of names; links are not followed."""
     if below.count("/") > MOST_DEEP:
-        raise SceneError([f"{root / below}: lies deeper than the folders of a run do; remove it"])
+        raise SceneError([f"{root / below} lies deeper than the folders of a run do. Remove it"])
     with os.scandir(root / below) as listing:
         for entry in sorted(listing, key=lambda item: item.name):
             name = f"{below}{entry.name}"

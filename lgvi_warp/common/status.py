@@ -59,29 +59,29 @@ class Status(IntEnum):
 
     @property
     def text(self) -> str:
-        """Problem and remedy, in one sentence."""
+        """Problem and remedy."""
         return _TEXT[self]
 
 
 _TEXT = {
     Status.OK: "ran to the end",
     Status.STEP_TOO_LARGE: "the step is too large: |J^-1 a| reached 1, where equation (24) may have no solution, or half the "
-    "angle of a turn of psi_x did; shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular "
+    "angle of a turn of psi_x did. Shorten the step below 1 / |angular velocity| (psi and psi_s: below 2 / |angular "
     "velocity|; rkn*: a quarter turn in a part; psi_x: below 4 / |angular velocity|, and shorter for slender bodies, whose "
     "turns about their length it splits off: there psi_s is better)",
     Status.NOT_CONVERGED: "the solve of the implicit rotation (equation (24); psi_w: its coupled form; gauss*: the stages) "
-    "kept a residual above the tolerance; give a shorter step, more iterations or a larger tolerance "
+    "kept a residual above the tolerance. Give a shorter step, more iterations or a larger tolerance "
     '(for slender bodies, whose inertias are 100 times apart and more: solver="cayley")',
-    Status.FORCES_NOT_CONVERGED: "the iteration for nonconservative forces in Phi* did not settle: they are stiff; "
-    "shorten the step, or use psi_s or psi_x, which treat drag implicitly",
-    Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h); "
-    "loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
+    Status.FORCES_NOT_CONVERGED: "the iteration for nonconservative forces in Phi* did not settle: they are stiff. "
+    "Shorten the step, or use psi_s or psi_x, which treat drag implicitly",
+    Status.STEP_TOO_SMALL: "the steps that the tolerance asks for became too small, or too many (100,000 within one h). "
+    "Loosen rtol or atol (float32 reaches about 1e-6), or look for forces that jump or are stiff",
     Status.ENERGY_GREW: "the total energy grew to more than 100 times the energy available, although no force of the scene "
-    "supplies any: the method is unstable at this step; shorten it (result.warnings names what is too fast)",
+    "supplies any: the method is unstable at this step. Shorten it (result.warnings names what is too fast)",
     Status.BACKWARD_DRAG: "this composition takes some stages with a negative step, and the drag is too strong to be "
-    "integrated backward: their drag number, (back) (l + q|v|) / I, passed 0.5; use the method that is composed, or shorten "
+    "integrated backward: their drag number, (back) (l + q|v|) / I, passed 0.5. Use the method that is composed, or shorten "
     "the step",
-    Status.CONTROL_NON_FINITE: "a command of the controller is not finite; check its gains, its sensors and a law of your own",
+    Status.CONTROL_NON_FINITE: "a command of the controller is not finite. Check its gains, its sensors and a law of your own",
     Status.SURFACE: "stopped by an event: rose to the surface",
     Status.FLOOR: "stopped by an event: sank to the sea floor",
     Status.BOX: "stopped by an event: left the box",
@@ -90,7 +90,7 @@ _TEXT = {
     Status.BATTERY: "stopped by an event: it used the capacity of its battery",
     Status.OUTSIDE: "stopped by an event: left the data of a field",
     Status.MISSION_DONE: "stopped by an event: reached all waypoints of its mission",
-    Status.NON_FINITE: "a number of the state is not finite; check the start state, the parameters and the step",
+    Status.NON_FINITE: "a number of the state is not finite. Check the start state, the parameters and the step",
 }
 
 
@@ -169,27 +169,27 @@ class Warnings(IntFlag):
 _WARNING_TEXT = {
     Warnings.INERTIA: "two principal moments of inertia sum to less than the third, which no rigid body has; right only if "
     "added inertia makes the difference",
-    Warnings.PRECISION_LOSS: "the position loses what a step adds to it: eps |b| > 0.05 h |v|; use float64 or "
+    Warnings.PRECISION_LOSS: "the position loses what a step adds to it: eps |b| > 0.05 h |v|. Use float64 or "
     "float32_compensated, or an origin nearer to the vehicle",
     Warnings.ORTHOGONALITY: "the attitude left the rotations: |R^T R - I| > 1e-10 (float64) or 1e-4 (float32), of rk4, rk5, "
-    "rk5_ck, rk8 and rkw3 1e-3; shorten the step, or use a method that stays on the group (psi_s, psi_x)",
-    Warnings.MUNK_COARSE: "the Munk moment's oscillation is coarsely resolved: h w > 0.5 in a stage; shorten the step, or do "
+    "rk5_ck, rk8 and rkw3 1e-3. Shorten the step, or use a method that stays on the group (psi_s, psi_x)",
+    Warnings.MUNK_COARSE: "the Munk moment's oscillation is coarsely resolved: h w > 0.5 in a stage. Shorten the step, or do "
     "not trust attitudes",
-    Warnings.RESTORING_COARSE: "the restoring moment's oscillation is coarsely resolved: h sqrt(B|r|/J) > 0.5 in a stage; "
-    "shorten the step, or do not trust attitudes",
+    Warnings.RESTORING_COARSE: "the restoring moment's oscillation is coarsely resolved: h sqrt(B|r|/J) > 0.5 in a stage. "
+    "Shorten the step, or do not trust attitudes",
     Warnings.ROTATION: "the rotation in one step is too large: h |Omega| passed the stability limit of the explicit method "
-    "(psi_x: 1, beyond which its turns are inaccurate); shorten the step",
+    "(psi_x: 1, beyond which its turns are inaccurate). Shorten the step",
     Warnings.DRAG_STIFF: "drag is stiff: h (l + 2 q|v|) / I > 1 for a method that treats it explicitly, or > 5 for psi_s, "
-    "psi_x and psi_w, which stay stable and are then of order 1 to 1.5 in place of 2; shorten the step, or use rkw3",
+    "psi_x and psi_w, which stay stable and are then of order 1 to 1.5 in place of 2. Shorten the step, or use rkw3",
     Warnings.MUNK_UNSTABLE: "the Munk moment's oscillation is too fast for this method and step: h w passed the measured "
-    "limit of stability; shorten the step",
+    "limit of stability. Shorten the step",
     Warnings.RESTORING_UNSTABLE: "the restoring moment's oscillation is too fast for this method and step: h sqrt(B|r|/J) "
-    "passed the measured limit of stability; shorten the step",
+    "passed the measured limit of stability. Shorten the step",
     Warnings.ENERGY: "the total energy grew by more than half of the energy available, although no force of the scene "
-    "supplies any; shorten the step",
+    "supplies any. Shorten the step",
     Warnings.CONTROL_NOT_CONVERGED: "iterations of a law or an allocation ended before they had converged, so that commands "
-    'are not those asked for; give it more iterations (the signal "unconverged" counts them)',
-    Warnings.ABOVE_SURFACE: "the member rose more than 0.1 m above the mean surface, where the model knows no air; stop "
+    'are not those asked for. Give it more iterations (the signal "unconverged" counts them)',
+    Warnings.ABOVE_SURFACE: "the member rose more than 0.1 m above the mean surface, where the model knows no air. Stop "
     "it there by the event surface, or let it float by the term surface_buoyancy",
 }
 

@@ -26,24 +26,24 @@ LEAST, MOST = -(2**63), 2**63 - 1
 def parsed(text: str, name: str) -> dict[str, Any]:
     """Parse a TOML text."""
     if DOTTED.search(text):
-        raise SceneError([f"{name}: has a key of more than {MOST_DOTS} parts; write section.key"])
+        raise SceneError([f"{name} has a key of more than {MOST_DOTS} parts. Write section.key"])
     if (tables := sum(1 for _ in TABLE.finditer(text))) > MOST_TABLES:
-        raise SceneError([f"{name}: has {tables:,} tables; give at most {MOST_TABLES:,}"])
+        raise SceneError([f"{name} has {tables:,} tables. Give at most {MOST_TABLES:,}"])
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise SceneError([f"{name} is not TOML: {error}; correct that line"]) from error
+        raise SceneError([f"{name} is not TOML: {error}. Correct that line"]) from error
     except RecursionError:
         raise SceneError([_deep(name)]) from None
     except ValueError:  # Python refuses whole numbers of several thousand digits
-        text = f"{name}: has a whole number of thousands of digits; write it with a point: 1.0e20"
+        text = f"{name} has a whole number of thousands of digits. Write it with a point: 1.0e20"
         raise SceneError([text]) from None
     _check(content, name)
     return content
 
 
 def _deep(name: str) -> str:
-    return f"{name}: has tables or lists nested more than {DEEPEST} deep; write a scene's tables, [vehicle] and so on"
+    return f"{name} has tables or lists nested more than {DEEPEST} deep. Write a scene's tables, [vehicle] and so on"
 
 
 def _check(content: dict[str, Any], name: str) -> None:

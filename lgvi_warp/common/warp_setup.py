@@ -17,6 +17,8 @@ from typing import Any
 import warp as wp
 import warp._src.context as context
 
+from lgvi_warp.common.sentences import capital
+
 
 @contextlib.contextmanager
 def _native_stderr_closed() -> Iterator[None]:
@@ -89,7 +91,7 @@ def unusable(cache: str | os.PathLike[str], error: OSError) -> OSError:
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     problem = "has no room for a new kernel" if full else "cannot be written"
     remedy = f"{'make room, or ' if full else ''}set WARP_CACHE_PATH to another folder"
-    return OSError(error.errno, f"the kernel cache {problem} ({error.strerror}); {remedy}", os.fspath(cache))
+    return OSError(error.errno, f"the kernel cache {problem} ({error.strerror}). {capital(remedy)}", os.fspath(cache))
 
 
 def header_folders() -> dict[int, Any]:

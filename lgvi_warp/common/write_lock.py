@@ -84,7 +84,7 @@ def _taken(path: Path, target: Path, wait: bool) -> int:
         descriptor = _opened(path)
         try:
             if not _locked(descriptor, wait):
-                text = f"{target}: another run is writing into it{_holder_text(descriptor)}; wait for it, or end it"
+                text = f"{target}: another run is writing into it{_holder_text(descriptor)}. Wait for it, or end it"
                 raise SceneError([text])
             # The previous holder may have removed the file that was opened here.
             if _is_still(path, descriptor):
@@ -112,7 +112,7 @@ def _opened(path: Path) -> int:
 
 
 def _no_lock(path: Path) -> SceneError:
-    return SceneError([f"{path}: is not a lock of lgvi-warp, but has its name; move it away"])
+    return SceneError([f"{path} is not a lock of lgvi-warp, but has its name. Move it away"])
 
 
 def _locked(descriptor: int, wait: bool) -> bool:

@@ -19,7 +19,7 @@ SIXTIES = re.compile(r"[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?")
 EXPONENT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+")
 # Most levels of nested brackets.
 DEEPEST = 50
-DEEP = "YAML: is nested too deep; write mass: ..., added_mass: ..."
+DEEP = "YAML is nested too deep. Write mass: ..., added_mass: ..."
 PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")}
 
 
@@ -44,9 +44,9 @@ def parsed(text: str) -> Any:
     except RecursionError:
         raise SceneError([DEEP]) from None
     except yaml.YAMLError as error:
-        raise SceneError([f"YAML: {' '.join(str(error).split())}; correct that line"]) from None
+        raise SceneError([f"YAML: {' '.join(str(error).split())}. Correct that line"]) from None
     except Exception as error:  # PyYAML passes on what int(), float() and dates raise
-        text = f"YAML: has a value that cannot be read ({type(error).__name__}: {error}); correct it"
+        text = f"YAML has a value that cannot be read ({type(error).__name__}: {error}). Correct it"
         raise SceneError([text]) from None
 
 
@@ -99,7 +99,7 @@ def _look(yaml: Any, faults: Faults, root: Any) -> None:
 def _size(yaml: Any, node: Any, sizes: dict[int, int], above: set[int]) -> int:
     """Number of values of a node, aliases written out. Raises SceneError where a node contains itself."""
     if id(node) in above:
-        raise SceneError([f"YAML: {_line(node)}: contains itself through an alias; write it out"])
+        raise SceneError([f"YAML: {_line(node)} contains itself through an alias. Write it out"])
     if id(node) not in sizes:
         above.add(id(node))
         children: list[Any] = []

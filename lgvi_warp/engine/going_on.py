@@ -127,7 +127,7 @@ def _of_same_members(plan: Plan, final: Final) -> Plan:
     same = np.array_equal(np.sort(now), np.sort(final.indices))
     who = "the same members in another order" if same else "other members"
     text = f"start is the end of {who}: member {final.indices[i]} goes on in the place of member {now[i]}"
-    text += "; give final.part(places) in the order of the members"
+    text += ". Give final.part(places) in the order of the members"
     return plan if text in plan.grid.messages else replace(plan, grid=plan.grid.telling(text))
 
 

@@ -94,5 +94,5 @@ def call_host(packets: Packets, t: float) -> None:
         raise
     values, shape = answered(where, returned), (packets.members.count, controller.bus.rows - controller.bus.answer)
     if values.shape != shape:
-        raise ValueError(f"{where}: returned shape {values.shape}; return {shape}, a row for each member")
+        raise ValueError(f"{where}: returned shape {values.shape}. Return {shape}, a row for each member")
     write_answer(packets, values)

@@ -169,7 +169,7 @@ def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
     listed = ", ".join(f"{name} ({worst[name]:.2g} times)" for name in ranked[:MOST_TOLD])
     more = f" and {len(ranked) - MOST_TOLD} more" if len(ranked) > MOST_TOLD else ""
     return (f"readings of cost disagree: their median is above the least, which is taken, for {listed}{more}; other programs "
-            "run at the same time, and costs that lie closer are not told apart; run again on an idle machine")  # fmt: skip
+            "run at the same time, and costs that lie closer are not told apart. Run again on an idle machine")  # fmt: skip
 
 
 def agreement_text(spreads: Sequence[float]) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.results.quantities import samples_of
 from lgvi_warp.results.result import Result
@@ -78,15 +79,15 @@ def compared_in(of: Any) -> Distance:
     if isinstance(of, str) and of.strip().startswith(MEAN):
         entry = compared_in(of.strip().removeprefix(MEAN))
         if entry.name == "attitude" or entry.mean:
-            problem = "is not a mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"
+            problem = "is not a mean of numbers. Give the mean of an entry, such as 'mean attitude[2,2]'"
             raise SceneError([f"of = {of!r}: {problem}"])
         inner = entry.functional or functional("of", entry.name)
         return replace(entry, name=MEAN + entry.name, functional=inner, mean=True)
     if not callable(of) and items_of(of) is not None:
-        raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
+        raise SceneError([f"of = {of!r} is several quantities, and an error is of one of them. Give its name"])
     parsed = functional("of", of)
     if parsed.over_path:
         problem = "is taken over the whole path, and errors are of a quantity at each time"
         remedy = f"give {parsed.inner.name!r}, whose largest error over the path is reported"
-        raise SceneError([f"of = {parsed.label!r}: {problem}; {remedy}"])
+        raise SceneError([f"of = {parsed.label!r}: {problem}. {capital(remedy)}"])
     return Distance(parsed.label, parsed.unit or "1", parsed)

@@ -103,7 +103,7 @@ def make_reference(
     names = list(methods or sample.accepted(PRECISE, most=2)[0])
     if not names:
         raise SceneError(
-            [f"method: the scene takes none of {', '.join(PRECISE)}; name one that it takes: methods=[...]"]
+            [f"method: the scene takes none of {', '.join(PRECISE)}. Name one that it takes: methods=[...]"]
         )
     noisy = sample.noise(names[0]) == "grid"
     if noisy and not methods:

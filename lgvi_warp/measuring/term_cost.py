@@ -63,7 +63,7 @@ def term_cost(
         h = faults.positive("h", h)
     faults.raise_if_any()
     if not scene.terms:
-        raise SceneError(["scene.terms: is empty; give the scene terms whose cost is to be measured"])
+        raise SceneError(["scene.terms is empty. Give the scene terms whose cost is to be measured"])
     step = scene.run.step if h is None else h
     plans = plans_of_terms(scene, members, method, step, dtype)
     for plan in plans.values():

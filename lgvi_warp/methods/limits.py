@@ -71,11 +71,11 @@ def too_large(method: Method) -> str:
     reached = "half the angle of a turn" if method.turns else "|J^-1 a|"
     head = f"the step is too large: {reached} reached 1{'' if method.turns else ', where equation (24) may have no solution'}"
     if method.two_part:
-        return f"{head}; shorten the step, so that no part of it turns by a quarter turn"
+        return f"{head}. Shorten the step, so that no part of it turns by a quarter turn"
     part = max(share for letter, share in method.program if letter[0] in "DRWP") * longest_stage(method)
     slender = ", and more for a slender body, whose turns about its length are split off: there psi_s is better"
     limit = f"{(2.0 if method.turns else 1.0) / part:.3g} / |angular velocity|"
-    return f"{head}; shorten the step below {limit}{slender if method.turns else ''}"
+    return f"{head}. Shorten the step below {limit}{slender if method.turns else ''}"
 
 
 def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.declared import array, checked, positive, read, real, symmetric, text
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import inertia as inertias
 from lgvi_warp.physics import notation
@@ -181,7 +182,7 @@ class Vehicle(Summarized):
             return (f"vehicle.rigid_body_mass_matrix: {fault}, {amount}: no rigid body has; taken as it is",)
         remedy = "give the rigid body's own inertia here, and added inertia in added_mass_matrix"
         remedy += f"; or allow it: inertia_tolerance = {short * 1.01:.2g}" if short <= LITTLE else ""
-        remedy = f"it misses {amount}; {remedy}"
+        remedy = f"it misses {amount}. {capital(remedy)}"
         faults.add("rigid_body_mass_matrix", rigid[3:, 3:], f"{fault}: no rigid body has", remedy)
         return ()
 

@@ -83,7 +83,7 @@ def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tup
         if change == 0.0 or (change >= smallest and change <= 1e-12 * np.abs(y).max()):
             return K, iteration
         smallest = min(smallest, change)
-    raise NotConverged(f"Gauss: the stages still change by {change:.3g} after {iteration} iterations; shorten the step")
+    raise NotConverged(f"Gauss: the stages still change by {change:.3g} after {iteration} iterations. Shorten the step")
 
 
 def advance(x: State, body: Body, h: float, steps: int, s: int = 3) -> tuple[State, int]:

@@ -330,7 +330,7 @@ def settled(value: Callable[[Array], Array], newton: Callable[[Array], Array], c
             break
         c, rho = new, new_rho
     if not rho <= RESIDUAL * scale:
-        raise NoSolution(f"coupled Moser-Veselov: residual {rho:.3g} for |a| = {scale:.3g}; shorten the step")
+        raise NoSolution(f"coupled Moser-Veselov: residual {rho:.3g} for |a| = {scale:.3g}. Shorten the step")
     return c
 
 

@@ -141,7 +141,7 @@ def followed(x: State, body: Body, h: float) -> State:
     if h == 0.0 or not any(memory.size and follows(law) for law, memory in zip(body.terms, x.memory, strict=False)):
         return x
     if h < 0.0:
-        raise ValueError(f"h = {h:.3g} s: what laws remember is not known before a step; use rkmk4")
+        raise ValueError(f"h = {h:.3g} s: what laws remember is not known before a step. Use rkmk4")
     views = look(x, body, h)
     return recorded(x, body, views, tuple(law.follow(view) for law, view in zip(body.terms, views, strict=True)))
 
@@ -291,6 +291,6 @@ def adaptive(
             else:
                 h = taken * min(1.0, factor)
             if not h > 1e-14 * max(1.0, abs(x.t)):
-                raise ValueError(f"t = {x.t:.6g}: the step {h:.3g} s is too small; loosen rtol or atol")
+                raise ValueError(f"t = {x.t:.6g}: the step {h:.3g} s is too small. Loosen rtol or atol")
         states.append(x)
     return states

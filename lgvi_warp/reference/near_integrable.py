@@ -70,7 +70,7 @@ def modified_inertia(pi: Array, J: Array, h: float, order: int = 10) -> Array:
     inverse = (1.0 + s) / moments + d
     # A spin by theta about a principal axis has J~^-1 h pi = sin(theta): past a quarter turn (24) yields another angle.
     if not (abs(h) * norm(np.linalg.solve(J, pi)) < QUARTER_TURN and np.all(inverse > 0.0)):
-        raise NoSolution(f"the modified inertia is of no use for h pi = {h * norm(pi):.3g}; shorten the step")
+        raise NoSolution(f"the modified inertia is of no use for h pi = {h * norm(pi):.3g}. Shorten the step")
     return np.asarray(axes / inverse @ axes.T)
 
 

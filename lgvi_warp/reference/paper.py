@@ -201,7 +201,7 @@ def Phi_adjoint(x: State, body: Body, h: float, solve: Solver = newton, alpha: f
         star, moved = new, drift(y, body, h)
         if change <= 1e-15 * (norm(p) + norm(pi) + h * norm(np.concatenate(new))):
             return at_time(remembered_over(at_time(y, y.t - 0.5 * h), body, h), y.t)
-    raise NoSolution(f"Phi*: the forces change by {change:.3g} N s from one iteration to the next; shorten the step")
+    raise NoSolution(f"Phi*: the forces change by {change:.3g} N s from one iteration to the next. Shorten the step")
 
 
 def at_time(x: State, t: float) -> State:

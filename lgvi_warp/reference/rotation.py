@@ -128,7 +128,7 @@ def iterate(value: Function, differential: Function, x: Array, a: Array, iterati
             break
         x, v = new, new_v
     if not norm(v) <= RESIDUAL * norm(a):
-        raise NoSolution(f"equation (24): residual {norm(v):.3g} for |a| = {norm(a):.3g}; shorten the step")
+        raise NoSolution(f"equation (24): residual {norm(v):.3g} for |a| = {norm(a):.3g}. Shorten the step")
     return x
 
 
@@ -250,7 +250,7 @@ def quartic(a: Array, J: Array, iterations: int | None = None) -> Array:
     s = quartic_root(a, J, iterations)
     c = quartic_parameter(a, J, s)
     if iterations is None and not norm(cayley_value(c, a, np.diag(J))) <= RESIDUAL * norm(a):
-        raise NoSolution(f"equation (24): the quartic has no small root for |a| = {norm(a):.3g}; shorten the step")
+        raise NoSolution(f"equation (24): the quartic has no small root for |a| = {norm(a):.3g}. Shorten the step")
     return cay(c)
 
 

@@ -96,7 +96,7 @@ def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...
     by = ", ".join(f"{Status(int(code)).name.lower()} {number:,}" for code, number in zip(codes, numbers, strict=True))
     some = f"{int(begun.sum()):,} of {len(status):,} members begin at or beyond an event ({by}; the first: member "
     return (
-        f"{some}{int(begun.argmax())}) and count as stopped at t = 0; start them before it, or leave the event out",
+        f"{some}{int(begun.argmax())}) and count as stopped at t = 0. Start them before it, or leave the event out",
     )
 
 

@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterator
 from typing import Any
 
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.engine.plan import Plan, choose_plan, damping_terms
 from lgvi_warp.methods.limits import drag_limit, rotation_limit
 from lgvi_warp.methods.method import Method
@@ -105,7 +106,7 @@ def messages(method: Method, rates: Rates, h: float, t1: float) -> tuple[str, ..
         (h / n for n in (2, 5, 10, 20, 50, 100) if best_error(method, rates, h / n, t1) <= ALLOWED), math.nan
     )
     remedy = f"h = {shorter:.3g} s keeps that" if shorter > 0.0 else "shorten it"
-    return (f"{text}; {remedy}, or ask for an error: lw.suggest, --error",)
+    return (f"{text}. {capital(remedy)}, or ask for an error: lw.suggest, --error",)
 
 
 def cost(method: Method, rates: Rates, h: float, measured: tuple[float, float] | None = None) -> str:

@@ -72,4 +72,4 @@ def _near_the_limit(plan: Plan) -> Plan:
         return plan
     how = f"off by about {100.0 * measured[0]:.2g} % of the path" if measured[0] < 1.0 else "off by more than the path"
     text = f"step h = {plan.grid.h:g} s: {name} is {how} in {measured[1]:.3g} s, by a run of the first member at half the step"
-    return replace(plan, grid=plan.grid.telling(f"{text}; shorten the step, or ask for an error: lw.suggest, --error"))
+    return replace(plan, grid=plan.grid.telling(f"{text}. Shorten the step, or ask for an error: lw.suggest, --error"))

@@ -224,7 +224,7 @@ def _remarks(fleet: Ensemble, plan: Plan) -> list[str]:
     if rounding:
         texts.append(
             f"tangents: {', '.join(rounding)} rounds: the slope of a rounded reading is 0, so derivatives leave out what goes "
-            "through it; set quantum = 0 for those of the loop without it"
+            "through it. Set quantum = 0 for those of the loop without it"
         )
     if plan.method.adaptive or plan.spec.substep:
         texts.append("tangents: derivatives hold the lengths of the steps that are chosen on the way")

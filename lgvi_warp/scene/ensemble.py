@@ -361,7 +361,7 @@ class Ensemble(Summarized, Documented):
         """
         if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
             raise NoSuchMembers(
-                [f"members {brief(first)} to {brief(stop)}: are not among {self.members:,}; give others"]
+                [f"members {brief(first)} to {brief(stop)} are not among {self.members:,}. Give others"]
             )
         given = None if self.given is None else self.given.of_members(slice(first, stop))
         values, indices = self._values(first, stop), self.indices_of(first, stop)

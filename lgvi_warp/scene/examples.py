@@ -9,6 +9,7 @@ from pathlib import Path
 
 from lgvi_warp.common.errors import SceneError, closest
 from lgvi_warp.common.reading import file_text
+from lgvi_warp.common.sentences import capital
 
 PREFIX = "example:"
 # Folders of such files.
@@ -35,5 +36,5 @@ def located(path: str | os.PathLike[str], folder: Path | None = None) -> str | o
         return path if folder is None else folder / path
     files, name = example_files(), name.removeprefix(PREFIX)
     if name not in files:
-        raise SceneError([f"{PREFIX}{name}: is not a known example; {closest(name, files)}"])
+        raise SceneError([f"{PREFIX}{name} is not a known example. {capital(closest(name, files))}"])
     return files[name]

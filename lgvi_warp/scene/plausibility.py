@@ -60,9 +60,9 @@ FAST = f"a current of {{:.4g}} m/s is beyond the {LIMITS['current'].value:g} m/s
 FAR = "an angle of {:.4g} rad is beyond 90 degrees: is it given in degrees?"
 SHALLOW = ("a depth of {:.4g} m is within one hull length, {:.3g} m, of a surface with waves: where the hull leaves the water "
            "is known to the event surface and the term surface_buoyancy alone")  # fmt: skip
-BEYOND = "the start is {:.4g} m beyond this event: the member stops before its first step; start it before the event"
+BEYOND = "the start is {:.4g} m beyond this event: the member stops before its first step. Start it before the event"
 HIGH = "a depth of {:.4g} m is above the surface: depth is positive down"
-FAR_AWAY = ("a place is {:.0f} km from environment.origin: lengths across the way to it are {:.2g} % too long there; take an "
+FAR_AWAY = ("a place is {:.0f} km from environment.origin: lengths across the way to it are {:.2g} % too long there. Take an "
             "origin nearer to the mission")  # fmt: skip
 LARGE = ("an inertia of {:.4g} kg m2 is beyond the {:.4g} kg m2 that the mass allows within the {:.4g} m of the hull's "
          "stations: a unit?")  # fmt: skip

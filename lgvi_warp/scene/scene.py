@@ -415,7 +415,7 @@ def _check_ensemble(settings: EnsembleSettings, scene: Scene | None, parameters:
         try:
             Ensemble.of(scene, settings)
         except MemoryError:
-            raise SceneError([f"ensemble.members = {settings.members}: do not fit into memory; give less"]) from None
+            raise SceneError([f"ensemble.members = {settings.members} do not fit into memory. Give less"]) from None
 
 
 def _build(faults: Faults, name: str, kind: Callable[..., Any], table: Mapping[str, Any]) -> Any:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import scratch
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
 from lgvi_warp.results.result import TIME
 from lgvi_warp.store.arrays import array, whole_array
@@ -66,7 +67,7 @@ def free_enough(path: Path, wanted: int) -> None:
     if wanted + SPARE_BYTES > free:
         shortage = f"needs {wanted / 1e9:.2f} GB, and the disk has {free / 1e9:.2f} GB left"
         remedy = "save less often or fewer fields (SaveAt), store float32 (--store-dtype float32), or use another disk"
-        raise SceneError([f"store = {path}: {shortage}; {remedy}"])
+        raise SceneError([f"store = {path}: {shortage}. {capital(remedy)}"])
 
 
 def skeleton(

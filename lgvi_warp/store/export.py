@@ -100,7 +100,7 @@ def export(
     root = None if beside is None else beside.parent
     durable.place_of(target, root)
     if not replaces and os.path.lexists(target):
-        raise SceneError([f"{target}: is there already; give overwrite=True (--overwrite), or another name"])
+        raise SceneError([f"{target} is there already. Give overwrite=True (--overwrite), or another name"])
     if source.folder is not None:
         check_whole(source.folder)
     if of_regions is not None:
@@ -135,7 +135,7 @@ def _source(run: Any) -> Source:
         return Source(lambda: Result.load(file), None, file)
     folder = Folder(folder_of(path))
     if not folder.complete:
-        raise SceneError([f"{folder.path}: is not complete; go on with `lgvi-warp resume {folder.path.parent}` first"])
+        raise SceneError([f"{folder.path} is not complete. Go on with `lgvi-warp resume {folder.path.parent}` first"])
     return Source(lambda: open_run(folder.path), folder, folder.path)
 
 
@@ -145,7 +145,7 @@ def _only_result(path: Path) -> Path | None:
         return None
     files = sorted(path.glob("result*.npz"))
     if len(files) > 1:
-        raise SceneError([f"{path}: holds {len(files)} results; name one: {', '.join(map(str, files[:5]))}"])
+        raise SceneError([f"{path} holds {len(files)} results. Name one: {', '.join(map(str, files[:5]))}"])
     # A folder from elsewhere could otherwise lead to any file of the user.
     return inside(path, files[0].name) if files else None
 
@@ -239,7 +239,7 @@ def fault_of_library(to: str, target: Path) -> Iterator[None]:
     except MissingExtra as error:
         raise SceneError([f"to = {to!r}: {error}"]) from error
     except ImportError as error:
-        raise SceneError([f"to = {to!r}: {error}; install it: {install('export')}"]) from error
+        raise SceneError([f"to = {to!r}: {error}. Install it: {install('export')}"]) from error
     except (OSError, RuntimeError) as error:
         # Neither library names the file, and netCDF4 hides the system's error.
         reason = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"
@@ -252,4 +252,4 @@ def check_whole(folder: Folder) -> None:
     if not content["complete"]:
         unfinished = content["blocks"] - content["finished"]
         damage = content["damage"][:5] or [f"{unfinished} blocks are not marked as finished"]
-        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in damage)
+        raise SceneError(f"{folder.path}: {text}. `lgvi-warp resume {folder.path}` mends it" for text in damage)

@@ -69,4 +69,4 @@ def check_parts(folder: Folder, sums: Any, block: Block) -> None:
     else:
         faults = [f"{key} is not in the marker of its block"] if folder.recipe["keepers"] else []
     if faults:
-        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in faults)
+        raise SceneError(f"{folder.path}: {text}. `lgvi-warp resume {folder.path}` mends it" for text in faults)

@@ -25,6 +25,7 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine, safe_files, scratch
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.write_lock import write_lock
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.methods.saveat import TimeGrid
@@ -64,14 +65,14 @@ class Folder:
             texts = [self.attributes[name] for name in ("provenance", "recipe", "messages", "shared")]
             good = self.attributes["format"] == FORMAT and self.attributes["crc32c"] == checksum_of(texts)
         except FileNotFoundError:
-            raise SceneError([f"{path}: holds no run; give a folder that `lgvi-warp run --store zarr` made"]) from None
+            raise SceneError([f"{path} holds no run. Give a folder that `lgvi-warp run --store zarr` made"]) from None
         except SceneError:
             raise
         except (ValueError, KeyError, TypeError, AttributeError):
             good = False
         if not good:
             problem = "is damaged, or of another version of the format"
-            raise SceneError([f"{path / ROOT}: {problem}; run again (--overwrite)"])
+            raise SceneError([f"{path / ROOT}: {problem}. Run again (--overwrite)"])
         with corrupt_store_as_scene_error(path / ROOT):
             self.provenance, self.recipe, messages, self.shared = (parsed(text) for text in texts)
             store_texts.check_texts(self.attributes, self.provenance, self.recipe, messages, self.shared)
@@ -130,7 +131,7 @@ class Folder:
         memory = machine.memory_bytes() or 2**40
         if each > memory:
             size = f"has {self.members:,} members, of which {each / 1e9:.0f} GB are read at once"
-            remedy = f"the memory is {memory / 1e9:.0f} GB; read it on a larger machine, or run it again"
+            remedy = f"the memory is {memory / 1e9:.0f} GB. Read it on a larger machine, or run it again"
             raise SceneError([f"{self.path}: {size}, and {remedy}"])
 
     def unfinished(self) -> list[Block]:
@@ -176,7 +177,7 @@ class Folder:
 
     def _cannot_go_on(self, reason: object) -> SceneError:
         remedy = "run the same scene again with --store zarr --resume, which mends it"
-        return SceneError([f"{self.path}: {'; '.join(self.damage()) or reason}; {remedy}"])
+        return SceneError([f"{self.path}: {'; '.join(self.damage()) or reason}. {capital(remedy)}"])
 
     def damage(self) -> list[str]:
         """List what is wrong with the files that belong to no block."""
@@ -287,4 +288,4 @@ def foreign(path: Path) -> str | None:
 def refuse_foreign(path: Path) -> None:
     """Check that a folder that is to be replaced holds only what a run wrote."""
     if os.path.lexists(path) and (fault := foreign(Path(os.path.realpath(path)))):
-        raise SceneError([f"{path}: {fault}; it is not overwritten: move it away, or give another folder"])
+        raise SceneError([f"{path}: {fault}, and is not overwritten. Move it away, or give another folder"])

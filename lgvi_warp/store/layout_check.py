@@ -20,6 +20,7 @@ import numpy as np
 
 from lgvi_warp.common import scratch
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.control.signals import SAVED, has_shape
 from lgvi_warp.engine.block import block_size
 from lgvi_warp.results import member_fields
@@ -264,7 +265,7 @@ def corrupt_store_as_scene_error(path: Path) -> Iterator[None]:
         text = " ".join(str(error).split())[:200] or type(error).__name__
         reason = text if isinstance(error, NotOursError) else f"cannot be used ({type(error).__name__}: {text})"
         remedy = "ask for the run anew, or run it again"
-        raise SceneError([f"{path}: is not what lgvi-warp writes: {reason}; {remedy}"]) from error
+        raise SceneError([f"{path} is not what lgvi-warp writes: {reason}. {capital(remedy)}"]) from error
 
 
 def is_sum(value: Any) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import members_of, path_of
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.status import Status
 from lgvi_warp.common.summaries import as_table, few_digits
 from lgvi_warp.common.write_lock import writer_of
@@ -107,7 +108,7 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
     stores = sorted(location.glob("*.zarr")) if location.is_dir() else []
     if len(stores) == 1 and stores[0].is_symlink():
         # A folder from elsewhere could otherwise lead to any run of the user.
-        raise SceneError([f"{stores[0]}: is a link; name the store that it leads to: {stores[0].resolve()}"])
+        raise SceneError([f"{stores[0]} is a link. Name the store that it leads to: {stores[0].resolve()}"])
     if len(stores) == 1:
         return stores[0]
     if stores:
@@ -115,7 +116,7 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
     else:
         fault = "is not there" if not location.exists() else "is a file" if location.is_file() else "holds no store"
         remedy = "give the folder of a run made with --store zarr"
-    raise SceneError([f"{location}: {fault}; {remedy}"])
+    raise SceneError([f"{location}: {fault}. {capital(remedy)}"])
 
 
 def open_run(
@@ -156,11 +157,11 @@ def open_run(
     if not folder.complete:
         blocks = len(folder.unfinished())
         missing = f"{blocks} blocks are missing" if blocks else "the members that it keeps have not been run again yet"
-        text = f"{folder.path}: is not complete: {missing}"
+        text = f"{folder.path} is not complete: {missing}"
         if not incomplete and (writer := writer_of(folder.path)):
-            raise SceneError([f"{text}; it is being written ({writer}): wait for it, or give incomplete=True"])
+            raise SceneError([f"{text}. It is being written ({writer}): wait for it, or give incomplete=True"])
         if not incomplete:
-            raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
+            raise SceneError([f"{text}. Go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
         return result_of(folder, members, (*messages, text))
     if lost := folder.lost():
         more = f", and {len(lost) - 1:,} more" if len(lost) > 1 else ""
@@ -219,7 +220,7 @@ def result_of(
         shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
     strange = np.setdiff1d(small["status"], np.array([int(code) for code in Status]))
     if len(strange):
-        raise SceneError([f"{folder.path}: has the status {strange[0]}, which no member ends with; run it again"])
+        raise SceneError([f"{folder.path} has the status {strange[0]}, which no member ends with. Run it again"])
     provenance = at_end(folder.provenance, small, n, int(folder.recipe["members"]))
     estimates, remarks = Estimates(), tuple[str, ...]()
     if observing is not None:
@@ -253,12 +254,12 @@ def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result |
         return wanted, None
     group = folder.kept()
     if group is None:
-        raise SceneError([f"{folder.path / KEPT}: is missing; `lgvi-warp resume {folder.path}` makes it again"])
+        raise SceneError([f"{folder.path / KEPT} is missing. `lgvi-warp resume {folder.path}` makes it again"])
     kept = result_of(group, _chosen_places(group.group()), group.messages, terms)
     ensemble = kept.provenance["ensemble"]
     if kept.members != len(wanted):
         count = f"holds {kept.members} members, not {len(wanted)}"
-        raise SceneError([f"{group.path}: {count}; `lgvi-warp resume` mends it"])
+        raise SceneError([f"{group.path}: {count}. `lgvi-warp resume` mends it"])
     with corrupt_store_as_scene_error(folder.path / ROOT):
         places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
     return wanted, replace(kept, provenance=kept.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})

@@ -12,6 +12,7 @@ from typing import Any
 
 from lgvi_warp.common import safe_files, scratch
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
@@ -105,9 +106,9 @@ class StoredRun:
         exists = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
         if exists and store.existing == "refuse":
             if fault := foreign(path):
-                raise SceneError([f"{path}: {fault}; give another folder"])
+                raise SceneError([f"{path}: {fault}. Give another folder"])
             remedy = 'go on with `lgvi-warp resume` (existing="resume"), or replace it with --overwrite (existing="overwrite")'
-            raise SceneError([f"{path}: holds a run already; {remedy}"])
+            raise SceneError([f"{path} holds a run already. {capital(remedy)}"])
         if exists and store.existing == "resume":
             safe_files.refuse_links(path)
             folder = Folder(path, store.whole)
@@ -115,7 +116,7 @@ class StoredRun:
             recipe = folder.recipe
             for present, wanted in ((recipe["store"], store.layout()), (recipe["keepers"], names_of(self.keepers))):
                 if present != wanted:
-                    raise SceneError([f"{path}: stores {present}, not {wanted}; ask for the same, or overwrite"])
+                    raise SceneError([f"{path} stores {present}, not {wanted}. Ask for the same, or overwrite"])
             return noted
         refuse_foreign(path)
         with disk_error_with_remedy(store.whole):
@@ -196,7 +197,7 @@ def disk_error_with_remedy(path: os.PathLike[str]) -> Iterator[None]:
         yield
     except OSError as error:
         if error.errno in FULL:
-            remedy = f"the blocks that were finished are kept; make room, then `lgvi-warp resume {path}`"
+            remedy = f"the blocks that were finished are kept. Make room, then `lgvi-warp resume {path}`"
         elif error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
             remedy = "choose a folder that can be written"
         else:

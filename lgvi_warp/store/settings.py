@@ -112,4 +112,4 @@ def needed() -> None:
         import xarray  # noqa: F401
         import zarr  # noqa: F401
     except ImportError as error:
-        raise SceneError([f"store: {error}; install it: {install('store')}"]) from error
+        raise SceneError([f"store: {error}. Install it: {install('store')}"]) from error

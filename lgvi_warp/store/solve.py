@@ -141,7 +141,7 @@ def blocks_there(only: range | None, plan: Plan) -> range | None:
     present = range(only.start, min(only.stop, count))
     if only.step != 1 or only.start < 0 or not present:
         problem = f"are not within the {count} of this run"
-        raise SceneError([f"blocks {only.start}:{only.stop}: {problem}; give 0:{count} or less"])
+        raise SceneError([f"blocks {only.start}:{only.stop}: {problem}. Give 0:{count} or less"])
     return present
 
 

@@ -69,7 +69,7 @@ class CheckedFolder:
         except (FileNotFoundError, NotADirectoryError):
             return None
         if len(data) != size:
-            raise SceneError([f"{self.root / key}: is torn; `lgvi-warp resume {self.root}` mends it"])
+            raise SceneError([f"{self.root / key} is torn. `lgvi-warp resume {self.root}` mends it"])
         return data
 
     async def get(

@@ -23,6 +23,7 @@ from lgvi_warp.common import extensions
 from lgvi_warp.common.arguments import name_set
 from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.common.reading import MOST_BYTES, MOST_OTHERS, file_text
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.toml_text import parsed
 from lgvi_warp.physics.notation import hat
 from lgvi_warp.physics.terms.quadratic_form import FORCES, VELOCITIES
@@ -62,7 +63,7 @@ def vehicle_file(name: str) -> Path:
     """Return the path of a vehicle's TOML file in the scene file's form, with a table [source]."""
     path = _own_vehicles().get(name) or extensions.file("vehicles", name)
     if path is None:
-        raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, vehicle_names())}"])
+        raise SceneError([f"vehicle file {name!r} is not known. {capital(closest(name, vehicle_names()))}"])
     return path
 
 
@@ -416,6 +417,6 @@ def read_text(source: str | os.PathLike[str], is_text: bool, format_name: str) -
     if is_text:
         text = str(source)
         if len(text) > (most := MOST_BYTES.get(format_name, MOST_OTHERS)):
-            raise SceneError([f"{format_name}: a text of {len(text):,} characters; give at most {most:,}"])
+            raise SceneError([f"{format_name}: a text of {len(text):,} characters. Give at most {most:,}"])
         return text
     return file_text(source, format_name)

@@ -94,12 +94,12 @@ def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
         raise refusal("most", most, "draws no member", "give a number from 1")
     if "position" not in result.samples:
         raise NothingToDraw(
-            'no positions were kept: there is nothing to draw; give keep="all", or indices of members to keep'
+            'no positions were kept: there is nothing to draw. Give keep="all", or indices of members to keep'
         )
     frames = frames_of(result.time)
     finite, farthest = _survey(result, frames)
     if not finite.any():
-        raise NothingToDraw("no member has a finite start: there is nothing to draw; see result.status")
+        raise NothingToDraw("no member has a finite start: there is nothing to draw. See result.status")
     rank = np.argsort(mixed(np.arange(result.members)), kind="stable")
     rank = rank[finite[rank]]
     first = list(dict.fromkeys([*farthest, *_ended(result, rank, most // 3), *rank.tolist()]))

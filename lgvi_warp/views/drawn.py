@@ -139,7 +139,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     source = result.kept if not result.samples and result.kept is not None else result
     if missing := [name for name in NEEDED if source.samples and name not in source.samples]:
         names = ", ".join(missing)
-        raise NothingToDraw(f"{names} were not kept: a recording needs them; add them to SaveAt(fields=...)")
+        raise NothingToDraw(f"{names} were not kept: a recording needs them. Add them to SaveAt(fields=...)")
     choice = select_members(source)
     if members is not None:
         kept = np.arange(result.members) if source is result else result.kept_members

@@ -232,10 +232,10 @@ def test_an_altimeter_follows_as_the_chart_does_and_looking_ahead_stays_higher()
 
 
 @pytest.mark.parametrize(("guidance", "sensors", "events", "words"), [
-    ([lw.control.Altitude(altitude=5.0)], [], ["floor"], r"altitude.altimeter = '': needs an altimeter"),
-    ([], [lw.control.Altimeter()], [], r"altimeter.floor = '': needs a floor; give the scene one"),
-    ([lw.control.Altitude(altitude=5.0, source="chart")], [], ["a", "b"], r"does not say which of 2 floors; name one: a, b"),
-    ([], [lw.control.Altimeter(floor="c")], ["a"], r"altimeter.floor = 'c': is not a floor of the scene"),
+    ([lw.control.Altitude(altitude=5.0)], [], ["floor"], r"altitude.altimeter = '' needs an altimeter"),
+    ([], [lw.control.Altimeter()], [], r"altimeter.floor = '' needs a floor. Give the scene one"),
+    ([lw.control.Altitude(altitude=5.0, source="chart")], [], ["a", "b"], r"does not say which of 2 floors. Name one: a, b"),
+    ([], [lw.control.Altimeter(floor="c")], ["a"], r"altimeter.floor = 'c' is not a floor of the scene"),
 ])  # fmt: skip
 def test_what_is_missing_in_the_scene_is_said(guidance, sensors, events, words):
     controller = lw.Controller(period=0.1, sensors=sensors, guidance=[lw.control.SetPoint(heading=0.0), *guidance],
@@ -247,10 +247,10 @@ def test_what_is_missing_in_the_scene_is_said(guidance, sensors, events, words):
 
 @pytest.mark.parametrize(("part", "numbers", "words"), [
     ("Altimeter", {"direction": [0.0, 0.0, 0.0]}, "is not a direction"),
-    ("Altimeter", {"most": 0.0}, "most = 0.0: is not positive"),
-    ("Altitude", {"altitude": 0.0}, "altitude = 0.0: is not positive"),
+    ("Altimeter", {"most": 0.0}, "most = 0.0 is not positive"),
+    ("Altitude", {"altitude": 0.0}, "altitude = 0.0 is not positive"),
     ("Altitude", {"altitude": 1.0, "look_ahead": 3.0}, "is given beside an altimeter"),
-    ("Altitude", {"altitude": 1.0, "shallowest": 3.0, "deepest": 2.0}, "is below deepest; give at most deepest = 2"),
+    ("Altitude", {"altitude": 1.0, "shallowest": 3.0, "deepest": 2.0}, "is below deepest. Give at most deepest = 2"),
     ("Altitude", {"altitude": 1.0, "source": "map"}, "source = 'map'"),
 ])  # fmt: skip
 def test_bad_input(part, numbers, words):

@@ -204,7 +204,7 @@ def test_a_wrong_port_is_told_in_a_line(port):
     command = [sys.executable, ROOT / "examples" / "bridges" / "ardupilot_json.py", port]
     told_of = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert told_of.returncode == 1
-    assert told_of.stderr == f"port = {port!r}: is not a port; give a number from 1 to 65535, such as 9002\n"
+    assert told_of.stderr == f"port = {port!r} is not a port. Give a number from 1 to 65535, such as 9002\n"
 
 
 def test_the_mixing_is_complete():

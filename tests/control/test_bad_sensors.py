@@ -26,36 +26,36 @@ def of_table(**tables):
 CELL = {"type": "sensor", "name": "cell", "of": "depth"}
 # A table of a sensor or an estimator (with its type), or of a fault -> words of the message.
 WRONG = [
-    ("sensors", {"type": "sensor", "of": "dept"}, "sensor.of = 'dept': is not known", "'depth'"),
-    ("sensors", {"type": "sensor"}, "sensor.of = '': is not known"),
+    ("sensors", {"type": "sensor", "of": "dept"}, "sensor.of = 'dept' is not known", "'depth'"),
+    ("sensors", {"type": "sensor"}, "sensor.of = '' is not known"),
     ("sensors", {"type": "sensor", "of": ["depth"]}, "sensor.of", "is not known"),
-    ("sensors", {"type": "sensor", "of": "depth", "noise": -0.1}, "sensor.noise = -0.1: is out of bounds", "from 0"),
+    ("sensors", {"type": "sensor", "of": "depth", "noise": -0.1}, "sensor.noise = -0.1 is out of bounds", "from 0"),
     ("sensors", {"type": "sensor", "of": "depth", "noise": float("nan")}, "sensor.noise", "is not finite"),
     ("sensors", {"type": "sensor", "of": "depth", "noise": [0.1, 0.1, 0.1]}, "sensor.noise", "has shape (3,)"),
     ("sensors", {"type": "sensor", "of": "velocity", "bias": [0.1, 0.1]}, "sensor.bias", "has shape (2,)"),
     ("sensors", {"type": "sensor", "of": "velocity", "bias": "much"}, "sensor.bias"),
     ("sensors", {"type": "sensor", "of": "velocity", "bias": None}, "sensor.bias"),
     ("sensors", {"type": "sensor", "of": "depth", "every": 1.5},
-     "sensor.every = 1.5: is not a whole number of ticks; give 1 or 2"),
+     "sensor.every = 1.5 is not a whole number of ticks. Give 1 or 2"),
     ("sensors", {"type": "sensor", "of": "depth", "every": 0}, "sensor.every = 0", "from 1 to 1000"),
     ("sensors", {"type": "sensor", "of": "depth", "latency": -1}, "sensor.latency = -1", "from 0 to 1000"),
     ("sensors", {"type": "sensor", "of": "depth", "dropout": 1.1}, "sensor.dropout = 1.1", "from 0 to 1"),
     ("sensors", {"type": "sensor", "of": "depth", "nois": 0.1}, "sensors[0].nois", "noise"),
-    ("sensors", {"type": "low_pas"}, "sensors[0].type = 'low_pas': is not known", "'low_pass'"),
-    ("sensors", {"type": "low_pass", "of": "depth"}, "sensors[0].time_constant", "is missing; give it [s]"),
-    ("sensors", {"type": "low_pass", "of": "speed", "time_constant": 1.0}, "low_pass.of = 'speed': is not known"),
+    ("sensors", {"type": "low_pas"}, "sensors[0].type = 'low_pas' is not known", "'low_pass'"),
+    ("sensors", {"type": "low_pass", "of": "depth"}, "sensors[0].time_constant", "is missing. Give it [s]"),
+    ("sensors", {"type": "low_pass", "of": "speed", "time_constant": 1.0}, "low_pass.of = 'speed' is not known"),
     ("sensors", {"type": "complementary_filter", "time_constant": -1.0}, "complementary_filter.time_constant = -1.0"),
-    ("sensors", {"type": "dead_reckoning", "rule": "simpson"}, "dead_reckoning.rule = 'simpson': is not known"),
+    ("sensors", {"type": "dead_reckoning", "rule": "simpson"}, "dead_reckoning.rule = 'simpson' is not known"),
     ("sensors", {"type": "dead_reckoning", "velocity": "wind"}, "dead_reckoning.velocity = 'wind'"),
     ("sensors", {"type": "dead_reckoning", "depth": 3.0}, "dead_reckoning.depth = 3.0"),
     ("faults", {"of": "cel", "time": 1.0},
-     "fault.of = 'cel': is not an actuator and no sensor of this controller", "'cell'"),
-    ("faults", {"of": "cell", "time": 1.0, "channel": 1}, "fault.channel = 1: is beyond the 1 of cell; give 0"),
+     "fault.of = 'cel' is not an actuator and no sensor of this controller", "'cell'"),
+    ("faults", {"of": "cell", "time": 1.0, "channel": 1}, "fault.channel = 1 is beyond the 1 of cell. Give 0"),
     ("faults", {"of": "control_wrench", "time": 1.0, "channel": 6},
-     "fault.channel = 6", "is beyond the 6", "give 0 to 5"),
-    ("faults", {"of": "control_wrench", "time": 1.0, "channel": -1}, "fault.channel = -1", "give 0 to 5"),
-    ("faults", {"of": "control_wrench", "time": 1.0, "channel": 1.5}, "fault.channel = 1.5: is not a whole number"),
-    ("faults", {"of": "control_wrench", "time": 1.0, "channel": True}, "fault.channel = True: is not a whole number"),
+     "fault.channel = 6", "is beyond the 6", "Give 0 to 5"),
+    ("faults", {"of": "control_wrench", "time": 1.0, "channel": -1}, "fault.channel = -1", "Give 0 to 5"),
+    ("faults", {"of": "control_wrench", "time": 1.0, "channel": 1.5}, "fault.channel = 1.5 is not a whole number"),
+    ("faults", {"of": "control_wrench", "time": 1.0, "channel": True}, "fault.channel = True is not a whole number"),
     ("faults", {"of": ["cell"], "time": 1.0}, "fault.of", "is not a text"),
     ("faults", {"of": "cell", "time": -1.0}, "fault.time = -1.0"),
     ("faults", {"of": "cell", "time": float("nan")}, "fault.time"),
@@ -84,12 +84,12 @@ def test_the_examples_of_the_pages():
 def test_two_faults_without_names_are_told_to_have_some():
     faults = [{"of": "cell", "time": 1.0}, {"of": "control_wrench", "time": 2.0}]
     text = refused(of_table, sensors=[CELL], faults=faults)
-    says(text, "'fault': is the name of two parts", 'name = "fault_2"')
+    says(text, "'fault' is the name of two parts", 'name = "fault_2"')
 
 
 def test_a_part_and_a_term_of_one_name_are_told_apart():
     text = refused(of_table, sensors=[CELL | {"name": "control_wrench"}])
-    assert "'control_wrench': is the name of two parts or of a term too" in text
+    assert "'control_wrench' is the name of two parts or of a term too" in text
 
 
 def test_all_faults_at_once():

@@ -78,7 +78,7 @@ def test_one_member_without_an_answer():
 
 
 def test_wrong_shape():
-    with pytest.raises(ValueError, match=r"returned shape \(20,\); return \(20, 6\)"):
+    with pytest.raises(ValueError, match=r"returned shape \(20,\). Return \(20, 6\)"):
         run([lw.control.Callback(lambda t, y, r, members: np.zeros(len(members)))])
 
 

@@ -43,6 +43,6 @@ def test_the_loop_is_that_of_fixed_steps(h, lag, delay):
 
 def test_what_is_refused():
     # Ticks are at whole steps of the run, whatever steps are chosen within.
-    sentence = "controller.period = 0.1: is not a whole number of steps of 0.04 s; give 0.08 or 0.12 s, or another step"
+    sentence = "controller.period = 0.1 is not a whole number of steps of 0.04 s. Give 0.08 or 0.12 s, or another step"
     with pytest.raises(lw.SceneError, match=re.escape(sentence)):
         lw.solve(scene(NONE), chosen(1e-6), h=0.04, t1=1.0)

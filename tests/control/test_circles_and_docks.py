@@ -337,16 +337,16 @@ def test_a_contact_of_a_cubic_path_is_exact():
 @pytest.mark.parametrize(("part", "numbers", "words"), [
     ("Waypoints", WAY | {"times": (0, 2, 1, 4)}, r"waypoints.times.*not rising"),
     ("Waypoints", WAY | {"times": (0, 2, 3)}, r"waypoints.times.*give 4 numbers"),
-    ("Waypoints", WAY | {"loiter_turns": (0, 1, 0, 0)}, r"waypoints.loiter_radius = None: is missing; give the radius"),
-    ("Waypoints", WAY | {"at_end": "loiter"}, r"waypoints.loiter_radius = None: is missing"),
-    ("Waypoints", WAY | {"loiter_radius": 3.0}, r"waypoints.loiter_radius = 3.0: is given, and nothing is circled"),
-    ("Waypoints", CIRCLES | {"loiter_turns": (1, 1, 0, 0)}, r"waypoints.loiter_turns\[0\] = 1.0: is of the first point"),
-    ("Waypoints", CIRCLES | {"at_end": "go_on"}, r"waypoints.loiter_turns\[3\] = 0.5: is of the last point"),
+    ("Waypoints", WAY | {"loiter_turns": (0, 1, 0, 0)}, r"waypoints.loiter_radius = None is missing. Give the radius"),
+    ("Waypoints", WAY | {"at_end": "loiter"}, r"waypoints.loiter_radius = None is missing"),
+    ("Waypoints", WAY | {"loiter_radius": 3.0}, r"waypoints.loiter_radius = 3.0 is given, and nothing is circled"),
+    ("Waypoints", CIRCLES | {"loiter_turns": (1, 1, 0, 0)}, r"waypoints.loiter_turns\[0\] = 1.0 is of the first point"),
+    ("Waypoints", CIRCLES | {"at_end": "go_on"}, r"waypoints.loiter_turns\[3\] = 0.5 is of the last point"),
     ("Waypoints", CIRCLES | {"loiter_turns": (0, -1, 0, 0)}, r"waypoints.loiter_turns.*out of bounds"),
-    ("Waypoints", CIRCLES | {"clockwise": 1}, r"waypoints.clockwise = 1: is neither true nor false"),
-    ("Loiter", CIRCLE | {"radius": 0.0}, r"loiter.radius = 0.0: is not positive"),
-    ("Docking", DOCK | {"judged": 19.0}, r"docking.judged = 19.0: is above approach; give at most approach = 18"),
-    ("Docking", DOCK | {"contact_speed": 2.0}, r"docking.contact_speed = 2.0: is above speed; give at most speed = 1.2"),
+    ("Waypoints", CIRCLES | {"clockwise": 1}, r"waypoints.clockwise = 1 is neither true nor false"),
+    ("Loiter", CIRCLE | {"radius": 0.0}, r"loiter.radius = 0.0 is not positive"),
+    ("Docking", DOCK | {"judged": 19.0}, r"docking.judged = 19.0 is above approach. Give at most approach = 18"),
+    ("Docking", DOCK | {"contact_speed": 2.0}, r"docking.contact_speed = 2.0 is above speed. Give at most speed = 1.2"),
     ("Docking", DOCK | {"funnel": 1.6}, r"docking.funnel = 1.6"),
 ])  # fmt: skip
 def test_bad_input(part, numbers, words):
@@ -355,7 +355,7 @@ def test_bad_input(part, numbers, words):
 
 
 def test_a_contact_needs_a_dock():
-    with pytest.raises(lw.SceneError, match=r"dock_contact\.of = 'depth': is nothing that is known at a dock"):
+    with pytest.raises(lw.SceneError, match=r"dock_contact\.of = 'depth' is nothing that is known at a dock"):
         lw.metrics.DockContact("depth")
     with pytest.raises(lw.SceneError, match="needs a guidance docking of the name 'docking'"):
         lw.solve(scene(lw.control.Loiter(**CIRCLE)), h=H, t1=1.0, statistics=[lw.metrics.DockContact("speed")])

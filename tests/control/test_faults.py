@@ -379,17 +379,17 @@ def test_blocks_and_threads_change_no_bit(driven, tmp_path):
 # Refusals, and what is absent -----------------------------------------------------------------------------------------
 
 REFUSED = {
-    "until": (dict(time=5.0, until=5.0), "fault.until = 5.0: is not after time = 5"),
+    "until": (dict(time=5.0, until=5.0), "fault.until = 5.0 is not after time = 5"),
     "kind": (dict(kind="broken"), "fault.kind = 'broken'"),
     "kinds": (dict(kind=["gain", "lost"]), "fault.kind = 'lost'"),
     "no kind": (dict(kind=[]), "is no kind of fault"),
-    "choice": (dict(kind=["gain", "slow"], choice=2.0), "give 0 to 1"),
+    "choice": (dict(kind=["gain", "slow"], choice=2.0), "Give 0 to 1"),
     "value": (dict(kind="freeze", value=1.0), "is of a fault of the kind stuck"),
     "duty": (dict(duty=1.5), "fault.duty = 1.5"),
     "period": (dict(period=0.0), "fault.period = 0.0"),
     "delay": (dict(kind="delay", delay=-1.0), "fault.delay = -1.0"),
     "known": (dict(known=True, until=9.0), "leaves the channel out for good"),
-    "channel": (dict(channel="both"), "fault.channel = 'both': is not a whole number"),
+    "channel": (dict(channel="both"), "fault.channel = 'both' is not a whole number"),
 }
 
 

@@ -58,14 +58,16 @@ def test_a_second_run_begins_anew(law):
 
 
 def test_what_the_file_has_not_is_named(fmu):
-    with pytest.raises(ValueError, match="has no real variable 'torque'; it has heading_error, rate_error, moment, kp"):
+    with pytest.raises(
+        ValueError, match=r"has no real variable 'torque'. It has heading_error, rate_error, moment, kp"
+    ):
         BRIDGE.FmuLaw(fmu, BRIDGE.PERIOD, BRIDGE.INPUTS, {"N": "torque"})
 
 
 def test_a_file_that_is_no_fmu_is_told(tmp_path):
     other = tmp_path / "law.fmu"
     for _ in range(2):
-        with pytest.raises(ValueError, match=r"law\.fmu: is not an FMU, or not there; give the path of one"):
+        with pytest.raises(ValueError, match=r"law\.fmu is not an FMU, or not there. Give the path of one"):
             BRIDGE.FmuLaw(other, BRIDGE.PERIOD, BRIDGE.INPUTS, BRIDGE.OUTPUTS)
         other.write_text("no archive")
 

@@ -21,5 +21,5 @@ def test_each_part_has_a_section_with_all_its_keys(page):
     for name, kind in PAGES[page].kinds.items():
         if kind.__module__.startswith("lgvi_warp."):
             fields = {item.name.removesuffix("_") for item in kind.number_fields()}
-            assert name in sections, f"write its section, ## {name}, into docs/controllers/{page}"
+            assert name in sections, f"Write its section, ## {name}, into docs/controllers/{page}"
             assert fields <= set(re.findall(r"`(\w+)`", sections[name])), name

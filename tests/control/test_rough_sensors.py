@@ -125,8 +125,8 @@ def test_beams_of_a_log_have_outliers_and_bursts_of_their_own():
 ])  # fmt: skip
 def test_bursts_that_cannot_be_are_refused(make):
     for numbers, text in (
-        (dict(dropout=0.8, burst=2.0), "is too short for dropout = 0.8; give at least 4, or 0"),
-        (dict(dropout=0.1, burst=0.5), "give at least 1, or 0"),
+        (dict(dropout=0.8, burst=2.0), "is too short for dropout = 0.8. Give at least 4, or 0"),
+        (dict(dropout=0.1, burst=0.5), "Give at least 1, or 0"),
         (dict(outlier=1.5), "outlier = 1.5"),
         (dict(outlier_std=-1.0), "outlier_std = -1.0"),
     ):

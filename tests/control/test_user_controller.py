@@ -71,7 +71,7 @@ def test_a_type_is_taken_once(monkeypatch):
         monkeypatch.setattr(base, "kinds", dict(base.kinds))
         taken = type("Mine", (base,), {"type": word})
         with pytest.raises(
-            ValueError, match=rf"Mine.type = '{word}': is that of lgvi_warp\..*; give a type that no other"
+            ValueError, match=rf"Mine.type = '{word}' is that of lgvi_warp\..*. Give a type that no other"
         ):
             lw.laws.register(taken)
         assert base.kinds[word] is not taken
@@ -152,7 +152,7 @@ def shapeless_control(w: Any, r: Any, y: Any, p: Any):
 
 
 def test_what_is_no_part_or_does_not_compile_is_refused():
-    with pytest.raises(lw.SceneError, match="is not a part of a controller; give an object"):
+    with pytest.raises(lw.SceneError, match=r"is not a part of a controller. Give an object"):
         lw.laws.check_controller(lw.control.HeadingPID)
     with pytest.raises(lw.SceneError, match="is not a part of a controller"):
         lw.laws.check_controller(lw.terms.Current(velocity=(1.0, 0.0, 0.0)))

@@ -139,5 +139,5 @@ if __name__ == "__main__":
         print(*entered(), sep="\n")
         sys.exit()
     if sys.argv[1:2] == [] or sys.argv[1] not in ARGUMENTS:
-        sys.exit(f"give one of {', '.join(ARGUMENTS)}")
+        sys.exit(f"Give one of {', '.join(ARGUMENTS)}")
     main(*sys.argv[1:3])

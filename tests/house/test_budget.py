@@ -80,7 +80,7 @@ def test_the_house_keeps_within_its_budget(now, table):
 def test_the_budget_holds_no_slack(now, table):
     loose = {key: (number, now[table].get(key, 0)) for key, number in BUDGET[table].items()
              if number > 20 and now[table].get(key, 0) < SLACK * number}  # fmt: skip
-    assert loose == {}, "write the smaller number into budget.toml"
+    assert loose == {}, "Write the smaller number into budget.toml"
 
 
 if __name__ == "__main__":

@@ -39,11 +39,11 @@ def has_twin(kind):
 def test_a_force_has_its_twin_case_page_and_public_name(word):
     kind = terms.TYPES[word]
     assert kind.__name__ in lw.terms.__all__, "name it in lgvi_warp/terms.pyi"
-    assert has_twin(kind), f"write its twin: class {kind.__name__} in lgvi_warp/reference/terms"
+    assert has_twin(kind), f"Write its twin: class {kind.__name__} in lgvi_warp/reference/terms"
     tested = {type(term).type for case in CASES.values() for term in case.terms} | EVERYWHERE
-    assert word in tested, "add a case to tests/laws/cases.py"
-    assert (GUIDE / f"{word}.md").exists(), f"write docs/guide/terms/{word}.md"
-    assert f"| [{word}](" in (GUIDE / "README.md").read_text(), "add its row to docs/guide/terms/README.md"
+    assert word in tested, "Add a case to tests/laws/cases.py"
+    assert (GUIDE / f"{word}.md").exists(), f"Write docs/guide/terms/{word}.md"
+    assert f"| [{word}](" in (GUIDE / "README.md").read_text(), "Add its row to docs/guide/terms/README.md"
 
 
 @pytest.mark.parametrize("word", built_in(PARTS))
@@ -51,7 +51,7 @@ def test_a_part_of_a_controller_has_its_twin_and_public_name(word):
     name = PARTS[word].__name__
     assert name in lw.control.__all__, "name it in lgvi_warp/control/__init__.pyi"
     twin = word in NO_TWIN or has_twin(PARTS[word])
-    assert twin, f"write its twin: class {name} in lgvi_warp/reference/control"
+    assert twin, f"Write its twin: class {name} in lgvi_warp/reference/control"
 
 
 LAWS = {word: kind for word, kind in lw.laws.ControlLaw.kinds.items() if ".extensions." not in kind.__module__}
@@ -60,7 +60,7 @@ LAWS = {word: kind for word, kind in lw.laws.ControlLaw.kinds.items() if ".exten
 # Laws of extensions are tested in tests/extensions.
 @pytest.mark.parametrize("word", built_in(LAWS))
 def test_a_law_of_a_controller_is_tested(word):
-    assert word in ACTING or word in NO_TWIN, "add numbers with which it acts to ACTING of tests/control/test_laws.py"
+    assert word in ACTING or word in NO_TWIN, "Add numbers with which it acts to ACTING of tests/control/test_laws.py"
 
 
 @pytest.mark.parametrize("word", built_in(STATISTICS))

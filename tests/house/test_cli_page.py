@@ -20,7 +20,7 @@ OLD = {"plan": "predict"}
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_its_options(verb):
-    assert OLD.get(verb, verb) in SECTIONS, f"write its section, ## {verb}, into docs/start/cli.md"
+    assert OLD.get(verb, verb) in SECTIONS, f"Write its section, ## {verb}, into docs/start/cli.md"
     section = SECTIONS[OLD.get(verb, verb)]
     assert verb not in OLD or f"`{verb}`" in section
     options = {name for action in VERBS[verb]._actions for name in action.option_strings} - {"-h", "--help"} - OF_EVERY

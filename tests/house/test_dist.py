@@ -39,18 +39,18 @@ def faults(folder):
     """Sentences on what is wrong with the archives in a folder."""
     wheels, sources = sorted(Path(folder).glob("*.whl")), sorted(Path(folder).glob("*.tar.gz"))
     if (len(wheels), len(sources)) != (1, 1):
-        yield f"{folder}: needs one wheel and one source archive, not {len(wheels)} and {len(sources)}."
+        yield f"{folder} needs one wheel and one source archive, not {len(wheels)} and {len(sources)}."
         return
     wheel, source = contents(wheels[0]), contents(sources[0])
-    yield from (f"{name}: does not belong into the wheel." for name in wheel if not name.startswith(OURS))
-    yield from (f"{name}: is missing in the source archive." for name in sorted(IN_THE_SOURCE - set(source)))
+    yield from (f"{name} does not belong into the wheel." for name in wheel if not name.startswith(OURS))
+    yield from (f"{name} is missing in the source archive." for name in sorted(IN_THE_SOURCE - set(source)))
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     extra = set(source) - set(tracked) - {"PKG-INFO"}
-    yield from (f"{name}: is in the source archive, but not in git." for name in sorted(extra))
+    yield from (f"{name} is in the source archive, but not in git." for name in sorted(extra))
     for archive in (wheel, source):
         for name, text in archive.items():
             if found := PLACES.search(text):
-                yield f"{name}: names a folder of this machine, {found[0].decode()}."
+                yield f"{name} names a folder of this machine, {found[0].decode()}."
 
 
 def build(folder, root=ROOT, *targets):
@@ -81,13 +81,13 @@ def test_what_does_not_belong_is_listed(tmp_path):
     complete.pop("LICENSE")
     archives_of(tmp_path, {"tests/conftest.py": "", "lgvi_warp/a.py": home + "clone"}, complete | {"note.txt": ""})
     assert list(faults(tmp_path)) == [
-        "tests/conftest.py: does not belong into the wheel.",
-        "LICENSE: is missing in the source archive.",
-        "note.txt: is in the source archive, but not in git.",
-        f"lgvi_warp/a.py: names a folder of this machine, {home}.",
+        "tests/conftest.py does not belong into the wheel.",
+        "LICENSE is missing in the source archive.",
+        "note.txt is in the source archive, but not in git.",
+        f"lgvi_warp/a.py names a folder of this machine, {home}.",
     ]
     (tmp_path / "a-2.whl").touch()
-    assert list(faults(tmp_path)) == [f"{tmp_path}: needs one wheel and one source archive, not 2 and 1."]
+    assert list(faults(tmp_path)) == [f"{tmp_path} needs one wheel and one source archive, not 2 and 1."]
 
 
 def test_releases_are_built_at_the_time_of_the_commit():

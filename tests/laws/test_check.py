@@ -193,7 +193,7 @@ def test_a_flow_whose_gradient_is_wrong():
     report = lw.laws.check_law(Stirred(strength=0.3))
     wrong = {"rate = du/dt", "by_depth = du/db3", "FLOW", "water()", "blind to time"}
     assert set(names_of_failed(report)) == {f"flow: {name}" for name in wrong}
-    says(str(report), "write FLOW = 'varying'", "timed = True")
+    says(str(report), "Write FLOW = 'varying'", "timed = True")
 
 
 @wp.func
@@ -388,11 +388,11 @@ def plain_law(w, view, p):
 
 
 UNBUILT = {
-    "signature": (with_role("law", short_law), "write law(w, view, p)"),
+    "signature": (with_role("law", short_law), "Write law(w, view, p)"),
     "not a Warp function": (with_role("law", plain_law), "decorate it with @wp.func"),
     "no role": (with_role("other", None), "has none of law, damping"),
     "no such field": (with_role("law", unknown_law), "does not compile"),
-    "no key": (with_device(SimpleNamespace(params=stirred_params, law=hasty_law)), "give a module, or a class"),
+    "no key": (with_device(SimpleNamespace(params=stirred_params, law=hasty_law)), "Give a module, or a class"),
     "no such name": (with_device("hasty"), "name of a built-in one"),
 }
 

@@ -120,9 +120,9 @@ def test_scenarios_are_members_of_a_forecast():
     [
         ({"velocities": np.zeros((3, 3))}, "has shape"),
         ({"velocities": np.zeros((2, 3, 4, 5, 2))}, "has shape"),
-        ({"velocities": np.zeros((1, 2, 3, 3, 3, 3))}, "times = None: is missing for 2 fields"),
+        ({"velocities": np.zeros((1, 2, 3, 3, 3, 3))}, "times = None is missing for 2 fields"),
         ({"times": [0.0, 0.0], "velocities": np.zeros((2, 3, 3, 3, 3))}, "has no time between two fields"),
-        ({"scenario": 1.0}, "scenario = 1.0: is none of 1"),
+        ({"scenario": 1.0}, "scenario = 1.0 is none of 1"),
         ({"spacing": [1.0, 0.0, 1.0]}, "spacing"),
     ],
 )

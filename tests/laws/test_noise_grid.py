@@ -146,9 +146,9 @@ def test_what_is_no_time_is_refused(kind, value):
 
 @pytest.mark.parametrize(("h", "every", "text"), [
     # 0.075 is nearer, but does not divide a second.
-    (0.08, 1.0, r"step = 0.0769.*not a whole multiple of wrench_noise.noise_step = 0.025 s; use a step of 0.1 s"),
+    (0.08, 1.0, r"step = 0.0769.*not a whole multiple of wrench_noise.noise_step = 0.025 s. Use a step of 0.1 s"),
     (0.01, 1.0, r"step = 0.01: .*use a step of 0.025 s"),
-    (0.05, 0.11, r"give a noise_step that divides the 0.11 s between samples"),
+    (0.05, 0.11, r"Give a noise_step that divides the 0.11 s between samples"),
 ])  # fmt: skip
 def test_a_step_that_is_no_multiple_is_refused_with_the_nearest(h, every, text):
     with pytest.raises(lw.SceneError, match=text):
@@ -175,7 +175,7 @@ def test_steps_of_a_comparison_divide_the_draws():
     assert {term.noise_step for term in sample.ensemble.scene.terms[1:]} == {GRID}
     assert {term.noise_step for term in drawn_every(fleet(members=2), 0.5, own_grid=False).scene.terms[1:]} == {0.5}
     with pytest.raises(
-        lw.SceneError, match=r"wrench_noise.noise_step = 0.03: does not divide the 0.1 s.*run.save_every"
+        lw.SceneError, match=r"wrench_noise.noise_step = 0.03 does not divide the 0.1 s.*run.save_every"
     ):
         Sample(fleet(members=2, grid=0.03), 2.0)
 

@@ -104,8 +104,8 @@ def device_with(**roles):
 @pytest.mark.parametrize(
     ("device", "carried", "match"),
     [
-        (device_with(carried_inertia=no_inertia), False, "its device code has carried_inertia; write carried = True in Own"),
-        (device_with(law=wheel_momentum), True, "its device code has no carried_inertia; write carried = False in Own"),
+        (device_with(carried_inertia=no_inertia), False, "its device code has carried_inertia. Write carried = True in Own"),
+        (device_with(law=wheel_momentum), True, "its device code has no carried_inertia. Write carried = False in Own"),
         (device_with(law=wheel_momentum, carried_momentum=wheel_momentum), False, "carried_momentum or depart and no"),
     ],
 )  # fmt: skip

@@ -268,9 +268,9 @@ def test_standard_names():
 def test_what_is_refused():
     for products, values, words in (
         (["X_uv", "X_vu"], [1.0, 1.0], "twice"),
-        (["X_uv"], [1.0, 1.0], "give one for each"),
+        (["X_uv"], [1.0, 1.0], "Give one for each"),
         (["X_u"], [1.0], "not a product"),
-        ("X_uu", [1.0, 2.0], "give one for each"),
+        ("X_uu", [1.0, 2.0], "Give one for each"),
         ([3.0], [1.0], "products"),
         (["X_uu"], [np.nan], "values"),
     ):

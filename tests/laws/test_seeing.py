@@ -85,8 +85,8 @@ def test_it_is_checked_like_any_law():
     ("make", "words"),
     [
         (lambda water_at: {"push": None}, "is not a dict with load"),
-        (lambda water_at: {"load": len}, "is not a Warp function; decorate it with @wp.func"),
-        (lambda water_at: {"load": LinearFlow.device.flow}, "takes 3 arguments; write load(D, w, view, p, sea)"),
+        (lambda water_at: {"load": len}, "is not a Warp function. Decorate it with @wp.func"),
+        (lambda water_at: {"load": LinearFlow.device.flow}, "takes 3 arguments. Write load(D, w, view, p, sea)"),
     ],
 )
 def test_what_is_wrong_is_said(make, words):

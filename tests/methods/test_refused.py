@@ -11,13 +11,13 @@ from tests.laws.test_parity import VEHICLE
 from tests.methods.test_coupled import scene_of as coupled_scene_of
 
 TOLERANCES = {"rtol": 1e-8, "atol": 1e-8}
-ESTIMATES_NONE = "estimates no error; use one of rk5, rk5_ck, rk8, or leave them out"
+ESTIMATES_NONE = "estimates no error. Use one of rk5, rk5_ck, rk8, or leave them out"
 
 
 @pytest.mark.parametrize(("words", "output"), [
     ({"name": "kl8(rk8)"}, "not symmetric"), ({"name": "su4(rkw3)"}, "not symmetric"),
     ({"name": "bm6(phi)"}, "not symmetric"), ({"name": "bm4(psi_1)"}, "divide D"),
-    ({"name": "kl6(rkn4_6)"}, "not of order 2"), ({"name": "bm5(psi_x)"}, "did you mean 'bm"),
+    ({"name": "kl6(rkn4_6)"}, "not of order 2"), ({"name": "bm5(psi_x)"}, "Did you mean 'bm"),
     ({"name": "rk6"}, "rk"),
     *(({"name": name} | TOLERANCES, ESTIMATES_NONE) for name in ("rk4", "rkw3", "psi_s", "psi_x")),
     ({"name": "rk8", "rtol": 1e-8}, "is given alone"),
@@ -40,7 +40,7 @@ NO_POTENTIAL = "needs potentials of position plus those of attitude; {} has none
     ("rkn6_14", [TETHER], NO_POTENTIAL.format("tether")),
     ("rkn6_11", [DRAG], NO_POTENTIAL.format("drag")),
     # Nor do compositions take what these laws remember.
-    ("rkn4_6", ROUGH, "thrusters has none such; use psi_s"),
+    ("rkn4_6", ROUGH, "thrusters has none such. Use psi_s"),
     ("rkn4_6", [WRENCH], NO_POTENTIAL.format("wrench")),
     ("bm4(psi_x)", [MATRIX], "keeps its order only if a step of -h undoes one of h"),
     *(("gauss6", [term], "takes forces of position and time only")
@@ -50,10 +50,10 @@ NO_POTENTIAL = "needs potentials of position plus those of attitude; {} has none
     *((method, [term], "noise more than once|undoes one of h")
       for method in ("psi", "psi_1", "tj4(psi_s)") for term in (NOISE, WANDERING)),
     *((lw.Method(name, **TOLERANCES), [NOISE],
-       "cannot choose its steps where noise is drawn once a step; leave out rtol and atol")
+       "cannot choose its steps where noise is drawn once a step. Leave out rtol and atol")
       for name in ("rk5", "rk5_ck", "rk8")),
-    ("cg3", ROUGH, "before the step's start, where it is not known what thrusters remembers; use rkmk4"),
-    ("kl6(psi_x)", ROUGH, "use psi_x"),
+    ("cg3", ROUGH, "before the step's start, where it is not known what thrusters remembers. Use rkmk4"),
+    ("kl6(psi_x)", ROUGH, "Use psi_x"),
 ])  # fmt: skip
 def test_laws_that_do_not_fit(method, inputs, output):
     scene = lw.Scene(VEHICLE, lw.Environment(gravity=9.8, water_density=1025.0), terms=list(inputs))

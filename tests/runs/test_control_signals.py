@@ -121,7 +121,7 @@ def test_a_scene_names_what_is_saved(complete):
     # The call decides, where it says something.
     assert lw.solve(members, "psi_s", h=H, t1=H, save=lw.SaveAt(fields=("velocity",))).samples.keys() == {"velocity"}
     bare = lw.Scene.from_dict({**scene(controller=False).to_dict(), "run": {"save_fields": ["command"]}})
-    with pytest.raises(lw.SceneError, match=r"run.save_fields = 'command': is a signal of a controller"):
+    with pytest.raises(lw.SceneError, match=r"run.save_fields = 'command' is a signal of a controller"):
         lw.solve(bare, "psi_s", h=H, t1=H)
 
 
@@ -368,17 +368,17 @@ def test_statistics_and_quantities_of_interest(complete):
     ({"statistics": [Mean("command[0]")]}, "statistics = 'command'"),
 ])  # fmt: skip
 def test_a_scene_without_a_controller_has_none(requested, text):
-    why = r": is a signal of a controller, which this scene has not; give \[controller\]"
+    why = r": is a signal of a controller, which this scene has not. Give \[controller\]"
     with pytest.raises(lw.SceneError, match=text + why):
         lw.solve(scene(controller=False), "psi_s", h=H, t1=1.0, **requested)
 
 
 def test_names_that_are_not_known():
-    with pytest.raises(lw.SceneError, match=r"save.fields = 'commands': is not known; did you mean 'command'\?"):
+    with pytest.raises(lw.SceneError, match=r"save.fields = 'commands' is not known. Did you mean 'command'\?"):
         lw.SaveAt(fields=("commands",))
-    with pytest.raises(lw.SceneError, match=r"is not one channel of command; give one: 'command\[0\]'"):
+    with pytest.raises(lw.SceneError, match=r"is not one channel of command. Give one: 'command\[0\]'"):
         Mean("command")
     with pytest.raises(lw.SceneError, match=r"demand has the components demand\[0\]"):
         Mean("demand[6]")
-    with pytest.raises(lw.SceneError, match=r"is beyond the 6 channels .*; give 'command\[0\]' to 'command\[5\]'"):
+    with pytest.raises(lw.SceneError, match=r"is beyond the 6 channels .*. Give 'command\[0\]' to 'command\[5\]'"):
         lw.solve(fleet(), "psi_s", **SETTINGS, statistics=[Mean("command[6]")])

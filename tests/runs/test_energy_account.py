@@ -260,15 +260,15 @@ def test_driven_vehicles_use_the_power_of_where_their_actuators_are(name, method
 
 def test_what_does_not_go_together_is_a_sentence():
     battery = lw.events.Battery(capacity=1.0)
-    with pytest.raises(lw.SceneError, match=r'battery.*no term accounts; give a term of type "energy_use"'):
+    with pytest.raises(lw.SceneError, match=r'battery.*no term accounts. Give a term of type "energy_use"'):
         scene_of(events=[battery])
     # Other names do not help: a scene has one account.
     for second in (account(), lw.terms.EnergyUse(name="other")):
-        with pytest.raises(lw.SceneError, match="is a second term of the type energy_use; keep one of them"):
+        with pytest.raises(lw.SceneError, match=r"is a second term of the type energy_use. Keep one of them"):
             scene_of(account(), second)
-    with pytest.raises(lw.SceneError, match="energy_used': is not accounted"):
+    with pytest.raises(lw.SceneError, match="energy_used' is not accounted"):
         lw.solve(scene_of(), h=0.1, t1=1.0, save=SAVE)
-    with pytest.raises(lw.SceneError, match="energy_used': is not accounted"):
+    with pytest.raises(lw.SceneError, match="energy_used' is not accounted"):
         lw.solve(scene_of(), h=0.1, t1=1.0, statistics=[lw.statistics.Mean("energy_used")])
     with pytest.raises(lw.SceneError, match=r"power.*without power_commands"):
         lw.terms.Thrusters(**PAIR, power=[1.0, 2.0])

@@ -296,7 +296,7 @@ def test_members_that_were_kept_alone(tmp_path):
         assert set(of.status) == {0}
         assert set(frame[frame.realization == 1].status) == {int(lw.Status.FLOOR)}
         assert pandas.read_csv(lw.export(kept, tmp_path / f"{i}4.csv", members=[4])).realization.unique() == [4]
-        with pytest.raises(lw.SceneError, match="members = 0: is none of the 2 members that were kept"):
+        with pytest.raises(lw.SceneError, match="members = 0 is none of the 2 members that were kept"):
             lw.export(kept, tmp_path / "no.csv", members=[0])
 
 
@@ -307,7 +307,7 @@ def test_a_run_without_samples_is_a_row_for_each_member(tmp_path):
     assert "time" not in frame
     for kind in ("nc", "geojson", "kml", "mcap"):
         with pytest.raises(
-            lw.SceneError, match=r"position.* were not kept: .* is made of them; run it with keep='all'"
+            lw.SceneError, match=r"position.* were not kept: .* is made of them. Run it with keep='all'"
         ):
             lw.export(run, tmp_path / f"run.{kind}", origin=ORIGIN)
     assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
@@ -323,7 +323,7 @@ def test_a_run_without_an_origin(tmp_path):
         assert content.time.values[0, 0] == np.datetime64("1970-01-01")
     for kind in ("geojson", "kml"):
         with pytest.raises(
-            lw.SceneError, match=r"origin = None: is not known: a map has places on the Earth; give origin="
+            lw.SceneError, match=r"origin = None is not known: a map has places on the Earth. Give origin="
         ):
             lw.export(run, tmp_path / f"run.{kind}")
     there = json.loads(lw.export(run, tmp_path / "run.geojson", origin=ORIGIN).read_text())["features"][0]["geometry"]
@@ -337,26 +337,26 @@ def test_faults(result, tmp_path, monkeypatch):
         with pytest.raises(lw.SceneError, match=words):
             lw.export(result, *values, **settings)
 
-    refused("to = 'run.xyz': is not a file of a known kind; give a name that ends in .csv", "run.xyz")
-    refused("to = 5: is not a file of a known kind", 5)
-    refused("to = 'netcdf': is all that a store holds", "netcdf", tmp_path / "a.nc")
-    refused(r"members = \[1\]: is given for all that a store holds", "netcdf", tmp_path / "a.nc", members=[1])
-    refused("to = 5: is not a file", 5, "b.csv")
-    refused("overwrite = 'yes': is neither true nor false", "a.csv", overwrite="yes")
-    refused("out = None: is missing, and the run is in memory", "parquet")
-    refused("out = .*: is given beside the file 'a.csv'", "a.csv", "b.csv")
+    refused("to = 'run.xyz' is not a file of a known kind. Give a name that ends in .csv", "run.xyz")
+    refused("to = 5 is not a file of a known kind", 5)
+    refused("to = 'netcdf' is all that a store holds", "netcdf", tmp_path / "a.nc")
+    refused(r"members = \[1\] is given for all that a store holds", "netcdf", tmp_path / "a.nc", members=[1])
+    refused("to = 5 is not a file", 5, "b.csv")
+    refused("overwrite = 'yes' is neither true nor false", "a.csv", overwrite="yes")
+    refused("out = None is missing, and the run is in memory", "parquet")
+    refused("out = .* is given beside the file 'a.csv'", "a.csv", "b.csv")
     for members in ("all", [0.5], [[1]], 3):
-        refused("members = .*: is not a list of members", "a.csv", members=members)
-    refused("members = 5: is none of the 5 members; give indices from 0 to 4", "a.csv", members=[5])
-    refused("members = -1: is negative", "a.csv", members=[-1])
-    refused("members = .*: is a mask of 1 for 5 members", "a.csv", members=[True])
+        refused("members = .* is not a list of members", "a.csv", members=members)
+    refused("members = 5 is none of the 5 members. Give indices from 0 to 4", "a.csv", members=[5])
+    refused("members = -1 is negative", "a.csv", members=[-1])
+    refused("members = .* is a mask of 1 for 5 members", "a.csv", members=[True])
     for members in (slice(5, 9), []):
-        refused("members = .*: names no member", "a.csv", members=members)
-    refused("^origin = 95.0: is not a latitude", "a.csv", origin=[95.0, 0.0])
-    refused("^start = 'soon': is not a date and time", "a.csv", start="soon")
-    refused("start = .*: is before 1970", tmp_path / "a.mcap", start="1960-01-01")
+        refused("members = .* names no member", "a.csv", members=members)
+    refused("^origin = 95.0 is not a latitude", "a.csv", origin=[95.0, 0.0])
+    refused("^start = 'soon' is not a date and time", "a.csv", start="soon")
+    refused("start = .* is before 1970", tmp_path / "a.mcap", start="1960-01-01")
     assert list(tmp_path.iterdir()) == []
-    with pytest.raises(lw.SceneError, match="run = 5: is not a path"):
+    with pytest.raises(lw.SceneError, match="run = 5 is not a path"):
         lw.export(5, "a.csv")
 
 
@@ -381,7 +381,7 @@ def test_any_value_of_where_a_result_comes_from_may_be_another(result, tmp_path)
 def test_a_file_that_is_there_is_kept(result, tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("mine")
-    with pytest.raises(lw.SceneError, match=r"is there already; give overwrite=True \(--overwrite\), or another name"):
+    with pytest.raises(lw.SceneError, match=r"is there already. Give overwrite=True \(--overwrite\), or another name"):
         lw.export(result, path)
     assert path.read_text() == "mine"
 
@@ -422,15 +422,15 @@ def test_the_command_exports_any_run(stored, tmp_path, capsys):
     ]
     assert main(verb) == 0
     assert main(verb) == 2
-    assert "is there already; give overwrite=True (--overwrite)" in capsys.readouterr().err
+    assert "is there already. Give overwrite=True (--overwrite)" in capsys.readouterr().err
     assert main([*verb, "--overwrite"]) == 0
     assert "<when>2027-01-01T00:00:00.000000Z</when>" in map_file.read_text()
     (alone / "result2.npz").write_bytes(b"")
-    for path, words in ((alone, "holds 2 results; name one"), (tmp_path / "nowhere", "is not there"),
-                        (tmp_path, "holds no store; give the folder of a run")):  # fmt: skip
+    for path, words in ((alone, "holds 2 results. Name one"), (tmp_path / "nowhere", "is not there"),
+                        (tmp_path, "holds no store. Give the folder of a run")):  # fmt: skip
         assert main(["export", str(path), "--to", str(tmp_path / "x.csv")]) == 2
         assert words in capsys.readouterr().err
-    for option, words in ((["--members", "a:b"], "--members a:b: is not a list of members"),
-                          (["--origin", "north"], "--origin north: is not a place")):  # fmt: skip
+    for option, words in ((["--members", "a:b"], "--members a:b is not a list of members"),
+                          (["--origin", "north"], "--origin north is not a place")):  # fmt: skip
         assert main(["export", str(folder), "--to", str(tmp_path / "x.csv"), *option]) == 2
         assert words in capsys.readouterr().err

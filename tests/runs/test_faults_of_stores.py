@@ -189,7 +189,7 @@ def test_a_file_of_the_users_is_not_taken_for_a_lock(tmp_path):
         lambda: os.mkfifo(path),
     ):
         make()
-        with pytest.raises(lw.SceneError, match=r"is not a lock of lgvi-warp, but has its name; move it away"):
+        with pytest.raises(lw.SceneError, match=r"is not a lock of lgvi-warp, but has its name. Move it away"):
             lw.solve(fleet(10), **SETTINGS, store=tmp_path / "run.zarr")
         assert not (tmp_path / "run.zarr").exists()
         assert not (tmp_path / "other").exists()
@@ -311,7 +311,7 @@ def test_what_no_run_wrote_is_not_overwritten(complete, tmp_path, name, verb, ca
     assert cli.main([verb, *arguments, "--out", str(tmp_path), "--overwrite"]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "not overwritten: move it away, or give another folder" in said
+    assert "not overwritten. Move it away, or give another folder" in said
     assert tree(tmp_path) == before
 
 

@@ -96,13 +96,13 @@ def test_replicates_and_a_run_that_ended_early_keep_their_intervals():
 
 def test_what_was_not_kept_is_named():
     few = lw.solve(fleet_of(40), **SETTINGS | {"save": lw.SaveAt(fields=("position",))})
-    with pytest.raises(lw.SceneError, match=r"'velocity'.*not kept; keep it: .*fields=\('position', 'velocity'\)"):
+    with pytest.raises(lw.SceneError, match=r"'velocity'.*not kept. Keep it: .*fields=\('position', 'velocity'\)"):
         lw.gather(few, [lw.statistics.Mean("speed"), lw.statistics.Mean("depth")])
     with pytest.raises(lw.SceneError, match=r"'velocity'"):
         lw.gather(few, [lw.statistics.Mean(lambda samples, members: samples["velocity"][..., 0])])
     assert lw.gather(few, [lw.statistics.Mean("depth")])["mean depth"].count[0] == 40
     none = lw.solve(fleet_of(40), **SETTINGS, keep="none")
-    with pytest.raises(lw.SceneError, match=r'no samples of all were kept; run with keep="all"'):
+    with pytest.raises(lw.SceneError, match=r'no samples of all were kept. Run with keep="all"'):
         lw.gather(none, [lw.statistics.Mean("depth")])
     assert lw.gather(none, [lw.statistics.Outcome("floor")])["outcome floor"].value[-1] >= 0.0
     with pytest.raises(lw.SceneError, match="not an outcome of this scene"):

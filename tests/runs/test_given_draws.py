@@ -314,13 +314,13 @@ def test_a_failed_member_fails_alone(white):
 
 
 @pytest.mark.parametrize(("words", "more"), [
-    (r"xi = None: is missing.*shape \(300, 30\), such as lw.uq.draws_of", {"xi": None}),
-    (r"xi = .*: has shape \(300, 29\); give standard normals of shape \(300, 30\)", {"xi": np.zeros((300, 29))}),
-    (r"xi = .*: has shape \(30,\)", {"xi": np.zeros(30)}), (r"xi = .*: has shape \(1, 30\)", {"xi": np.zeros((1, 30))}),
-    (r"xi = nan: is not finite in row 2, column 17 \(wrench_noise, force\)", {"xi": "nan"}),
-    (r"xi = -?inf: is not finite in row 2, column 17", {"xi": "inf"}), ("xi = ", {"xi": np.full((300, 30), 1j)}),
-    (r"xi = ", {"xi": [["a"] * 30] * 300}), (r"seed = 3: says whose noise.*draws_of\(run, indices, seed=", {"seed": 3}),
-    (r"indices = .*: says whose noise", {"indices": np.arange(300)}),
+    (r"xi = None is missing.*shape \(300, 30\), such as lw.uq.draws_of", {"xi": None}),
+    (r"xi = .* has shape \(300, 29\). Give standard normals of shape \(300, 30\)", {"xi": np.zeros((300, 29))}),
+    (r"xi = .* has shape \(30,\)", {"xi": np.zeros(30)}), (r"xi = .* has shape \(1, 30\)", {"xi": np.zeros((1, 30))}),
+    (r"xi = nan is not finite in row 2, column 17 \(wrench_noise, force\)", {"xi": "nan"}),
+    (r"xi = -?inf is not finite in row 2, column 17", {"xi": "inf"}), ("xi = ", {"xi": np.full((300, 30), 1j)}),
+    (r"xi = ", {"xi": [["a"] * 30] * 300}), (r"seed = 3 says whose noise.*draws_of\(run, indices, seed=", {"seed": 3}),
+    (r"indices = .* says whose noise", {"indices": np.arange(300)}),
 ])  # fmt: skip
 def test_normals_that_are_wrong_are_refused(white, words, more):
     given, _ = white
@@ -336,21 +336,21 @@ def test_normals_that_are_wrong_are_refused(white, words, more):
 def test_other_arguments_that_do_not_go_together_are_refused(white):
     given, drawn = white
     with pytest.raises(
-        lw.SceneError, match=r'xi = .*: is given to a run that draws its noise; prepare the run with draws="given"'
+        lw.SceneError, match=r'xi = .* is given to a run that draws its noise. Prepare the run with draws="given"'
     ):
         drawn(X, np.zeros((300, 30)))
     scene = everything()
-    with pytest.raises(lw.SceneError, match=r'common_noise = True: says whose noise.*draws="given"'):
+    with pytest.raises(lw.SceneError, match=r'common_noise = True says whose noise.*draws="given"'):
         lw.prepare(scene, NAMES, draws="given", common_noise=True, h=H, t1=1.0)
     with pytest.raises(lw.SceneError, match=r"draws = 'givn': .*given"):
         lw.prepare(scene, NAMES, draws="givn", h=H, t1=1.0)
-    with pytest.raises(lw.SceneError, match=r"members = 3: is given beside indices"):
+    with pytest.raises(lw.SceneError, match=r"members = 3 is given beside indices"):
         lw.uq.draws_of(given, [0, 1], members=3)
     with pytest.raises(lw.SceneError, match=r"indices = .*from 0"):
         lw.uq.draws_of(given, [-1])
     with pytest.raises(lw.SceneError, match=r"indices = .*from 0"):
         lw.uq.draws_of(given, [[1], [1, 2]])
-    with pytest.raises(lw.SceneError, match=r"run = .*: is not a prepared run"):
+    with pytest.raises(lw.SceneError, match=r"run = .* is not a prepared run"):
         lw.uq.draws_of(lambda X: X)
 
 
@@ -359,7 +359,7 @@ def test_more_than_a_gigabyte_is_refused_with_the_sum(white):
     # A view of one number: nothing of it is in memory.
     large = np.broadcast_to(0.0, (5_000_000, 30))
     words = re.escape(
-        "5,000,000 members times 30 normals of 8 bytes, 1.2 GB; call with fewer members at once, at most 4,166,666"
+        "5,000,000 members times 30 normals of 8 bytes, 1.2 GB. Call with fewer members at once, at most 4,166,666"
     )
     with pytest.raises(lw.SceneError, match=words):
         given(np.broadcast_to(0.0, (5_000_000, 1)), large)

@@ -336,16 +336,16 @@ def test_what_is_refused():
     final = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2).final
     few = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, save=lw.SaveAt(fields=("position",))).final
     for message, call in {
-        "t1 = 0.2: is not after the start, 0.2 s": lambda: lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, start=final),
+        "t1 = 0.2 is not after the start, 0.2 s": lambda: lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, start=final),
         "is the end of 20 members, and there are 3": lambda: lw.solve(
             fleet.subset([1, 2, 3]), t1=1.0, h=0.1, start=final
         ),
         "is no end of a run": lambda: lw.solve(fleet, t1=1.0, h=0.1, start="final"),
-        "save.at = 0.1: lies before the start": lambda: lw.solve(
+        "save.at = 0.1 lies before the start": lambda: lw.solve(
             fleet, t1=1.0, h=0.02, start=final, save=lw.SaveAt(at=[0.1])
         ),
-        "start.attitude = '...': was not kept": lambda: lw.solve(fleet, "rk4", t1=1.0, h=STEPS, start=few),
-        "t0 = 0.05: is not a whole number of steps": lambda: lw.prepare(
+        "start.attitude = '...' was not kept": lambda: lw.solve(fleet, "rk4", t1=1.0, h=STEPS, start=few),
+        "t0 = 0.05 is not a whole number of steps": lambda: lw.prepare(
             fleet.scene, method="psi_x", h=STEPS, t1=0.2
         ).states(final, t0=0.05),
         "lies between two ticks": lambda: lw.prepare(autopilot().scene, method="psi_x", h=0.01, t1=0.2).states(
@@ -355,7 +355,7 @@ def test_what_is_refused():
         with pytest.raises(lw.SceneError, match=re.escape(message)):
             call()
     kept = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, keep="none", statistics=[lw.statistics.Mean("depth")])
-    with pytest.raises(AttributeError, match=re.escape("give SaveAt(final=True)")):
+    with pytest.raises(AttributeError, match=re.escape("Give SaveAt(final=True)")):
         _ = kept.final
     asked = lw.SaveAt(final=True, fields=("position",))
     kept = lw.solve(fleet, "psi_x", h=STEPS, t1=0.2, keep="none", statistics=[lw.statistics.Mean("depth")], save=asked)

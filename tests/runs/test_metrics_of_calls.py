@@ -65,9 +65,9 @@ def test_a_member_that_fails_has_no_metric(idle):
 
 
 @pytest.mark.parametrize(("of", "words"), [
-    ("mean depth", "of = 'mean': is not a metric: it is not one number of each member"), ("iae headng", "headng"),
+    ("mean depth", "of = 'mean' is not a metric: it is not one number of each member"), ("iae headng", "headng"),
     (lw.statistics.Mean("depth"), "is not a metric"), ({"type": "iea", "of": "heading"}, "of.*iea"),
-    (["iae heading", lw.metrics.IAE("heading")], "of = 'iae heading': is the name of another metric"),
+    (["iae heading", lw.metrics.IAE("heading")], "of = 'iae heading' is the name of another metric"),
     ("iae depth", "no guidance of the scene wants a depth"),
 ])  # fmt: skip
 def test_metrics_that_are_wrong_are_refused(idle, of, words):

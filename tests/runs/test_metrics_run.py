@@ -242,7 +242,7 @@ def test_metrics_of_what_no_guidance_wants_are_refused(fleet):
     few = replace(controller, guidance=[lw.control.SetPoint(depth=10.0, heading=0.5), *controller.guidance[1:]])
     for run in (lw.solve, lw.predict):
         with pytest.raises(
-            lw.SceneError, match=r"statistics = 'iae speed': is of the speed, and no guidance .* wants a speed"
+            lw.SceneError, match=r"statistics = 'iae speed' is of the speed, and no guidance .* wants a speed"
         ):
             run(
                 replace(fleet.scene, controller=few),

@@ -121,7 +121,7 @@ def test_a_scene_file_names_it():
     ids=["goes on", "another name"],
 )
 def test_guidance_that_never_ends_is_refused(words, event):
-    with pytest.raises(lw.SceneError, match=r"mission_done\.guidance.*is the name of no guidance that ends; give"):
+    with pytest.raises(lw.SceneError, match=r"mission_done\.guidance.*is the name of no guidance that ends. Give"):
         way(words, [event])
 
 

@@ -80,7 +80,7 @@ def test_a_set_point_is_taken_from_a_depth():
         ("vehicle.buoyanci", ["not a number of this scene", "vehicle.buoyancy"]),
         ("control_fins.position", ["not a single number", "(2, 3)", "control_fins.position[0,0]"]),
         ("drag_matrix.linear[6,0]", ["not a single number", "drag_matrix.linear[5,5]"]),
-        ("vehicle.buoyancy[0]", ["not a single number", "give 'vehicle.buoyancy'"]),
+        ("vehicle.buoyancy[0]", ["not a single number", "Give 'vehicle.buoyancy'"]),
         ("start.velocity[0]", ["does not vary"]),
         ("controller.sensors[0].bias", ["names a part by its place"]),
         ("depth - vehicle.buoyancy", ["[m]", "[N]", "one unit"]),

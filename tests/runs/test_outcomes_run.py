@@ -249,7 +249,7 @@ def test_quantities_of_outcomes_and_times():
     found = lw.uq.sobol(members, ["outcome floor", "outcome surface"], samples=64, second_order=False, **how)
     assert found.quantities == ("outcome floor", "outcome surface")
     assert found.mean.sum() <= 1.0
-    refused = {"outcome flor": "is not an outcome of this scene; did you mean 'floor'", "depth at flor": "did you mean",
+    refused = {"outcome flor": "is not an outcome of this scene. Did you mean 'floor'", "depth at flor": "Did you mean",
                "max(depth) at floor": "is taken over the whole path", "depth at -1": "is at no time of a run"}  # fmt: skip
     for text, words in refused.items():
         with pytest.raises(lw.SceneError, match=words):
@@ -291,7 +291,7 @@ def test_an_outcome_that_no_member_can_have_is_refused():
         lw.solve(fleet(10, [Floor(depth=26.0)]), "psi_s", h=0.04, t1=1.0,
                  statistics=[Outcome("surface"), Mean("depth", at="flor")])  # fmt: skip
     text = str(error.value)
-    says(text, "outcome.of = 'surface': is not an outcome of this scene", "did you mean 'floor'")
+    says(text, "outcome.of = 'surface' is not an outcome of this scene", "Did you mean 'floor'")
 
 
 def test_until_an_outcome_is_sure_enough():

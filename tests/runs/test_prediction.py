@@ -103,7 +103,7 @@ def test_the_command(tmp_path, capsys):
 def test_too_little_room_is_said():
     given = dict(members=1, steps=1, blocks=1, threads=1, compile=0.0, set_up=1.0, advance=7300.0, write=10.0)
     text = str(prediction.Prediction(**given, memory=10**10, disk=10**12, free_memory=10**10, free_disk=10**11))
-    says(text, "2.0 h", "100% of the memory", "use --store zarr", "more than the disk holds")
+    says(text, "2.0 h", "100% of the memory", "Use --store zarr", "more than the disk holds")
 
 
 def test_statistics_without_samples_take_little(tmp_path):

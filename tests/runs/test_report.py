@@ -103,7 +103,7 @@ def test_of_a_study(tmp_path):
 def test_what_is_no_run(tmp_path, capsys):
     assert main(["report", str(tmp_path)]) == 2
     assert (
-        f"{tmp_path}: holds no run and no study; give a folder that lgvi-warp run wrote, or a study"
+        f"{tmp_path} holds no run and no study. Give a folder that lgvi-warp run wrote, or a study"
         in capsys.readouterr().err
     )
     assert list(tmp_path.iterdir()) == []

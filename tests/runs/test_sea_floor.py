@@ -204,11 +204,11 @@ def test_a_run_in_two_pieces_has_the_bits_of_one():
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"depth": [[1.0, 2.0]]}, "floor.spacing = None: is missing for a grid of depths"),
-        ({"depth": 3.0, "spacing": [1.0, 1.0]}, "floor.spacing = .*: is given for a floor of one depth"),
-        ({"depth": [1.0, 2.0], "spacing": [1.0, 1.0]}, "floor.depth = .*: has shape"),
-        ({"depth": [[1.0, np.nan]], "spacing": [1.0, 1.0]}, "floor.depth = .*: is not finite"),
-        ({"depth": [[1.0, 2.0]], "spacing": [1.0, 0.0]}, "floor.spacing = .*: is not positive"),
+        ({"depth": [[1.0, 2.0]]}, "floor.spacing = None is missing for a grid of depths"),
+        ({"depth": 3.0, "spacing": [1.0, 1.0]}, "floor.spacing = .* is given for a floor of one depth"),
+        ({"depth": [1.0, 2.0], "spacing": [1.0, 1.0]}, "floor.depth = .* has shape"),
+        ({"depth": [[1.0, np.nan]], "spacing": [1.0, 1.0]}, "floor.depth = .* is not finite"),
+        ({"depth": [[1.0, 2.0]], "spacing": [1.0, 0.0]}, "floor.spacing = .* is not positive"),
     ],
 )
 def test_bad_input(wrong, words):
@@ -217,7 +217,7 @@ def test_bad_input(wrong, words):
 
 
 def test_a_flat_floor_has_no_edges():
-    with pytest.raises(lw.SceneError, match=r"has no edges; give a grid, or lw\.events\.Box"):
+    with pytest.raises(lw.SceneError, match=r"has no edges. Give a grid, or lw\.events\.Box"):
         lw.events.Floor(depth=3.0).edges()
 
 
@@ -254,7 +254,7 @@ def test_the_altitude_is_a_quantity_everywhere():
 
 
 def test_the_altitude_needs_a_floor():
-    with pytest.raises(lw.SceneError, match="of = 'altitude': needs a floor; give the scene one"):
+    with pytest.raises(lw.SceneError, match=r"of = 'altitude' needs a floor. Give the scene one"):
         lw.solve(scene(), "rk4", h=0.5, t1=1.0, statistics=[lw.statistics.Mean("altitude")])
 
 

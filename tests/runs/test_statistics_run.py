@@ -283,7 +283,7 @@ def test_what_is_left_out_is_said_with_its_reason(spinning):
     left_out = 'members from the event on that stopped them (stopped = "left_out")'
     for kind, words in (
         (Mean("depth"), None),
-        (Mean(none), "leave out members where a number of theirs is not finite: 0 of 300"),
+        (Mean(none), "Leave out members where a number of theirs is not finite: 0 of 300"),
         (Mean("depth", stopped="left_out"), left_out),
         (PathMean("depth", stopped="left_out"), left_out),
     ):  # fmt: skip
@@ -563,10 +563,10 @@ def test_a_function_of_ones_own(fleet, complete):
     np.testing.assert_allclose(found["mean drop"].value[:, 0], expected, atol=1e-14)
     np.testing.assert_allclose(found["mean pair"].value, complete.velocity[..., :2].mean(axis=1), atol=1e-14)
     wrong = Quantity("wrong", lambda s, m: s["velocity"][0], "m/s")
-    with pytest.raises(ValueError, match=r"quantity wrong: gave shape .*; \(\d+, \d+\) is wanted"):
+    with pytest.raises(ValueError, match=r"quantity wrong gave shape .*; \(\d+, \d+\) is wanted"):
         lw.solve(fleet, **SETTINGS, statistics=[Mean(wrong)])
     two = Quantity("two", lambda s, m: s["velocity"], "m/s", ("velocity",), ("u", "v"))
-    with pytest.raises(ValueError, match=r"quantity two: gave shape .*; \(\d+, \d+, 2\) is wanted"):
+    with pytest.raises(ValueError, match=r"quantity two gave shape .*; \(\d+, \d+, 2\) is wanted"):
         lw.solve(fleet, **SETTINGS, statistics=[Mean(two)])
 
 
@@ -686,7 +686,7 @@ statistic = "mean depth"
     assert len(faults) == 6
     assert all(f.startswith(("run.", "until.")) for f in faults)
     for i, word in enumerate(
-        ("keep", "did you mean 'mean'", "did you mean 'levels'", "run.statistics[2]", "size", "half_width")
+        ("keep", "Did you mean 'mean'", "Did you mean 'levels'", "run.statistics[2]", "size", "half_width")
     ):
         assert word in faults[i]
 

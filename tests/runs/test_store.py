@@ -219,7 +219,7 @@ def test_an_existing_run_is_refused_replaced_or_gone_on_with(copy):
     before = tree(copy)
     lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
     assert tree(copy) == before
-    with pytest.raises(lw.SceneError, match=r"ensemble.members is 1003 in the store and 1004 here: is another run"):
+    with pytest.raises(lw.SceneError, match=r"ensemble.members is 1003 in the store and 1004 here is another run"):
         lw.solve(fleet(1004), **SETTINGS, store=lw.Store(copy, existing="resume"))
     with pytest.raises(lw.SceneError, match=r"stores .*float32"):
         lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, dtype="float32", existing="resume"))
@@ -265,7 +265,7 @@ def test_damage_is_seen_and_its_block_alone_runs_again(copy, complete, name, wor
 
 def test_damaged_times_are_mended_by_the_same_run(copy, complete):
     hostile.flipped(copy / "time" / "c.0", None)
-    with pytest.raises(lw.SceneError, match=r"time/c.0 has changed; run the same scene again"):
+    with pytest.raises(lw.SceneError, match=r"time/c.0 has changed. Run the same scene again"):
         lw.resume(copy)
     lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
     assert differing(complete, copy) == []
@@ -286,7 +286,7 @@ def test_lost_times_are_not_taken_for_nan(copy, complete):
     for name in ("time/c.0", "step/c.0"):
         (copy / name).unlink()
         before = tree(copy)
-        with pytest.raises(lw.SceneError, match=f"{name} is missing; run the same scene again"):
+        with pytest.raises(lw.SceneError, match=f"{name} is missing. Run the same scene again"):
             lw.resume(copy)
         assert tree(copy) == before
         if name.startswith("time"):
@@ -339,7 +339,7 @@ def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
     (copy / "velocity" / "c.0.2.0").unlink()
     with pytest.raises(lw.SceneError, match=r"velocity/c.0.2.0 is missing; `lgvi-warp resume"):
         lw.export(copy, to, out)
-    with pytest.raises(lw.SceneError, match=r"is a folder, which is not replaced; give the name of a file"):
+    with pytest.raises(lw.SceneError, match=r"is a folder, which is not replaced. Give the name of a file"):
         lw.export(copy, to, tmp_path)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
 
@@ -462,7 +462,7 @@ def test_only_parts_of_one_run_are_merged(tmp_path, complete):
 
 def test_blocks_beyond_the_run_are_refused(tmp_path):
     for only in (range(4, 9), range(2, 2), range(-1, 2), range(0, 4, 2)):
-        with pytest.raises(lw.SceneError, match=f"blocks {only.start}:{only.stop}: are not within the 4"):
+        with pytest.raises(lw.SceneError, match=f"blocks {only.start}:{only.stop} are not within the 4"):
             lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", blocks=only)
     assert list(tmp_path.iterdir()) == []
     # The last of equal parts may be shorter.
@@ -539,7 +539,7 @@ def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path, monkeypatch):
     own = lw.Ensemble(scene, 300, 1, {"mine.force": lw.distributions.Normal(std=0.1)})
     whole = lw.solve(own, **SETTINGS, store=tmp_path / "a.zarr")
     lw.solve(own, **SETTINGS, store=tmp_path / "b.zarr", blocks=range(0, 1))
-    with pytest.raises(lw.SceneError, match=r"'mine': is not known"):
+    with pytest.raises(lw.SceneError, match=r"'mine' is not known"):
         lw.resume(tmp_path / "b.zarr")
     assert lw.resume(tmp_path / "b.zarr", own).energy.tobytes() == whole.energy.tobytes()
     assert differing(tmp_path / "a.zarr", tmp_path / "b.zarr") == []
@@ -613,7 +613,7 @@ def test_a_file_that_may_not_grow_is_told_as_a_full_disk(tmp_path, capsys):
 
 def test_too_small_a_disk_is_refused_before_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "disk_usage", lambda path: shutil._ntuple_diskusage(10**9, 10**9, 10**6))
-    with pytest.raises(lw.SceneError, match=r"needs 0.00 GB, and the disk has 0.00 GB left; save less often"):
+    with pytest.raises(lw.SceneError, match=r"needs 0.00 GB, and the disk has 0.00 GB left. Save less often"):
         lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
     assert list(tmp_path.iterdir()) == []
 
@@ -717,7 +717,7 @@ def test_parquet(complete, memory, tmp_path):
 
 def test_what_is_no_run_is_named(tmp_path):
     for call in (lw.open_run, lw.resume, state):
-        with pytest.raises(lw.SceneError, match=r"holds no store; give the folder of a run made with --store zarr"):
+        with pytest.raises(lw.SceneError, match=r"holds no store. Give the folder of a run made with --store zarr"):
             call(tmp_path)
     with pytest.raises(lw.SceneError, match="is not there"):
         lw.open_run(tmp_path / "none")
@@ -742,7 +742,7 @@ def test_a_distribution_of_your_own_goes_on_with_its_ensemble(tmp_path):
     lw.solve(own(), **SETTINGS, store=path)
     (path / "blocks" / "000000256.json").unlink()
     with pytest.raises(
-        lw.SceneError, match="a distribution of your own, which a file does not hold; give the ensemble again"
+        lw.SceneError, match=r"a distribution of your own, which a file does not hold. Give the ensemble again"
     ):
         lw.resume(path)
     lw.resume(path, own())

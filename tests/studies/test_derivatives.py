@@ -257,7 +257,7 @@ def test_across_an_event():
     assert (found.error[0] < 1e-4 * np.abs(depth / speed)).all()
     assert np.isnan(found.jacobian[[1, 3, 4]]).all()
     says(found.undefined["depth by vehicle.buoyancy"], "an event stopped the member (floor)", '"end_time NAME"')
-    says(found.undefined["time_to_failure by vehicle.buoyancy"], 'ask for "end_time NAME"')
+    says(found.undefined["time_to_failure by vehicle.buoyancy"], 'Ask for "end_time NAME"')
     says(found.undefined["end_time time by vehicle.buoyancy"], "does not end so")
     s = 2.0 * np.sqrt(F * k) / M
     assert abs(found.jacobian[2, 0] + M / k * np.tanh(s) * s / (2.0 * F)) <= found.error[2, 0]
@@ -439,7 +439,7 @@ def test_bad_arguments_are_told_all_at_once():
     found = faults(lw.derivatives, scene, ["depth", "depth", "dept"], ["vehicle.mas", "start.position", "drag.linear[9]"],
                    smooth=3, seed=-1)  # fmt: skip
     text = "\n".join(found)
-    says(text, "dept", "vehicle.mas", "did you mean 'vehicle.mass'", "is not a single number", "start.position[0]",
+    says(text, "dept", "vehicle.mas", "Did you mean 'vehicle.mass'", "is not a single number", "start.position[0]",
          "drag.linear[9]", "smooth", "seed = -1")  # fmt: skip
     says("\n".join(faults(lw.derivatives, scene, ["depth", "depth"], "vehicle.mass")), "of = 'depth'", "is named twice")
     metrics = [lw.metrics.IAE("depth"), lw.metrics.IAE("depth")]

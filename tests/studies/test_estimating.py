@@ -194,24 +194,24 @@ def test_refusals():
     def ask(of="mean position[2]", error=0.1, **settings):
         return refused(lw.estimate, settings.pop("fleet", fleet), of, error, **RUN | settings)
 
-    says(ask(error=None), "error = None", "give one of them")
+    says(ask(error=None), "error = None", "Give one of them")
     says(ask(error=-1.0), "error = -1.0")
-    says(ask(t1=None), "t1 = None: is missing")
+    says(ask(t1=None), "t1 = None is missing")
     says(ask(cheaper={"vehicle.mass": 1.0}), "is not a list of scenes")
-    says(ask(cheaper=[1]), "cheaper[0] = 1: is not a scene")
+    says(ask(cheaper=[1]), "cheaper[0] = 1 is not a scene")
     says(ask(risk="large"), "is not a risk")
-    says(ask("position[2] above 425", risk=0.5), "leave it out")
+    says(ask("position[2] above 425", risk=0.5), "Leave it out")
     says(ask(lambda result: 1.0 / (result.position[-1, :, 2] - 422.0), 0.01), "has no finite variance", "risk=0.5")
     says(ask("position[2] above 900", None, relative_error=0.1), "lw.rare_event", "65,536 members")
-    says(ask(lambda result: 0.0 * result.position[-1, :, 2], None, relative_error=0.1), "which is 0", "give error=")
-    says(ask(error=1e-9), "would take", "give a larger one")
-    says(ask(error=1e-300), "would take", "give a larger one")
+    says(ask(lambda result: 0.0 * result.position[-1, :, 2], None, relative_error=0.1), "which is 0", "Give error=")
+    says(ask(error=1e-9), "would take", "Give a larger one")
+    says(ask(error=1e-300), "would take", "Give a larger one")
     says(ask(seed=-1), "seed = -1")
-    says(ask("position"), "is 3 numbers", "name one of its entries")
+    says(ask("position"), "is 3 numbers", "Name one of its entries")
     table = lw.Ensemble(closed.sphere(), sampling=lw.designs.Table({"vehicle.buoyancy": [950.0, 955.0]}))
     says(ask(fleet=table), "gives vehicle.buoyancy to its members", "lw.solve")
     fails = lw.Ensemble(closed.sphere(), vary={"drag.linear[2]": lw.distributions.Uniform(1e6, 1e8)}, members=4)
-    says(ask(fleet=fails, h=0.5), "64 of 64 members fail", "give a shorter step")
+    says(ask(fleet=fails, h=0.5), "64 of 64 members fail", "Give a shorter step")
 
 
 @pytest.mark.parametrize("name", ["plain Monte Carlo", "sobol", "regression"])
@@ -229,7 +229,7 @@ def test_levels_may_be_fixed_and_what_cannot_be_had_is_refused():
     assert abs(found.value - truth) <= 4.0 * found.error_reached
     still = lw.Ensemble(closed.pushed().scene, 4)
     fault = refused(lw.estimate, still, "mean position[0]", 0.05, estimator="sobol", **RUN)
-    says(fault, "estimator = 'sobol'", "cannot be had", "leave it out")
+    says(fault, "estimator = 'sobol'", "cannot be had", "Leave it out")
     says(refused(estimated, "fall", estimator="best"), "estimator = 'best'")
 
 
@@ -274,9 +274,9 @@ def test_a_suggestion_for_a_mean_in_noise():
 def test_studies_of_errors_refuse_weights():
     values = {"vehicle.buoyancy": [950.0, 955.0]}
     fleet = lw.Ensemble(closed.sphere(), sampling=lw.designs.Table(values, weights=[0.2, 0.8]))
-    says(refused(lw.suggest, fleet, 1e-3, t1=1.0), "members with weights", "leave the weights out")
-    says(refused(lw.tradeoff, fleet, 1.0), "members with weights", "leave the weights out")
-    says(refused(lw.worst_case, fleet, {"vehicle.mass": (90.0, 110.0)}, "depth"), "weights", "give the scene alone")
+    says(refused(lw.suggest, fleet, 1e-3, t1=1.0), "members with weights", "Leave the weights out")
+    says(refused(lw.tradeoff, fleet, 1.0), "members with weights", "Leave the weights out")
+    says(refused(lw.worst_case, fleet, {"vehicle.mass": (90.0, 110.0)}, "depth"), "weights", "Give the scene alone")
 
 
 @pytest.mark.slow
@@ -317,6 +317,6 @@ def test_tails_have_members_in_them(risk):
 def test_a_level_beyond_what_a_pilot_sees_is_refused():
     fleet = lw.Ensemble(lw.Scene.named("sphere"), vary={"start.velocity[2]": lw.distributions.Normal(std=0.3)})
     with pytest.raises(
-        lw.SceneError, match=r"risk = .*members of the pilot, too few to know its error; ask for a level"
+        lw.SceneError, match=r"risk = .*members of the pilot, too few to know its error. Ask for a level"
     ):
         lw.estimate(fleet, "depth", error=0.05, risk=0.99999, t1=1.0, threads=1, method="rk4")

@@ -73,5 +73,5 @@ def test_the_command_says_and_writes_it(result, tmp_path, capsys):
     page = lw.report(tmp_path, tmp_path / "report.html").read_text()
     says(page, "Footprint", "ellipse_area", "data:image/png")
     assert cli.main(["footprint", str(tmp_path / "other")]) == 2
-    says(capsys.readouterr().err, "holds no runs", "give the folder of one run")
+    says(capsys.readouterr().err, "holds no runs", "Give the folder of one run")
     assert cli.main(["footprint", str(tmp_path), "--at", "flor"]) == 2

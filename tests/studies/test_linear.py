@@ -75,7 +75,7 @@ def test_a_run_from_a_trim_stays_there():
 
 @pytest.mark.parametrize(("words", "message"), [
     ({"speed": 1.0, "free": ("pitch",)}, "has no steady motion with pitch free"),
-    ({"speed": 1.0, "free": ("pich",)}, "did you mean 'pitch'"),
+    ({"speed": 1.0, "free": ("pich",)}, "Did you mean 'pitch'"),
     ({"speed": 1.0, "fixed": {"speed": 2.0}}, "is given twice"),
     ({"free": ("pitch",), "fixed": {"pitch": 0.1}}, "has a value too"),
 ])  # fmt: skip
@@ -260,7 +260,7 @@ def test_what_has_no_regulator(regulator):
 
 
 @pytest.mark.parametrize(("words", "message"), [
-    ({"inputs": "thrust"}, "did you mean|known: commands"), ({"closed": True, "period": 0.2}, "is that of a plant"),
+    ({"inputs": "thrust"}, "Did you mean|known: commands"), ({"closed": True, "period": 0.2}, "is that of a plant"),
     ({"about": 3.0}, "is not a motion"), ({"step": 0.0}, "step"),
 ])  # fmt: skip
 def test_what_cannot_be_linearised(words, message):

@@ -187,7 +187,7 @@ def test_edges_beside_known_ones():
 
 
 @pytest.mark.parametrize(("words", "message"), [
-    ({"loop": "heding_pid"}, "did you mean 'heading_pid'"), ({"of": "frequency"}, "of = 'frequency'"),
+    ({"loop": "heding_pid"}, "Did you mean 'heading_pid'"), ({"of": "frequency"}, "of = 'frequency'"),
     ({"by": "guess"}, "by = 'guess'"), ({"seconds": 0.0}, "seconds"), ({"seconds": 1.0}, "is less than 30 ticks"),
 ])  # fmt: skip
 def test_bad_arguments(words, message):
@@ -218,7 +218,7 @@ def test_a_copy_that_fails_does_not_settle(fleet):
 
 
 def test_scenes_without_margins():
-    with pytest.raises(lw.SceneError, match="controller = None: is not in the scene"):
+    with pytest.raises(lw.SceneError, match="controller = None is not in the scene"):
         lw.linear.margins(dataclasses.replace(scene(), controller=None), h=H)
     whole = scene()
     late = dataclasses.replace(whole.controller, sensors=[Sensor(of="heading", latency=2.0)])

@@ -241,7 +241,7 @@ def test_the_page_and_the_command_know_the_names(tmp_path, capsys):
 
 @pytest.mark.parametrize("sensors", [[], [lw.control.Sensor(of="heading", bias=0.1)]], ids=["none", "compass"])
 def test_a_scene_that_estimates_no_position_refuses_it(sensors):
-    told = r"navigation_error'.*needs an estimate of the position, which nothing in this scene makes; give"
+    told = r"navigation_error'.*needs an estimate of the position, which nothing in this scene makes. Give"
     blind = scene(sensors=sensors)
     for settings in (dict(save=lw.SaveAt(fields=SAVED)), dict(statistics=[lw.statistics.Mean(ERROR)])):
         with pytest.raises(lw.SceneError, match=told):

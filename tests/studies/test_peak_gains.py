@@ -76,6 +76,6 @@ def test_coupled_axes_beside_a_sweep(inertia, delay):
 
 def test_what_does_not_fit_is_said():
     fleet = heading_loops(2)
-    says(refused(lw.linear.margins, fleet, of=("gain",), to=("rotation[2]",)), "to", 'add "peak"')
+    says(refused(lw.linear.margins, fleet, of=("gain",), to=("rotation[2]",)), "to", 'Add "peak"')
     says(refused(lw.linear.margins, fleet, of=("peak",), to=("depth",)), "to", "position[0]")
     says(refused(lw.linear.margins, fleet, of=("peak",), by="runs"), "by", "eigenvalues")

@@ -137,7 +137,7 @@ def test_a_loop_that_grows_has_an_open_loop_and_no_margins():
     one = scene(law, (5.0, 8.0, J), delay=0.0)
     found = lw.linear.margins(one, of=("phase",), **RUN)
     assert found.why.tolist() == ["does not settle"]
-    says(found.answer, "The loop of all laws has no margins in any of 1 member (1: does not settle).")
+    says(found.answer, "The loop of all laws has no margins in any of 1 member (1 does not settle).")
     A, B, C = opened([6.0], [0.0], [2.1 * J / PERIOD], J, 0)
     grows = lw.linear.loop(one, **RUN)
     w = np.array([0.5, 3.0, 30.0])
@@ -229,8 +229,8 @@ def test_members_without_a_loop_and_what_is_refused():
     says(refused(found.frd, 1), "member", "has no loop: failed")
     says(refused(found.state_space, 2), "member", "is none of 2")
     one = fleet.scene
-    says(refused(lw.linear.loop, one, "heding_pid"), "at", "did you mean 'heading_pid'")
-    says(refused(lw.linear.loop, one, "M", **RUN), "at", "is a component that no law demands; give one of N")
+    says(refused(lw.linear.loop, one, "heding_pid"), "at", "Did you mean 'heading_pid'")
+    says(refused(lw.linear.loop, one, "M", **RUN), "at", "is a component that no law demands. Give one of N")
     says(refused(lw.linear.loop, one, about=-1.0), "about")
     says(refused(lw.linear.loop, dataclasses.replace(one, controller=None)), "controller", "a loop needs one")
     noisy = dataclasses.replace(

@@ -348,13 +348,13 @@ def test_noise_alone_can_be_the_cause():
     ({"status": "floor"}, 'rare_event(fleet, "floor")'),
     ({}, "is a status"),
     ("peak depth", "is a metric without a bound"),
-    ("position", "is 3 numbers; name one of its entries"),
+    ("position", "is 3 numbers. Name one of its entries"),
     ("position[0] - 1000.0", "within 17 levels, each a tenth of the one before"),
     ("position[0] + 1000.0", "happens for each of"),
     ("position[1] - 1.0", "has the same value for most members"),
     (3.0, "is not an event"),
     ({"position[0]": {"near": 1.0}}, "is not a condition"),
-    ({"max(depth)": {"above": 9.0}, "position[0]": {"above": 9.0}}, 'give "max(position[0])"'),
+    ({"max(depth)": {"above": 9.0}, "position[0]": {"above": 9.0}}, 'Give "max(position[0])"'),
 ])  # fmt: skip
 def test_what_is_no_rare_event_is_refused(limit, words):
     with pytest.raises(lw.SceneError) as error:

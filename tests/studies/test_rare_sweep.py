@@ -140,7 +140,7 @@ def test_the_sweep_tells_of_them(answer):
     text = str(answer)
     says(text, "## Rare failures", "- near: fails with probability", "- aside: fails ", "times as often as near", "not")
     assert "- unasked: fails with" not in text
-    with pytest.raises(lw.SceneError, match="did not ask for its rare failure; give the case rare = true"):
+    with pytest.raises(lw.SceneError, match=r"did not ask for its rare failure. Give the case rare = true"):
         answer.rare("unasked")
     assert pickle.loads(pickle.dumps(answer.rare("near"))).probability == near["rare"]
 
@@ -225,8 +225,8 @@ def test_success_by_events_alone_and_by_nothing(scene):
 
 
 @pytest.mark.parametrize(("more", "words"), [
-    ({"rare": 1.0}, "rare = 1.0: is neither true nor a table"),
-    ({"rare": {"error": 0.1}}, "rare.error = 0.1: is an unknown key; did you mean 'relative_error'?"),
+    ({"rare": 1.0}, "rare = 1.0 is neither true nor a table"),
+    ({"rare": {"error": 0.1}}, "rare.error = 0.1 is an unknown key. Did you mean 'relative_error'?"),
     ({"cases": [{"name": "a", "rare": "yes"}]}, "case 'a': rare = 'yes'"),
     ({"cases": [{"name": "a", "rare": {"relative_error": 3.0, "most": 5}}]}, "case 'a': rare.relative_error = 3.0"),
 ])  # fmt: skip

@@ -169,7 +169,7 @@ def test_indices_of_members_are_whole_numbers():
     run = lw.prepare(regulated(), None, "depth", **RUN)
     for wrong, words in (
         (np.arange(3), "are not one whole number from 0 for each member"),
-        (np.array([0.5, 1.0]), "give whole numbers from 0"),
+        (np.array([0.5, 1.0]), "Give whole numbers from 0"),
     ):
         with pytest.raises(lw.SceneError, match=words):
             run.states(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), *np.zeros((2, 2, 3)), indices=wrong)

@@ -227,9 +227,9 @@ def test_the_command(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (["--grid", "mass", "--x", "h"], ["--grid mass", "leave out"]),
+    (["--grid", "mass", "--x", "h"], ["--grid mass", "Leave out"]),
     (["--x", "h=3:1", "--error", "-1"], ["2 faults", "does not rise", "error = -1"]),
-    (["--methods", "psi_z"], ["psi_z", "not known"]), (["--y", "vehicle.mas"], ["did you mean 'vehicle.mass'"]),
+    (["--methods", "psi_z"], ["psi_z", "not known"]), (["--y", "vehicle.mas"], ["Did you mean 'vehicle.mass'"]),
     (["--seed", "x"], ["seed"]),
 ])  # fmt: skip
 def test_a_bad_argument_is_refused_with_the_remedy(arguments, words, tmp_path, capsys):

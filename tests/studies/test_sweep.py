@@ -229,7 +229,7 @@ def test_a_metric_of_what_a_case_does_not_want_refuses_the_case(scene):
     mixed = swept(scene, grid=None, members=4, cases=[{"name": "place"}, {"name": "level", "replace": level}])
     place, refused = mixed.rows()
     assert not place["refused"]
-    assert "metrics = 'way': is of the north, and no guidance of the scene wants a position" in refused["refused"]
+    assert "metrics = 'way' is of the north, and no guidance of the scene wants a position" in refused["refused"]
     with pytest.raises(lw.SceneError, match="no guidance of the scene wants a position"):
         lw.worst_case(mixed.cells[1].fleet, {"vehicle.mass": (45.0, 55.0)}, "iae north", budget=64)
 
@@ -317,7 +317,7 @@ baseline = "stiff"
 @pytest.mark.parametrize(("more", "text"), [
     ({"success": {"overshot": {"below": 1.0}}}, "is not a metric of this sweep"),
     ({"success": {"way": {"under": 1.0}}}, "is not a condition"), ({"success": {"status": "fine"}}, "success.status"),
-    ({"metrics": ["overshoot headin"]}, "did you mean 'heading'"), ({"cases": [{"set": {}}]}, "has no name"),
+    ({"metrics": ["overshoot headin"]}, "Did you mean 'heading'"), ({"cases": [{"set": {}}]}, "has no name"),
     ({"grid": {"controller.delay": []}}, "not a list of values"), ({"baseline": "hard"}, "baseline"),
     ({"interval": "wald"}, "interval"),
     ({"keep": "all"}, "is what a sweep decides"),

@@ -392,8 +392,8 @@ def test_suggestions_for_twenty_scenes():
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    ({"error": -1.0}, ["error = -1.0", "above 0 [m]"]), ({"of": "spead"}, ["of = 'spead'", "did you mean 'speed'"]),
-    ({"of": "max(depth)"}, ["of = 'max(depth)'", "give 'depth'"]),
+    ({"error": -1.0}, ["error = -1.0", "above 0 [m]"]), ({"of": "spead"}, ["of = 'spead'", "Did you mean 'speed'"]),
+    ({"of": "max(depth)"}, ["of = 'max(depth)'", "Give 'depth'"]),
     ({"of": ["depth", "speed"]}, ["of = ['depth', 'speed']", "one of them"]),
     ({"methods": ["psi_z"]}, ["methods = 'psi_z'", "psi_x"]), ({"methods": []}, ["methods = []", "name one"]),
     ({"t1": 0.0}, ["t1 = 0.0"]),
@@ -443,7 +443,7 @@ def test_run_with_an_error_chooses_and_checks(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [(["--error", "1e-3", "--step", "0.1"], ["--step 0.1", "leave out"]), (["--of", "position"], ["--error 1e-3"])],
+    [(["--error", "1e-3", "--step", "0.1"], ["--step 0.1", "Leave out"]), (["--of", "position"], ["--error 1e-3"])],
 )
 def test_options_that_contradict_are_refused(options, words, tmp_path, capsys):
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SHORT, *options]) == 2

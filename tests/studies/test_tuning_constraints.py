@@ -108,7 +108,7 @@ def test_metrics_margins_and_quantities_at_once_and_none_that_fit():
 def test_constraints_that_are_none():
     fleet = turned()
     for text, words in (
-        ("disk", "is no number with a bound"), ("disk >= 0.5", 'write "disk above 0.5"'),
+        ("disk", "is no number with a bound"), ("disk >= 0.5", 'Write "disk above 0.5"'),
         ("disk depth_pid above 0.5", "names depth_pid, which is no law of the controller"),
         (5.0, "is not a list"), ([5.0], "is no number with a bound"),
     ):  # fmt: skip

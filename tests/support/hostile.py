@@ -377,7 +377,7 @@ STORES = {
     "kept is a link": (at("kept", link("work")), DAMAGED),
     "kept's root is a link": (at("kept/zarr.json", link("secret")), DAMAGED),
     "a link leads nowhere": (at(STATUS, link("nothing")), LINKED),
-    "the store is a link": (lambda path, home: path.symlink_to(path.rename(home / "run.zarr")), "is a link; name the store"),
+    "the store is a link": (lambda path, home: path.symlink_to(path.rename(home / "run.zarr")), "is a link. Name the store"),
     "a chunk is a pipe": (at(STATUS, pipe), "pipe"),
     "the root is a pipe": (at(ROOT, pipe), "pipe"),
     "created is a pipe": (at("created.json", pipe), "pipe"),

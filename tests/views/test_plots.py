@@ -323,7 +323,7 @@ def margins_of(steady):
 
 
 def test_margins_of_nobody_are_no_picture(tmp_path):
-    with pytest.raises(NothingToDraw, match=r"none of the 5 members has margins \(5: does not settle\)"):
+    with pytest.raises(NothingToDraw, match=r"none of the 5 members has margins \(5 does not settle\)"):
         lw.plots.margins(margins_of([False] * 5), path=tmp_path / "margins.png")
     assert not list(tmp_path.iterdir())
 

@@ -108,7 +108,7 @@ def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
     """Judgement of energies: "conservative" where kept, "dissipative" where lost, "driven" where a force may supply them."""
     laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").kernel_choice.laws
     if any(getattr(module, "NOISE", False) for _, module in laws):
-        raise SceneError(["terms: noise acts, whose path differs from step to step; leave it out for a stability map"])
+        raise SceneError(["terms: noise acts, whose path differs from step to step. Leave it out for a stability map"])
     flows = [getattr(module, "FLOW", "none") for _, module in laws]
     if any(flow not in ("none", "steady") for flow in flows):
         return "driven"

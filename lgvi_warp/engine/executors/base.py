@@ -11,6 +11,7 @@ from concurrent.futures import Future
 from typing import Any, Protocol, runtime_checkable
 
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.work import Work
 
@@ -69,7 +70,7 @@ def _refusal(name: str, problem: str, error: Exception) -> str:
     remedy = (
         'define laws and functions at the top level of a module that the workers can import, or use executor="threads"'
     )
-    return f"executor = {name!r}: the run {problem} ({type(error).__name__}: {error}); {remedy}"
+    return f"executor = {name!r}: the run {problem} ({type(error).__name__}: {error}). {capital(remedy)}"
 
 
 def finished_blocks(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:

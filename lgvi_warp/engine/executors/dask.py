@@ -15,6 +15,7 @@ from typing import Any
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import SceneError, install
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.executors.base import MOST_DEATHS, Advanced, deaf, received, sent
 from lgvi_warp.engine.work import Work
@@ -54,7 +55,7 @@ class Dask:
                     yield block, value
             except KilledWorker as error:
                 raise RuntimeError(
-                    f"workers died {MOST_DEATHS} times over a block: too little memory, or killed from outside; give them "
+                    f"workers died {MOST_DEATHS} times over a block: too little memory, or killed from outside. Give them "
                     "more memory"
                 ) from error
             finally:
@@ -77,7 +78,7 @@ class Dask:
         try:
             import distributed
         except ImportError as error:
-            raise SceneError([f"executor = 'dask': {error}; install it: {install('cluster')}"]) from error
+            raise SceneError([f"executor = 'dask': {error}. Install it: {install('cluster')}"]) from error
         if isinstance(self.scheduler, distributed.Client):
             yield self.scheduler
             return
@@ -87,7 +88,7 @@ class Dask:
             except (OSError, ValueError, MemoryError) as error:  # memory: what answers is no scheduler
                 problem = f"does not answer ({type(error).__name__}: {error})"
                 remedy = "give the address that dask scheduler prints"
-                raise SceneError([f"scheduler = {self.scheduler!r}: {problem}; {remedy}"]) from error
+                raise SceneError([f"scheduler = {self.scheduler!r}: {problem}. {capital(remedy)}"]) from error
             with client:
                 yield client
             return
@@ -113,7 +114,7 @@ def _work(data: bytes, block: Block, topic: str, kind: dict[str, str]) -> Any:
     worker_kind = machine.kind()
     if worker_kind != kind:
         raise SceneError(
-            [f"worker {worker_kind}: is not of the kind of the machine that asks, {kind}, and would give other bits; "
+            [f"worker {worker_kind} is not of the kind of the machine that asks, {kind}, and would give other bits; "
              "let workers be of one kind, and run from one of them"]
         )  # fmt: skip
     tasks_at_work[topic] += 1

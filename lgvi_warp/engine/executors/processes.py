@@ -44,7 +44,7 @@ class Processes:
             if len(unfinished) == before and unfinished and min(deaths[i] for i in unfinished) >= MOST_DEATHS:
                 raise RuntimeError(
                     f"worker processes died {MOST_DEATHS} times without finishing a block: too little memory, or killed "
-                    "from outside; use fewer threads, or the executor threads"
+                    "from outside. Use fewer threads, or the executor threads"
                 )
 
     def _until_death(

@@ -122,19 +122,19 @@ def observation_of(saved: Mapping[str, Any] | None, statistics: Any = None) -> O
     """
     if saved is None:
         if statistics:
-            raise SceneError([f"statistics = {statistics}: the run gathered none; leave them out"])
+            raise SceneError([f"statistics = {statistics}: the run gathered none. Leave them out"])
         return Observation()
     if statistics is None and saved.get("functions"):
         names = ", ".join(saved["functions"])
         problem = "are of functions that a store does not hold"
-        raise SceneError([f"statistics: {names}: {problem}; give statistics=[...] again"])
+        raise SceneError([f"statistics: {names}: {problem}. Give statistics=[...] again"])
     keep = saved["keep"] if isinstance(saved["keep"], str) else tuple(saved["keep"])
     until = from_dict(saved["until"]) if "until" in saved else None
     observation = Observation(from_list(saved.get("statistics", ()) if statistics is None else statistics), keep, until)
     table, expected = observation.to_dict(), {name: value for name, value in saved.items() if name != "fields"}
     if table != expected:
         wanted, run_had = table.get("statistics"), expected.get("statistics")
-        raise SceneError([f"statistics = {wanted}: are not the run's, {run_had}; give those"])
+        raise SceneError([f"statistics = {wanted} are not the run's, {run_had}. Give those"])
     return observation
 
 
@@ -243,7 +243,7 @@ def _few_effective(estimates: Mapping[str, Estimate], apart: Collection[str]) ->
     text = (
         f"the weights leave an effective number of {effective:.3g} of {members:,} members: intervals hold from {FEW} on"
     )
-    return (f"{text}; run more members, or draw them nearer to where the weights are large",)
+    return (f"{text}. Run more members, or draw them nearer to where the weights are large",)
 
 
 def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Collection[str]) -> tuple[str, ...]:

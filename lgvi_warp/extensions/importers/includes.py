@@ -31,13 +31,13 @@ def put_in_place(root: Element, given: Any) -> None:
         remedy = closest(unused[0], sorted(known)) if known else "leave it out: it includes nothing"
         raise refusal("include", unused[0], "is none that the file includes", remedy)
     if size > MOST_ELEMENTS:
-        raise SceneError([f"SDF include: makes more than {MOST_ELEMENTS:,} elements; give the vehicle alone"])
+        raise SceneError([f"SDF include: makes more than {MOST_ELEMENTS:,} elements. Give the vehicle alone"])
 
 
 def _put(root: Element, files: Mapping[str, Element], used: set[str], known: set[str], depth: int) -> int:
     """Put models in place below an element; the number of elements there is then."""
     if depth > MOST_NESTED:
-        raise SceneError([f"SDF include: is nested more than {MOST_NESTED} deep, or in a circle; correct the files"])
+        raise SceneError([f"SDF include is nested more than {MOST_NESTED} deep, or in a circle. Correct the files"])
     size = sum(1 for _ in root.iter())
     for parent in [element for element in root.iter() if element.find("include") is not None]:
         for place, child in reversed(list(enumerate(parent))):
@@ -68,7 +68,7 @@ def _model(root: Element, name: str, include: Element) -> Element:
     """A copy of the model of a file with what its <include> says of it: name, pose, static, and plugins besides."""
     found = root if root.tag == "model" else root.find("model")
     if found is None:
-        raise SceneError([f"SDF include {name!r}: the file has no <model>; give the file of a model"])
+        raise SceneError([f"SDF include {name!r}: the file has no <model>. Give the file of a model"])
     model = copy.deepcopy(found)
     model.set("name", text_of(include.find("name")) or model.get("name", ""))
     for tag in ("pose", "static", "placement_frame"):
@@ -85,7 +85,7 @@ def _model(root: Element, name: str, include: Element) -> Element:
 def _merged(model: Element, name: str) -> list[Element]:
     """The parts of a model that becomes one with the model that includes it; its own frame becomes a frame of that model."""
     if model.get("placement_frame"):
-        raise SceneError([f"SDF include {name!r}: is merged by a placement_frame; include it without merge"])
+        raise SceneError([f"SDF include {name!r} is merged by a placement_frame. Include it without merge"])
     parts = [child for child in model if child.tag not in ("pose", "static")]
     pose = model.find("pose")
     if pose is None:

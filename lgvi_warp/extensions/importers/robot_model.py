@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.extensions.importers.includes import names_of
 from lgvi_warp.extensions.importers.links import (
     MOST_LINKS,
@@ -77,7 +78,7 @@ def refuse_crowd(elements: Sequence[Element]) -> None:
     """Refuse more elements than any vehicle has, since the time to read them would have no bound."""
     if len(elements) > MOST_LINKS:
         problem = f"the model has {len(elements):,} of <{elements[0].tag}>, more than {MOST_LINKS:,}"
-        raise SceneError([f"SDF model: {problem}; give the vehicle alone"])
+        raise SceneError([f"SDF model: {problem}. Give the vehicle alone"])
 
 
 # URDF and SDF -------------------------------------------------------------------------------------------------------
@@ -128,7 +129,7 @@ def world_of(root: Element) -> Element:
     """Return the first <world> of a file."""
     world = next(root.iter("world"), None)
     if world is None:
-        raise SceneError(["world: the file has no <world>; give an SDF file with one"])
+        raise SceneError(["world: the file has no <world>. Give an SDF file with one"])
     return world
 
 
@@ -145,18 +146,18 @@ def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Ele
         problem = "the file has none of its own" + (" that can move" if known else "")
         problem += f", it includes {listed(included)}" if included else ""
         remedy = f"pass include={{{included[0]!r}: 'model.sdf'}}" if included else "give an SDF model with a <link>"
-        raise SceneError([f"SDF link: {problem}; {remedy}"])
+        raise SceneError([f"SDF link: {problem}. {capital(remedy)}"])
     if name is not None:
         fitting = [pair for pair in known if pair[0].get("name") == name]
         if not fitting:
-            raise SceneError([f"SDF model = {name!r}: is not in the file; {closest(name, _names(known))}"])
+            raise SceneError([f"SDF model = {name!r} is not in the file. {capital(closest(name, _names(known)))}"])
     for narrowed in (
         [pair for pair in fitting if link is not None and any(x.get("name") == link for x in pair[0].iter("link"))],
         [pair for pair in fitting if any(is_read(plugin) for plugin in plugins_of(pair[0]))],
     ):
         fitting = narrowed if len(fitting) > 1 and narrowed else fitting
     if len(fitting) > 1:
-        raise SceneError([f"SDF model: the file holds several: {listed(_names(fitting))}; name one, model=..."])
+        raise SceneError([f"SDF model: the file holds several: {listed(_names(fitting))}. Name one, model=..."])
     return fitting[0]
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, brief
 from lgvi_warp.common.reading import MOST_OTHERS, UnreadableError, file_bytes
+from lgvi_warp.common.sentences import capital
 
 # Limits of one file. The largest robot descriptions are far below: some 1 MB, 20,000 elements, 20 levels.
 MOST_BYTES, MOST_ELEMENTS, MOST_LEVELS = MOST_OTHERS, 100_000, 200
@@ -41,9 +42,9 @@ class Reader:
         """Open an element and count it."""
         self.level, self.elements = self.level + 1, self.elements + 1
         if self.level > MOST_LEVELS:
-            raise Refused(f"is nested more than {MOST_LEVELS} levels deep; give the model alone")
+            raise Refused(f"is nested more than {MOST_LEVELS} levels deep. Give the model alone")
         if self.elements > MOST_ELEMENTS:
-            raise Refused(f"has more than {MOST_ELEMENTS:,} elements; give the model alone")
+            raise Refused(f"has more than {MOST_ELEMENTS:,} elements. Give the model alone")
         self.tree.start(tag, attributes)
 
     def end(self, tag: str) -> None:
@@ -53,7 +54,7 @@ class Reader:
 
     def doctype(self, *_: Any) -> None:
         """Refuse a document type, since it may declare entities, which can grow without end or name other files."""
-        raise Refused("has a document type declaration (<!DOCTYPE>), which is not read; remove it")
+        raise Refused("has a document type declaration (<!DOCTYPE>), which is not read. Remove it")
 
 
 def parse_xml(source: str | os.PathLike[str], format_name: str = "SDF") -> Element:
@@ -62,7 +63,7 @@ def parse_xml(source: str | os.PathLike[str], format_name: str = "SDF") -> Eleme
     content = str(source).encode() if is_text else read_bytes(source, format_name)
     content = content.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
     if len(content) > MOST_BYTES:
-        raise SceneError([f"{format_name} is longer than {MOST_BYTES / 2**20:g} MiB; give the model alone"])
+        raise SceneError([f"{format_name} is longer than {MOST_BYTES / 2**20:g} MiB. Give the model alone"])
     reader = Reader()
     parser = expat.ParserCreate("utf-8" if is_text else None)
     parser.StartElementHandler, parser.EndElementHandler = reader.start, reader.end
@@ -72,7 +73,7 @@ def parse_xml(source: str | os.PathLike[str], format_name: str = "SDF") -> Eleme
     except Refused as error:
         raise SceneError([f"{format_name} {error}"]) from None
     except (expat.ExpatError, ValueError, LookupError) as error:
-        raise SceneError([f"{format_name} is not XML: {error}; {remedy_for(content)}"]) from None
+        raise SceneError([f"{format_name} is not XML: {error}. {capital(remedy_for(content))}"]) from None
     return reader.tree.close()
 
 
@@ -82,7 +83,7 @@ def remedy_for(content: bytes) -> str:
     if mark is None:
         return "correct that line"
     shown = f"{mark.decode()}, which is not executed here"
-    return f"it looks like a template: it holds {shown}; {TEMPLATES.get(mark.decode(), TEMPLATES['@'])}"
+    return f"it looks like a template: it holds {shown}. {capital(TEMPLATES.get(mark.decode(), TEMPLATES['@']))}"
 
 
 def read_bytes(source: Any, format_name: str) -> bytes:

@@ -119,13 +119,13 @@ def refuse_empty(faults: Faults, read: RobotModel) -> None:
     if not read.links:
         faults.raise_if_any()
         known = "; ".join(["the model has none", *read.warnings])
-        raise SceneError([f"SDF link: {known}; give an SDF model with a <link>"])
+        raise SceneError([f"SDF link: {known}. Give an SDF model with a <link>"])
 
 
 def refuse_unweighed(read: RobotModel, main: Link, parts: Sequence[Link]) -> None:
     """Refuse a main link without inertia; note other links without it, to which Gazebo gives 1 kg."""
     if not main.weighed:
-        raise SceneError([f"SDF link {main.name!r}: has no <inertial>; add mass, pose and inertia"])
+        raise SceneError([f"SDF link {main.name!r} has no <inertial>. Add mass, pose and inertia"])
     unweighed = [body_link.name for body_link in parts if not body_link.weighed]
     if unweighed:
         read.warnings.append(f"links without <inertial>, to which Gazebo gives 1 kg and 1 kg m2: {listed(unweighed)}")

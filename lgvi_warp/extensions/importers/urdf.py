@@ -6,6 +6,7 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.extensions.importers.links import Joint, Link, add_volumes, read_inertia, volume_of
 from lgvi_warp.extensions.importers.poses import Pose, read_origin
 from lgvi_warp.extensions.importers.robot_xml import TEMPLATES, numbers_in
@@ -17,7 +18,7 @@ def refuse_xacro(root: Element) -> None:
         if element.tag.startswith("xacro:"):
             shown = " ".join([element.tag, *(f'{key}="{value}"' for key, value in element.attrib.items())])[:80]
             problem = f"is xacro, a program that writes URDF and is not executed here; its first instruction: <{shown}>"
-            raise SceneError([f"URDF {problem}; {TEMPLATES['${']}"])
+            raise SceneError([f"URDF {problem}. {capital(TEMPLATES['${'])}"])
 
 
 def read_urdf(faults: Faults, root: Element) -> tuple[dict[str, Link], list[Joint]]:

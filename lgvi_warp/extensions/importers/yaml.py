@@ -119,7 +119,7 @@ def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
     text = fossen.read_text(source, isinstance(source, str) and ("\n" in source or ": " in source), "YAML file")
     content = yaml_text.parsed(text)
     if not isinstance(content, Mapping):
-        raise SceneError(["YAML: is not a map; write mass: ..., added_mass: ..."])
+        raise SceneError(["YAML is not a map. Write mass: ..., added_mass: ..."])
     return content
 
 

@@ -253,7 +253,7 @@ class Vehicles:
             ValueError: Where the mask has another shape, or is False throughout.
         """
         if seed is not None and not isinstance(seed, int | np.integer):
-            raise TypeError(f"seed = {brief(seed)}: is not a whole number; give one for all environments")
+            raise TypeError(f"seed = {brief(seed)} is not a whole number. Give one for all environments")
         super().reset(seed=seed)  # type: ignore[misc]  # of gymnasium.vector.VectorEnv
         mask = _mask(options, self.num_envs)
         all_begin = mask.all() or not self._begun
@@ -306,7 +306,7 @@ class Vehicles:
             raise needed().error.ResetNeeded("steps are counted up to 2^31: reset all environments")
         wanted = answered("actions", actions)
         if wanted.shape != self.action_space.shape:
-            raise ValueError(f"actions: have shape {wanted.shape}; give {self.action_space.shape}")
+            raise ValueError(f"actions have shape {wanted.shape}. Give {self.action_space.shape}")
         scaled = wanted if self._scale is None else wanted * self._scale
         if self._columns is None:
             self._answer = scaled
@@ -380,7 +380,7 @@ class Vehicles:
         """Observations of some environments."""
         observed = answered("observe", self._observe(self.time, y, r)).astype(self._kind)
         if observed.ndim != 2 or len(observed) != len(y.heading):
-            raise ValueError(f"observe: returned shape {observed.shape}; return ({len(y.heading)}, k), a row for each")
+            raise ValueError(f"observe: returned shape {observed.shape}. Return ({len(y.heading)}, k), a row for each")
         return observed if self._limits is None else np.clip(observed, *self._limits)
 
     def _rewarded(self, y: CallbackInput, r: CallbackInput, actions: Any) -> np.ndarray:
@@ -389,7 +389,7 @@ class Vehicles:
         more = (np.asarray(actions),) if self._with_actions else ()
         rewards = answered("reward", self._reward(self.time, y, r, *more))
         if rewards.shape != (self.num_envs,):
-            raise ValueError(f"reward: returned shape {rewards.shape}; return ({self.num_envs},)")
+            raise ValueError(f"reward: returned shape {rewards.shape}. Return ({self.num_envs},)")
         return rewards
 
     def _truth(self, values: Any) -> np.ndarray:
@@ -398,7 +398,7 @@ class Vehicles:
         if terminated is None or terminated.dtype.kind != "b":
             terminated = answered("terminated", values) != 0.0
         if terminated.shape != (self.num_envs,):
-            raise ValueError(f"terminated: returned shape {terminated.shape}; return ({self.num_envs},)")
+            raise ValueError(f"terminated: returned shape {terminated.shape}. Return ({self.num_envs},)")
         return terminated
 
 
@@ -493,8 +493,8 @@ def _mask(options: Mapping[str, Any] | None, count: int) -> np.ndarray:
     if mask is None:
         return np.ones(count, bool)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-        raise TypeError(f"options['reset_mask'] = {brief(mask)}: is not a NumPy array of truth values; give one")
+        raise TypeError(f"options['reset_mask'] = {brief(mask)} is not a NumPy array of truth values. Give one")
     if mask.shape != (count,) or not mask.any():
         problem = f"has shape {mask.shape} and {int(mask.sum())} True"
-        raise ValueError(f"options['reset_mask']: {problem}; give shape ({count},) with one True at least")
+        raise ValueError(f"options['reset_mask']: {problem}. Give shape ({count},) with one True at least")
     return mask

@@ -78,7 +78,7 @@ class Baselines:
             ValueError: Where options were set, of which there are none.
         """
         if any(self._options):
-            raise ValueError(f"options = {self._options[0]}: there are none to set; vary the ensemble")
+            raise ValueError(f"options = {self._options[0]}: there are none to set. Vary the ensemble")
         self._asked = None
         observed, _ = self.env.reset(seed=self._seeds[0])
         self._seeds = [None] * self.num_envs
@@ -102,7 +102,7 @@ class Baselines:
             RuntimeError: Without `step_async` before.
         """
         if self._asked is None:
-            raise RuntimeError("step_wait: no step was begun; call step_async(actions) first")
+            raise RuntimeError("step_wait: no step was begun. Call step_async(actions) first")
         actions, self._asked = self._asked, None
         observed, rewards, terminated, truncated, infos = step_by("SameStep", self.env, actions)
         done = terminated | truncated
@@ -156,7 +156,7 @@ class Baselines:
             ValueError: Where only some environments are named.
         """
         if set(self._chosen(indices)) != set(range(self.num_envs)):
-            raise ValueError(f"indices = {indices}: all environments share their attributes; leave it out")
+            raise ValueError(f"indices = {indices}: all environments share their attributes. Leave it out")
         setattr(self.env, attr_name, value)
 
     def env_method(

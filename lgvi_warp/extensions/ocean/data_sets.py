@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp.common import reading
 from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import MissingExtra, SceneError, brief, closest, refusal
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.extensions.ocean.closed_files import leads_elsewhere
 
 # What reads a file, by how it begins: a stranger's file decides nothing else. HDF5 is read from the file that was looked at.
@@ -41,7 +42,7 @@ def data_set(source: Any, attributes: Mapping[str, Any] | None = None) -> Iterat
         yield ds
     except OSError as error:  # of what is read when it is needed
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise SceneError([f"file = {brief(os.fspath(source))}: is damaged: {reason}; {REMEDY}"]) from error
+        raise SceneError([f"file = {brief(os.fspath(source))} is damaged: {reason}. {capital(REMEDY)}"]) from error
     finally:
         if not isinstance(source, xarray().Dataset):
             ds.close()
@@ -80,7 +81,7 @@ def opened(source: Any, attributes: Mapping[str, Any] | None = None) -> Any:
             raise
         except Exception as error:  # whatever the library makes of a damaged file
             reason = " ".join(str(error).split())[:200] or type(error).__name__
-            raise SceneError([f"file = {path}: is damaged, or no NetCDF file: {reason}; {REMEDY}"]) from error
+            raise SceneError([f"file = {path} is damaged, or no NetCDF file: {reason}. {capital(REMEDY)}"]) from error
 
 
 def decoded(ds: Any, attributes: Mapping[str, Any] | None = None) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import MissingExtra, SceneError, refusal
 from lgvi_warp.common.places import LocalPlane
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.extensions.ocean.projections import transformer_of
 from lgvi_warp.extensions.ocean.regrid import Regular, edge_of
 
@@ -174,4 +175,4 @@ def _damage(path: str) -> Iterator[None]:
     except (RasterioError, ValueError, MemoryError) as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         remedy = "give the path of a GeoTIFF or NetCDF file"
-        raise SceneError([f"file = {path}: is damaged, or no GeoTIFF: {reason}; {remedy}"]) from error
+        raise SceneError([f"file = {path} is damaged, or no GeoTIFF: {reason}. {capital(remedy)}"]) from error

@@ -45,7 +45,7 @@ def register(kind: type[AnyTerm]) -> type[AnyTerm]:
     if not registry.add(kind.kinds, kind):
         former = kind.kinds.get(kind.type)
         problem = f"is that of {former.__module__}.{former.__qualname__}" if former else "is missing"
-        raise ValueError(f"{kind.__name__}.type = {kind.type!r}: {problem}; give a type that no other term has")
+        raise ValueError(f"{kind.__name__}.type = {kind.type!r}: {problem}. Give a type that no other term has")
     return kind
 
 

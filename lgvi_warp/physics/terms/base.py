@@ -148,7 +148,7 @@ def number(
         ValueError: Where `axes` is none of these.
     """
     if axes not in ("vector", "point", None):
-        raise ValueError(f"axes = {axes!r}: is not known; give 'vector', 'point' or None")
+        raise ValueError(f"axes = {axes!r} is not known. Give 'vector', 'point' or None")
     meta = dict(shape=shape, unit=unit, least=least, most=most, above=above, rising=rising, axes=axes)
     return field(default=default, metadata=meta | dict(optional=optional, infinite=infinite))
 
@@ -853,5 +853,5 @@ def check_list(key: str, entries: Any, example: str) -> list[Any]:
     if listed is None:
         raise refusal(key, entries, "is not a list", example)
     if len(listed) > MOST_TERMS:
-        raise SceneError([f"{key}: are {len(listed):,}; give at most {MOST_TERMS:,}"])
+        raise SceneError([f"{key} are {len(listed):,}. Give at most {MOST_TERMS:,}"])
     return listed

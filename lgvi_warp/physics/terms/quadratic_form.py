@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp.common.arguments import mapping_of, name_set, names_of
 from lgvi_warp.common.declared import declared
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.physics.notation import cross
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, side_by_side
 
@@ -291,7 +292,7 @@ def _standard_product(faults: Faults, key: Any, value: Any) -> Product | None:
         tail = f"u{tail}" if tail != "u" else ""
     product = read_product(force + tail)
     if product is None:
-        remedy = f"write X'uu, Z'w (of u w), M'* (of u^2), M'|w|, Y'v|r| or the like; {_REMEDY}"
+        remedy = f"write X'uu, Z'w (of u w), M'* (of u^2), M'|w|, Y'v|r| or the like. {capital(_REMEDY)}"
         faults.add(str(key), value, "is not a coefficient of a product of two velocities", remedy)
     return product
 

@@ -27,7 +27,7 @@ from lgvi_warp.scene.scene import Scene
 # Parts of the progress of a rare failure, where a cell's own members are one.
 RARE_PARTS = 20
 # Said of a cell whose function holds what cannot be compared.
-NOT_KEPT = "cannot be told from other functions, so this cell runs in every call; give version=1 where it takes one"
+NOT_KEPT = "cannot be told from other functions, so this cell runs in every call. Give version=1 where it takes one"
 
 
 @shows_progress

@@ -14,6 +14,7 @@ import numpy as np
 from lgvi_warp.common import summaries
 from lgvi_warp.common.errors import MissingExtra, brief, closest
 from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.statistics.estimates.lines import texts_of
 from lgvi_warp.statistics.estimates.naming import canonical, free
@@ -74,7 +75,7 @@ class Estimate(Summarized):
     def _array(self, name: str) -> np.ndarray:
         """One of the arrays that most estimates have, as an attribute."""
         if name not in self.arrays:
-            raise AttributeError(f"{self.name!r} has no {name}; it has {', '.join(self.arrays)}", name=name, obj=self)
+            raise AttributeError(f"{self.name!r} has no {name}. It has {', '.join(self.arrays)}", name=name, obj=self)
         return self.arrays[name]
 
     @property
@@ -153,7 +154,7 @@ class Estimates(Summarized, Mapping[str, Estimate]):
             name = self._spelled.get(canonical(name), name)
         if name not in self._found:
             hint = closest(name, self._found) if self._found else "none were asked for: give statistics=[...]"
-            raise KeyError(f"{brief(name)} is not a statistic of this run; {hint}")
+            raise KeyError(f"{brief(name)} is not a statistic of this run. {capital(hint)}")
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -284,8 +284,8 @@ class CustomMetric(Metric):
     def finish(self, state: State) -> np.ndarray:
         values = state["own"] if self.last is None else self._real(self.last(state["own"]))
         if values.shape != state["begun"].shape:
-            wanted = f"({len(state['begun'])},) is wanted, a number for each member"
-            raise ValueError(f"metric {self.key}: ended with shape {values.shape}; {wanted}")
+            wanted = f"({len(state['begun'])},), a number for each member"
+            raise ValueError(f"metric {self.key}: ended with shape {values.shape}. It must be {wanted}")
         return values
 
     def _asked(self, state: np.ndarray | None, x: np.ndarray, t: float, dt: float) -> np.ndarray:
@@ -293,14 +293,14 @@ class CustomMetric(Metric):
         values = self._real(self.of(state, TickSamples(dict(self._divided(x)), t, dt)))
         if values.shape[-1:] != x.shape[1:] or (state is not None and values.shape != state.shape):
             wanted = f"(..., {x.shape[1]})" if state is None else f"{state.shape}"
-            raise ValueError(f"metric {self.key}: gave shape {values.shape}; {wanted} is wanted, members last")
+            raise ValueError(f"metric {self.key} gave shape {values.shape}. It must be {wanted}, members last")
         return values
 
     def _real(self, values: Any) -> np.ndarray:
         try:
             return np.asarray(real_results(values), np.float64)
         except NotReal as error:
-            raise ValueError(f"metric {self.key}: {error.what}; real numbers are wanted") from None
+            raise ValueError(f"metric {self.key}: {error.what}. Return real numbers") from None
 
     def _divided(self, x: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         """The samples by name, (n, ...)."""

@@ -79,11 +79,11 @@ class Quantity:
         try:
             values = real_results(self.function(samples, members))
         except NotReal as error:
-            raise ValueError(f"quantity {self.name}: {error.what}; real numbers, true or false are wanted") from None
+            raise ValueError(f"quantity {self.name}: {error.what}. Return real numbers, true or false") from None
         k, n = len(samples.time), members.count
         if values.shape not in ((k, n), (k, n, self.size)) or (values.ndim == 2 and self.size != 1):
             wanted = f"({k}, {n})" if self.size == 1 else f"({k}, {n}, {self.size})"
-            raise ValueError(f"quantity {self.name}: gave shape {values.shape}; {wanted} is wanted: times, members")
+            raise ValueError(f"quantity {self.name} gave shape {values.shape}. It must be {wanted}: times, members")
         real = np.float32 if values.dtype == np.float32 else np.float64
         return np.ascontiguousarray(values.reshape(k, n, self.size).transpose(0, 2, 1), dtype=real)
 

@@ -13,6 +13,7 @@ import numpy as np
 from lgvi_warp.common.arguments import members_of
 from lgvi_warp.common.errors import SceneError, ragged, refusal
 from lgvi_warp.common.places import LocalPlane
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.status import Status
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.physics import notation
@@ -81,7 +82,7 @@ class Tracks:
         """Refuse a run that has not kept what a kind of file is made of."""
         if missing := [name for name in names if name not in self.result.samples]:
             remedy = "run it with keep='all', or SaveAt(fields=...) that names them"
-            raise SceneError([f"{', '.join(missing)} were not kept: {purpose} is made of them; {remedy}"])
+            raise SceneError([f"{', '.join(missing)} were not kept: {purpose} is made of them. {capital(remedy)}"])
 
     def needing_origin(self, purpose: str) -> LocalPlane:
         """The plane of the axes on the Earth; refuse a run whose origin is not known."""

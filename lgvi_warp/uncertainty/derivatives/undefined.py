@@ -8,6 +8,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.status import Status, failed, stopped
 from lgvi_warp.control.docking import Docking
 from lgvi_warp.control.fault import Fault
@@ -142,13 +143,13 @@ def of_member(interest: OfResult, value: float, code: int, end: float, growth: f
     timed, at_end = code == Status.TIME, is_end_time(interest)
     early = isinstance(interest, EndQuantity) and interest.when is not None and interest.when < end
     if stopped(np.array([code]))[0] and not (timed or at_end or early):
-        return f"an event stopped the member ({Status(code).name.lower()}), and that time moves too; {BEFORE}"
+        return f"an event stopped the member ({Status(code).name.lower()}), and that time moves too. {capital(BEFORE)}"
     if not np.isfinite(value):
         return "the member does not end so" if at_end else f"it is {value:g}"
     if growth > MOST_GROWTH:
-        return f"a small difference of the start grows {growth:.1g} times, more than 1e6; ask at an earlier time"
+        return f"a small difference of the start grows {growth:.1g} times, more than 1e6. Ask at an earlier time"
     if legs > 0.0:
-        return f"it jumps with the tick at which a leg is done, and {legs:.0f} of them were; ask for a time before"
+        return f"it jumps with the tick at which a leg is done, and {legs:.0f} of them were. Ask for a time before"
     return None
 
 

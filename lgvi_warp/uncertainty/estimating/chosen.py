@@ -60,7 +60,7 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
         ladder = climb(pilot, steps, asked, most)
         if asked is not None and asked not in ladder.settings:
             why = ladder.refused.get(str(asked), "it was not run")
-            raise SceneError([f"setting = {asked}: {why}; give a shorter step, or leave h out"])
+            raise SceneError([f"setting = {asked}: {why}. Give a shorter step, or leave h out"])
         if ladder.settings:
             climbed.append(choice_of(pilot, ladder, asked))
         elif i == len(ladders) - 1 and not climbed:
@@ -68,7 +68,7 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
             if len({why for _, why in refused}) == 1:  # no step would help
                 raise SceneError([refused[0][1]])
             causes = "; ".join(f"{name}: {why}" for name, why in refused)
-            raise SceneError([f"setting: no step qualified: {causes}; fix the failing members, or set method= and h="])
+            raise SceneError([f"setting: no step qualified: {causes}. Fix the failing members, or set method= and h="])
         if climbed and climbed[-1].ladder.end == "apart":
             break
     climbed = [with_rounding(pilot, each) for each in climbed]

@@ -73,13 +73,13 @@ def mean_settings(
     if not kept:
         if not closest:
             raise SceneError(
-                [f"error = {error:g} of {question.label}: no step qualified: members fail; fix the failing members"]
+                [f"error = {error:g} of {question.label}: no step qualified: members fail. Fix the failing members"]
             )
         best = min(closest, key=lambda each: each.largest)
         problem = (
             f"error = {error:g} of {question.label}: its bias is known to {best.largest:.2g} alone, by {best.setting}"
         )
-        raise SceneError([f"{problem} against {best.reference} on {best.members} members; ask for a larger one"])
+        raise SceneError([f"{problem} against {best.reference} on {best.members} members. Ask for a larger one"])
     return sorted(kept, key=lambda each: each.cost)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import SceneError, closest, refusal
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.status import failed, stop_time
 from lgvi_warp.common.times import rows_at
 from lgvi_warp.physics.terms.events import from_list
@@ -194,4 +195,4 @@ def _row(result: Result, row: int) -> np.ndarray:
     remedy = (
         "run it with keep='all'; without save=... start and end alone take little memory. Kept members are result.kept"
     )
-    raise SceneError([f"positions of all members were not kept; {remedy}"])
+    raise SceneError([f"positions of all members were not kept. {capital(remedy)}"])

@@ -105,7 +105,7 @@ def chosen_chain(
         pace = other.seconds / other.members
         if shared <= CORRELATED:
             problem = f"tells {shared:.0%} of the scene's own limit near failure, less than {CORRELATED:.0%}"
-            notes.append(f"cheaper: {name}: {problem}; name a setting nearer to the scene's own")
+            notes.append(f"cheaper: {name}: {problem}. Name a setting nearer to the scene's own")
         else:
             fitting.append((pace, ChainLimit(other, name, offset, slope, MARGIN * missed)))
     return (min(fitting, key=lambda pair: pair[0])[1] if fitting else None), notes

@@ -158,7 +158,7 @@ def refuse_lost(lost: np.ndarray) -> None:
     """Raise FailedMembers where members (n,) failed."""
     if lost.any():
         problem = f"limit: {int(lost.sum())} of {len(lost)} members failed, or have a number that is not finite"
-        raise FailedMembers([f'{problem}; fix the failing members, or count them as the event: failed="event"'])
+        raise FailedMembers([f'{problem}. Fix the failing members, or count them as the event: failed="event"'])
 
 
 def limits_of(distances: np.ndarray, spreads: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ ALL_LOST = (
     'failed="refuse" shows the first of them'
 )
 WITH_STATUS = (
-    "by_condition is empty: a member that ends with the status counts as every condition; ask for each by itself"
+    "by_condition is empty: a member that ends with the status counts as every condition. Ask for each by itself"
 )
 WAYS = ("chains", "splitting")
 ASK = 'ask for what is rare, as "peak depth above 12"'
@@ -211,7 +211,7 @@ def expected_cost(own: VehicleLimit, relative_error: float) -> list[str]:
             f"{8e-9 * level * own.d:,.1f} GB for each copy"
         )
         remedy = (
-            'give by="splitting", which takes no draws as numbers; run plain members, which bound the event by 3 / n; leave '
+            'give by="splitting", which takes no draws as numbers. Run plain members, which bound the event by 3 / n. Leave '
             "the noise out, for chains over the numbers that vary alone, and draw it afresh for the members found; or ask "
             "for a larger relative_error"
         )

@@ -55,7 +55,7 @@ class ScalarModel:
         self._variations = as_given(self._fleet)
         joint = [variation.key for variation in self._variations if variation.distribution.joint]
         if joint and not levels:
-            raise SceneError([f"vary.\"{key}\": is a joint distribution, whose values are not single numbers; use levels=True"
+            raise SceneError([f"vary.\"{key}\": is a joint distribution, whose values are not single numbers. Use levels=True"
                               for key in joint])  # fmt: skip
         # Column of the ensemble's cube, whose keys are sorted, for each column of X.
         self._columns = [
@@ -100,7 +100,7 @@ class ScalarModel:
             SceneError: for names alone.
         """
         if not self._variations:
-            raise SceneError(["vary: names alone have no distributions; map names to distributions"])
+            raise SceneError(["vary: names alone have no distributions. Map names to distributions"])
         return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
 
     def __call__(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:

@@ -17,6 +17,7 @@ from lgvi_warp.calls.runner import Outputs as Outputs
 from lgvi_warp.common.arguments import ensemble_of, flag
 from lgvi_warp.common.errors import closest
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
@@ -39,7 +40,7 @@ def known_arguments(**gone: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
         def checked(*arguments: P.args, **settings: P.kwargs) -> R:
             for name in settings.keys() - known:
                 raise TypeError(
-                    f"lw.uq.{function.__name__}() has no argument {name!r}; {gone.get(name) or closest(name, known)}"
+                    f"lw.uq.{function.__name__}() has no argument {name!r}. {capital(gone.get(name) or closest(name, known))}"
                 )
             return function(*arguments, **settings)
 

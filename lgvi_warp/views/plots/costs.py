@@ -109,5 +109,5 @@ def measured(rows: Rows, keys: tuple[str, ...], remedy: str) -> list[Mapping[str
     rows = listed("rows", rows, "rows")
     points = [row for row in rows if isinstance(row, Mapping) and all(key in row for key in (*keys, COST))]
     if not points:
-        raise NothingToDraw(f"no row has {', '.join(keys)} and {COST}: there is nothing to draw; give rows of {remedy}")
+        raise NothingToDraw(f"no row has {', '.join(keys)} and {COST}: there is nothing to draw. Give rows of {remedy}")
     return points

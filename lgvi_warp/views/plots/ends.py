@@ -169,7 +169,7 @@ def _counted(result: Result, of: OfResult, at: float | None) -> Shares:
         raise refusal("of", of.label, f"has {len(labels)} components", f"name one: {', '.join(labels)}")
     when, finite = float(result.time[frame]), np.isfinite(values[:, 0])
     if not finite.any():
-        raise NothingToDraw(f"no member has a finite {of.label}: there is nothing to draw; see result.status")
+        raise NothingToDraw(f"no member has a finite {of.label}: there is nothing to draw. See result.status")
     edges, shares = _edges(values[finite, 0]), {}
     for code, group in _groups(result, members, when):
         share = np.histogram(values[finite & group, 0], edges)[0] * (100.0 / len(members))

@@ -41,7 +41,7 @@ def statistics(result: Result, *, figure: Any = None, path: FilePath | None = No
     """
     drawn = drawable(result)[:PANELS]
     if not drawn:
-        raise NothingToDraw("no statistic against time was gathered: there is nothing to draw; give statistics=[...]")
+        raise NothingToDraw("no statistic against time was gathered: there is nothing to draw. Give statistics=[...]")
     columns = min(3, len(drawn))
     rows = -(-len(drawn) // columns)
     size = max(7.0, 4.6 * columns), 3.9 * rows + 1.0

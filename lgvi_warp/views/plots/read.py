@@ -62,7 +62,7 @@ def with_samples(result: Result) -> Result:
     if result.kept is not None:
         return result.kept
     raise NothingToDraw(
-        'no samples were kept: there is nothing to draw; give keep="all", or indices of members to keep, '
+        'no samples were kept: there is nothing to draw. Give keep="all", or indices of members to keep, '
         "or draw what the statistics tell: lw.plots.statistics, lw.plots.outcomes"
     )
 
@@ -141,7 +141,7 @@ def survey_of(result: Result, of: Quantity, at_once: int = AT_ONCE) -> ValuesUnd
         rows.append(values[:, ranked])
         counts.append(counted[:, ranked])
     if not np.isfinite(low).any():
-        raise NothingToDraw(f"no member has a finite {of.name}: there is nothing to draw; see result.status")
+        raise NothingToDraw(f"no member has a finite {of.name}: there is nothing to draw. See result.status")
     values, counted = np.concatenate(rows, axis=1), np.concatenate(counts, axis=1)
     sums = going.sum(axis=1)
     return ValuesUnderWay(of, result.time[frames], values, counted, low, high, sums, last, above, result.members)

@@ -70,7 +70,7 @@ def _why(log: IO[str]) -> Exception:
     log.seek(0)
     text = log.read()
     if NO_DRIVER.search(text):
-        return DriverMissingError("no Vulkan driver; install one, such as mesa-vulkan-drivers")
+        return DriverMissingError("no Vulkan driver. Install one, such as mesa-vulkan-drivers")
     return OSError(f"the viewer ended: {one_line(text[-800:])}")
 
 

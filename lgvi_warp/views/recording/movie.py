@@ -97,7 +97,9 @@ def write(result: Result, path: str | os.PathLike[str], *, members: Any = None, 
             return "viewer"
         except headless.DriverMissingError as error:
             if by == "viewer":
-                raise OSError(f'by = "viewer": the viewer cannot draw on this machine: {error}; or by="plot"') from None
+                raise OSError(
+                    f'by = "viewer": the viewer cannot draw on this machine: {error}. Give by="plot"'
+                ) from None
         except MissingExtra:
             if by == "viewer":
                 raise

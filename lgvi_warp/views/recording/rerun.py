@@ -68,7 +68,7 @@ def record(
     viewer.rerun()
     if path is None and to is None:
         words = "neither path nor to is given: the recording would go nowhere"
-        raise SceneError([f'{words}; give path="fleet.rrd"'])
+        raise SceneError([f'{words}. Give path="fleet.rrd"'])
     if to is not None and not isinstance(to, str):
         of_kind("to", to, "flush", "a recording", "give the address of a viewer, or a rerun.RecordingStream")
     runs = _runs(result, members)
@@ -118,7 +118,7 @@ def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
     if not isinstance(result, Mapping):
         return [drawn_of(result_of(result), members)]
     if not result:
-        raise NothingToDraw("there is no result to draw; give {name: result}")
+        raise NothingToDraw("there is no result to draw. Give {name: result}")
     colors = [COLORS[i % len(COLORS)] for i in range(len(result))]
     return [
         drawn_of(result_of(compared), members, str(name), rgb)
@@ -153,7 +153,7 @@ def _to_viewer(runs: list[Drawn], address: str) -> None:
         recording.flush()
         recording.disconnect()
     except RuntimeError as error:
-        raise OSError(f"to = {address!r}: the recording could not be sent ({error}); start the viewer again") from error
+        raise OSError(f"to = {address!r}: the recording could not be sent ({error}). Start the viewer again") from error
 
 
 def _layout(runs: list[Drawn]) -> Any:

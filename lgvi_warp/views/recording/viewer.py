@@ -15,6 +15,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from lgvi_warp.common.errors import MissingExtra, one_line
+from lgvi_warp.common.sentences import capital
 
 # Where a viewer listens that was started without a port.
 PORT = 9876
@@ -45,7 +46,7 @@ def reach(address: str) -> None:
         _connect(address)
     except (OSError, ValueError) as error:
         remedy = f'start a viewer with "rerun", or give to="{ADDRESS}"'
-        raise OSError(f"to = {address!r}: no viewer answers ({error}); {remedy}") from None
+        raise OSError(f"to = {address!r}: no viewer answers ({error}). {capital(remedy)}") from None
 
 
 def answers(address: str = ADDRESS) -> bool:
@@ -96,10 +97,10 @@ def start(words: Sequence[str | Path], remedy: str, started: float = STARTED) ->
         except subprocess.TimeoutExpired:
             return
         except OSError as error:
-            raise OSError(f"the viewer cannot be started ({error}); {remedy}") from None
+            raise OSError(f"the viewer cannot be started ({error}). {capital(remedy)}") from None
         if code:
             log.seek(0)
-            raise OSError(f"the viewer did not start ({one_line(log.read().strip()[-200:])}); {remedy}")
+            raise OSError(f"the viewer did not start ({one_line(log.read().strip()[-200:])}). {capital(remedy)}")
 
 
 def opened(address: str | None, home: str = ADDRESS, patience: float = PATIENCE) -> str:

@@ -394,7 +394,7 @@ def test_what_is_refused():
     hull = lw.terms.SurfaceBuoyancy(heights=0.3)
     with pytest.raises(lw.SceneError, match="keep one of them"):
         floating("box", lw.terms.SurfaceBuoyancy(heights=0.3, name="second"))
-    with pytest.raises(lw.SceneError, match="is a second term of the type surface_buoyancy; keep one"):
+    with pytest.raises(lw.SceneError, match=r"is a second term of the type surface_buoyancy. Keep one"):
         floating("box", hull)
     with pytest.raises(lw.SceneError, match="heights"):
         lw.terms.SurfaceBuoyancy(heights=[0.3, 0.0, 0.0], stations=[0.0, 1.0, 2.0])

@@ -17,7 +17,7 @@ MERGES = "a: &a {x: 1}\n" + "".join(
     for before, one in zip("abcdefgh", "bcdefghi", strict=True)
 )
 YAML = {
-    "octal": (GOOD.replace("30", "010"), ("line 1 = '010'", "octal", "write 10")),
+    "octal": (GOOD.replace("30", "010"), ("line 1 = '010'", "octal", "Write 10")),
     "base 60": (GOOD.replace("30", "1:30"), ("line 1 = '1:30'", "base 60")),
     "base 60 with a point": (GOOD.replace("30", "1:30.5"), ("base 60",)),
     "octal in a list": (GOOD.replace("[1,", "[-010,"), ("line 2 = '-010'",)),

@@ -260,7 +260,7 @@ def test_volumes_of_shapes(shape):
 def test_shapes_in_other_files_need_a_volume():
     mesh = "<mesh><uri>model://hull.dae</uri></mesh>"
     message = refused(from_sdf, link(mesh))
-    says(message, "hull <collision> = 'shape'", "give volume=")
+    says(message, "hull <collision> = 'shape'", "Give volume=")
     tables = from_sdf(link(mesh), volume=0.02, center_of_buoyancy=(0.0, 0.0, 0.1))
     assert tables["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1000.0 * 9.80665)
     assert from_sdf(link(mesh), buoyancy=200.0)["vehicle"]["buoyancy"] == 200.0
@@ -304,18 +304,18 @@ REFUSED = {
     "a mass to calculate": no_mass("@calculated", "generate the file"),
     "a mass of xacro's": no_mass("${mass}", "xacro"),
     "a mass of Jinja's": no_mass("{{ mass }}", "Jinja"),
-    "a mass in words": no_mass("about 20", "write a finite"),
+    "a mass in words": no_mass("about 20", "Write a finite"),
     "a mass of nan": no_mass("nan", "a finite number"),
     "a mass of 1e999": no_mass("1e999", "a finite number"),
     "a mass of 2_0": no_mass("2_0", "a finite number"),
-    "an empty mass": no_mass("", "give the mass"),
+    "an empty mass": no_mass("", "Give the mass"),
     "a negative mass": (link(outside=NAMED.format("b", -1)), ("is negative",)),
     "a template": ("<sdf><%= mass %></sdf>", ("erb",)),
     "xacro": (XACRO, ('xacro:property name="mass"', "not executed", "run xacro")),
     "a type that is not read": (URDF, ("a <type> = 'sphere'",)),
     "a property of xacro's": (URDF.replace("'3'", "'${m}'"), ("${m}",)),
     "several models": (f"<sdf><world>{TWO}</world></sdf>", ("several: a, b", "model=")),
-    "no such model": (f"<sdf>{TWO}</sdf>", ("known: a, b",), {"model": "rov"}),
+    "no such model": (f"<sdf>{TWO}</sdf>", ("Known: a, b",), {"model": "rov"}),
     "what it includes": (
         "<sdf><world><include><uri>model://rov</uri></include></world></sdf>",
         ("includes model://rov",),

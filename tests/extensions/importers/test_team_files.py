@@ -43,8 +43,8 @@ def test_a_mass_matrix_is_taken_apart(table, axes):
 
 @pytest.mark.parametrize(("text", "more", "words"), [
     ("mass_matrix: [30, 35, 40, 1, 2, 3]\n", {}, "is not that of a rigid body"),
-    ("mass_matrix: [30, 30, 30, 1, 2, 3]\nmass: 30\n", {}, "mass = 30: is given besides mass_matrix"),
-    (TEAM, {"table": "vehicle.dynamic"}, "table = 'dynamic': is not a table of the file; did you mean 'dynamics'"),
+    ("mass_matrix: [30, 30, 30, 1, 2, 3]\nmass: 30\n", {}, "mass = 30 is given besides mass_matrix"),
+    (TEAM, {"table": "vehicle.dynamic"}, "table = 'dynamic' is not a table of the file. Did you mean 'dynamics'"),
     (TEAM, {"table": "controller.rate"}, "is not a table of the file"),
     (TEAM, {"table": 3}, "table"),
 ])  # fmt: skip
@@ -90,10 +90,10 @@ def test_the_water_of_several_plugins_is_one(second):
 
 
 def test_plugins_that_differ_on_the_water_are_refused():
-    with pytest.raises(lw.SceneError, match=r"<default_current> = .*: differs from plugin to plugin"):
+    with pytest.raises(lw.SceneError, match=r"<default_current> = .* differs from plugin to plugin"):
         from_sdf(two(current(0.5), current(0.4)))
     densities = two("<water_density>1025</water_density>", "<water_density>1000</water_density>")
-    with pytest.raises(lw.SceneError, match=r"<water_density> = '1025; 1000': differs .*; pass water_density="):
+    with pytest.raises(lw.SceneError, match=r"<water_density> = '1025; 1000' differs .*; pass water_density="):
         from_sdf(densities)
     assert from_sdf(densities, water_density=1020.0)["environment"]["water_density"] == 1020.0
 
@@ -168,7 +168,7 @@ def test_a_merged_model_lies_where_its_pose_says():
 
 @pytest.mark.parametrize(("include", "words"), [
     (None, "the file has none of its own that can move, it includes .*swimmer; pass include="),
-    ({"swimer": HULL}, "include = 'swimer': is none that the file includes; did you mean 'swimmer'"),
+    ({"swimer": HULL}, "include = 'swimer' is none that the file includes. Did you mean 'swimmer'"),
     ({"swimmer": EQUIPPED.format("", "", ""), "tethys": EQUIPPED.format("", "", "")}, "nested more than 8 deep"),
     ({"swimmer": "<sdf/>"}, "the file has no <model>"),
     ({"swimmer": "nowhere.sdf"}, "include 'swimmer' file 'nowhere.sdf': No such file"),

@@ -273,12 +273,12 @@ def test_names_show_what_functions_do():
 
 
 WRONG = {
-    "observe": (dict(observe=["heading_eror"]), "did you mean 'heading_error'"),
+    "observe": (dict(observe=["heading_eror"]), "Did you mean 'heading_error'"),
     "a wish": (dict(observe=["depth_error"]), "needs a wanted depth, which no guidance gives"),
-    "act": (dict(act="demands"), "did you mean 'demand'"),
+    "act": (dict(act="demands"), "Did you mean 'demand'"),
     "a law": (dict(instead_of="heading"), "heading_pid"),
     "duration": (dict(duration=0.25), "not a whole number of periods of 0.1 s"),
-    "number": (dict(num_envs=0), "give a whole number from 1"),
+    "number": (dict(num_envs=0), "Give a whole number from 1"),
     "outputs": (dict(outputs=["yaw"]), "is not known"),
     "twice": (dict(outputs=["N", "N"]), "is named twice"),
     "scale": (dict(scale=[1.0, 2.0]), r"has shape \(2,\)"),
@@ -295,10 +295,10 @@ def test_bad_input(case):
 
 
 def test_bad_input_to_calls(env):
-    with pytest.raises(lw.SceneError, match="controller = None: is not in the scene"):
+    with pytest.raises(lw.SceneError, match="controller = None is not in the scene"):
         environment(lw.Scene(lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0))))
     env.reset()
-    with pytest.raises(ValueError, match=r"have shape \(20, 2\); give \(20, 1\)"):
+    with pytest.raises(ValueError, match=r"have shape \(20, 2\). Give \(20, 1\)"):
         env.step(np.zeros((N, 2)))
     for mask, error in (([True] * N, TypeError), (np.zeros(N, bool), ValueError), (np.ones(3, bool), ValueError)):
         with pytest.raises(error, match="reset_mask"):

@@ -153,7 +153,7 @@ def test_what_is_refused():
         env.reset()
     with pytest.raises(lw.SceneError, match=r"has actions without bounds.* give scale="):
         lw.gym.sb3(environment(observe=["heading_error"]))
-    with pytest.raises(lw.SceneError, match=r"'One': is not a lw.gym.VectorEnv"):
+    with pytest.raises(lw.SceneError, match=r"'One' is not a lw.gym.VectorEnv"):
         lw.gym.sb3(One())
 
 

@@ -361,7 +361,7 @@ def test_readings_of_members_that_vary():
 
 
 FAULTS = {
-    "imu": ([lw.control.ErrorStateFilter()], "give the scene a part of type imu"),
+    "imu": ([lw.control.ErrorStateFilter()], "Give the scene a part of type imu"),
     "kind": ([lw.control.Sensor(name="imu", of="depth"), lw.control.ErrorStateFilter()], "is not a part of type imu"),
     "noise": ([lw.control.IMU(), lw.control.DVL(), lw.control.ErrorStateFilter(dvl="dvl")], "dvl.noise"),
     "before": ([lw.control.IMU(), lw.control.Sensor(of="depth"), lw.control.ErrorStateFilter()], "sensors = 'sensor'"),
@@ -376,7 +376,7 @@ FAULTS = {
         "usbl.latency",
     ),
     "after": ([lw.control.ErrorStateFilter(), lw.control.IMU()], "stands before the filter"),
-    "range": ([lw.control.DVL(least_range=1.0, greatest_range=20.0, floor="ground")], "give the scene one"),
+    "range": ([lw.control.DVL(least_range=1.0, greatest_range=20.0, floor="ground")], "Give the scene one"),
     "no floor": ([lw.control.DVL(floor="ground")], "dvl.floor = 'ground'"),
 }  # fmt: skip
 
@@ -390,8 +390,8 @@ BAD_NUMBERS = {
         lambda: lw.control.Sensor(of="velocity", place=(1.0, 0.0, 0.0)),
         "has no meaning for a sensor of velocity",
     ),
-    "point": (lambda: lw.control.Altimeter(place=(1.0, 0.0, 0.0)), "give point"),
-    "sigma": (lambda: lw.control.ErrorStateFilter(attitude_sigma=0.0), "give numbers above 0 [rad]"),
+    "point": (lambda: lw.control.Altimeter(place=(1.0, 0.0, 0.0)), "Give point"),
+    "sigma": (lambda: lw.control.ErrorStateFilter(attitude_sigma=0.0), "Give numbers above 0 [rad]"),
 }
 
 

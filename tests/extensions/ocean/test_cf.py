@@ -114,16 +114,16 @@ def with_latitude(values):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (with_attribute("uo", "units", "furlong"), "is not a unit of m/s; convert it"),
-        (lambda ds: ds.uo.attrs.pop("units") and None, "uo.units = '': is missing"),
+        (with_attribute("uo", "units", "furlong"), "is not a unit of m/s. Convert it"),
+        (lambda ds: ds.uo.attrs.pop("units") and None, "uo.units = '' is missing"),
         (with_attribute("depth", "positive", "up"), "upside down: write the attribute positive = 'down'"),
-        (lambda ds: ds.drop_vars("depth"), "uo.depth = 'depth': has no depths"),
+        (lambda ds: ds.drop_vars("depth"), "uo.depth = 'depth' has no depths"),
         (lambda ds: ds.rename(latitude="row").drop_vars("row"), "have no latitude"),
-        (lambda ds: ds.isel(time=[0, 2, 1]), "does not rise; sort it by ds.sortby"),
+        (lambda ds: ds.isel(time=[0, 2, 1]), "does not rise. Sort it by ds.sortby"),
         (lambda ds: ds.isel(latitude=[0, 2, 1]), "neither rises nor falls"),
         (lambda ds: ds.assign_coords(time=[0.0, 1.0, 2.0, 3.0]), "is not a time of the standard calendar"),
-        (with_latitude(np.where(np.arange(11) == 3, np.nan, data.LATITUDE)), "has 1 holes; give a place to every node"),
-        (lambda ds: ds.expand_dims(track=2), "uo.dims = 'track': is not an axis that is known"),
+        (with_latitude(np.where(np.arange(11) == 3, np.nan, data.LATITUDE)), "has 1 holes. Give a place to every node"),
+        (lambda ds: ds.expand_dims(track=2), "uo.dims = 'track' is not an axis that is known"),
         (with_latitude(data.LATITUDE * 10.0), "passes 90 degrees"),
     ],
 )  # fmt: skip
@@ -139,7 +139,7 @@ def test_names_that_are_not_there():
     with pytest.raises(lw.SceneError, match="is not a variable of the data set"):
         cf.variable_name(ds, cf.EASTWARD, "uo")
     ds.a.attrs["standard_name"] = ds.b.attrs["standard_name"] = "eastward_sea_water_velocity"
-    with pytest.raises(lw.SceneError, match="are all the eastward velocity; name the one"):
+    with pytest.raises(lw.SceneError, match=r"are all the eastward velocity. Name the one"):
         cf.variable_name(ds, cf.EASTWARD)
 
 

@@ -239,10 +239,10 @@ def test_holes_are_counted_and_filled_with_the_nearest():
     zero = read(ds, region=None, fill="zero")
     west = lon < data.LONGITUDE[3]
     np.testing.assert_array_equal(zero.velocities[0, 0][west], 0.0)
-    with pytest.raises(lw.SceneError, match=r"values of uo at time 0 are missing; give fill = 'nearest'"):
+    with pytest.raises(lw.SceneError, match=r"values of uo at time 0 are missing. Give fill = 'nearest'"):
         read(ds, fill="refuse")
     ds.uo[:] = np.nan
-    with pytest.raises(lw.SceneError, match="uo at time 0': has no value there: land"):
+    with pytest.raises(lw.SceneError, match="uo at time 0' has no value there: land"):
         read(ds)
 
 
@@ -269,7 +269,7 @@ def test_what_a_vehicle_can_reach():
     # Far beyond the data: cut, or refused where it would be held.
     far = {"region": None, "speed": 20.0, "duration": 7200.0}
     assert read(data.cmems(EAST, NORTH), **far).data.request.region[0, 1] < 6e4
-    words = r"speed = '-144 to 144 km north and -144 to 144 km east': is not within the data, .* outside = 'stop'"
+    words = r"speed = '-144 to 144 km north and -144 to 144 km east' is not within the data, .* outside = 'stop'"
     with pytest.raises(lw.SceneError, match=words):
         read(data.cmems(EAST, NORTH), **far, outside="hold")
 
@@ -281,14 +281,14 @@ def test_what_a_vehicle_can_reach():
         ({"region": [[3e4, -3e4], [-3e4, 3e4], [0.0, 40.0]]}, "ends before it begins"),
         ({"region": None, "speed": 2.0}, "says no region without a duration"),
         ({"speed": 2.0, "duration": 9.0}, "says the region, and so does region"),
-        ({"start": "2023-01-01"}, "start = '2023-01-01': is outside the data, 2024-05-01T00:00:00 to"),
-        ({"start": "yesterday"}, "is not a moment; give a datetime"),
-        ({"fill": "guess"}, "fill = 'guess': is not known"),
+        ({"start": "2023-01-01"}, "start = '2023-01-01' is outside the data, 2024-05-01T00:00:00 to"),
+        ({"start": "yesterday"}, "is not a moment. Give a datetime"),
+        ({"fill": "guess"}, "fill = 'guess' is not known"),
         ({"variables": ["uo"]}, "are no two or three names"),
-        ({"variables": ["uo", "w"]}, "is not a variable of the data set; known: uo, vo"),
+        ({"variables": ["uo", "w"]}, "is not a variable of the data set. Known: uo, vo"),
         ({"spacing": [0.0, 1.0, 1.0]}, "is not positive"),
-        ({"spacing": [1e-3, 1e-3, 1e-3]}, "more than half the memory; give a smaller region"),
-        ({"checksum": 7}, "checksum = 7: is not that of what is read"),
+        ({"spacing": [1e-3, 1e-3, 1e-3]}, "more than half the memory. Give a smaller region"),
+        ({"checksum": 7}, "checksum = 7 is not that of what is read"),
     ],
 )
 def test_refused(more, words):
@@ -297,7 +297,7 @@ def test_refused(more, words):
 
 
 def test_faults_of_the_data():
-    with pytest.raises(lw.SceneError, match="have no CF names that are known; write the attribute standard_name"):
+    with pytest.raises(lw.SceneError, match=r"have no CF names that are known. Write the attribute standard_name"):
         read(data.cmems(EAST, NORTH, standard=False).rename(uo="a"))
     with pytest.raises(lw.SceneError, match="upside down"):
         read(data.cmems(EAST, NORTH, depth=-data.DEPTH[::-1]))
@@ -357,9 +357,9 @@ speed = 1.0
     again = lw.Scene.from_dict(scene.to_dict())
     np.testing.assert_array_equal(again.terms[0].velocities, field.velocities)
     for wrong, words in {
-        'file = "water/b.nc"': "terms[0].file = .*b.nc': No such file or directory; give the path of a NetCDF file",
-        'file = "water/a.nc"\nvelocities = [0.0]': "terms[0].velocities = .*: is an unknown key",
-        'file = "scene.toml"': "terms[0].file = .*: is damaged, or no NetCDF file",
+        'file = "water/b.nc"': "terms[0].file = .*b.nc': No such file or directory. Give the path of a NetCDF file",
+        'file = "water/a.nc"\nvelocities = [0.0]': "terms[0].velocities = .* is an unknown key",
+        'file = "scene.toml"': "terms[0].file = .* is damaged, or no NetCDF file",
     }.items():
         (tmp_path / "scene.toml").write_text(text.replace('file = "water/a.nc"', wrong))
         with pytest.raises(lw.SceneError, match=words.replace("[", r"\[")):
@@ -460,7 +460,7 @@ def test_each_variable_stands_at_the_places_that_it_names(stored, tmp_path):
 def test_places_that_nobody_names_are_refused():
     ds = own_places()
     del ds.vel_v.attrs["coordinates"]
-    with pytest.raises(lw.SceneError, match=r"vel_v.coordinates = .*: are all its latitude; name one"):
+    with pytest.raises(lw.SceneError, match=r"vel_v.coordinates = .* are all its latitude. Name one"):
         lw.terms.CurrentField.from_dataset(ds, ORIGIN)
 
 
@@ -500,7 +500,7 @@ def test_a_turned_grid_loses_little_and_the_change_is_the_largest(angle):
         assert np.nanmax(change) <= field.data.error * (1.0 + 1e-9)
         assert np.nanmax(change) >= 0.99 * field.data.error
         assert field.data.error <= most * field.data.speed
-        assert any("give a finer spacing" in text for text in field.remarks) == (
+        assert any("Give a finer spacing" in text for text in field.remarks) == (
             field.data.error > 0.05 * field.data.speed
         )
     assert field.remarks

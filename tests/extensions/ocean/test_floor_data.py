@@ -134,7 +134,7 @@ def test_integers_with_scale_and_without_a_value(tmp_path):
     table = RegularGridInterpolator((LATITUDE, LONGITUDE), DEPTH)
     np.testing.assert_allclose(floor.depth, table(np.stack(nodes(floor), axis=-1)), atol=0.051)
     whole = dict(region=[[-3000.0, 5000.0], [-6000.0, 4200.0]])
-    with pytest.raises(lw.SceneError, match=r"fill = 'refuse': \d of [\d,]+ depths are missing; give fill = 'nearest'"):
+    with pytest.raises(lw.SceneError, match=r"fill = 'refuse': \d of [\d,]+ depths are missing. Give fill = 'nearest'"):
         lw.events.Floor.from_file(tmp_path / "floor.tif", ORIGIN, **whole)
     near = lw.events.Floor.from_file(tmp_path / "floor.tif", ORIGIN, **whole, fill="nearest")
     zero = lw.events.Floor.from_file(tmp_path / "floor.tif", ORIGIN, **whole, fill="zero")
@@ -161,14 +161,12 @@ def test_a_variable_is_a_depth_or_an_elevation_by_what_says_so(attributes, reque
             lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=requested, **known).depth, depth
         )
     else:
-        with pytest.raises(lw.SceneError, match=r"dry land, .*; give positive = 'up' if the numbers are elevations"):
+        with pytest.raises(lw.SceneError, match=r"dry land, .*. Give positive = 'up' if the numbers are elevations"):
             lw.events.Floor.from_file(band(**attributes), ORIGIN, positive=requested, **known)
 
 
 def test_a_variable_that_nothing_explains_needs_a_word():
-    with pytest.raises(
-        lw.SceneError, match=r"variable = 'Band1': says neither .*; give positive = 'up' for elevations"
-    ):
+    with pytest.raises(lw.SceneError, match=r"variable = 'Band1' says neither .*. Give positive = 'up' for elevations"):
         lw.events.Floor.from_file(band(), ORIGIN, variable="Band1")
 
 
@@ -198,11 +196,11 @@ def holed():
 
 
 @pytest.mark.parametrize(("ds", "more", "words"), [
-    (gebco(), {"region": [[0.0, 9e4], [0.0, 1e3]]}, r"region = .*: is not within the data, .* of the origin; give one within"),
+    (gebco(), {"region": [[0.0, 9e4], [0.0, 1e3]]}, r"region = .* is not within the data, .* of the origin; give one within"),
     (gebco(), {"region": [[0.0, 1e3], [1e3, 0.0]]}, "ends before it begins"),
-    (gebco(), {"spacing": [1.0, 0.01]}, "are too many nodes for a scene; give a smaller region or a wider spacing"),
-    (gebco(), {"spacing": [1.0, -1.0]}, "spacing = .*: is not positive"),
-    (gebco(), {"variable": "depht"}, "variables = 'depht': is not a variable of the data set"),
+    (gebco(), {"spacing": [1.0, 0.01]}, "are too many nodes for a scene. Give a smaller region or a wider spacing"),
+    (gebco(), {"spacing": [1.0, -1.0]}, "spacing = .* is not positive"),
+    (gebco(), {"variable": "depht"}, "variables = 'depht' is not a variable of the data set"),
     (gebco(), {"fill": "guess"}, "fill = 'guess'"),
     (gebco(), {"positive": "down"}, "makes all of the floor dry land"),
     (gebco().rename(elevation="q").assign(q=gebco().elevation.drop_attrs().rename("q")), {}, "have no CF names"),
@@ -230,7 +228,7 @@ def test_a_damaged_file(content, words, tmp_path):
 
 def test_a_raster_without_a_reference_system(tmp_path):
     geotiff(tmp_path / "floor.tif", -DEPTH, NORTH_UP, None)
-    with pytest.raises(lw.SceneError, match="says no coordinate reference system; write it"):
+    with pytest.raises(lw.SceneError, match=r"says no coordinate reference system. Write it"):
         lw.events.Floor.from_file(tmp_path / "floor.tif", ORIGIN)
 
 

@@ -320,7 +320,7 @@ def test_a_reference_system_without_places(name, tmp_path, pipes):
         geotiff(tmp_path / "floor.tif", -DEPTH[::-1], NORTH_UP, system.format(tmp_path / "grid.gsb"))
     # The library that writes the file would wait for this one.
     pipes.at(tmp_path / "grid.gsb")
-    with pytest.raises(lw.SceneError, match=f"has a coordinate reference system that ({words}).*; write one"):
+    with pytest.raises(lw.SceneError, match=f"has a coordinate reference system that ({words}).*. Write one"):
         lw.events.Floor.from_file(tmp_path / "floor.tif", PLACE)
     time.sleep(0.02)
     assert not pipes.opened
@@ -425,5 +425,5 @@ def test_a_damaged_chunk_is_a_line(tmp_path):
     with open(tmp_path / "a.nc", "r+b") as file:
         file.seek(place)
         file.write(b"\xff" * 64)
-    with pytest.raises(lw.SceneError, match=r"^file = .*a.nc': is damaged"):
+    with pytest.raises(lw.SceneError, match=r"^file = .*a.nc' is damaged"):
         lw.events.Floor.from_file(tmp_path / "a.nc", PLACE)

@@ -230,14 +230,14 @@ def test_what_is_refused():
         ),
         "is not a Series": lambda: lw.assimilate(fleet, [1.0], h=0.05),
         "series = <object": lambda: lw.assimilate(fleet, object(), h=0.05),
-        "h = 0: is not positive": lambda: lw.assimilate(fleet, fixes, h=0),
-        "discount = 'all': is not numeric": lambda: lw.assimilate(fleet, fixes, discount="all", h=0.05),
+        "h = 0 is not positive": lambda: lw.assimilate(fleet, fixes, h=0),
+        "discount = 'all' is not numeric": lambda: lw.assimilate(fleet, fixes, discount="all", h=0.05),
         "seed = -1": lambda: lw.assimilate(fleet, fixes, seed=-1, h=0.05),
-        "learn = 3: is not a list": lambda: lw.assimilate(fleet, fixes, 3, h=0.05),
+        "learn = 3 is not a list": lambda: lw.assimilate(fleet, fixes, 3, h=0.05),
         "names no instrument": lambda: lw.assimilate(fleet, [], h=0.05),
         "is not known": lambda: lw.assimilate(fleet, fixes, filter="ukf", h=0.05),
         "series.std = 0": lambda: lw.studies.Series("depth", [1.0], [1.0], 0.0),
-        "that are infinite; give NaN": lambda: lw.studies.Series("depth", [1.0, 2.0], [1.0, np.inf], 0.1),
+        "that are infinite. Give NaN": lambda: lw.studies.Series("depth", [1.0, 2.0], [1.0, np.inf], 0.1),
         "has 3 numbers, and 1 were measured": lambda: lw.assimilate(
             fleet, lw.studies.Series("position", [1.0], [1.0], 0.1), h=0.05
         ),
@@ -271,7 +271,7 @@ def test_vehicles_are_as_sure_as_they_should_be(filter):
 def test_two_instruments_of_one_quantity():
     fleet, (_, y, fixes) = drifting(), series()
     other = lw.studies.Series("position[0]", TIMES[:1], y[:1] + 0.1, 0.3)
-    with pytest.raises(lw.SceneError, match=re.escape("series = 'position[0]': is measured by two")):
+    with pytest.raises(lw.SceneError, match=re.escape("series = 'position[0]' is measured by two")):
         lw.assimilate(fleet, [fixes, other], method="rk8", h=0.05)
     named = lw.studies.Series("position[0]", TIMES[:1], y[:1] + 0.1, 0.3, name="second receiver")
     silent = lw.studies.Series("depth", [0.5], [np.nan], 0.1)

@@ -145,7 +145,7 @@ def test_what_no_map_can_hold_is_refused(answer, tmp_path):
     path = lw.export(nowhere, tmp_path / "a.kml", origin=ORIGIN)
     assert path.read_text() == lw.export(answer, tmp_path / "b.kml").read_text()
     says(refused(lw.export, answer, tmp_path / "a.csv"), "holds no regions", ".geojson or .kml")
-    says(refused(lw.export, answer, tmp_path / "c.kml", members=[0]), "members", "leave it out")
+    says(refused(lw.export, answer, tmp_path / "c.kml", members=[0]), "members", "Leave it out")
     says(refused(lw.export, answer, tmp_path / "b.kml"), "is there already")
     at_the_pole = footprint(100.0 * np.random.default_rng(2).standard_normal((200, 2)), [90.0, 0.0])
     says(refused(lw.export, at_the_pole, tmp_path / "pole.kml"), "holds a pole")

@@ -418,10 +418,10 @@ def test_weights_of_a_table_are_those_of_particles():
 @pytest.mark.parametrize(
     ("message", "more"),
     [
-        ("gate = 0: is not positive", {"gate": 0}),
-        ("inflation = 0.5: is below 1", {"inflation": 0.5}),
-        ("inflation = 'adaptiv': is not known", {"inflation": "adaptiv"}),
-        ("inflation = 1.1: is of Kalman filters", {"inflation": 1.1, "filter": "particles"}),
+        ("gate = 0 is not positive", {"gate": 0}),
+        ("inflation = 0.5 is below 1", {"inflation": 0.5}),
+        ("inflation = 'adaptiv' is not known", {"inflation": "adaptiv"}),
+        ("inflation = 1.1 is of Kalman filters", {"inflation": 1.1, "filter": "particles"}),
     ],
 )
 def test_options_out_of_range_are_refused(message, more):

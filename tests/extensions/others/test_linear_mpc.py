@@ -329,8 +329,8 @@ def test_bluerov2_holds_its_depth_by_thrusters():
 
 
 @pytest.mark.parametrize(("more", "words"), [
-    ({"horizon": 21}, "linear_mpc.horizon = 21: is too long; give 1 to 20"),
-    ({"horizon": 0}, "linear_mpc.horizon = 0: is not a number of periods"),
+    ({"horizon": 21}, "linear_mpc.horizon = 21 is too long. Give 1 to 20"),
+    ({"horizon": 0}, "linear_mpc.horizon = 0 is not a number of periods"),
     ({"iterations": 0}, "linear_mpc.iterations = 0"),
     ({"R": [0.0, 1.0]}, "linear_mpc.R.*not positive"),
     ({"Q": [-1.0, 1.0, 1.0]}, "linear_mpc.Q.*out of bounds"),
@@ -338,7 +338,7 @@ def test_bluerov2_holds_its_depth_by_thrusters():
     ({"limit": [0.0, 1.0]}, "linear_mpc.limit.*not positive"),
     ({"P": np.diag([1.0, -1.0, 1.0])}, "linear_mpc.P.*is not symmetric and at least 0"),
     ({"A": np.eye(2)}, r"linear_mpc\.B.*give 2 x"),
-    ({"states": STATES[:2]}, r"linear_mpc.states.*are 2; name the 3 of A and B"),
+    ({"states": STATES[:2]}, r"linear_mpc.states.*are 2. Name the 3 of A and B"),
     ({"states": ("depth", *STATES[1:])}, r"linear_mpc.states\[0\] = 'depth'"),
     ({"tracked": ["velocity[0]"]}, r"linear_mpc.tracked\[0\] = 'velocity\[0\]'"),
     ({"tracked": STATES}, "linear_mpc.tracked.*are 3; name at most 2"),
@@ -353,7 +353,7 @@ def test_bad_input(more, words):
 def test_another_period_than_the_model_s_is_refused(heave):
     scene = heaving(heave)
     with pytest.raises(
-        lw.SceneError, match=r"linear_mpc\.period = 0.1: is that of the model, and the controller's is 0.2 s"
+        lw.SceneError, match=r"linear_mpc\.period = 0.1 is that of the model, and the controller's is 0.2 s"
     ):
         dataclasses.replace(scene, controller=dataclasses.replace(scene.controller, period=0.2))
 

@@ -199,7 +199,7 @@ def test_lines_are_cut_wherever_they_cross():
 def test_maps_of_more_than_1000_members_are_of_members_that_are_named(tmp_path):
     many = lw.Ensemble(scene(origin=ORIGIN), members=1001, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
     run = lw.solve(many, **SETTINGS | {"t1": 0.2, "save": lw.SaveAt(every=0.1)})
-    with pytest.raises(lw.SceneError, match=r"members = None: are 1,001, more than the 1,000 .*--members 0:100"):
+    with pytest.raises(lw.SceneError, match=r"members = None are 1,001, more than the 1,000 .*--members 0:100"):
         lw.export(run, tmp_path / "run.geojson")
     content = json.loads(lw.export(run, tmp_path / "run.geojson", members=range(1001)).read_text())
     assert len(content["features"]) == 1001

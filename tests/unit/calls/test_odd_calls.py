@@ -89,7 +89,7 @@ def test_no_odd_call_of_a_picture_or_a_method_ends_in_a_raw_error(inputs):
 )
 @pytest.mark.parametrize("odd", [None, 3, "x", np.zeros(3), lw.Result])
 def test_pictures_are_of_results(draw, odd):
-    with pytest.raises(lw.SceneError, match=r"^result = .*is not a Result; give what lw.solve"):
+    with pytest.raises(lw.SceneError, match=r"^result = .*is not a Result. Give what lw.solve"):
         getattr(lw.plots, draw)(odd)
 
 
@@ -138,7 +138,7 @@ def test_arrays_are_refused_where_a_word_is_meant(name):
 def test_a_device_other_than_the_cpu_is_refused(call):
     scene = lw.Scene(lw.Vehicle(**odd_calls.BODY))
     with pytest.raises(
-        lw.SceneError, match=r"^device = 'cuda:0': .* runs are on CPU cores; leave it out, or give \"cpu\"$"
+        lw.SceneError, match=r"^device = 'cuda:0': .* runs are on CPU cores. Leave it out, or give \"cpu\"$"
     ):
         call(scene, h=0.1, t1=0.2, device="cuda:0")
 

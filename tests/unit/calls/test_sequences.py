@@ -78,7 +78,7 @@ def test_every_argument_that_is_a_sequence_is_tried():
         missing = sequence_arguments(path, thing) - tried - RUN.get(path, set()) - ELSEWHERE.get(path, set())
         if missing and path not in RECORDS:
             untried[path] = sorted(missing)
-    assert untried == {}, "add good arguments to tests/support/sequences.py"
+    assert untried == {}, "Add good arguments to tests/support/sequences.py"
 
 
 @pytest.fixture(scope="module")

@@ -101,17 +101,17 @@ def test_options_reach_the_run(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (["--set", "vehicle.mas=1"], ["vehicle.mas", "did you mean 'mass'"]),
+    (["--set", "vehicle.mas=1"], ["vehicle.mas", "Did you mean 'mass'"]),
     (["--step", "-1", "--members", "0", "--set", "vehicle.mass=-2"], ["3 faults", "step", "members", "mass"]),
-    (["--method", "psy"], ["psy", "did you mean"]), (["--set", "nonsense"], ["nonsense", "vehicle.buoyancy=300"]),
+    (["--method", "psy"], ["psy", "Did you mean"]), (["--set", "nonsense"], ["nonsense", "vehicle.buoyancy=300"]),
     (["--dtype", "float16"], ["float16"]), (["--width", "5"], ["width = 5"]), (["--threads", "0"], ["threads = 0"]),
-    (["--device", "cuda"], ["run.device = 'cuda'", "runs are on CPU cores", 'give "cpu"']),
+    (["--device", "cuda"], ["run.device = 'cuda'", "runs are on CPU cores", 'Give "cpu"']),
     (["--resume"], ["--resume", "--store zarr"]),
     (["--blocks", "0:2", "--overwrite"], ["--blocks and --overwrite", "--store zarr"]),
     (["--store", "zarr", "--blocks", "3"], ["--blocks 3", "--blocks 0:100"]),
     (["--store", "zarr", "--blocks", "5:9"], ["blocks 5:9", "within the 1"]),
     (["--store", "zarr", "--store-dtype", "float16"], ["float16"]),
-    (["--executor", "thread"], ["did you mean 'threads'"]), (["--scheduler", "tcp://x"], ["dask alone"]),
+    (["--executor", "thread"], ["Did you mean 'threads'"]), (["--scheduler", "tcp://x"], ["dask alone"]),
 ])  # fmt: skip
 def test_a_bad_argument_is_refused_with_the_remedy(arguments, words, tmp_path, capsys):
     assert cli.main(["run", PAPER, "--out", str(tmp_path / "out"), *SMALL, *arguments]) == 2
@@ -174,10 +174,10 @@ def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     for verb in (["run"], ["stability"], ["sensitivity", "--of", "depth"], ["tradeoff"]):
         assert cli.main([*verb, PAPER, "--out", str(tmp_path / "file")]) == 2
-        assert f"--out {tmp_path / 'file'}: is a file; give a folder" in capsys.readouterr().err
+        assert f"--out {tmp_path / 'file'} is a file. Give a folder" in capsys.readouterr().err
     for verb in (["info"], ["resume"], ["export", "--to", "netcdf"]):
         assert cli.main([*verb, str(tmp_path / "file")]) == 2
-        assert "file: is a file; give the folder of a run made with --store zarr" in capsys.readouterr().err
+        assert "file is a file. Give the folder of a run made with --store zarr" in capsys.readouterr().err
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, monkeypatch, capsys):

@@ -83,7 +83,7 @@ def test_contents_of_a_folder(tmp_path):
         place = tmp_path / ("empty" if "results" in words else name)
         with pytest.raises(lw.SceneError) as caught:
             contents(place)
-        assert str(caught.value) == f"{place}: {words}; give the folder of a run or of a study"
+        assert str(caught.value) == f"{place}: {words}. Give the folder of a run or of a study"
 
 
 def test_info_of_a_folder_with_everything(store, tmp_path, capsys):
@@ -147,7 +147,7 @@ def test_pictures_are_drawn_again(tmp_path, capsys):
 
 def test_the_last_run_of_a_folder_is_viewed(tmp_path):
     (tmp_path / "sweep.json").write_text("{}")
-    with pytest.raises(lw.SceneError, match=rf"^{tmp_path}: holds a study, and no run; give the folder of a run$"):
+    with pytest.raises(lw.SceneError, match=rf"^{tmp_path} holds a study, and no run. Give the folder of a run$"):
         view.run_in(tmp_path)
     (tmp_path / "result.npz").touch()
     assert view.run_in(tmp_path) == Content("result", tmp_path / "result.npz")
@@ -160,7 +160,7 @@ def test_members_to_view_are_a_list():
     assert view.indices(None) is None
     assert view.indices(" 3, 17") == [3, 17]
     for text in ("3,,4", "-1", "", "3;4"):
-        with pytest.raises(lw.SceneError, match="is not a list of members; write --members 3,17"):
+        with pytest.raises(lw.SceneError, match=r"is not a list of members. Write --members 3,17"):
             view.indices(text)
 
 
@@ -280,7 +280,7 @@ def test_what_rare_and_derivatives_wrote_is_shown_and_drawn(tmp_path, capsys):
     assert "by start.velocity[2]" in text
     assert cli.main(["plot", str(tmp_path)]) == 0
     assert (tmp_path / "rare.png").stat().st_size > 1000
-    assert "derivatives.json: has no picture" in capsys.readouterr().err
+    assert "derivatives.json has no picture" in capsys.readouterr().err
     lw.report(tmp_path, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text()
     assert "Rare of " in page

@@ -247,8 +247,8 @@ def test_labels_have_their_colors():
 
 
 @pytest.mark.parametrize(("error", "code", "text"), [
-    (MemoryError(), 1, "out of memory; run fewer members or keep fewer samples"),
-    (MemoryError("3 GB"), 1, "3 GB; run fewer members or keep fewer samples"),
+    (MemoryError(), 1, "out of memory. Run fewer members or keep fewer samples"),
+    (MemoryError("3 GB"), 1, "3 GB. Run fewer members or keep fewer samples"),
     (OSError(errno.ENOSPC, "No space", "a file"), 1, "a file: No space"), (OSError("odd"), 1, "odd"),
     (lw.SceneError(["a", "b"]), 2, str(lw.SceneError(["a", "b"]))),
     (KeyboardInterrupt(), 130, "interrupted; nothing was to be written"),

@@ -140,9 +140,9 @@ def test_a_live_run_hands_over_its_blocks(tmp_path):
     ("options", "words"),
     [
         (["--live"], "pip install '.[viz]'"),
-        (["--viewer", "x"], "has no effect without --live; add --live"),
-        (["--live", "--keep", "none"], "--live: shows members as they are done, and the run keeps none; add --keep all"),
-        (["--live", "--keep", "1,2"], "--live: shows members as they are done, and the run keeps none; add --keep all"),
+        (["--viewer", "x"], "has no effect without --live. Add --live"),
+        (["--live", "--keep", "none"], "--live shows members as they are done, and the run keeps none. Add --keep all"),
+        (["--live", "--keep", "1,2"], "--live shows members as they are done, and the run keeps none. Add --keep all"),
     ],
 )  # fmt: skip
 def test_a_live_run_needs_its_library_and_what_it_shows(tmp_path, capsys, options, words):
@@ -178,7 +178,7 @@ def test_a_run_with_an_error_takes_what_is_suggested_and_checks_it(tmp_path, cap
     assert said.out == f"suggested   a step\nchecked     error of speed 5.0e-01 m/s, {again}\n"
     for options, number in ((["-q", "--method", "rk4", "--of", "depth", "--threads", "2"], "5.1e-01"), (["-q"], "nan")):
         assert main([*verb, *options], **parts) == 1
-        text = f"error of speed {number} m/s, {again}: missed; ask for a smaller one"
+        text = f"error of speed {number} m/s, {again}: missed. Ask for a smaller one"
         assert capsys.readouterr() == ("", f"lgvi-warp: {text}\n")
         assert report.calls[-1][2] == [text]
     (first, settings), (_, named), _ = suggest.calls
@@ -197,13 +197,13 @@ def test_a_run_with_an_error_takes_what_is_suggested_and_checks_it(tmp_path, cap
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (["--of", "depth"], "--of depth: has no effect without --error; add --error 1e-3"),
-        (["--error", "0.01", "--step", "0.5"], "--step 0.5: is what --error chooses; leave out --step or --error"),
-        (["--error", "1", "--dtype", "float32"], "--dtype float32: is what --error chooses; leave out --dtype or --error"),
+        (["--of", "depth"], "--of depth has no effect without --error. Add --error 1e-3"),
+        (["--error", "0.01", "--step", "0.5"], "--step 0.5 is what --error chooses. Leave out --step or --error"),
+        (["--error", "1", "--dtype", "float32"], "--dtype float32 is what --error chooses. Leave out --dtype or --error"),
         (["--error", "0.01", "--keep", "3"],
-         '--error 0.01: is checked on samples of all members; give run.keep="all", no run.until'),
+         '--error 0.01 is checked on samples of all members. Give run.keep="all", no run.until'),
         (["--error", "0.01", "--keep", "none"],
-         '--error 0.01: is checked on samples of all members; give run.keep="all", no run.until'),
+         '--error 0.01 is checked on samples of all members. Give run.keep="all", no run.until'),
     ],
 )  # fmt: skip
 def test_what_contradicts_an_error_is_refused(tmp_path, capsys, options, text):

@@ -225,36 +225,36 @@ ESTIMATE = ["estimate", PAPER, "--of", "depth", "--error", "1"]
 
 
 @pytest.mark.parametrize(("inputs", "words"), [
-    (["sensitivity", PAPER, "--of", "depth", "--groups", "start"], ["--groups = 'start': names nothing; give NAME=A,B"]),
-    (["sensitivity", PAPER, "--of", "depth", "--levels", "4"], ["--levels = '4': is an option of morris; leave it out"]),
-    (["rare", PAPER, "--limit", "depth above 3", "--cheaper", "h"], ["--cheaper = 'h': names no value; give A=X,B=Y"]),
+    (["sensitivity", PAPER, "--of", "depth", "--groups", "start"], ["--groups = 'start' names nothing. Give NAME=A,B"]),
+    (["sensitivity", PAPER, "--of", "depth", "--levels", "4"], ["--levels = '4' is an option of morris. Leave it out"]),
+    (["rare", PAPER, "--limit", "depth above 3", "--cheaper", "h"], ["--cheaper = 'h' names no value. Give A=X,B=Y"]),
     ([*ESTIMATE, "--risk", "large", "--cheaper", "a", "--seed", "1.5"],
-     ["--risk = 'large': is not a risk", "--cheaper = 'a': names no value", "--seed = '1.5': is not a whole",
+     ["--risk = 'large' is not a risk", "--cheaper = 'a' names no value", "--seed = '1.5' is not a whole",
       "3 faults"]),
     ([*ESTIMATE, "--risk", "cvar:2"], ["is not a part"]),
     (["stability", PAPER, "--points", "3,x", "--error", "low"],
-     ["--points = '3,x': is not a whole number", "--error = 'low': is not a number; give one, as 0.5"]),
+     ["--points = '3,x' is not a whole number", "--error = 'low' is not a number. Give one, as 0.5"]),
     *[(["stability", PAPER, "--grid", "mass", axis, "h"],
-       ["--grid mass: names the same axes as --x and --y; leave out --grid, or both of them"]) for axis in ("--x", "--y")],
+       ["--grid mass names the same axes as --x and --y. Leave out --grid, or both of them"]) for axis in ("--x", "--y")],
     (["worst-case", SCENE, "--of", "depth", "--within", "=1:2", "--within", "a"],
-     ["--within = '=1:2': names no value; give NAME=LOW:HIGH", "--within = 'a'"]),
+     ["--within = '=1:2' names no value. Give NAME=LOW:HIGH", "--within = 'a'"]),
     (["worst-case", SCENE, "--of", "depth", "--within", "vehicle.mass=4", "--within", "vehicle.buoyancy=1:2:lg"],
      ['within."vehicle.mass" = 4.0', 'within."vehicle.buoyancy"']),
     (["worst-case", SCENE, "--of", "depth", "--within", "vehicle.buoyance=4:5"],
-     ["within.\"vehicle.buoyance\" = '...': does not name what the scene has; did you mean 'vehicle.buoyancy'?"]),
+     ["within.\"vehicle.buoyance\" = '...' does not name what the scene has. Did you mean 'vehicle.buoyancy'?"]),
     (["worst-case", SCENE, "--of", "depth", "--within", "start.velocity=4:5"],
-     ["within.\"start.velocity\" = '...': is not a single number"]),
+     ["within.\"start.velocity\" = '...' is not a single number"]),
     (["trim", SCENE, "--fixed", "pitch", "--fixed", "roll=low", "--fixed", "=2"],
-     ["--fixed = 'pitch': is not a value; give NAME=0.1", "'roll=low'", "'=2'"]),
+     ["--fixed = 'pitch' is not a value. Give NAME=0.1", "'roll=low'", "'=2'"]),
     (["margins", SCENE, "--loop", "heading", "--skew", "2"],
-     ["loop = 'heading': is not a law of the controller; did you mean 'heading_pid'?",
-      "skew = 2.0: is above 1; give a number from -1 to 1"]),
+     ["loop = 'heading' is not a law of the controller. Did you mean 'heading_pid'?",
+      "skew = 2.0 is above 1. Give a number from -1 to 1"]),
     (["margins", PAPER],
-     ["controller = None: is not in the scene, and margins are those of a loop; give [controller]"]),
+     ["controller = None is not in the scene, and margins are those of a loop. Give [controller]"]),
     *[(["rare", PAPER, "--limit", limit], [remedy]) for limit, remedy in [
-        ("peak depth over 12", 'write "peak depth above 12"'), ("max(depth) > 4 m", 'write "max(depth) above 4"'),
-        ("depth under", 'write "depth below 12.0"'), ("depth", 'write "depth above 12.0"'),
-        ("max(dpeth) above 3", "did you mean 'depth'?"), ("dpeth", "is neither a quantity nor an event"),
+        ("peak depth over 12", 'Write "peak depth above 12"'), ("max(depth) > 4 m", 'Write "max(depth) above 4"'),
+        ("depth under", 'Write "depth below 12.0"'), ("depth", 'Write "depth above 12.0"'),
+        ("max(dpeth) above 3", "Did you mean 'depth'?"), ("dpeth", "is neither a quantity nor an event"),
     ]],
 ])  # fmt: skip
 def test_odd_arguments_are_refused_all_at_once(inputs, words, tmp_path, capsys, monkeypatch):
@@ -279,7 +279,7 @@ def test_a_method_that_was_asked_for_and_has_no_measurement_ends_with_1(tmp_path
     verb = ["tradeoff", PAPER, "--methods", "rk4,rk8", "--out", str(tmp_path / "b")]
     assert main(verb, study=Study(found), draw=draw) == 1
     out, err = capsys.readouterr()
-    assert "lgvi-warp: --methods rk8: has no measurement: members failed at every step" in err
+    assert "lgvi-warp: --methods rk8 has no measurement: members failed at every step" in err
     assert "\n\nmissing     rk8: members failed" in out
     assert (tmp_path / "b" / "tradeoff.png").exists()
     assert json.loads((tmp_path / "b" / "tradeoff.json").read_text())["missing"] == found.missing

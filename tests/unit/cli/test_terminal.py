@@ -59,12 +59,12 @@ def test_alone_it_helps(capsys):
 
 
 @pytest.mark.parametrize(("inputs", "usage", "words"), [
-    (["rnu"], "lgvi-warp", "'rnu' is not known; did you mean 'run'?"),
-    (["run", PAPER, "--sed", "1", "--stepp", "2"], "lgvi-warp run", "'--stepp' is not known; did you mean '--step'?"),
-    (["run", PAPER, "--store", "zar"], "lgvi-warp run", "'zar' is not known; did you mean 'zarr'?"),
-    (["list", "vehicle"], "lgvi-warp list", "'vehicle' is not known; did you mean 'vehicles'?"),
+    (["rnu"], "lgvi-warp", "'rnu' is not known. Did you mean 'run'?"),
+    (["run", PAPER, "--sed", "1", "--stepp", "2"], "lgvi-warp run", "'--stepp' is not known. Did you mean '--step'?"),
+    (["run", PAPER, "--store", "zar"], "lgvi-warp run", "'zar' is not known. Did you mean 'zarr'?"),
+    (["list", "vehicle"], "lgvi-warp list", "'vehicle' is not known. Did you mean 'vehicles'?"),
     (["check", PAPER, "more"], "lgvi-warp check", "'more' is not known"),
-    (["check", "--color", "allways", PAPER], "lgvi-warp check", "did you mean 'always'?"),
+    (["check", "--color", "allways", PAPER], "lgvi-warp check", "Did you mean 'always'?"),
     (["merge", "a"], "lgvi-warp merge", "--out"), (["--json"], "lgvi-warp", "VERB"),
 ])  # fmt: skip
 def test_a_fault_has_the_verbs_usage_and_the_nearest_name(inputs, usage, words, capsys):
@@ -492,4 +492,4 @@ def test_studies_print_a_document_and_info_and_plot_know_their_folders(verb, tmp
     assert document(["plot", out], capsys)["files"] == [f"{out}/{verb}.png"]
     (tmp_path / f"{verb}.json").write_text('{"name": 3}')
     assert cli.main(["info", out]) == 2
-    assert f"{verb}.json: is damaged" in capsys.readouterr().err
+    assert f"{verb}.json is damaged" in capsys.readouterr().err

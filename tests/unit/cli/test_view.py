@@ -26,8 +26,8 @@ def test_a_recording_of_some_members(folder, tmp_path, capsys, name):
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (["--members", "6"], "members = 6: is none of the 6 members; give indices from 0 to 5"),
-    (["--members", "a"], "--members a: is not a list of members; write --members 3,17"),
+    (["--members", "6"], "members = 6 is none of the 6 members. Give indices from 0 to 5"),
+    (["--members", "a"], "--members a is not a list of members. Write --members 3,17"),
     (["--members", ""], "is not a list of members"),
 ])  # fmt: skip
 def test_bad_members_are_refused(folder, tmp_path, capsys, arguments, words):
@@ -40,7 +40,7 @@ def test_bad_members_are_refused(folder, tmp_path, capsys, arguments, words):
 
 @pytest.mark.parametrize(
     ("name", "words", "code"),
-    [("none", "is not there; give the folder of a run or", 2), ("none.npz", "No such file", 1), ("study", "no run", 2)],
+    [("none", "is not there. Give the folder of a run or", 2), ("none.npz", "No such file", 1), ("study", "no run", 2)],
 )
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, name, words, code):
     (tmp_path / "study").mkdir()

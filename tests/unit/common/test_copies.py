@@ -44,14 +44,14 @@ def scaled(k):
 
 
 ERRORS = {
-    "SceneError": lambda: lw.SceneError(["mass = -1: is negative; give more"] * 30, 2),
+    "SceneError": lambda: lw.SceneError(["mass = -1 is negative. Give more"] * 30, 2),
     "MembersFailed": lambda: lw.MembersFailed("2 of 3 members failed", {"status": np.arange(3)}),
     "Interrupted": lambda: lw.Interrupted("interrupted: the first 2 members", {"status": np.arange(2)}),
     "FailedMembers": lambda: lw.uq.FailedMembers(["1 of 4 members failed"]),
     "MissingExtra": lambda: MissingExtra("plots", "matplotlib", "viz"),
     "NothingToDraw": lambda: NothingToDraw("no samples"),
-    "NotReal": lambda: NotReal("is not numeric", "give numbers"),
-    "UnreadableError": lambda: UnreadableError("is a pipe", "give a file"),
+    "NotReal": lambda: NotReal("is not numeric", "Give numbers"),
+    "UnreadableError": lambda: UnreadableError("is a pipe", "Give a file"),
 }
 
 

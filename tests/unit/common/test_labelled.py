@@ -160,7 +160,7 @@ FRAME = pd.DataFrame(columns())
 BAD = {
     "missing": (lambda: FRAME.drop(columns=MASS), ['X["vehicle.mass"]', "is missing", "vehicle.buoyancy"]),
     "extra": (lambda: FRAME.assign(id=1.0), ['X["id"]', "is not one of its columns"]),
-    "misspelt": (lambda: FRAME.rename(columns={MASS: "vehicle.masss"}), ["vehicle.masss", "did you mean 'vehicle.mass'"]),
+    "misspelt": (lambda: FRAME.rename(columns={MASS: "vehicle.masss"}), ["vehicle.masss", "Did you mean 'vehicle.mass'"]),
     "doubled": (lambda: pd.concat([FRAME, FRAME[[MASS]]], axis=1), ["columns of one name (vehicle.mass)"]),
     "without names": (lambda: pd.DataFrame(ROWS), ["no names of columns: they are called 0, 1, 2, 3, 4", "to_numpy()"]),
     "vector and entry": (lambda: columns() | {"current.velocity": ROWS[:, 2:]}, ["current.velocity[0]", "is given twice"]),

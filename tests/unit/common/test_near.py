@@ -56,7 +56,7 @@ def test_names_in_another_case():
 def test_public_names_that_are_nearly_right(door, word, name):
     module = getattr(lw, door) if door else lw
     assert set(name.split("' or '")) <= set(dir(module))
-    with pytest.raises(AttributeError, match=f"has no attribute '{word}'; did you mean '{name}'"):
+    with pytest.raises(AttributeError, match=f"has no attribute '{word}'. Did you mean '{name}'"):
         getattr(module, word)
     assert not hasattr(module, "__path_of_nothing__")
 
@@ -68,7 +68,7 @@ def test_public_names_that_are_nearly_right(door, word, name):
      ("terms", "Controller", "lw.Controller")],
 )  # fmt: skip
 def test_public_names_behind_another_door(place, word, name):
-    with pytest.raises(AttributeError, match=f"has no attribute '{word}'; did you mean '{name}'"):
+    with pytest.raises(AttributeError, match=f"has no attribute '{word}'. Did you mean '{name}'"):
         getattr(getattr(lw, place) if place else lw, word)
 
 
@@ -82,7 +82,7 @@ def test_options_by_the_names_of_arguments(capsys):
     for word, option in (("--dt", "--step"), ("--t1=3", "--duration"), ("--n", "--members"), ("--stpe", "--step")):
         with pytest.raises(SystemExit):
             cli.main(["run", "scene.toml", word, "3"])
-        assert f"is not known; did you mean '{option}'?" in capsys.readouterr().err
+        assert f"is not known. Did you mean '{option}'?" in capsys.readouterr().err
 
 
 def keywords(kind):
@@ -143,7 +143,7 @@ ELSEWHERE = {"dt": "h", "timestep": "h", "Metod": "method", "H": "h"}
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_unknown_keywords_name_the_nearest(name):
     for word, known in ELSEWHERE.items():
-        told = rf"^{name}\(\) got an unexpected keyword argument '{word}'; did you mean '{known}s?'"
+        told = rf"^{name}\(\) got an unexpected keyword argument '{word}'. Did you mean '{known}s?'"
         with pytest.raises(TypeError, match=told):
             FUNCTIONS[name](SCENE, **{word: 0.1})
     with pytest.raises(TypeError, match=r"known: .*\bh\b"):
@@ -159,7 +159,7 @@ def test_a_float_that_is_whole_is_refused_with_the_number_to_write():
     ):
         with pytest.raises(lw.SceneError) as refused:
             call()
-        says(str(refused.value), key, "whole number", "write 10000")
+        says(str(refused.value), key, "whole number", "Write 10000")
     with pytest.raises(lw.SceneError, match="give 1 or more"):
         lw.Ensemble(SCENE, members=1.5)
 

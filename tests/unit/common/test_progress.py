@@ -132,7 +132,7 @@ def test_true_is_cleaned_up_after_an_error():
 
 @pytest.mark.parametrize("wrong", ["yes", 1.0, 3])
 def test_what_is_no_function_is_refused(wrong):
-    with pytest.raises(lw.SceneError, match=r"progress = .*: is not a function; give True"):
+    with pytest.raises(lw.SceneError, match=r"progress = .* is not a function. Give True"):
         work([], progress=wrong)
 
 
@@ -200,7 +200,7 @@ def test_the_real_bar_of_tqdm_takes_the_same_calls():
     ids=lambda call: call.__qualname__,
 )
 def test_every_long_call_takes_true(call):
-    with pytest.raises(lw.SceneError, match="progress = 7: is not a function"):
+    with pytest.raises(lw.SceneError, match="progress = 7 is not a function"):
         call(None, *[None] * (2 if call in (lw.tune_gains, lw.worst_case) else call is lw.uq.evaluate),
              *[1.0] * (call is lw.suggest), progress=7)  # fmt: skip
 

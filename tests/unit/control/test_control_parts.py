@@ -75,7 +75,7 @@ def policy(tmp_path, arrays=ONE, **words):
     (ONE, {"scale": (1.0, 2.0)}, "policy.scale.*give 1"),
     (ONE, {"activation": "gelu"}, "policy.activation.*relu"),
     (ONE, {"checksum": 1}, "policy.checksum.*is not that of"),
-    ({"weights_0": np.ones((1, 1))}, {}, "policy.file.*has weights_0; save it by np.savez"),
+    ({"weights_0": np.ones((1, 1))}, {}, "policy.file.*has weights_0. Save it by np.savez"),
     ({}, {}, "policy.file.*has no arrays"),
     (ONE | {"biases_0": np.zeros(2)}, {}, r"policy.file.*weights_0 of shape \(1, 1\)"),
     (ONE | dict(weights_1=np.ones((1, 2)), biases_1=np.zeros(1)), {}, r"policy.file.*weights_1.*give \(n, 1\)"),

@@ -18,12 +18,12 @@ def scene(terms=(), **controller):
 
 @pytest.mark.parametrize(("h", "t1", "words"), [
     # The period is two of the steps that were asked for, and the end made other steps of them.
-    (0.03, 2.0, "controller.period = 0.06: is not a whole number of steps of 0.0298507463 s, which the end of the run and its "
-                "sample times have made of 0.03 s; give an end and sample times that are whole numbers of 0.03 s, or another"),
+    (0.03, 2.0, "controller.period = 0.06 is not a whole number of steps of 0.0298507463 s, which the end of the run and its "
+                "sample times have made of 0.03 s. Give an end and sample times that are whole numbers of 0.03 s, or another"),
     # It is none of either.
-    (0.04, 1.99, "steps of 0.0398 s, which the end of the run and its sample times have made of 0.04 s; give 0.0398 or "
+    (0.04, 1.99, "steps of 0.0398 s, which the end of the run and its sample times have made of 0.04 s. Give 0.0398 or "
                  "0.0796 s, or another step"),
-    (0.04, 2.0, "controller.period = 0.06: is not a whole number of steps of 0.04 s; give 0.04 or 0.08 s, or another step"),
+    (0.04, 2.0, "controller.period = 0.06 is not a whole number of steps of 0.04 s. Give 0.04 or 0.08 s, or another step"),
 ])  # fmt: skip
 def test_a_step_that_was_fitted_to_the_end_is_told(h, t1, words):
     with pytest.raises(lw.SceneError, match=re.escape(words)):
@@ -35,7 +35,7 @@ def test_a_delay_beside_a_fitted_step():
     with pytest.raises(lw.SceneError) as caught:
         lw.solve(loop, "psi_s", h=0.03, t1=2.0, threads=1)
     assert [fault.split(" = ")[0] for fault in caught.value.faults] == ["controller.period", "controller.delay"]
-    assert all("have made of 0.03 s; give an end" in fault for fault in caught.value.faults)
+    assert all("have made of 0.03 s. Give an end" in fault for fault in caught.value.faults)
 
 
 @pytest.mark.parametrize(

@@ -175,7 +175,7 @@ def test_the_coarsest_step_turns_by_an_angle(scene):
 def test_the_end_is_the_scenes_or_given(scene):
     assert tradeoff_by(Runs({}), fleet_of(scene), methods=["rk4"], t1=None, seconds=1e-6).t1 == scene.run.duration
     endless = fleet_of(dataclasses.replace(scene, run=dataclasses.replace(scene.run, duration=None)))
-    words = "t1 = None: is missing; give the end in seconds: t1=150.0 or [run] duration"
+    words = "t1 = None is missing. Give the end in seconds: t1=150.0 or [run] duration"
     assert words in refusal(lw.tradeoff, endless)
 
 
@@ -213,7 +213,7 @@ def test_a_scenes_own_draws_are_kept(scene):
     assert found.reference == "psi_s at h = 0.05 s against psi_x at h = 0.1 s"
     assert {plan.ensemble.scene.terms[0].noise_step for plan in (*runs.plans, *runs.priced)} == {0.05}
     assert {round(0.2 / h) for _, _, h in runs.settings} <= {1, 2, 4}
-    words = "noise_step = 0.3: does not divide the 0.2 s between the times of the comparison; give run.save_every"
+    words = "noise_step = 0.3 does not divide the 0.2 s between the times of the comparison. Give run.save_every"
     assert words in refusal(tradeoff_by, Runs({}), noisy(scene, 0.3))
     two = [dataclasses.replace(CURRENT, noise_step=step, name=f"c{step:g}") for step in (0.05, 0.1)]
     runs = Runs({"psi_s": 1e-3})
@@ -333,10 +333,10 @@ def test_a_mean_is_compared_by_the_end_of_its_interval(scene):
 
 
 @pytest.mark.parametrize(("of", "words"), [
-    ("mean attitude", "of = 'mean attitude': is not a mean of numbers; give the mean of an entry, such as 'mean attitude"),
+    ("mean attitude", "of = 'mean attitude' is not a mean of numbers. Give the mean of an entry, such as 'mean attitude"),
     ("mean mean depth", "is not a mean of numbers"),
-    (("depth", "speed"), "of = ('depth', 'speed'): is several quantities; errors are of one of them: give its name"),
-    ("max(depth)", "is taken over the whole path, and errors are of a quantity at each time; give 'depth', whose"),
+    (("depth", "speed"), "of = ('depth', 'speed') is several quantities; errors are of one of them: give its name"),
+    ("max(depth)", "is taken over the whole path, and errors are of a quantity at each time. Give 'depth', whose"),
 ])  # fmt: skip
 def test_quantities_that_cannot_be_compared_are_refused(of, words):
     assert words in refusal(lw.tradeoff, lw.Scene.named("sphere"), 1.0, of)
@@ -405,19 +405,19 @@ def test_a_reference_too_rough_is_refused_with_what_would_do(scene):
     said = refusal(tradeoff_by, early, fleet_of(scene), methods=["rk4"])
     assert said.startswith("no reference: rk8 at h = ")
     assert said.endswith(
-        "differ by 0.2 m after 0.2 s, and agree no better with shorter steps; give a shorter t1 (--duration)"
+        "differ by 0.2 m after 0.2 s, and agree no better with shorter steps. Give a shorter t1 (--duration)"
     )
     said = refusal(suggestion_by, late, fleet_of(scene), 1e-2, ["rk4"])
     assert said.startswith("error = 0.01 m of position up to 4 s cannot be checked: rk8 at h = ")
     assert "differ by 4.0e+00 m, and agree no better with shorter steps; " in said
-    assert said.endswith("; ask for t1 (--duration) up to 0.8 s, or for a larger error")
+    assert said.endswith(". Ask for t1 (--duration) up to 0.8 s, or for a larger error")
     said = refusal(suggestion_by, early, fleet_of(scene), 1e-2, ["rk4"])
-    assert "; ask for a shorter t1 (--duration), or for a larger error" in said
+    assert ". Ask for a shorter t1 (--duration), or for a larger error" in said
     said = refusal(suggestion_by, busy, fleet_of(scene), 1e-9, ["rk4"], seconds=1e-6)
     assert said.startswith("1e-06 s were over; ")
     assert " of position up to 4 s cannot be checked yet: rk8 at h" in said
     said = refusal(tradeoff_by, busy, fleet_of(scene), methods=["rk4"], seconds=1e-6)
-    assert said.startswith("1e-06 s were over; give more seconds. There is no reference: rk8 at h")
+    assert said.startswith("1e-06 s were over. Give more seconds. There is no reference: rk8 at h")
     failing = Runs({"rk8": math.inf})
     assert "differ by inf m after 0.2 s" in refusal(tradeoff_by, failing, fleet_of(scene), methods=["rk4"])
 
@@ -635,7 +635,7 @@ def test_biases_in_words():
 
 
 @pytest.mark.parametrize(("methods", "words"), [
-    (["psi_z"], "methods = 'psi_z': is not known; known: "), ([], "methods = []: is empty; name one method or more"),
+    (["psi_z"], "methods = 'psi_z' is not known. Known: "), ([], "methods = [] is empty. Name one method or more"),
 ])  # fmt: skip
 def test_methods_that_are_none_are_refused(scene, methods, words):
     assert words in refusal(lw.tradeoff, fleet_of(scene), 4.0, methods=methods)
@@ -835,7 +835,7 @@ def test_a_suggestion_is_the_cheapest_by_arithmetic(scene, error):
 def test_a_suggestion_that_no_step_keeps_is_refused(scene):
     with pytest.raises(lw.SceneError) as caught:
         suggestion_by(Runs({"psi_x": 1e12, "rk8": 0.0}), fleet_of(scene), 1e-3, ["psi_x"])
-    assert str(caught.value) == ("error = 0.001 m of position: no step of psi_x kept it; ask for a larger error or a shorter "
+    assert str(caught.value) == ("error = 0.001 m of position: no step of psi_x kept it. Ask for a larger error or a shorter "
                                  "t1")  # fmt: skip
 
 

@@ -47,7 +47,7 @@ def test_what_each_term_costs():
         assert (plan.method.name, plan.dtype, plan.grid.h, plan.ensemble.members) == ("rk4", "float64", 0.05, 64)
         assert not plan.ensemble.scene.events
     with pytest.raises(
-        lw.SceneError, match=r"scene\.terms: is empty; give the scene terms whose cost is to be measured"
+        lw.SceneError, match=r"scene\.terms is empty. Give the scene terms whose cost is to be measured"
     ):
         lw.bench.term_cost(speed.example())
 
@@ -90,7 +90,7 @@ def test_disagreement_is_above_its_bound():
     assert cost.disagreement([]) is None
     text = cost.disagreement([("b", 1.31), ("a", 2.0), ("b", 4.0), ("b", 3.0)])
     assert text == ("readings of cost disagree: their median is above the least, which is taken, for b (4 times), a (2 "
-                    "times); other programs run at the same time, and costs that lie closer are not told apart; run again "
+                    "times); other programs run at the same time, and costs that lie closer are not told apart. Run again "
                     "on an idle machine")  # fmt: skip
     assert " and 1 more; " in cost.disagreement([(f"m{i}", 2.0 + i) for i in range(7)])
     assert " more" not in cost.disagreement([(f"m{i}", 2.0 + i) for i in range(6)])
@@ -191,8 +191,8 @@ def test_a_damaged_file_is_said_to_be_damaged(tmp_path):
     for error in (ValueError("a"), KeyError("b"), TypeError("c"), AttributeError("d")):
         with pytest.raises(lw.SceneError) as caught, files.of_study(tmp_path / "x.json"):
             raise error
-        head = f"{tmp_path / 'x.json'}: is damaged, or of another version"
-        assert str(caught.value) == f"{head}: {error}; run the study again"
+        head = f"{tmp_path / 'x.json'} is damaged, or of another version"
+        assert str(caught.value) == f"{head}: {error}. Run the study again"
         assert caught.value.__cause__ is error
     with pytest.raises(lw.SceneError, match="itself"), files.of_study(tmp_path):
         raise lw.SceneError(["itself"])
@@ -208,10 +208,10 @@ def test_whose_members_a_study_is_about(scene):
     assert ensemble_of(scene).members == scene.ensemble_settings.members
     with pytest.raises(lw.SceneError) as caught:
         ensemble_of(3)
-    assert str(caught.value) == "fleet = 3: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"
+    assert str(caught.value) == "fleet = 3 is neither an Ensemble nor a Scene. Give lw.Scene(...) or lw.Ensemble(...)"
     with pytest.raises(lw.SceneError) as caught:
         scene_of(3, "scene")
-    assert str(caught.value) == "scene = 3: is neither an Ensemble nor a Scene; give lw.Scene(...) or lw.Ensemble(...)"
+    assert str(caught.value) == "scene = 3 is neither an Ensemble nor a Scene. Give lw.Scene(...) or lw.Ensemble(...)"
 
 
 def test_speeds_beside_the_peak_of_the_core():

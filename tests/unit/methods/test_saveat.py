@@ -70,7 +70,7 @@ def test_what_cannot_be_met_is_refused(h, t1, save, text):
 @pytest.mark.parametrize(("named", "text"), [
     ({"every": 0.0}, "every"), ({"every": -1.0}, "every"), ({"every": 1.0, "at": [1.0]}, "both"),
     ({"at": [2.0, 1.0]}, "rising"), ({"at": [-1.0]}, "rising"), ({"at": ["a"]}, "numeric"),
-    ({"fields": ("positon",)}, "did you mean 'position'"),
+    ({"fields": ("positon",)}, "Did you mean 'position'"),
 ])  # fmt: skip
 def test_faults_of_save_at(named, text):
     with pytest.raises(lw.SceneError, match=text):

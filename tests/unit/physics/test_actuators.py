@@ -34,17 +34,17 @@ def fins(**more):
 
 
 FAULTY_TERMS = {
-    "thrusters.table_commands = [0.0, 1.0]: is given alone": lambda: thrusters(table_commands=(0.0, 1.0)),
+    "thrusters.table_commands = [0.0, 1.0] is given alone": lambda: thrusters(table_commands=(0.0, 1.0)),
     "does not rise from below 0 through 0": lambda: thrusters(**TABLE | {"table_thrusts": (-8.0, 0.0, 5.0, 4.0)}),
     "count commands from the neutral one": lambda: thrusters(**TABLE | {"table_thrusts": (-8.0, 1.0, 5.0, 7.0)}),
     "is given beside a table": lambda: thrusters(**TABLE, polynomial=(1.0, 2.0)),
-    "torque_loss = [0.1, 0.1]: is given without torque_coefficient": lambda: thrusters(torque_loss=0.1),
+    "torque_loss = [0.1, 0.1] is given without torque_coefficient": lambda: thrusters(torque_loss=0.1),
     "thrusters.rate_limit": lambda: thrusters(rate_limit=-1.0),
     "give (n,) [N per unit^2], a table [N], or a polynomial [N]": lambda: lw.terms.Thrusters(**PAIR),
     "give it [1/rad], or a table of lift": lambda: lw.terms.ControlFins(**FIN),
     "does not begin with no lift at 0": lambda: fins(lift_angles=(0.1, 0.3), lift_coefficients=(0.0, 0.9)),
-    "control_fins.lift_angles = [0.0, 0.3]: is given alone": lambda: fins(lift_angles=(0.0, 0.3)),
-    "control_fins.flow_angle = 'no': is neither true nor false": lambda: fins(flow_angle="no"),
+    "control_fins.lift_angles = [0.0, 0.3] is given alone": lambda: fins(lift_angles=(0.0, 0.3)),
+    "control_fins.flow_angle = 'no' is neither true nor false": lambda: fins(flow_angle="no"),
     "control_fins.time_constant": lambda: fins(time_constant=-0.1),
 }
 
@@ -65,8 +65,8 @@ FAULTY_LOOPS = {
     "give 2, one for each channel of thrusters": lambda: scene(
         [thrusters()], laws=[HEADING], allocation=[lw.control.PseudoInverse(to="thrusters", weights=(1.0, 1.0, 1.0))]
     ),
-    "fault.known = 1: is neither true nor false": lambda: lw.control.Fault(of="thrusters", known=1),
-    "has 5 channels with known faults; let at most 4 be known": lambda: scene(
+    "fault.known = 1 is neither true nor false": lambda: lw.control.Fault(of="thrusters", known=1),
+    "has 5 channels with known faults. Let at most 4 be known": lambda: scene(
         [lw.terms.ControlWrench()],
         laws=[HEADING],
         faults=[lw.control.Fault(name=f"f{i}", of="control_wrench", channel=i, known=True) for i in range(5)],
@@ -176,7 +176,7 @@ def test_absent_numbers_are_no_parameters():
 )
 def test_members_bring_in_no_lag_or_limit_that_the_scene_has_not(has, varied):
     looped = scene([lw.terms.ControlWrench(**has)], laws=[HEADING])
-    with pytest.raises(SceneError, match=f"control_wrench.{varied} = .*: does not act: the scene has none; give"):
+    with pytest.raises(SceneError, match=f"control_wrench.{varied} = .* does not act: the scene has none. Give"):
         lw.Ensemble(looped, 4, 1, {f"control_wrench.{varied}": lw.distributions.Uniform(low=1.0, high=2.0)})
 
 
@@ -184,5 +184,5 @@ def test_one_number_stands_for_thrusters_alike():
     place = {"position": ((0.0, 0.2, 0.0), (0.0, -0.2, 0.0)), "direction": ((1.0, 0.0, 0.0),) * 2, "command": 1.0}
     alike, each = lw.terms.Thrusters(**place, coefficient=9.0), lw.terms.Thrusters(**place, coefficient=(9.0, 9.0))
     assert alike.to_dict() == each.to_dict()
-    with pytest.raises(lw.SceneError, match=r"^thrusters.coefficient = .*: has shape \(3,\); give 2 numbers"):
+    with pytest.raises(lw.SceneError, match=r"^thrusters.coefficient = .* has shape \(3,\). Give 2 numbers"):
         lw.terms.Thrusters(**place, coefficient=(9.0, 9.0, 9.0), coefficient_astern=1.0)

@@ -30,10 +30,10 @@ class Row(Buoys):
 
 
 @pytest.mark.parametrize(("numbers", "words"), [
-    ({"pull": 0.0}, "buoys.pull = 0.0: is not positive; give numbers above 0 to 5 [N]"),
-    ({"pull": 6.0}, "buoys.pull = 6.0: is out of bounds; give numbers above 0 to 5 [N]"),
-    ({"least_pull": 1.0}, "buoys.least_pull = 1.0: is out of bounds; give numbers above 1 [N]"),
-    ({"places": [0.0, 0.0]}, "buoys.places = [0.0, 0.0]: is not rising; sort the table and drop repetitions"),
+    ({"pull": 0.0}, "buoys.pull = 0.0 is not positive. Give numbers above 0 to 5 [N]"),
+    ({"pull": 6.0}, "buoys.pull = 6.0 is out of bounds. Give numbers above 0 to 5 [N]"),
+    ({"least_pull": 1.0}, "buoys.least_pull = 1.0 is out of bounds. Give numbers above 1 [N]"),
+    ({"places": [0.0, 0.0]}, "buoys.places = [0.0, 0.0] is not rising. Sort the table and drop repetitions"),
 ])  # fmt: skip
 def test_a_number_out_of_its_bounds(numbers, words):
     with pytest.raises(lw.SceneError) as error:
@@ -79,5 +79,5 @@ def test_a_number_of_another_shape_is_not_packed():
 
 
 def test_axes_that_are_not_known():
-    with pytest.raises(ValueError, match="axes = 'body': is not known; give 'vector', 'point' or None"):
+    with pytest.raises(ValueError, match=r"axes = 'body' is not known. Give 'vector', 'point' or None"):
         lw.laws.number((3,), "m", axes="body")

@@ -165,12 +165,12 @@ def test_places_of_the_cube_are_numbers_of_the_box():
 
 
 @pytest.mark.parametrize(("bounds", "words"), [
-    ({"vehicle.mass": (2.0, 2.0)}, 'over."vehicle.mass" = (2.0, 2.0): does not rise; give (low, high)'),
-    ({"vehicle.mass": (0.0, 2.0, "log")}, "has no logarithm; give bounds above 0"),
+    ({"vehicle.mass": (2.0, 2.0)}, 'over."vehicle.mass" = (2.0, 2.0) does not rise. Give (low, high)'),
+    ({"vehicle.mass": (0.0, 2.0, "log")}, "has no logarithm. Give bounds above 0"),
     ({"vehicle.mass": (1.0, 2.0, "lin")}, 'over."vehicle.mass"'), ({"vehicle.mass": (1.0,)}, 'over."vehicle.mass"'),
     ({"vehicle.mas": (1.0, 2.0)}, "vehicle.mas"), ({"x": 3}, '"x"'),
-    ({5: (1.0, 2.0)}, 'over = 5: is not a name of a number; give {"heading_pid.kp": (0.5, 5.0)}'),
-    ({}, 'over = {}: maps no names to bounds; give {"heading_pid.kp": (0.5, 5.0)}'), ([], "maps no names to bounds"),
+    ({5: (1.0, 2.0)}, 'over = 5 is not a name of a number. Give {"heading_pid.kp": (0.5, 5.0)}'),
+    ({}, 'over = {}: maps no names to bounds. Give {"heading_pid.kp": (0.5, 5.0)}'), ([], "maps no names to bounds"),
 ])  # fmt: skip
 def test_bounds_that_are_none(bounds, words):
     with pytest.raises(lw.SceneError) as caught:
@@ -198,7 +198,7 @@ def test_risks_at_their_ends():
         assert faults
     for wrong in (0.0, 1.1, -1.0):
         with pytest.raises(
-            lw.SceneError, match=r"CVaR\.share = .*: is not a part; give a number in \(0, 1\], such as 0\.05"
+            lw.SceneError, match=r"CVaR\.share = .* is not a part. Give a number in \(0, 1\], such as 0\.05"
         ):
             lw.metrics.CVaR(wrong)
     given = lw.metrics.CVaR(0.3)
@@ -236,7 +236,7 @@ def test_numbers_of_quantities_and_of_metrics(monkeypatch):
     assert plain(lambda run: run(None)).tolist() == [1.0, np.inf]
     assert told.asked == [((SCENE, ["a"], "max(depth)"), {"failed": "nan", "h": 0.1})]
     assert numbers.Numbers(SCENE, None, "of", test_risks_at_their_ends, {}).label == "test_risks_at_their_ends"
-    with pytest.raises(lw.SceneError, match="of = '3 numbers': is not a single number; name one of its entries"):
+    with pytest.raises(lw.SceneError, match=r"of = '3 numbers' is not a single number. Name one of its entries"):
         plain(lambda run: np.zeros((2, 3)))
     for of in ("iae depth", lw.metrics.IAE("depth"), {"type": "iae", "of": "depth"}):
         told.asked.clear()
@@ -282,7 +282,7 @@ def test_the_worst_case_of_a_sum(monkeypatch):
         assert failed.runs < 100
     assert lost.asked
     for budget in (15, 16.0):
-        with pytest.raises(lw.SceneError, match=r"budget = .*: is less than a generation; give 16 or more"):
+        with pytest.raises(lw.SceneError, match=r"budget = .* is less than a generation. Give 16 or more"):
             worst_case.worst_case(SCENE, OVER, "depth", budget=budget)
     assert worst_case.worst_case(SCENE, {"vehicle.mass": (1.0, 2.0)}, "depth", budget=16).runs <= 16
 
@@ -349,16 +349,16 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     assert tune.tune_gains(fleet, OVER, "depth", budget=200).parameters["vehicle.mass"] <= 2.0
     assert lost.asked
     for budget, words in (
-        (79, "budget = 79: is less than a generation of all members; give 80 or more"),
+        (79, "budget = 79 is less than a generation of all members. Give 80 or more"),
         (1e3, "budget = 1000.0"),
     ):
         with pytest.raises(lw.SceneError) as caught:
             tune.tune_gains(fleet, OVER, "depth", budget=budget)
         assert words in str(caught.value)
-    with pytest.raises(lw.SceneError, match="varies by member too; leave it out of one of them"):
+    with pytest.raises(lw.SceneError, match=r"varies by member too. Leave it out of one of them"):
         tune.tune_gains(fleet, {"start.position[0]": (0.0, 1.0)}, "depth")
     for fresh in (-1, 1.5):
-        with pytest.raises(lw.SceneError, match="is not a number of members; give a whole number, 0 for none"):
+        with pytest.raises(lw.SceneError, match=r"is not a number of members. Give a whole number, 0 for none"):
             tune.tune_gains(fleet, OVER, "depth", fresh=fresh)
 
 

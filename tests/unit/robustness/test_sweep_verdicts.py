@@ -93,7 +93,7 @@ def test_files_and_words_have_the_verdicts(answer, tmp_path):
 
 
 @pytest.mark.parametrize(("matters", "words"), [
-    ({"overshot heading": 1.0}, "matters.\"overshot heading\" = 1.0: is not a metric of this sweep; did you mean 'overshoot"),
+    ({"overshot heading": 1.0}, "matters.\"overshot heading\" = 1.0 is not a metric of this sweep. Did you mean 'overshoot"),
     ({"success": -1.0}, 'matters."success" = -1.0'), ("much", 'matters."success" = \'much\''),
 ])  # fmt: skip
 def test_what_matters_is_a_number_of_what_there_is(matters, words, answer):

@@ -116,7 +116,7 @@ def test_rows_count_and_summarize_members_that_did_not_fail(answer):
     assert end == pytest.approx([4.0, np.nan, 4.0, N - 1], nan_ok=True)
     assert np.isnan(soft["time_to_failure mean"])
     assert np.isnan(soft["time_to_failure q05"])
-    refused = "\"heading_pid.kq\" = 1.0: is not a number of this scene; did you mean 'heading_pid.kp'?"
+    refused = "\"heading_pid.kq\" = 1.0 is not a number of this scene. Did you mean 'heading_pid.kp'?"
     assert unknown == {"case": "unknown", "refused": refused}
 
 
@@ -313,18 +313,18 @@ def test_members_that_pass_and_that_do_not(answer):
 
 
 @pytest.mark.parametrize(("ask", "words"), [
-    (lambda answer: answer.cells_of("sof"), "case = 'sof': is not part of this sweep; did you mean 'soft'"),
+    (lambda answer: answer.cells_of("sof"), "case = 'sof' is not part of this sweep. Did you mean 'soft'"),
     (lambda answer: answer.cells_of("soft", {"controller.dela": 0.02}),
-     "at = 'controller.dela': is not an axis of the grid; did you mean 'controller.delay'"),
+     "at = 'controller.dela' is not an axis of the grid. Did you mean 'controller.delay'"),
     (lambda answer: answer.cells_of("soft", {"controller.delay": 0.03}),
-     'at["controller.delay"] = 0.03: is not a value of this axis; give one of [0.02, 0.04]'),
+     'at["controller.delay"] = 0.03 is not a value of this axis. Give one of [0.02, 0.04]'),
     (lambda answer: answer.cell("soft"),
-     "at = None: leaves 2 cells of 'soft'; name one point of the grid: at={'controller.delay': 0.02}"),
+     "at = None leaves 2 cells of 'soft'. Name one point of the grid: at={'controller.delay': 0.02}"),
     (lambda answer: answer.values("soft", "iae", {"controller.delay": 0.02}),
-     "metric = 'iae': is not part of this sweep; did you mean 'iae heading'?"),
+     "metric = 'iae' is not part of this sweep. Did you mean 'iae heading'?"),
     (lambda answer: answer.values("soft", "zzz", {"controller.delay": 0.02}),
-     "metric = 'zzz': is not part of this sweep; known: overshoot heading, iae heading, time_to_failure"),
-    (lambda answer: answer.worst(by="iae"), "by = 'iae': is not a metric of this sweep; did you mean 'iae heading'?"),
+     "metric = 'zzz' is not part of this sweep. Known: overshoot heading, iae heading, time_to_failure"),
+    (lambda answer: answer.worst(by="iae"), "by = 'iae' is not a metric of this sweep. Did you mean 'iae heading'?"),
 ])  # fmt: skip
 def test_what_a_sweep_has_not_is_refused_with_what_it_has(gridded, ask, words):
     with pytest.raises(lw.SceneError) as caught:
@@ -333,9 +333,9 @@ def test_what_a_sweep_has_not_is_refused_with_what_it_has(gridded, ask, words):
 
 
 def test_a_refused_case_is_named_where_it_is_asked_for(answer):
-    with pytest.raises(lw.SceneError, match=r"case = 'unknown': was refused: .*; correct it, or choose another one"):
+    with pytest.raises(lw.SceneError, match=r"case = 'unknown' was refused: .*. Correct it, or choose another one"):
         answer.cell("unknown")
-    with pytest.raises(lw.SceneError, match="case = 'unknown': was refused; run a member of another one"):
+    with pytest.raises(lw.SceneError, match=r"case = 'unknown' was refused. Run a member of another one"):
         setup.rerun_members_of(answer.setup, answer.cells[2], [0], None, None)
     assert answer.cells[2].fleet is None
     assert [cell.index for cell in answer.cells] == [0, 1, 2]
@@ -351,7 +351,7 @@ SUMMARY = """# Sweep
 
 - soft: passes 54.57 to 81.93 % (28 of 40, 70 %)
 - stiff: passes 62.5 to 87.68 % (31 of 40, 77.5 %)
-- unknown: refused: "heading_pid.kq" = 1.0: is not a number of this scene; did you mean 'heading_pid.kp'?
+- unknown: refused: "heading_pid.kq" = 1.0 is not a number of this scene. Did you mean 'heading_pid.kp'?
 
 ## Rank
 
@@ -481,16 +481,16 @@ def test_cases_are_read_from_lists_and_tables():
 
 
 @pytest.mark.parametrize(("supplied", "faults"), [
-    ("pid", ["cases = 'pid': is not a list of cases"]), ([], ["cases = []: is not a list of cases"]),
-    (3, ["cases = 3: is not a list of cases"]),
-    ([{"set": {}}, "b"], ["cases[0] = {'set': {}}: has no name", "cases[1] = 'b': has no name"]),
+    ("pid", ["cases = 'pid' is not a list of cases"]), ([], ["cases = [] is not a list of cases"]),
+    (3, ["cases = 3 is not a list of cases"]),
+    ([{"set": {}}, "b"], ["cases[0] = {'set': {}} has no name", "cases[1] = 'b' has no name"]),
     ([{"name": "a", "sets": {}}, {"name": "b", "set": 3}],
-     ["did you mean 'set'", "case 'b': set = 3: is not a table; write set = { \"heading_pid.kp\" = 2.0 }"]),
-    ([{"name": ""}], ["case '': name = '': is not a name; give name = \"pid\""]),
-    ([{"name": 3}], ["cases: name = 3: is not a name"]),
-    ([{"name": "a", "replace": []}], ["case 'a': replace = []: is not a table; write replace = { laws = [...] }"]),
-    ([{"name": "a", "scene": "x.toml"}], ["case 'a': scene = 'x.toml': is not a Scene; give lw.Scene.load(path)"]),
-    ([{"name": "a"}, {"name": "b"}, {"name": "a"}, {"name": "a"}], ["cases = 'a': is the name of 3 cases"]),
+     ["Did you mean 'set'", "case 'b': set = 3 is not a table. Write set = { \"heading_pid.kp\" = 2.0 }"]),
+    ([{"name": ""}], ["case '': name = '' is not a name. Give name = \"pid\""]),
+    ([{"name": 3}], ["cases: name = 3 is not a name"]),
+    ([{"name": "a", "replace": []}], ["case 'a': replace = [] is not a table. Write replace = { laws = [...] }"]),
+    ([{"name": "a", "scene": "x.toml"}], ["case 'a': scene = 'x.toml' is not a Scene. Give lw.Scene.load(path)"]),
+    ([{"name": "a"}, {"name": "b"}, {"name": "a"}, {"name": "a"}], ["cases = 'a' is the name of 3 cases"]),
 ])  # fmt: skip
 def test_cases_that_are_none_are_refused_all_at_once(supplied, faults):
     with pytest.raises(lw.SceneError) as caught:
@@ -514,7 +514,7 @@ def test_a_case_changes_numbers_lists_vehicle_and_scene():
     drag = {term.key: term for term in changed.terms}["drag"]
     assert (list(drag.quadratic), list(drag.linear)) == ([1.0, 0, 0, 0, 0, 3.0], [0, 0, 0, 2.0, 2.0, 2.0])
     assert SCENE.with_numbers({}) is SCENE
-    with pytest.raises(lw.SceneError, match="vehicle = 3: is not a Vehicle; give"):
+    with pytest.raises(lw.SceneError, match=r"vehicle = 3 is not a Vehicle. Give"):
         cases.Case("a", vehicle=3).of(SCENE)
 
 
@@ -536,13 +536,13 @@ def test_lists_replace_and_terms_join():
 
 
 @pytest.mark.parametrize(("scene", "change", "words"), [
-    (SCENE, {"replace": {"law": []}}, "replace.law = '...': is not a list of a scene; did you mean 'laws'"),
+    (SCENE, {"replace": {"law": []}}, "replace.law = '...' is not a list of a scene. Did you mean 'laws'"),
     (BARE, {"replace": {"laws": []}},
-     "replace.laws = '...': is a list of a controller, which this scene has not; give the whole controller"),
-    (SCENE, {"set": {"heading_pid.kq": 1.0}}, "\"heading_pid.kq\" = 1.0: is not a number of this scene; did you mean"),
+     "replace.laws = '...' is a list of a controller, which this scene has not. Give the whole controller"),
+    (SCENE, {"set": {"heading_pid.kq": 1.0}}, "\"heading_pid.kq\" = 1.0 is not a number of this scene. Did you mean"),
     (SCENE, {"set": {"drag.linear[9]": 1.0}},
-     '"drag.linear[9]" = 1.0: is not a number of drag.linear, of shape (6,); give an existing one'),
-    (SCENE, {"set": {"drag.linear[0]": "a"}}, '"drag.linear[0]" = \'a\': is not a number of drag.linear, of shape (6,)'),
+     '"drag.linear[9]" = 1.0 is not a number of drag.linear, of shape (6,). Give an existing one'),
+    (SCENE, {"set": {"drag.linear[0]": "a"}}, '"drag.linear[0]" = \'a\' is not a number of drag.linear, of shape (6,)'),
 ])  # fmt: skip
 def test_what_does_not_fit_a_scene_is_refused(scene, change, words):
     with pytest.raises(lw.SceneError) as caught:
@@ -551,10 +551,10 @@ def test_what_does_not_fit_a_scene_is_refused(scene, change, words):
 
 
 @pytest.mark.parametrize(("supplied", "words"), [
-    ([1.0], "grid = [1.0]: is not a table"),
-    ({"a": "bc"}, "grid.\"a\" = 'bc': is not a list of values; give [0.0, 0.1, 0.2]"),
-    ({"a": []}, 'grid."a" = []: is not a list of values'), ({"a": 3.0}, 'grid."a" = 3.0: is not a list of values'),
-    ({"a": [1.0, 2.0, 1.0]}, 'grid."a" = [1.0, 2.0, 1.0]: has a value twice; keep one of them'),
+    ([1.0], "grid = [1.0] is not a table"),
+    ({"a": "bc"}, "grid.\"a\" = 'bc' is not a list of values. Give [0.0, 0.1, 0.2]"),
+    ({"a": []}, 'grid."a" = [] is not a list of values'), ({"a": 3.0}, 'grid."a" = 3.0 is not a list of values'),
+    ({"a": [1.0, 2.0, 1.0]}, 'grid."a" = [1.0, 2.0, 1.0] has a value twice. Keep one of them'),
 ])  # fmt: skip
 def test_grids_that_are_none_are_refused(supplied, words):
     with pytest.raises(lw.SceneError) as caught:
@@ -584,7 +584,7 @@ def test_what_a_case_sets_does_not_vary_in_it():
     assert cases.ensemble_of(SCENE, {}, vary, like)[1] == []
     other = lw.Ensemble(SCENE, 8, 3, vary, "sobol")
     assert cases.ensemble_of(SCENE, {}, vary, other)[0].sampling.kind == "sobol"
-    with pytest.raises(lw.SceneError, match=r"vary = 'heading_pid\.kp': does not vary here, and with sampling 'sobol'"):
+    with pytest.raises(lw.SceneError, match=r"vary = 'heading_pid\.kp' does not vary here, and with sampling 'sobol'"):
         cases.ensemble_of(BARE, {}, vary, other)
 
 
@@ -629,12 +629,12 @@ def test_conditions_are_read_and_written():
     with pytest.raises(lw.SceneError) as caught:
         success.success_of({"status": 3, "z": {}, "x": {}, "y": {"below": "a"}}, ("x", "y"))
     for words in ("success.status = 3",
-                  'success."z" = \'...\': is not a metric of this sweep', 'success."x" = {}: is not a condition',
+                  'success."z" = \'...\' is not a metric of this sweep', 'success."x" = {} is not a condition',
                   'success."y".below'):  # fmt: skip
         assert words in str(caught.value)
     with pytest.raises(lw.SceneError, match=r"give metrics=\[...\]"):
         success.success_of({"z": {"below": 1.0}}, ())
-    with pytest.raises(lw.SceneError, match="success = 3: is not a table"):
+    with pytest.raises(lw.SceneError, match="success = 3 is not a table"):
         success.success_of(3, ())
 
 
@@ -757,18 +757,18 @@ def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    ({"scene": 3}, "scene = 3: is neither a scene nor an ensemble; give lw.Scene.load(path)"),
+    ({"scene": 3}, "scene = 3 is neither a scene nor an ensemble. Give lw.Scene.load(path)"),
     ({"scene": lw.Ensemble(SCENE, 6, 7).subset([1, 2])}, "has members that were given or chosen one by one"),
-    ({"vary": [1]}, "vary = [1]: does not map names to distributions"),
-    ({"metrics": "iae heading"}, "metrics = 'iae heading': is not a list"),
-    ({"metrics": {"type": "iae"}}, "is not a list; give [\"overshoot depth\", lw.metrics.IAE(\"heading\")]"),
-    ({"metrics": ["depth"]}, "metrics[0] = 'depth': is not one number of each member; give \"overshoot depth\""),
+    ({"vary": [1]}, "vary = [1] does not map names to distributions"),
+    ({"metrics": "iae heading"}, "metrics = 'iae heading' is not a list"),
+    ({"metrics": {"type": "iae"}}, "is not a list. Give [\"overshoot depth\", lw.metrics.IAE(\"heading\")]"),
+    ({"metrics": ["depth"]}, "metrics[0] = 'depth' is not one number of each member. Give \"overshoot depth\""),
     ({"metrics": ["iae heading", {"type": "settling_time", "of": "depth", "within": -1.0}]},
-     "metrics[1]: settling_time.within = -1.0: is not positive; give a number above 0"),
-    ({"metrics": ["iae heading", lw.statistics.Mean("depth")]}, "metrics[1] = 'mean': is not a metric: it is not one number"),
-    ({"metrics": ["iae heading", lw.metrics.IAE("heading")]}, "metrics[1] = 'iae heading': is the name of another metric"),
-    ({"confidence": 0.0}, "confidence = 0.0: is not between 0 and 1; give 0.95"),
-    ({"confidence": 1.0}, "confidence = 1.0: is not between 0 and 1"),
+     "metrics[1]: settling_time.within = -1.0 is not positive. Give a number above 0"),
+    ({"metrics": ["iae heading", lw.statistics.Mean("depth")]}, "metrics[1] = 'mean' is not a metric: it is not one number"),
+    ({"metrics": ["iae heading", lw.metrics.IAE("heading")]}, "metrics[1] = 'iae heading' is the name of another metric"),
+    ({"confidence": 0.0}, "confidence = 0.0 is not between 0 and 1. Give 0.95"),
+    ({"confidence": 1.0}, "confidence = 1.0 is not between 0 and 1"),
 ])  # fmt: skip
 def test_what_a_sweep_is_asked_wrongly_is_refused(arguments, words):
     arguments = {"scene": SCENE, "members": N, "metrics": METRICS} | arguments
@@ -780,7 +780,7 @@ def test_what_a_sweep_is_asked_wrongly_is_refused(arguments, words):
 def test_ten_thousand_cells_are_not_too_many():
     grid = {"run.step": [0.01 * i for i in range(1, 101)], "run.duration": list(range(1, 103))}
     refused = mock.Mock(side_effect=lw.SceneError(["no"]))
-    told = r"10,200 cells': are 40 members each; give at most 10,000 cells, or vary a number"
+    told = r"10,200 cells' are 40 members each. Give at most 10,000 cells, or vary a number"
     with pytest.raises(lw.SceneError, match=told):
         setup.setup_of(SCENE, None, grid, None, N, None, None, [], {}, predict=refused)
     grid["run.duration"] = list(range(1, 101))
@@ -869,15 +869,15 @@ vehicle = { mass = 52.0 }
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ("members = 3", ["scene = '': is not a path of a scene file; write scene = \"remus_autopilot.toml\""]),
+    ("members = 3", ["scene = '' is not a path of a scene file. Write scene = \"remus_autopilot.toml\""]),
     ("scene = 3\nvary = 4\ncases = {}\nmetrics = 'a'\nbig = 1",
-     ["scene = 3: is not a path", "vary = 4: is not a table; see docs/guide/is_my_controller_robust.md", "cases = {}: is not",
-      "metrics = 'a': is not a list", "big"]),
+     ["scene = 3 is not a path", "vary = 4 is not a table. See docs/guide/is_my_controller_robust.md", "cases = {} is not",
+      "metrics = 'a' is not a list", "big"]),
     ("scene = 's.toml'\ncompare = { base = 1 }\nrun = { steps = 1 }\ncases = [3, { name = 'a', scene = 4 }]",
-     ["compare.base", "run.steps", "cases = 3: is not a table", "cases.scene = 4: is not a path of a scene file"]),
+     ["compare.base", "run.steps", "cases = 3 is not a table", "cases.scene = 4 is not a path of a scene file"]),
     ("scene = 's.toml'\nvary = { a = 3, b = { normal = { st = 1.0 } } }", ['vary."a"', 'vary."b"']),
     ("scene = 's.toml'\ncases = [{ name = 'a', vehicle = { name = 'spher' } }, { name = 'b', scene = 'none.toml' }]",
-     ["case 'a': ", "did you mean 'sphere'", "case 'b': ", "none.toml"]),
+     ["case 'a': ", "Did you mean 'sphere'", "case 'b': ", "none.toml"]),
 ])  # fmt: skip
 def test_sweep_files_at_fault_are_refused_with_every_fault(tmp_path, text, words):
     (tmp_path / "s.toml").write_text("[vehicle]\nmass = 50.0\ninertia = [4.0, 5.0, 6.0]\n")

@@ -171,7 +171,7 @@ def test_a_scene_file_holds_them(key, law):
 
 def test_a_scene_file_holds_no_functions():
     for table in ({"derived": {"k": {"normal": {"std": 0.1}}}}, {"openturns": {"law": "Gamma"}}):
-        with pytest.raises(lw.SceneError, match=r"which a file does not hold; give the ensemble again"):
+        with pytest.raises(lw.SceneError, match=r"which a file does not hold. Give the ensemble again"):
             D.Normal
             from_dict(scene().to_dict() | {"ensemble": {"members": 2, "vary": {MASS: table}}})
 
@@ -179,20 +179,20 @@ def test_a_scene_file_holds_no_functions():
 @pytest.mark.parametrize(
     ("law", "text"),
     [
-        (lambda: D.KernelDensity([1.0]), r"have shape \(1,\); give"),
-        (lambda: D.KernelDensity([1.0, 1.0]), "do not vary; give a bandwidth"),
+        (lambda: D.KernelDensity([1.0]), r"have shape \(1,\). Give"),
+        (lambda: D.KernelDensity([1.0, 1.0]), "do not vary. Give a bandwidth"),
         (lambda: D.KernelDensity([1.0, 2.0], 0.0), "is not above 0"),
         (lambda: D.KernelDensity([1.0, np.nan]), "draws"),
         (lambda: D.Copula([[1, 2], [2, 1]], [D.Normal(std=1), D.Normal(std=1)]), "is not positive semidefinite"),
         (lambda: D.Copula(np.eye(3), [D.Normal(std=1), D.Normal(std=1)]), "does not fit 2 marginals"),
         (
             lambda: D.Copula(np.eye(2), [D.Normal(std=1), 3.0]),
-            r"marginals.1 = 3.0: is not a distribution of a single number",
+            r"marginals.1 = 3.0 is not a distribution of a single number",
         ),
         (lambda: D.Copula(np.eye(1), []), "are no list of distributions"),
         (lambda: D.Derived({MASS: 3.0}, k=D.Normal(std=1)), "is not a function"),
         (lambda: D.Derived({MASS: lambda q: q}, k=D.Normal(std=1)), "is not a factor, of k"),
-        (lambda: D.Derived({MASS: lambda k: k}), "factors = None: are missing"),
+        (lambda: D.Derived({MASS: lambda k: k}), "factors = None are missing"),
     ],
 )
 def test_what_is_wrong_is_refused(law, text):

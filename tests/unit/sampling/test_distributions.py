@@ -158,7 +158,7 @@ def test_far_tails_against_scipy(bound):
 
 def test_a_law_relative_to_nothing_is_refused(scene):
     for law in (Normal(relative=0.1), Uniform(relative=0.1), LogNormal(sigma=0.1)):
-        with pytest.raises(lw.SceneError, match=r"0, so that its \w+ varies nothing; give an absolute spread"):
+        with pytest.raises(lw.SceneError, match=r"0, so that its \w+ varies nothing. Give an absolute spread"):
             lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": law})
     lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy": Normal(relative=0.1)})  # one entry is not 0
     lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": Normal(relative=0.0)})
@@ -256,13 +256,13 @@ def test_there_and_back(law):
 @pytest.mark.parametrize("content, text", [
     (3.0, "is not a distribution"), ({}, "is not a distribution"),
     ({"normal": {"std": 1.0}, "uniform": {}}, "is not a distribution"),
-    ({"gaussian": {"std": 1.0}}, "known: normal, uniform"), ({"normal": 1.0}, "is not a table"),
-    ({"normal": {"sd": 1.0}}, "did you mean 'std'?"), ({"normal": {"std": -1.0}}, "negative"),
-    ({"gamma": {"scale": 3.0}}, "key.gamma.a = None: is missing"),
-    ({"gamma": {"a": 1.0, "sale": 3.0}}, "did you mean 'scale'"), ({"gamma": {"a": -1.0}}, "scipy.stats refuses"),
+    ({"gaussian": {"std": 1.0}}, "Known: normal, uniform"), ({"normal": 1.0}, "is not a table"),
+    ({"normal": {"sd": 1.0}}, "Did you mean 'std'?"), ({"normal": {"std": -1.0}}, "negative"),
+    ({"gamma": {"scale": 3.0}}, "key.gamma.a = None is missing"),
+    ({"gamma": {"a": 1.0, "sale": 3.0}}, "Did you mean 'scale'"), ({"gamma": {"a": -1.0}}, "scipy.stats refuses"),
     ({"gamma": {"a": "x"}}, "not numeric"), ({"scipy": {"name": "gama"}}, "not a distribution of scipy.stats"),
     ({"scipy": {}}, "not a distribution of scipy.stats"), ({"scipy": 3}, "is not a table"),
-    ({"gammma": {"a": 1.0}}, "did you mean 'gamma'"),
+    ({"gammma": {"a": 1.0}}, "Did you mean 'gamma'"),
     ({"histogram": {"counts": [0.0], "edges": [0.0, 1.0]}}, "weigh no bin"),
     ({"histogram": {"counts": [1.0], "edges": [0.0]}}, "bound 1"),
     ({"histogram": {"counts": [1.0, 1.0], "edges": [0.0, 1.0, 1.0]}}, "rising"),

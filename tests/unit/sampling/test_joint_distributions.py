@@ -298,11 +298,11 @@ def test_whatever_has_quantiles_is_a_law(scene):
     fleet = lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": Triangle()})
     assert fleet.to_dict()["vary"] == {"vehicle.buoyancy": {"own": {"law": "Triangle()"}}}
     with pytest.raises(
-        lw.SceneError, match="distribution of your own, which a file does not hold; give the ensemble again"
+        lw.SceneError, match=r"distribution of your own, which a file does not hold. Give the ensemble again"
     ):
         from_dict("key", {"own": {"law": "Triangle()"}})
     for nothing in (3.0, "wide", Triangle, np.ones(3)):
-        with pytest.raises(lw.SceneError, match="is not a distribution; give"):
+        with pytest.raises(lw.SceneError, match=r"is not a distribution. Give"):
             lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": nothing})
     with pytest.raises(lw.SceneError, match=r"distribution = .* gives no numbers"):
         lw.Ensemble(scene, 4, vary={"vehicle.buoyancy": type("Bad", (), {"ppf": lambda self, u: "x"})()})

@@ -123,13 +123,13 @@ def test_the_last_members_there_can_be(scene, content):
 def test_no_sampling_has_more_members_than_there_can_be(scene):
     for content in ("random", "sobol", {"sobol": {"replicates": 64}}, "halton"):
         (fault,) = faults(lw.Ensemble, scene, MOST_MEMBERS + 64, 0, None, content)
-        says(fault, "ensemble.members = 2147483712: are more members than the 2147483648", "or less")
+        says(fault, "ensemble.members = 2147483712 are more members than the 2147483648", "or less")
     uniform = Uniform(low=0.0, high=1.0)
     names = ("start.position", "start.angular_velocity")
     grid = {"grid": dict.fromkeys(names, 3000)}
     content = scene.to_dict() | {"ensemble": {"vary": dict.fromkeys(names, uniform.to_dict()), "sampling": grid}}
     (fault,) = faults(lw.Scene.from_dict, content)
-    assert f"ensemble.sampling.grid = {3000**6}: are more members" in fault
+    assert f"ensemble.sampling.grid = {3000**6} are more members" in fault
     assert "fewer values" in fault
     # Beyond whole numbers of 64 bits.
     assert "more members" in faults(lw.Ensemble, scene, None, 0, {names[0]: uniform}, Grid({names[0]: 10**30}))[0]
@@ -400,7 +400,7 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
     frame.to_csv(path)
     found = faults(Table, path, columns=["vehicle.mass", "id"])
     assert len(found) == 2
-    assert all('leave the column out: ignore = ["id"]' in fault for fault in found)
+    assert all('Leave the column out: ignore = ["id"]' in fault for fault in found)
     tables = [Table(path, ignore=["", "id"]), Table(path, columns=("start.position[2]", "vehicle.mass")),
               Table(frame, ignore=["id"]),
               Table(values=frame, columns=["vehicle.mass", "start.position[2]"])]  # fmt: skip
@@ -492,15 +492,15 @@ def test_a_scene_file_names_its_sampling(tmp_path):
 @pytest.mark.parametrize(
     ("content", "members", "texts"),
     [
-        ("sobbol", 8, ["did you mean 'sobol'?"]),
+        ("sobbol", 8, ["Did you mean 'sobol'?"]),
         (3, 8, ["is not a sampling"]),
         ({"sobol": {}, "halton": {}}, 8, ["is not a sampling"]),
         ({"sobol": 3}, 8, ["is not a table"]),
         ({"sobol": {"scramble": True}}, 8, ["unknown key"]),
-        ({"sobol": {"replicates": 12}}, 24, ["ensemble.sampling.sobol.replicates = 12", "not a power of two", "give 8, 16"]),
+        ({"sobol": {"replicates": 12}}, 24, ["ensemble.sampling.sobol.replicates = 12", "not a power of two", "Give 8, 16"]),
         ({"sobol": {"replicates": 128}}, 128, ["replicates = 128"]),
         ({"halton": {"replicates": True}}, 8, ["replicates = True"]),
-        ({"halton": {"replicate": 8}}, 8, ["did you mean 'replicates'?"]),
+        ({"halton": {"replicate": 8}}, 8, ["Did you mean 'replicates'?"]),
         ({"sobol": {"replicates": 16}}, 40, ["groups of 16", "32 or 48"]),
         ({"latin_hypercube": {"group": 16, "replicates": 4}}, 80, ["groups of 64", "64 or 128"]),
         ("latin_hypercube", 8, ["group = None", "is missing", "256"]),
@@ -517,7 +517,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"grid": {"vehicle.mass": -3}}, None, ["whole number from 1"]),
         ({"grid": {"vehicle.mass": True}}, None, ["not numeric"]),
         ({"latin_hypercube": {"group": 30}}, 80, ["not a whole number of groups of 30", "60 or 90"]),
-        ("saltelli", 13, ["groups of 14", "give 14"]),
+        ("saltelli", 13, ["groups of 14", "Give 14"]),
         ({"saltelli": {"second_order": 1}}, 14, ["second_order = 1"]),
         ("morris", 20, ["groups of 7", "14 or 21"]),
         ({"morris": {"levels": 5}}, 7, ["levels = 5"]),
@@ -531,18 +531,18 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"table": {"file": "/nowhere.csv"}}, None, ["cannot be read"]),
         ({"table": {"values": {"environment.gravity": [9.8], "environment.water_density": [1.0, 2.0]}}}, None,
          ["lengths"]),
-        ({"table": {"values": {"environment.gravity": [9.8], "environment.gravty": [1.0]}}}, None, ["did you mean"]),
-        ({"table": {"values": {"vehicle.mass": [9.8]}}}, None, ["varied by", "keep one"]),
+        ({"table": {"values": {"environment.gravity": [9.8], "environment.gravty": [1.0]}}}, None, ["Did you mean"]),
+        ({"table": {"values": {"vehicle.mass": [9.8]}}}, None, ["varied by", "Keep one"]),
         ({"table": {"values": {"vehicle.center_of_buoyancy": [9.8]}}}, None, ["shape (1,)", "(1, 3)"]),
         ({"table": {"values": {"environment.gravity": [9.8, 9.9]}}}, 5, ["more than the 2 of the table", "2 or less"]),
-        ({"table": {"values": {"id": [1.0], "environment.gravity": [9.8]}}}, None, ['leave it out: ignore = ["id"]']),
+        ({"table": {"values": {"id": [1.0], "environment.gravity": [9.8]}}}, None, ['Leave it out: ignore = ["id"]']),
         ({"table": {"values": {"environment.gravity": [9.8]}, "columns": ["gravity"]}}, None,
-         ["columns = 'gravity'", "did you mean 'environment.gravity'?"]),
+         ["columns = 'gravity'", "Did you mean 'environment.gravity'?"]),
         ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": ["id"]}}, None, ["ignore = 'id'", "not a column"]),
         ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": "id"}}, None, ["is not a list of names"]),
         ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": ["environment.gravity"]}}, None,
          ["leaves no column"]),
-        ({"table": {"values": {"id": [9.8]}, "columns": ["id"], "ignore": ["id"]}}, None, ["keep one of them"]),
+        ({"table": {"values": {"id": [9.8]}, "columns": ["id"], "ignore": ["id"]}}, None, ["Keep one of them"]),
         ({"table": {"values": np.eye(3)}}, None, ["has no names of columns", "DataFrame"]),
         ({"table": {"values": {}}}, None, ["has no names of columns"]),
         ({"table": {"values": {3: [1.0]}}}, None, ["has no names of columns"]),
@@ -597,7 +597,7 @@ def test_files_that_are_none(scene, tmp_path):
     assert "not a text in UTF-8" in faults(Table, path)[0]
     path.write_text("vehicle.mass [kg],vehicle.buoyancy\n120,1000\n")
     (fault,) = faults(lw.Ensemble, scene, sampling=Table(path))
-    says(fault, '"vehicle.mass [kg]"', "did you mean 'vehicle.mass'?")
+    says(fault, '"vehicle.mass [kg]"', "Did you mean 'vehicle.mass'?")
 
 
 def test_bad_names_and_laws_come_in_one_message(scene):
@@ -722,7 +722,7 @@ def test_a_hypercube_without_its_group_is_told_so():
     for make in (LatinHypercube, lambda: sampling.sampling_of("latin_hypercube"), lambda: LatinHypercube(replicates=2)):
         (fault,) = faults(make)
         assert fault == (
-            "ensemble.sampling.latin_hypercube.group = None: is missing; give how many members make a hypercube: group = 256"
+            "ensemble.sampling.latin_hypercube.group = None is missing. Give how many members make a hypercube: group = 256"
         )
     assert "is not a whole number from 2" in faults(LatinHypercube, 0)[0]
 

@@ -50,7 +50,7 @@ TERMS = [
     ({"type": "drag_matrix", "linear": LOPSIDED}, "drag_matrix.linear = [[1.0, 3.0", "at the velocity",
      "positive on the"),
     ({"type": "drag_matrix", "quadratic": CREATES}, "drag_matrix.quadratic", "creates energy", "minus Fossen's"),
-    ({"type": "drag_matrix", "linear": [1.0] * 6}, "drag_matrix.linear", "shape (6,)", "give numbers of shape (6, 6)"),
+    ({"type": "drag_matrix", "linear": [1.0] * 6}, "drag_matrix.linear", "shape (6,)", "Give numbers of shape (6, 6)"),
     ({"type": "drag", "linear": [-4, 0, 0, 0, 0, 0]}, "drag.linear = [-4, 0", "out of bounds", "from 0 [N s/m, N m s]"),
     ({"type": "drag", "quadratic": [NAN] * 6}, "drag.quadratic = [nan", "not finite", "(6,)"),
     (TETHER | {"stiffness": -5.0}, "tether.stiffness = -5.0", "out of bounds", "from 0 [N/m]"),
@@ -58,7 +58,7 @@ TERMS = [
     (TETHER | {"anchor": [0.0, 0.0]}, "tether.anchor = [0.0, 0.0]", "shape (2,)", "(3,) [m]"),
     ({key: value for key, value in THRUSTER.items() if key != "coefficient"}, "thrusters.coefficient = None",
      "is missing", "or a polynomial [N]"),
-    (THRUSTER | {"polynomial": [[1.0]]}, "thrusters.polynomial = [[1.0]]", "has shape (1, 1)", "give p numbers"),
+    (THRUSTER | {"polynomial": [[1.0]]}, "thrusters.polynomial = [[1.0]]", "has shape (1, 1)", "Give p numbers"),
     (THRUSTER | {"coefficient": [-1.0]}, "thrusters.coefficient = [-1.0]", "out of bounds", "from 0"),
     (THRUSTER | {"time_constant": -0.1}, "thrusters.time_constant", "out of bounds", "from 0 [s]"),
     (HULL | {"diameters": [0.1, -0.1]}, "cross_flow.diameters = [0.1, -0.1]", "out of bounds", "from 0 [m]"),
@@ -69,43 +69,43 @@ TERMS = [
     (WANDERING | {"time_constant": 0.0}, "gauss_markov_current.time_constant = 0.0", "not positive", "above 0 [s]"),
     ({"type": "wrench_noise", "force": [-1, 0, 0]}, "wrench_noise.force = [-1", "out of bounds", "from 0 [N s^1/2]"),
     # tables: not sorted, empty, of different lengths
-    (PROFILE | {"depths": [9.0, 0.0]}, "current_profile.depths = [9.0, 0.0]", "not rising", "sort the table"),
+    (PROFILE | {"depths": [9.0, 0.0]}, "current_profile.depths = [9.0, 0.0]", "not rising", "Sort the table"),
     (SCHEDULE | {"times": [1.0, 1.0]}, "wrench_schedule.times = [1.0, 1.0]", "not rising", "drop repetitions"),
-    (HULL | {"stations": [1.0, -1.0]}, "cross_flow.stations = [1.0, -1.0]", "not rising", "sort the table"),
-    (HULL | {"stations": [1.0], "diameters": [1.0]}, "cross_flow.stations = [1.0]", "one station", "give two or more"),
+    (HULL | {"stations": [1.0, -1.0]}, "cross_flow.stations = [1.0, -1.0]", "not rising", "Sort the table"),
+    (HULL | {"stations": [1.0], "diameters": [1.0]}, "cross_flow.stations = [1.0]", "one station", "Give two or more"),
     (THRUSTER | {"times": [2.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times = [2.0, 1.0]",
      "not rising"),
-    (PROFILE | {"depths": []}, "current_profile.depths = []", "shape (0,)", "give k numbers [m]"),
-    (PROFILE | {"velocities": AHEAD}, "current_profile.velocities", "shape (1, 3)", "give 2 x 3 numbers [m/s]"),
-    (PROFILE | {"velocities": [[1.0], [2.0, 3.0]]}, "current_profile.velocities", "not numeric", "give numbers [m/s]"),
-    (TIDE | {"phases": [0.0, 1.0]}, "current_harmonics.phases = [0.0, 1.0]", "shape (2,)", "give 1 numbers [rad]"),
-    (SCHEDULE | {"interpolation": "cubic"}, "wrench_schedule.interpolation = 'cubic'", "known: linear, steps"),
-    (WANDERING | {"start": "warm"}, "gauss_markov_current.start = 'warm'", "known: zero, stationary"),
+    (PROFILE | {"depths": []}, "current_profile.depths = []", "shape (0,)", "Give k numbers [m]"),
+    (PROFILE | {"velocities": AHEAD}, "current_profile.velocities", "shape (1, 3)", "Give 2 x 3 numbers [m/s]"),
+    (PROFILE | {"velocities": [[1.0], [2.0, 3.0]]}, "current_profile.velocities", "not numeric", "Give numbers [m/s]"),
+    (TIDE | {"phases": [0.0, 1.0]}, "current_harmonics.phases = [0.0, 1.0]", "shape (2,)", "Give 1 numbers [rad]"),
+    (SCHEDULE | {"interpolation": "cubic"}, "wrench_schedule.interpolation = 'cubic'", "Known: linear, steps"),
+    (WANDERING | {"start": "warm"}, "gauss_markov_current.start = 'warm'", "Known: zero, stationary"),
     # directions and commands
     (THRUSTER | {"direction": POINT}, "thrusters.direction[0] = [0.0, 0.0, 0.0]", "zero length", "such as [1, 0, 0]"),
-    (THRUSTER | {"command_schedule": 3.0, "times": [0.0]}, "thrusters.command_schedule = 3.0", "give 1 x 1 numbers"),
-    (THRUSTER | {"command_schedule": [[1.0, 2.0], [3.0]]}, "thrusters.command_schedule", "not numeric", "give numbers"),
+    (THRUSTER | {"command_schedule": 3.0, "times": [0.0]}, "thrusters.command_schedule = 3.0", "Give 1 x 1 numbers"),
+    (THRUSTER | {"command_schedule": [[1.0, 2.0], [3.0]]}, "thrusters.command_schedule", "not numeric", "Give numbers"),
     (THRUSTER | {"command": [[1.0], [2.0, 3.0]]}, "thrusters.command = [[1.0], [2.0, 3.0]]", "not numeric",
      "give numbers"),
-    (THRUSTER | {"limit": [[1.0, 2.0], [3.0]]}, "thrusters.limit = [[1.0, 2.0], [3.0]]", "not numeric", "give numbers"),
+    (THRUSTER | {"limit": [[1.0, 2.0], [3.0]]}, "thrusters.limit = [[1.0, 2.0], [3.0]]", "not numeric", "Give numbers"),
     (THRUSTER | {"command": [1.0], "times": [0.0], "command_schedule": [[2.0]]}, "thrusters.command",
      "keep one of them"),
     (FIN | {"chord": POINT}, "fins.chord[0] = [0.0, 0.0, 0.0]", "zero length", "trailing to leading edge"),
     (FIN | {"normal": AHEAD}, "fins.normal[0] = [1.0, 0.0, 0.0]", "along the chord", "across the fin's plane"),
-    (FIN | {"drag": [0.1, 0.2]}, "fins.drag = [0.1, 0.2]", "shape (2,)", "give 1 numbers [1]"),
-    (STEERED | {"rate_limit": INF}, "control_fins.rate_limit", "not finite", "give numbers [rad/s]"),
-    (STEERED | {"times": [0.0], "command_schedule": [[0.3]]}, "control_fins.command", "keep one of"),
+    (FIN | {"drag": [0.1, 0.2]}, "fins.drag = [0.1, 0.2]", "shape (2,)", "Give 1 numbers [1]"),
+    (STEERED | {"rate_limit": INF}, "control_fins.rate_limit", "not finite", "Give numbers [rad/s]"),
+    (STEERED | {"times": [0.0], "command_schedule": [[0.3]]}, "control_fins.command", "Keep one of"),
     ({"type": "body_lift", "matrix": [[NAN] * 6] * 6}, "body_lift.matrix", "not finite", "shape (6, 6)"),
     # names and types
-    ({"type": "dragg"}, "terms[0].type = 'dragg'", "not known", "did you mean 'drag'?"),
-    ({"type": ["drag"]}, "terms[0].type = ['drag']", "not known", "did you mean 'drag'?"),
-    ({"linear": [1.0] * 6}, "terms[0].type = ''", "known: ", "body_lift, "),
+    ({"type": "dragg"}, "terms[0].type = 'dragg'", "not known", "Did you mean 'drag'?"),
+    ({"type": ["drag"]}, "terms[0].type = ['drag']", "not known", "Did you mean 'drag'?"),
+    ({"linear": [1.0] * 6}, "terms[0].type = ''", "Known: ", "body_lift, "),
     ({"type": "weight"}, "terms[0].type = 'weight'", "follows from the vehicle"),
-    ({"type": "drag", "quad": 1.0}, "terms[0].quad = 1.0", "unknown key", "did you mean 'quadratic'?"),
-    ({"type": "tether"}, "terms[0].anchor", "is missing", "give it [m]"),
-    ({"type": "drag", "name": 3}, "name = 3", "not a text", "give a name"),
+    ({"type": "drag", "quad": 1.0}, "terms[0].quad = 1.0", "unknown key", "Did you mean 'quadratic'?"),
+    ({"type": "tether"}, "terms[0].anchor", "is missing", "Give it [m]"),
+    ({"type": "drag", "name": 3}, "name = 3", "not a text", "Give a name"),
     ({"type": "drag", "name": "vehicle"}, "terms = 'vehicle'", "section of the scene", 'name = "vehicle_term"'),
-    (3, "terms[0] = 3", "is not a term", "write a table with type"),
+    (3, "terms[0] = 3", "is not a term", "Write a table with type"),
 ]  # fmt: skip
 
 
@@ -135,9 +135,9 @@ EVENTS = [
     ),
     ({"type": "time", "at": -1.0}, "time.at = -1.0", "out of bounds", "from 0 [s]"),
     ({"type": "floor", "depth": NAN}, "floor.depth = nan", "not finite", "[m]"),
-    ({"type": "floor"}, "events[0].depth", "is missing", "give it [m]"),
-    ({"type": "flor"}, "events[0].type = 'flor'", "not known", "did you mean 'floor'?"),
-    ({"type": "surface", "deep": 1.0}, "events[0].deep = 1.0", "unknown key", "did you mean 'depth'?"),
+    ({"type": "floor"}, "events[0].depth", "is missing", "Give it [m]"),
+    ({"type": "flor"}, "events[0].type = 'flor'", "not known", "Did you mean 'floor'?"),
+    ({"type": "surface", "deep": 1.0}, "events[0].deep = 1.0", "unknown key", "Did you mean 'depth'?"),
 ]
 
 
@@ -146,7 +146,7 @@ LISTS = [
     ([Drag(name="current"), Current(velocity=[1, 0, 0])], "terms = 'current'", "name of 2 terms", "current_2"),
     ([Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
     ([lw.events.Surface()], "terms[0] = 'surface'", "is an event", "events=[...]"),
-    ([Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
+    ([Weight()], "terms[0] = 'weight'", "acts already", "Leave it out"),
     ([Drag], "terms[0] = <class", "is not a term", "lw.terms.Drag(quadratic=...)"),
     (Drag(), "terms = Drag", "is not a list", "terms=[lw.terms.Drag(...)]"),
 ]
@@ -165,30 +165,30 @@ SETTINGS = [
     ("start.euler_deg", [(0.0, INF, 0.0)], "not finite", "(3,) [deg]"),
     ("start.quaternion_wxyz", [np.zeros(4)], "is zero", "that is not"),
     ("start.quaternion_wxyz", [(1.0, 0.0, 0.0)], "has shape (3,)", "(4,) [1]"),
-    *((f"run.{name}", SIX, "give a number", "[s]") for name in ("step", "duration", "save_every")),
+    *((f"run.{name}", SIX, "Give a number", "[s]") for name in ("step", "duration", "save_every")),
     ("run.dtype", ["float16", "double", np.float64, 64], "is not known", "float"),
     ("run.method", [3], "is not a text", 'such as "psi_s"'),
-    ("run.save_fields", [3, "position"], "is not a list of names", "give one"),
-    ("run.save_fields", [["positoin"]], "= 'positoin': is not known", "did you mean 'position'?"),
-    ("run.save_fields", [[[1]]], "= [1]: is not known", "known: "),
-    ("run.solver", ["cayly"], "is not known", "did you mean 'cayley'"),
+    ("run.save_fields", [3, "position"], "is not a list of names", "Give one"),
+    ("run.save_fields", [["positoin"]], "= 'positoin' is not known", "Did you mean 'position'?"),
+    ("run.save_fields", [[[1]]], "= [1] is not known", "Known: "),
+    ("run.solver", ["cayly"], "is not known", "Did you mean 'cayley'"),
     ("run.iterations", [-1], "from 0 to 100", 'or None to iterate'),
     ("run.tolerance", [2.0], "between 0 and 1", "such as 1e-12"),
-    ("run.atol", [1e-9], "is given alone", "give both"),
+    ("run.atol", [1e-9], "is given alone", "Give both"),
     ("run.checks", ["some"], "is not known", "safe"),
     ("run.on_failure", ["panic"], "is not known", "substep"),
-    ("run.device", ["cuda", "cuda:0", "CPU", 0, None], "runs are on CPU cores", 'leave it out, or give "cpu"'),
-    ("ensemble.members", [0, -3, 1.5, True, "4"], "whole number from 1", "give 1 or more"),
-    ("ensemble.members", [2.0], "whole number from 1", "write 2,"),
+    ("run.device", ["cuda", "cuda:0", "CPU", 0, None], "runs are on CPU cores", 'Leave it out, or give "cpu"'),
+    ("ensemble.members", [0, -3, 1.5, True, "4"], "whole number from 1", "Give 1 or more"),
+    ("ensemble.members", [2.0], "whole number from 1", "Write 2,"),
     ("ensemble.members", [2**31 + 1], "more members than the 2147483648", "or less"),
-    ("ensemble.seed", [-1, 0.5, False, "x", None], "whole number from 0", "give 0 or more"),
+    ("ensemble.seed", [-1, 0.5, False, "x", None], "whole number from 0", "Give 0 or more"),
     ("vehicle.mass", [0.0, -1.0], "not positive", "above 0 [kg]"),
     ("vehicle.buoyancy", [-1.0], "below 0", "from 0"),
     *((f"vehicle.{name}", [NAN, INF], "not finite", unit) for name, unit in (("mass", "[kg]"), ("buoyancy", "[N]"))),
     *((f"vehicle.{name}", [(1.0, NAN, 1.0), (1.0, INF, 1.0)], "not finite", unit)
       for name, unit in (("inertia", "[kg m2]"), ("added_mass", "[kg]"), ("center_of_buoyancy", "[m]"))),
-    *((f"vehicle.{name}", SIZES, "; give") for name in ("mass", "buoyancy", "inertia", "added_mass", "center_of_buoyancy")),
-    *((f"vehicle.{name}", [TURNED], "not symmetric", "give a symmetric matrix") for name in ("inertia", "added_mass")),
+    *((f"vehicle.{name}", SIZES, ". Give") for name in ("mass", "buoyancy", "inertia", "added_mass", "center_of_buoyancy")),
+    *((f"vehicle.{name}", [TURNED], "not symmetric", "Give a symmetric matrix") for name in ("inertia", "added_mass")),
     ("vehicle.inertia", [(1.0, 0.0, 1.0)], "not positive definite", "above 0 [kg m2]"),
     # Positive diagonal, yet eigenvalues 3 and -1 in the plane of x and y.
     ("vehicle.inertia", [[[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]], "not positive definite", "[kg m2]"),
@@ -229,8 +229,8 @@ def full(rigid=DIAGONAL, **more):
 
 VEHICLES = [
     ({}, "vehicle.mass = None", "is missing", "[kg]"),
-    (BODY | {"weight": 98.0}, "vehicle.weight = 98.0", "6x6 form", "give rigid_body_mass_matrix"),
-    (full(DIAGONAL + np.eye(6, k=1)), "vehicle.rigid_body_mass_matrix", "not symmetric", "give a symmetric matrix"),
+    (BODY | {"weight": 98.0}, "vehicle.weight = 98.0", "6x6 form", "Give rigid_body_mass_matrix"),
+    (full(DIAGONAL + np.eye(6, k=1)), "vehicle.rigid_body_mass_matrix", "not symmetric", "Give a symmetric matrix"),
     (full(-DIAGONAL), "vehicle.rigid_body_mass_matrix", "not positive definite", "[[m I, -m hat(r_g)]"),
     (full(np.diag([1.0, 2, 3, 1, 1, 1])), "vehicle.rigid_body_mass_matrix", "not have m I as its upper left block",
      "[[m I"),
@@ -238,7 +238,7 @@ VEHICLES = [
     (full(added_mass_matrix=-2.0 * DIAGONAL), "vehicle.added_mass_matrix", "not positive definite", "X_udot"),
     ({"added_mass_matrix": DIAGONAL}, "vehicle.rigid_body_mass_matrix = None", "is missing",
      "beside added_mass_matrix"),
-    (full(mass=10.0), "vehicle.mass = 10.0", "repeats what", "keep one of the two forms"),
+    (full(mass=10.0), "vehicle.mass = 10.0", "repeats what", "Keep one of the two forms"),
     (full(weight=NAN), "vehicle.weight = nan", "not finite", "[N]"),
     (full(center_of_gravity=[1.0]), "vehicle.center_of_gravity = [1.0]", "shape (1,)", "(3,) [m]"),
 ]  # fmt: skip
@@ -251,28 +251,28 @@ def test_a_vehicle(values, words):
 
 
 FOSSEN = [
-    ({"X_udot": 5.0}, "X_udot = 5.0", "is positive", "write -5"),
-    ({"X_u|u|": 5.0}, "X_u|u| = 5.0", "is positive", "write -5"),
+    ({"X_udot": 5.0}, "X_udot = 5.0", "is positive", "Write -5"),
+    ({"X_u|u|": 5.0}, "X_u|u| = 5.0", "is positive", "Write -5"),
     (
         {"Y_rdot": -1.0, "N_vdot": -2.0},
         "Y_rdot = -1.0",
         "from its partner N_vdot = -2.0",
         "correct one or leave it out",
     ),
-    ({"X_u": -1.0, "Xu": -2.0}, "Xu = -2.0", "given twice", "leave one out"),
-    ({"X_udot": -1.0, "Xdu": -1.0}, "Xdu = -1.0", "also as X_udot", "leave one out"),
+    ({"X_u": -1.0, "Xu": -2.0}, "Xu = -2.0", "given twice", "Leave one out"),
+    ({"X_udot": -1.0, "Xdu": -1.0}, "Xdu = -1.0", "also as X_udot", "Leave one out"),
     ({"Y_uv": -1.0}, "Y_uv = -1.0", "product of two velocities", "ignore="),
     ({"X_qq": -1.0}, "X_qq = -1.0", "no drag", "X_|q|q"),
-    ({"Q_u": -1.0}, "Q_u = -1.0", "not a coefficient's name", "known: X_udot"),
-    ({3: -1.0}, "3 = -1.0", "not a coefficient's name", "known: X_udot"),
-    ({"X_u": NAN}, "X_u = nan", "not finite", "give a number"),
+    ({"Q_u": -1.0}, "Q_u = -1.0", "not a coefficient's name", "Known: X_udot"),
+    ({3: -1.0}, "3 = -1.0", "not a coefficient's name", "Known: X_udot"),
+    ({"X_u": NAN}, "X_u = nan", "not finite", "Give a number"),
     ([1.0], "coefficients = [1.0]", "not a map", "X_udot"),
     ({"X_qdot": -1e3}, "total mass matrix", "not positive definite", "check mass"),
 ]
 ENERGY = [({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, "drag_matrix.linear", "creates energy", "minus Fossen's")]
 
 
-PATHS = [(path, str(path), "give the path of a TOML file") for path in ("missing.toml", None)]
+PATHS = [(path, str(path), "Give the path of a TOML file") for path in ("missing.toml", None)]
 FAR, NEAR = lw.distributions.Normal(std=100.0), lw.distributions.Uniform(0.1, 0.2)
 VARIED = [(PROFILE, "current_profile.depths"), (SCHEDULE, "wrench_schedule.times"),
           (THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times"),
@@ -281,35 +281,35 @@ VARIED = [(PROFILE, "current_profile.depths"), (SCHEDULE, "wrench_schedule.times
           (WAVES, "waves.periods")]  # fmt: skip
 
 
-NAMES = [({"type": "drag"}, "drag.quadrtic", "did you mean 'drag.quadratic'?"),
-         ({"type": "drag", "name": "hull"}, "drag.quadratic", "did you mean 'hull.quadratic'?")]  # fmt: skip
+NAMES = [({"type": "drag"}, "drag.quadrtic", "Did you mean 'drag.quadratic'?"),
+         ({"type": "drag", "name": "hull"}, "drag.quadratic", "Did you mean 'hull.quadratic'?")]  # fmt: skip
 
 
 SCHEDULED = THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}
 IDLE = [
     (SCHEDULED, "thrusters.command", "vary thrusters.command_schedule"),
     (THRUSTER, "thrusters.command_schedule", "vary thrusters.command"),
-    (THRUSTER, "thrusters.polynomial", "give thrusters.polynomial in the scene"),
-    (THRUSTER, "thrusters.time_constant", "give thrusters.time_constant above 0 [s] in the scene"),
+    (THRUSTER, "thrusters.polynomial", "Give thrusters.polynomial in the scene"),
+    (THRUSTER, "thrusters.time_constant", "Give thrusters.time_constant above 0 [s] in the scene"),
     (STEERED, "control_fins.times", "vary control_fins.command"),
-    (STEERED, "control_fins.rate_limit", "give control_fins.rate_limit below 1e+06 rad/s in the scene"),
+    (STEERED, "control_fins.rate_limit", "Give control_fins.rate_limit below 1e+06 rad/s in the scene"),
 ]
 
 
 NOISE = {"type": "wrench_noise", "force": [1.0, 1.0, 1.0]}
 MATRIX = {"type": "drag_matrix", "linear": np.eye(6).tolist()}
 RUNS = [
-    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix prevents that", "use psi_s"),
+    (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix prevents that", "Use psi_s"),
     (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only if a step of -h undoes",
      "use psi_x"),
-    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies prevents that", "use psi_s"),
-    (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "use psi_s"),
+    (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies prevents that", "Use psi_s"),
+    (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "Use psi_s"),
     ({"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]}, {"method": "kl6(psi_s)"}, "goes backward by",
-     "drag number up to", "use psi_s, or a step"),
-    (MATRIX, {"method": "psi_q"}, "method = 'psi_q'", "not known", "did you mean 'psi_"),
+     "drag number up to", "Use psi_s, or a step"),
+    (MATRIX, {"method": "psi_q"}, "method = 'psi_q'", "not known", "Did you mean 'psi_"),
     (MATRIX, {"method": "kl6(phi)"}, "method = 'kl6(phi)'", "not symmetric", "compose psi_s"),
-    (MATRIX, {"dtype": "float16"}, "dtype = 'float16'", "did you mean 'float64'?"),
-    (MATRIX, {"device": "cuda:0"}, "device = 'cuda:0'", "runs are on CPU cores", 'leave it out, or give "cpu"'),
+    (MATRIX, {"dtype": "float16"}, "dtype = 'float16'", "Did you mean 'float64'?"),
+    (MATRIX, {"device": "cuda:0"}, "device = 'cuda:0'", "runs are on CPU cores", 'Leave it out, or give "cpu"'),
     (MATRIX, {"h": NAN}, "h = nan", "not finite", "[s]"),
     (MATRIX, {"t1": -1.0}, "t1 = -1.0", "not positive", "above 0 [s]"),
     (MATRIX, {"h": "a"}, "h = 'a'", "not numeric", "[s]"),
@@ -408,12 +408,12 @@ class Packs(Pull):
 
 
 LAWS = [
-    (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "write law(w, view, p)"),
+    (device(law=pull_short), "pull.law = '(w, view)'", "takes 2 arguments", "Write law(w, view, p)"),
     (device(law=pull_plain), "pull.law", "not a Warp function", "@wp.func"),
     (device(), "pull.device", "has none of law, damping, push, flow, evolve, follow", "add_a_force.md"),
     (device(law=pull_law, follow=pull_law), "pull.device", "has follow and no evolve", "add_a_force.md"),
     (device(push=pull_law), "pull.device", "has push and no damping", "add_a_force.md"),
-    ("pull", "pull.device = 'pull'", "not known", "give a module"),
+    ("pull", "pull.device = 'pull'", "not known", "Give a module"),
 ]
 
 
@@ -458,7 +458,7 @@ def test_packed_left_out():
     assert next(check for check in lw.laws.check_law(Pull(k=1.0)).checks if check.name == "numbers").ok
     report = lw.laws.check_law(Wide(k=1.0))
     assert not report.ok
-    says(str(report), "NotImplementedError", "write packed(self, numbers, context)")
+    says(str(report), "NotImplementedError", "Write packed(self, numbers, context)")
 
 
 @pytest.mark.kernel
@@ -466,7 +466,7 @@ def test_numbers_of_the_wrong_shape():
     wrong = type("Bad", (Packs,), {"what": lw.laws.Packed({"k": np.ones((1, 3))}), "__annotations__": {}})
     report = lw.laws.check_law(wrong(k=1.0))
     assert not report.ok
-    says(str(report), "packed() fails", "give arrays (1,), (1, 3)")
+    says(str(report), "packed() fails", "Give arrays (1,), (1, 3)")
 
 
 def test_what_is_no_fleet():

@@ -267,7 +267,7 @@ def test_one_member(scene):
 
 
 @pytest.mark.parametrize("name, text", [
-    ("vehicle.mas", "did you mean 'vehicle.mass'?"), ("mass", "did you mean 'vehicle.mass'?"),
+    ("vehicle.mas", "Did you mean 'vehicle.mass'?"), ("mass", "Did you mean 'vehicle.mass'?"),
     ("start.velocity", "the scene gives start.position, start.rotation_vector, start.velocity_inertial"),
     ("start.euler_deg", "the scene gives start.position, start.rotation_vector"),
 ])  # fmt: skip

@@ -51,7 +51,7 @@ def test_what_is_no_name_is_refused(name, capsys):
 
 
 def test_a_near_name_is_suggested():
-    with pytest.raises(lw.SceneError, match=r"^example:papr: is not a known example; did you mean 'paper'"):
+    with pytest.raises(lw.SceneError, match=r"^example:papr is not a known example. Did you mean 'paper'"):
         lw.Scene.load("example:papr")
 
 

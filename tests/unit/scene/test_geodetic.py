@@ -137,21 +137,21 @@ def test_a_start_varies_in_metres_around_its_place():
 @pytest.mark.parametrize(
     ("sections", "words"),
     [
-        ({"environment": {}}, "start.geodetic = .*environment.origin is not known; give the origin"),
-        ({"environment": {"origin": [95.0, 0.0]}}, "environment.origin = 95.0: is not a latitude; give -90 to 90"),
-        ({"environment": {"origin": [5.0, 400.0]}}, "environment.origin = 400.0: is not a longitude; give -180 to 360"),
-        ({"environment": {"origin": [5.0]}}, r"environment.origin = \[5.0\]: has shape \(1,\)"),
-        ({"environment": {"origin": ORIGIN, "start": "soon"}}, "environment.start = 'soon': is not a date and time"),
-        ({"environment": {"origin": ORIGIN, "start": 5}}, "environment.start = 5: is not a date and time"),
+        ({"environment": {}}, "start.geodetic = .*environment.origin is not known. Give the origin"),
+        ({"environment": {"origin": [95.0, 0.0]}}, "environment.origin = 95.0 is not a latitude. Give -90 to 90"),
+        ({"environment": {"origin": [5.0, 400.0]}}, "environment.origin = 400.0 is not a longitude. Give -180 to 360"),
+        ({"environment": {"origin": [5.0]}}, r"environment.origin = \[5.0\] has shape \(1,\)"),
+        ({"environment": {"origin": ORIGIN, "start": "soon"}}, "environment.start = 'soon' is not a date and time"),
+        ({"environment": {"origin": ORIGIN, "start": 5}}, "environment.start = 5 is not a date and time"),
         ({"start": {"geodetic": [10.4, 163.0, 0.0], "position": [0.0, 0.0, 0.0]}}, "position and geodetic = .*: say the same"),
-        ({"start": {"geodetic": [-91.0, 10.0, 0.0]}}, "start.geodetic = -91.0: is not a latitude"),
+        ({"start": {"geodetic": [-91.0, 10.0, 0.0]}}, "start.geodetic = -91.0 is not a latitude"),
         ({"start": {}, "environment": {}, "controller": guided({"geodetic": WAY})}, "waypoints.geodetic = .*is not known"),
         ({"controller": guided({"geodetic": WAY, "points": WAY})}, "points and geodetic = .*: say the same thing twice"),
-        ({"controller": guided({})}, "points = None: are missing; give points"),
-        ({"controller": guided({"geodetic": WAY[:1]})}, "geodetic = .*: are less than two"),
-        ({"controller": guided({"geodetic": [*WAY, WAY[-1]]})}, r"geodetic\[3\] = .*: is at the same place of the map"),
-        ({"controller": guided({"geodetic": [[95.0, 0.0, 0.0], [5.0, 0.0, 0.0]]})}, "geodetic = 95.0: is not a latitude"),
-        ({"controller": guided({"geodetic": [[5.0, 0.0], [6.0, 0.0]]})}, r"geodetic = .*: has shape \(2, 2\)"),
+        ({"controller": guided({})}, "points = None are missing. Give points"),
+        ({"controller": guided({"geodetic": WAY[:1]})}, "geodetic = .* are less than two"),
+        ({"controller": guided({"geodetic": [*WAY, WAY[-1]]})}, r"geodetic\[3\] = .* is at the same place of the map"),
+        ({"controller": guided({"geodetic": [[95.0, 0.0, 0.0], [5.0, 0.0, 0.0]]})}, "geodetic = 95.0 is not a latitude"),
+        ({"controller": guided({"geodetic": [[5.0, 0.0], [6.0, 0.0]]})}, r"geodetic = .* has shape \(2, 2\)"),
     ],
 )  # fmt: skip
 def test_faults(sections, words):
@@ -168,17 +168,17 @@ def test_faults_of_members():
         lw.Ensemble(
             scene_of({"geodetic": WAY[0]}), members=2, vary={"start.geodetic": lw.distributions.Normal(std=1.0)}
         )
-    with pytest.raises(lw.SceneError, match=r"start.geodetic = 95.0: is not a latitude"):
+    with pytest.raises(lw.SceneError, match=r"start.geodetic = 95.0 is not a latitude"):
         lw.Ensemble(scene, sampling=table({"start.geodetic": [[95.0, 0.0, 0.0]]}))
     with pytest.raises(lw.SceneError, match=r"has shape \(1, 2\)"):
         lw.Ensemble(scene, sampling=table({"start.geodetic": [[5.0, 0.0]]}))
-    with pytest.raises(lw.SceneError, match=r'start.geodetic\[2\]" = .*: is missing; give it a column too'):
+    with pytest.raises(lw.SceneError, match=r'start.geodetic\[2\]" = .* is missing. Give it a column too'):
         lw.Ensemble(scene, sampling=table({"start.geodetic[0]": [5.0], "start.geodetic[1]": [5.0]}))
     with pytest.raises(lw.SceneError, match=r"environment.origin is not known"):
         lw.Ensemble(lw.Scene.named("remus_100"), sampling=table({"start.geodetic": [WAY[0]]}))
-    with pytest.raises(lw.SceneError, match=r"environment.origin = None: is not known"):
+    with pytest.raises(lw.SceneError, match=r"environment.origin = None is not known"):
         lw.Environment().geodetic([0.0, 0.0, 0.0])
-    with pytest.raises(lw.SceneError, match=r"geodetic = .*: has shape \(2,\)"):
+    with pytest.raises(lw.SceneError, match=r"geodetic = .* has shape \(2,\)"):
         scene.environment.positions([1.0, 2.0])
 
 

@@ -79,9 +79,9 @@ SCENES = {
     "quoted keys with points": ("'x y' . " * 100_000 + "a = 1", ("more than 8 parts",)),
     "a header of a million points": ("[" + "a." * 500_000 + "a]", ("more than 8 parts",)),
     "tables without end": (numbered("[a{}.b.c.d]\n", 60_000), ("60,000 tables",)),
-    "terms without end": (terms(1500), ("terms: are 1,500", "at most 1,000")),
-    "events without end": ("events = [" + '{type="floor"},' * 40_000 + "]\n" + BODY, ("events: are 40,000",)),
-    "unknown terms": (terms(900, "drug"), ("900 faults", "and 880 more", "did you mean 'drag'?")),
+    "terms without end": (terms(1500), ("terms are 1,500", "at most 1,000")),
+    "events without end": ("events = [" + '{type="floor"},' * 40_000 + "]\n" + BODY, ("events are 40,000",)),
+    "unknown terms": (terms(900, "drug"), ("900 faults", "and 880 more", "Did you mean 'drag'?")),
     "unknown keys": (BODY + numbered("key{} = 1\n", 30_000), ("30,000 faults", "and 29,980 more")),
     "unknown names that vary": (VARY + numbered("'a{}.b' = {{normal={{std=1.0}}}}\n", 6000), ("and 5,980 more",)),
     "unknown laws": (VARY + numbered("a{} = {{ norml = 1 }}\n", 6000), ("more",)),
@@ -243,7 +243,7 @@ OPTIONS = [
     ("run --tolerance", "run.tolerance", {"nan": "nan"}),
     ("run --iterations", "run.iterations", {"1e9": "1000000000.0", "-1": "-1"}),
     ("run --keep", "run.keep", {"9" * 20: "9" * 20, "-1": "-1"}),
-    ("run --members 8 --threads", "threads", {"-1": "-1", "1000000000": "1000000000: is more than 100,000"}),
+    ("run --members 8 --threads", "threads", {"-1": "-1", "1000000000": "1000000000 is more than 100,000"}),
     ("predict --threads", "threads", {"0": "0"}),
     ("run --members 8 --error", "error", {"nan": "nan", "inf": "inf", "-1": "-1"}),
     ("tradeoff --seconds", "seconds", {"nan": "nan", "inf": "inf", "-1": "-1", "0": "0"}),
@@ -252,7 +252,7 @@ OPTIONS = [
     ("sensitivity --of depth --samples", "samples", {"0": "0", "-4": "-4"}),
 ]  # fmt: skip
 SET = {
-    "vehicle.mass=120\n[start]": "vehicle.mass = '120\\n[start]': is not one value",
+    "vehicle.mass=120\n[start]": "vehicle.mass = '120\\n[start]' is not one value",
     "vehicle.mass=120\nvehicle.buoyancy=3": "is not one value",
     "run.method=psi_s\npsi": "is not one value",
     "vehicle.mass=" + "9" * 5000: "vehicle.mass",
@@ -305,7 +305,7 @@ def test_so_many_faults_are_said_and_the_rest_is_counted():
     error = refused(faults.raise_if_any)
     lines = str(error).splitlines()
     assert lines[0] == "63 faults:"
-    assert lines[1] == "  key0 = 0: is odd; correct it"
+    assert lines[1] == "  key0 = 0 is odd. Correct it"
     assert lines[-1] == "  and 43 more"
     assert len(lines) == 22
     assert len(error.faults) == 20
@@ -317,7 +317,7 @@ def test_faults_within_faults_are_counted_once():
     inner = lw.SceneError(f"fault {i}" for i in range(50))
     assert (len(inner.faults), inner.more) == (20, 30)
     outer = errors.Faults()
-    outer.add("first", 1, "is odd", "correct it")
+    outer.add("first", 1, "is odd", "Correct it")
     for _ in range(2):
         with outer.including():
             raise inner.prefixed("here: ")

@@ -144,7 +144,7 @@ def test_what_follows_from_a_key_follows_from_its_new_value():
 
 REFUSED = {
     "two names of one number": (
-        {"depth_cell.noise": 0.1, "controller.sensors[0].noise": 0.2}, ["is set by", "keep one of them"]),
+        {"depth_cell.noise": 0.1, "controller.sensors[0].noise": 0.2}, ["is set by", "Keep one of them"]),
     "a whole and its entry": ({"start.velocity": [1, 0, 0], "start.velocity[0]": 2.0}, ["is set by"]),
     "two entries of a symmetric matrix": (
         {"vehicle.added_mass_matrix[0,1]": 1.0, "vehicle.added_mass_matrix[1,0]": 2.0}, ["is set by"]),
@@ -153,10 +153,10 @@ REFUSED = {
     "no number": ({"heading_pid.kp": "high"}, ["heading_pid.kp", "'high'"]),
     "all faults at once": (
         {"headng_pid.kp": 1.0, "vehicle.bouyancy": 2.0, "run.step": -1.0},
-        ["3 faults", "did you mean 'heading_pid.kp'", "did you mean 'buoyancy'", "run.step"]),
-    "a field without its part": ({"pitch_limit": 1.0}, ["did you mean 'depth_pid.pitch_limit'"]),
-    "a key without its section": ({"methd": "rk4"}, ["did you mean 'run.method'"]),
-    "a name by place": ({"controller.laws[1].kpp": 1.0}, ["did you mean 'heading_pid.kp'"]),
+        ["3 faults", "Did you mean 'heading_pid.kp'", "Did you mean 'buoyancy'", "run.step"]),
+    "a field without its part": ({"pitch_limit": 1.0}, ["Did you mean 'depth_pid.pitch_limit'"]),
+    "a key without its section": ({"methd": "rk4"}, ["Did you mean 'run.method'"]),
+    "a name by place": ({"controller.laws[1].kpp": 1.0}, ["Did you mean 'heading_pid.kp'"]),
     "a place that is not there": ({"controller.laws[7].kp": 1.0}, ["controller.laws[7].kp"]),
     "several names": ({"heading_pid.kp, heading_pid.ki": 1.0}, ["is not a number"]),
     "no name": ({5: 1.0}, ["is not a name of a quantity"]),
@@ -177,7 +177,7 @@ def test_a_name_is_set_once_on_the_command():
         ["--set", "heading_pid.kp=1", "--set", "heading_pid.kp=2"],
         ["--step", "0.1", "--set", "run.step=0.2"],
     ):
-        with pytest.raises(lw.SceneError, match="as well; keep one of them"):
+        with pytest.raises(lw.SceneError, match=r"as well. Keep one of them"):
             load_scene(cli.parser().parse_args(["run", str(AUTOPILOT), *options]))
 
 

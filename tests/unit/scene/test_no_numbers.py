@@ -137,7 +137,7 @@ def test_laws_with_all_their_numbers_are_taken(scene):
 
 @pytest.mark.parametrize("table", [{"scipy": {"name": "norm"}}, {"exponential": {}}], ids=str)
 def test_a_table_of_a_law_without_numbers_is_refused(scene, table):
-    assert "has no numbers; give one or more of loc, scale" in refused(
+    assert "has no numbers. Give one or more of loc, scale" in refused(
         lw.Ensemble, scene, 4, 0, {"vehicle.mass": table}
     )
 
@@ -207,7 +207,7 @@ ONE_NUMBER = ["depth", "position[2]", "speed", "euler[1]", "energy", "norm(veloc
 @pytest.mark.parametrize("of", ONE_NUMBER, ids=str)
 def test_a_condition_wants_a_number(make, of):
     message = refused(make, of)
-    says(message, "missing", "compared with nothing", "give above=")
+    says(message, "missing", "compared with nothing", "Give above=")
     assert make(of, above=1.0) is not None
     assert make(of, below=1.0) is not None
 

@@ -41,7 +41,7 @@ def test_a_scene_names_its_vehicle(path):
     assert nameless.title is None
     assert "title" not in nameless.to_dict()
     assert "title" not in repr(nameless)
-    with pytest.raises(lw.SceneError, match=r"vehicle\.title = 3: is not a text"):
+    with pytest.raises(lw.SceneError, match=r"vehicle\.title = 3 is not a text"):
         lw.Vehicle(mass=1.0, inertia=(1.0, 1.0, 1.0), title=3)
 
 

@@ -39,18 +39,18 @@ SAME = {
     "max(position)[1]": lw.statistics.PathMaximum("position[1]"),
 }  # fmt: skip
 REFUSED = {
-    "deph": "is not known; did you mean 'depth'?", "max(deph)": "is not known; did you mean 'depth'?",
-    "speed[0]": "speed has one component; give 'speed'",
-    "position[3]": "position has the components position[0], position[1], position[2]; give one of them",
-    "median(speed)": "has a function 'median' that is not known; did you mean 'mean'?",
-    "max(min(depth))": "is taken over the path twice; keep one of max, min, mean, range",
-    "max(position)[3]": "max(position) has 3 components; give one of them from 0, or max(position) alone",
-    "max(speed": 'is not a quantity; write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"',
-    "max(depth) - depth": "max(depth) is taken over the whole path, and has no difference; give a difference of quantities at",
-    "depth - speed": "depth has 1 x [m] and speed has 1 x [m/s]; give quantities of one unit and size",
-    "position - depth": "position has 3 x [m] and depth has 1 x [m]; give quantities of one unit and size",
-    "depth - deph": "is not known; did you mean 'depth'?",
-    "horizontal(depth)": "has a horizontal length of what is not a vector in inertial axes; write horizontal(",
+    "deph": "is not known. Did you mean 'depth'?", "max(deph)": "is not known. Did you mean 'depth'?",
+    "speed[0]": "speed has one component. Give 'speed'",
+    "position[3]": "position has the components position[0], position[1], position[2]. Give one of them",
+    "median(speed)": "has a function 'median' that is not known. Did you mean 'mean'?",
+    "max(min(depth))": "is taken over the path twice. Keep one of max, min, mean, range",
+    "max(position)[3]": "max(position) has 3 components. Give one of them from 0, or max(position) alone",
+    "max(speed": 'is not a quantity. Write "position[2]", "depth", "norm(velocity)", "max(depth)" or "measured_depth - depth"',
+    "max(depth) - depth": "max(depth) is taken over the whole path, and has no difference. Give a difference of quantities at",
+    "depth - speed": "depth has 1 x [m] and speed has 1 x [m/s]. Give quantities of one unit and size",
+    "position - depth": "position has 3 x [m] and depth has 1 x [m]. Give quantities of one unit and size",
+    "depth - deph": "is not known. Did you mean 'depth'?",
+    "horizontal(depth)": "has a horizontal length of what is not a vector in inertial axes. Write horizontal(",
     "horizontal(max(position))": "has a horizontal length of what is not a vector in inertial axes",
 }  # fmt: skip
 
@@ -187,7 +187,7 @@ def test_each_door_refuses_with_the_same_words(scene, text, tmp_path, capsys):
 def test_what_has_no_number_at_each_time_is_refused_with_a_remedy(scene, capsys):
     text = "range(norm(velocity))"
     wanted = (
-        f"of = {text!r}: is taken over the whole path, and errors are of a quantity at each time; give 'norm(velocity)'"
+        f"of = {text!r} is taken over the whole path, and errors are of a quantity at each time. Give 'norm(velocity)'"
     )
     for door in (lambda: lw.tradeoff(scene, ["psi_s"], of=text), lambda: lw.suggest(scene, error=1e-3, of=text),
                  lambda: lw.stability_map(scene, of=text), ["tradeoff", str(PAPER), "--of", text]):  # fmt: skip
@@ -197,11 +197,11 @@ def test_what_has_no_number_at_each_time_is_refused_with_a_remedy(scene, capsys)
 @pytest.mark.parametrize(("make", "words"), [
     (lambda: lw.statistics.FirstPassage("max(depth)", above=1.0),
      "is of samples in time, and max(depth) is one number of each member"),
-    (lambda: lw.statistics.PathMean("max(depth)"), "max(depth) is one number of each member; ask for its mean"),
+    (lambda: lw.statistics.PathMean("max(depth)"), "max(depth) is one number of each member. Ask for its mean"),
     (lambda: lw.statistics.Mean("max(depth)", at="floor"),
-     "mean.at = 'floor': says when, and max(depth) has no time; leave it out"),
-    (lambda: lw.statistics.Mean(["speed", "max(depth)"]), "mean.of[1] = 'max(depth)': is taken over the whole path, and a"),
-    (lambda: lw.statistics.Exceedance("max(depth)"), "max(depth) is compared with nothing; give above=... or below=... [m]"),
+     "mean.at = 'floor' says when, and max(depth) has no time. Leave it out"),
+    (lambda: lw.statistics.Mean(["speed", "max(depth)"]), "mean.of[1] = 'max(depth)' is taken over the whole path, and a"),
+    (lambda: lw.statistics.Exceedance("max(depth)"), "max(depth) is compared with nothing. Give above=... or below=... [m]"),
     (lambda: lw.statistics.PathMaximum("depth", lw.statistics.Mean("max(depth)")), "is given already"),
 ])  # fmt: skip
 def test_what_a_statistic_of_one_number_cannot_do(make, words, capsys):
@@ -209,14 +209,14 @@ def test_what_a_statistic_of_one_number_cannot_do(make, words, capsys):
 
 
 @pytest.mark.parametrize(("statistics", "name", "words"), [
-    ([lw.statistics.Mean("max(depth)")], "mean max(deph)", "did you mean 'mean max(depth)'?"),
-    ([lw.statistics.Quantiles("max(depth)")], "quantiles max(deph) 0.95", "did you mean 'quantiles max(depth) 0.95'?"),
-    ([lw.statistics.Quantiles("speed")], "wholly else", "known: quantiles speed"),
-    ([], "median depth", 'give a mean, such as "mean depth", or statistics'),
+    ([lw.statistics.Mean("max(depth)")], "mean max(deph)", "Did you mean 'mean max(depth)'?"),
+    ([lw.statistics.Quantiles("max(depth)")], "quantiles max(deph) 0.95", "Did you mean 'quantiles max(depth) 0.95'?"),
+    ([lw.statistics.Quantiles("speed")], "wholly else", "Known: quantiles speed"),
+    ([], "median depth", 'Give a mean, such as "mean depth", or statistics'),
 ])  # fmt: skip
 def test_what_is_watched_is_one_of_the_statistics_or_a_mean(statistics, name, words, capsys):
     message = said_by(lambda: watch(lw.Until(name, 1.0), statistics, np.zeros(1)), capsys)
-    assert f"until.statistic = {name!r}: is not a statistic of the run; {words}" in message
+    assert f"until.statistic = {name!r} is not a statistic of the run; {words}" in message
 
 
 def test_a_watched_name_may_have_other_spaces():

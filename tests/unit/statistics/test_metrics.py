@@ -184,7 +184,7 @@ def test_the_users_own_sees_each_tick():
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: lw.metrics.Overshoot("dept"), "did you mean 'depth'"),
+    (lambda: lw.metrics.Overshoot("dept"), "Did you mean 'depth'"),
     (lambda: lw.metrics.Overshoot("position"), "no goal beyond"),
     (lambda: lw.metrics.IAE(None), "is missing"), (lambda: lw.metrics.SettlingTime("depth", within=-1.0), "within"),
     (lambda: lw.metrics.RiseTime("depth", limits=(0.9, 0.1)), "two rising parts"),
@@ -193,7 +193,7 @@ def test_the_users_own_sees_each_tick():
     (lambda: lw.metrics.CustomMetric("depth"), "not a function"),
     (lambda: lw.metrics.CustomMetric(len, fields=("dept",)), "fields"),
     (lambda: lw.metrics.IAE("depth", stopped="held"), "no meaning"),
-    (lambda: lw.metrics.IAE("depth", at="floor"), "one moment"), (lambda: lw.metrics.ActuatorEnergy("depth"), "leave it out"),
+    (lambda: lw.metrics.IAE("depth", at="floor"), "one moment"), (lambda: lw.metrics.ActuatorEnergy("depth"), "Leave it out"),
 ])  # fmt: skip
 def test_what_is_asked_wrongly_gets_one_sentence(make, text):
     with pytest.raises(lw.SceneError, match=text):

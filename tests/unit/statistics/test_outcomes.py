@@ -324,7 +324,7 @@ def test_from_a_scene_file():
     (lambda: lw.statistics.Outcome(3), "is not an outcome"),
     (lambda: lw.statistics.Outcome("floor", levels=(0.0,)), "between 0 and 1"),
     (lambda: lw.statistics.EndTime("floor", lw.statistics.FirstPassage(above=1.0)), "one number of each member"),
-    (lambda: lw.statistics.EndTime("floor", lw.statistics.Mean(at="floor")), "leave it out"),
+    (lambda: lw.statistics.EndTime("floor", lw.statistics.Mean(at="floor")), "Leave it out"),
     (lambda: lw.statistics.FirstPassage("depth", above=1.0, at="floor"), "of all times"),
     (lambda: lw.statistics.PathMean("depth", at="floor"), "of all times"),
     (lambda: lw.statistics.Mean("depth", at=""), "is not an outcome"),

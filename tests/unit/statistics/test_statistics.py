@@ -721,8 +721,8 @@ def test_one_entry_is_watched(name, estimate, shape, entries):
 
 
 @pytest.mark.parametrize(("name", "hint"), [
-    ("quantiles depth 0.9", "did you mean 'quantiles depth 0.95'"), ("quantiles dept", "did you mean 'quantiles depth'"),
-    ("quantiles position[3] 0.5", "did you mean 'quantiles position[2] 0.5'"), ("wholly else", "known: mean position,"),
+    ("quantiles depth 0.9", "Did you mean 'quantiles depth 0.95'"), ("quantiles dept", "Did you mean 'quantiles depth'"),
+    ("quantiles position[3] 0.5", "Did you mean 'quantiles position[2] 0.5'"), ("wholly else", "Known: mean position,"),
 ])  # fmt: skip
 def test_what_is_watched_has_a_name(name, hint):
     with pytest.raises(lw.SceneError) as caught:
@@ -839,7 +839,7 @@ def test_coins_are_fair_and_fixed():
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: Mean("positon"), "did you mean 'position'"), (lambda: Mean("position[3]"), "components position"),
+    (lambda: Mean("positon"), "Did you mean 'position'"), (lambda: Mean("position[3]"), "components position"),
     (lambda: Mean("depth[0]"), "has one component"), (lambda: Mean(3.0), "is not a quantity"),
     (lambda: Mean("depth", confidence=1.5), "between 0 and 1"), (lambda: Mean("depth", stopped="no"), "held"),
     (lambda: Quantiles("depth", (0.0, 0.5)), "between 0 and 1"),
@@ -848,11 +848,11 @@ def test_coins_are_fair_and_fixed():
     (lambda: Exceedance("position", (1.0, 2.0)), "one for each component"),
     (lambda: Exceedance("depth", 2.0, 1.0), "have nothing between"),
     (lambda: FirstPassage("position", 1.0), "3 components"), (lambda: MeanAttitude("depth"), "not an attitude"),
-    (lambda: PathMaximum("depth", Mean("speed")), "leave it out"),
+    (lambda: PathMaximum("depth", Mean("speed")), "Leave it out"),
     (lambda: lw.Until("mean depth", -1.0), "half_width"), (lambda: lw.Until(3, 1.0), "not a name"),
-    (lambda: Mean(name=3, of="depht"), "did you mean 'depth'"),
-    (lambda: PathMaximum("depth", FirstPassage(above=1.0)), "ask for its mean, quantiles, or an exceedance"),
-    (lambda: PathMean("depth", PathTime(above=1.0)), "ask for its mean, quantiles, or an exceedance"),
+    (lambda: Mean(name=3, of="depht"), "Did you mean 'depth'"),
+    (lambda: PathMaximum("depth", FirstPassage(above=1.0)), "Ask for its mean, quantiles, or an exceedance"),
+    (lambda: PathMean("depth", PathTime(above=1.0)), "Ask for its mean, quantiles, or an exceedance"),
     (lambda: PathTime("depth", above="x"), "is not numeric"),
     (lambda: Histogram("depth", bins=True, limits=(0, 1)), "bins"),
     (lambda: Quantiles("depth", size=True), "power of two"),
@@ -945,9 +945,7 @@ def test_coverage_of_runs_that_stop_by_themselves():
 
 def test_two_statistics_have_two_names():
     twice = [Mean("depth"), {"type": "mean", "of": "depth"}]
-    with pytest.raises(
-        lw.SceneError, match=r"statistics = 'mean depth': is the name of 2 statistics; give each a name"
-    ):
+    with pytest.raises(lw.SceneError, match=r"statistics = 'mean depth' is the name of 2 statistics. Give each a name"):
         from_list(twice)
     assert len(from_list([Mean("depth"), {"type": "mean", "of": "depth", "name": "other"}])) == 2
     # What is not of anything yet has no name to differ by.

@@ -153,7 +153,7 @@ def test_numbers_of_every_member_are_as_they_are():
 @pytest.mark.parametrize(
     ("weights", "text"),
     [
-        ([1.0, -2.0, 3.0], "weights = -2.0: is below 0, of member 1"),
+        ([1.0, -2.0, 3.0], "weights = -2.0 is below 0, of member 1"),
         ([0.0, 0.0, 0.0], "are all 0"),
         ("v", "is not a column of the table"),
         ([1.0, 2.0], "are the columns' lengths"),

@@ -333,7 +333,7 @@ def test_members_without_a_place_are_counted():
 def test_what_cannot_be_is_refused():
     places = drawn(math.inf, 30, 1)
     result = run_to(places)
-    says(refused(lw.studies.footprint, result, 0.7), "at = 0.7", "not a time of a sample", "give 0 or 1", "at=[0.7]")
+    says(refused(lw.studies.footprint, result, 0.7), "at = 0.7", "not a time of a sample", "Give 0 or 1", "at=[0.7]")
     says(
         refused(lw.studies.footprint, result, "flor"),
         "at = 'flor'",

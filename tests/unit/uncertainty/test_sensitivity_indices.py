@@ -251,7 +251,7 @@ def test_factors_are_in_the_users_order_and_in_groups():
 
 
 @pytest.mark.parametrize(("groups", "words"), [
-    ({"a": ["start.positon"]}, "does not vary by itself; did you mean"), (3, "is not a mapping of names"),
+    ({"a": ["start.positon"]}, "does not vary by itself. Did you mean"), (3, "is not a mapping of names"),
     ({"a": ["vehicle.mass"], "b": ["vehicle.mass"]}, "is in 'a' as well"), ({"a": []}, "is not a list of names"),
     ({"a": "vehicle.mass"}, "is not a list of names"), ({"vehicle.mass": ["start.position[0]"]}, "is the name of a factor"),
 ])  # fmt: skip
@@ -263,22 +263,22 @@ def test_groups_that_are_none(groups, words):
 
 def test_samples_are_shared_among_replicates():
     for samples, words in (
-        (20, "not a multiple of replicates = 8; give 16 or 24"),
-        (4, "not a multiple of replicates = 8; give 8"),
+        (20, "not a multiple of replicates = 8. Give 16 or 24"),
+        (4, "not a multiple of replicates = 8. Give 8"),
     ):
         with pytest.raises(lw.SceneError, match=words):
             analyses.sobol(BARE, "depth", samples=samples, vary=VARY)
-    with pytest.raises(lw.SceneError, match=r"replicates = 3: is not a power of two"):
+    with pytest.raises(lw.SceneError, match=r"replicates = 3 is not a power of two"):
         analyses.sobol(BARE, "depth", samples=6, replicates=3, vary=VARY)
 
 
 @pytest.mark.parametrize(("entry", "arguments", "words"), [
     (lw.uq.sobol, {"store": "a"}, r"lw\.uq\.sobol\(\) has no argument 'store'"),
-    (lw.uq.sobol, {"sample": 8}, "did you mean 'samples'"), (lw.uq.sobol, {"resamples": 100}, "give replicates=8"),
+    (lw.uq.sobol, {"sample": 8}, "Did you mean 'samples'"), (lw.uq.sobol, {"resamples": 100}, "Give replicates=8"),
     (lw.uq.morris, {"groups": {}}, r"lw\.uq\.morris\(\) has no argument 'groups'"),
     (lw.uq.evaluate, {"fields": ()}, r"lw\.uq\.evaluate\(\) has no argument 'fields'"),
     (lw.uq.model, {"survey_all": True}, r"lw\.uq\.model\(\) has no argument 'survey_all'"),
-    (lw.uq.model, {"level": True}, "did you mean 'levels'"),
+    (lw.uq.model, {"level": True}, "Did you mean 'levels'"),
 ])  # fmt: skip
 def test_an_argument_that_does_not_exist_is_told_as_such(entry, arguments, words):
     given = (lw.Ensemble(BARE, 4, 0, VARY), "depth") if entry is lw.uq.evaluate else (BARE, VARY, "depth")
@@ -331,11 +331,11 @@ def test_groups_with_failures_are_refused_or_left_out():
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    ((1, 0.9, "drop", 10), "samples = 1: is not a whole number from 2; give 2 or more"),
-    ((True, 0.9, "drop", 10), "samples = True: is not a whole number from 2"),
-    ((2, 0.9, "drop", 1.5), "resamples = 1.5: is not a whole number from 2"),
-    ((2, 0.0, "drop", 2), "confidence = 0.0: is not between 0 and 1; give a level, such as 0.95"),
-    ((2, 1.0, "drop", 2), "confidence = 1.0: is not between 0 and 1"), ((2, 0.9, "keep", 2), "failed = 'keep'"),
+    ((1, 0.9, "drop", 10), "samples = 1 is not a whole number from 2. Give 2 or more"),
+    ((True, 0.9, "drop", 10), "samples = True is not a whole number from 2"),
+    ((2, 0.9, "drop", 1.5), "resamples = 1.5 is not a whole number from 2"),
+    ((2, 0.0, "drop", 2), "confidence = 0.0 is not between 0 and 1. Give a level, such as 0.95"),
+    ((2, 1.0, "drop", 2), "confidence = 1.0 is not between 0 and 1"), ((2, 0.9, "keep", 2), "failed = 'keep'"),
 ])  # fmt: skip
 def test_settings_of_an_analysis_that_are_none(arguments, words):
     analyses.check_settings(2, 0.5, "refuse", np.int64(2))
@@ -354,7 +354,7 @@ def test_a_design_takes_what_varies_and_the_seed_unless_given(scene):
     paper = analyses.designed(scene, None, None, Morris(4), 3)
     assert paper.seed == scene.ensemble_settings.seed
     assert set(paper.vary) == set(scene.ensemble_settings.vary)
-    with pytest.raises(lw.SceneError, match=r"scene = 3: is neither an Ensemble nor a Scene; give lw\.Scene"):
+    with pytest.raises(lw.SceneError, match=r"scene = 3 is neither an Ensemble nor a Scene. Give lw\.Scene"):
         analyses.designed(3, None, None, Saltelli(True), 4)
 
 
@@ -474,12 +474,12 @@ def test_a_model_describes_its_columns(monkeypatch):
     assert problem["bounds"] == [[0.0, 1.0]] * 4
     assert problem["names"] == names
     bare = adaptor.model(BARE, ["vehicle.mass"], "depth", **settings)
-    with pytest.raises(lw.SceneError, match=r"vary\.names = .*: have no distributions; map names to distributions"):
+    with pytest.raises(lw.SceneError, match=r"vary\.names = .* have no distributions. Map names to distributions"):
         _ = bare.problem
-    with pytest.raises(lw.SceneError, match="vary: names alone have no distributions; map names to distributions"):
+    with pytest.raises(lw.SceneError, match=r"vary names alone have no distributions. Map names to distributions"):
         _ = bare.distributions
     odd = adaptor.model(BARE, {"vehicle.mass": Choice([1.0, 2.0])}, "depth", **settings)
-    with pytest.raises(lw.SceneError, match=r"is unknown to SALib; use levels=True"):
+    with pytest.raises(lw.SceneError, match=r"is unknown to SALib. Use levels=True"):
         _ = odd.problem
 
 

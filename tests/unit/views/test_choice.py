@@ -169,7 +169,7 @@ def test_one_member_two_times():
 
 def test_what_cannot_be_shown_says_why():
     result = made(np.zeros((2, 3, 3)))
-    with pytest.raises(ValueError, match="most = 0: draws no member"):
+    with pytest.raises(ValueError, match="most = 0 draws no member"):
         lw.select_members(result, most=0)
     with pytest.raises(NothingToDraw, match="no member has a finite start"):
         lw.select_members(made(np.full((2, 3, 3), np.nan)))

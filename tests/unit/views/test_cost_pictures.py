@@ -46,7 +46,7 @@ def test_rows_of_another_kind_are_refused():
 
 
 def test_what_cannot_be_measured_is_refused(scene):
-    with pytest.raises(lw.SceneError, match="terms: is empty"):
+    with pytest.raises(lw.SceneError, match="terms is empty"):
         lw.bench.term_cost(scene, h=0.1)
 
 

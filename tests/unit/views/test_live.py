@@ -182,7 +182,7 @@ def test_what_is_no_viewer_ends_the_sending_and_leaves_the_file(tmp_path):
     path = tmp_path / "fleet.rrd"
     with (
         peer(b"HTTP/1.1 400 Bad Request\r\n\r\n") as port,
-        pytest.raises(OSError, match=r"the recording could not be sent .*; start the viewer again"),
+        pytest.raises(OSError, match=r"the recording could not be sent .*. Start the viewer again"),
     ):
         lw.record(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
     assert len(rows(path, "/world/bodies/ok", "translations")) == 31
@@ -208,7 +208,7 @@ def test_an_address_without_a_port_has_that_of_viewers():
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ("echo no display >&2; exit 1", r"did not start \(no display\); run where there is a display"),
+    ("echo no display >&2; exit 1", r"did not start \(no display\). Run where there is a display"),
     ("exit 0", "no viewer answers"),
 ])  # fmt: skip
 def test_a_viewer_that_does_not_start_is_told_of(tmp_path, monkeypatch, text, words):

@@ -60,9 +60,9 @@ def test_every_picture_takes_a_style():
 
 
 def test_what_is_no_style_is_refused():
-    with pytest.raises(lw.SceneError, match="style = 'column': is not known"):
+    with pytest.raises(lw.SceneError, match="style = 'column' is not known"):
         lw.plots.fan(fleet_result(), style="column")
-    with pytest.raises(lw.SceneError, match="is given with ax, whose size is its owner's; leave out style or ax"):
+    with pytest.raises(lw.SceneError, match=r"is given with ax, whose size is its owner's. Leave out style or ax"):
         lw.plots.fan(fleet_result(), ax=Figure().subplots(), style="one_column")
     with pytest.raises(lw.SceneError, match="is given with figure"):
         lw.plots.summary(fleet_result(), figure=Figure(), style="one_column")

@@ -333,7 +333,7 @@ def lean(mixed, **named):
 
 def test_of_kept_members_alone_no_others_are_drawn(mixed, tmp_path):
     assert drawn.drawn_of(lean(mixed), [9, 3]).members.tolist() == [3, 9]
-    with pytest.raises(lw.SceneError, match=r"members = 4: has no samples; keep them: keep=\[4\]"):
+    with pytest.raises(lw.SceneError, match=r"members = 4 has no samples. Keep them: keep=\[4\]"):
         lw.record(lean(mixed), tmp_path / "kept.rrd", members=[4])
 
 
@@ -349,7 +349,7 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     assert rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
     assert f"drawn {scale} times their size" in text_of(path, "/run/summary")
     mesh.unlink()
-    with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb': cannot be read"):
+    with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb' cannot be read"):
         lw.record(result, tmp_path / "mesh.rrd")
 
 
@@ -376,16 +376,16 @@ def test_a_viewer_that_takes_no_more_leaves_the_whole_file(tmp_path, mixed, monk
     monkeypatch.setattr(rr.RecordingStream, "set_sinks", lambda *_, **__: None)
     monkeypatch.setattr(viewer, "reach", lambda address: None)
     monkeypatch.setattr(viewer, "answers", lambda *_: True)
-    with pytest.raises(OSError, match=r"could not be sent .*; start the viewer again"):
+    with pytest.raises(OSError, match=r"could not be sent .*. Start the viewer again"):
         lw.record(mixed, tmp_path / "fleet.rrd", to="rerun+http://127.0.0.1:9/proxy")
     assert abs(len((tmp_path / "fleet.rrd").read_bytes()) - len(whole)) < 0.01 * len(whole)
 
 
 @pytest.mark.parametrize(("arguments", "kind", "words"), [
-    ({"members": [40]}, lw.SceneError, "members = 40: is none of the 40 members; give indices from 0 to 39"),
-    ({"members": [-1]}, lw.SceneError, "members = -1: is negative; count members from 0"),
+    ({"members": [40]}, lw.SceneError, "members = 40 is none of the 40 members. Give indices from 0 to 39"),
+    ({"members": [-1]}, lw.SceneError, "members = -1 is negative; count members from 0"),
     ({"members": []}, lw.SceneError, "names no member"),
-    ({"members": "3"}, lw.SceneError, "is not a list of members"), ({"path": None}, ValueError, "give path="),
+    ({"members": "3"}, lw.SceneError, "is not a list of members"), ({"path": None}, ValueError, "Give path="),
     ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*start a viewer with "rerun"'),
     ({"to": "nowhere"}, OSError, "no viewer answers"),
 ])  # fmt: skip

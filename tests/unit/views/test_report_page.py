@@ -241,7 +241,7 @@ def test_a_folder_of_several_has_all_of_them(tmp_path):
 def test_a_damaged_study_is_told_in_a_line(tmp_path, damage, capsys):
     (tmp_path / "tradeoff.json").write_text(damage)
     assert cli.main(["report", str(tmp_path)]) == 2
-    assert "tradeoff.json: is damaged" in capsys.readouterr().err
+    assert "tradeoff.json is damaged" in capsys.readouterr().err
     assert not (tmp_path / "report.html").exists()
 
 

@@ -15,6 +15,7 @@ from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import listed, names_of, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.sentences import capital
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.common.times import of_step, whole_steps
 from lgvi_warp.criteria.running import step_of
@@ -199,14 +200,14 @@ def _check_times(times: np.ndarray, steps: _Steps) -> None:
     """Refuse times that are no whole number of steps."""
     if times[0] <= 0.0:
         raise SceneError(
-            ["series.time = 0: is where the members start; give times after it, and what is known there as starts"]
+            ["series.time = 0 is where the members start. Give times after it, and what is known there as starts"]
         )
     for time in times:
         if whole_steps(float(time), steps.h) is None:
             near = round(float(time) / steps.h) * steps.h
             problem = f"is not a whole number of steps of {steps.h:g} s"
             raise SceneError(
-                [f"series.time = {time:.9g}: {problem}; give {near:.9g}, or a step that divides all times"]
+                [f"series.time = {time:.9g}: {problem}. Give {near:.9g}, or a step that divides all times"]
             )
 
 
@@ -256,7 +257,7 @@ class _Track:
         if self.filter != "particles" and self.coordinates.separate.any():
             names = ", ".join(target.label for target in self.targets)
             problem = "has separate values, between which a Kalman filter cannot move it"
-            raise SceneError([f"learn = {names}: one of them {problem}; give filter='particles'"])
+            raise SceneError([f"learn = {names}: one of them {problem}. Give filter='particles'"])
         if more := [target.label for target in self.coordinates.targets if target not in self.targets]:
             self.messages.append(
                 f"{', '.join(more)} is learned too: one distribution draws it together with the others"
@@ -279,7 +280,7 @@ class _Track:
             except SceneError as fault:
                 problem = f"at {self.time:g} s the filter moved what it learns to where the scene refuses it"
                 remedy = "vary it by a distribution without such values, as lw.distributions.LogNormal(sigma=...)"
-                raise SceneError([f"learn: {problem} ({fault.faults[0]}); {remedy}"]) from None
+                raise SceneError([f"learn: {problem} ({fault.faults[0]}). {capital(remedy)}"]) from None
         self.result, self.final, self.time = result, result.final, time
         self.states = {name: np.asarray(result.samples[name][-1], np.float64) for name in FIELDS}
         self.provenance = result.provenance
@@ -288,7 +289,7 @@ class _Track:
         if ended.any() and self.filter != "particles":
             problem = f"{int(ended.sum())} of {len(ended)} members failed before {time:g} s"
             raise SceneError(
-                [f"fleet: {problem}, and a Kalman filter needs all; give a shorter step, or filter='particles'"]
+                [f"fleet: {problem}, and a Kalman filter needs all. Give a shorter step, or filter='particles'"]
             )
         self.log_weights = np.where(ended, -np.inf, self.log_weights)
 
@@ -310,14 +311,14 @@ class _Track:
             numbers = one.quantity.values(now).T
             if len(numbers) != len(values):
                 problem = f"has {len(numbers)} numbers, and {len(values)} were measured"
-                raise SceneError([f"series.of = {one.label!r}: {problem}; give a column for each"])
+                raise SceneError([f"series.of = {one.label!r}: {problem}. Give a column for each"])
             there = np.isfinite(values)
             Y, y, sigma = one.near(values, numbers)[there], values[there], one.std[there]
             w_there = np.where(np.isfinite(Y).all(axis=0), w, 0.0)
             if w_there.sum() <= 0.0 or (self.filter != "particles" and (w_there == 0.0).any()):
                 missing = int((w_there == 0.0).sum())
                 problem = f"{missing} of {len(w)} members predict no number of it at {time:g} s"
-                raise SceneError([f"series = {one.label!r}: {problem}; leave that time out, or give NaN"])
+                raise SceneError([f"series = {one.label!r}: {problem}. Leave that time out, or give NaN"])
             apart, S = filters.innovation(Y, y, sigma, w_there / w_there.sum())
             z, total, _ = filters.whitened(apart, S)
             note[:, there] = apart, np.sqrt(np.diag(S)), z
@@ -373,7 +374,7 @@ class _Track:
         self.log_weights = before + filters.log_likelihood(Y, y, sigma)
         if not np.isfinite(self.log_weights).any():
             problem = f"no member is near what was measured at {self.time:g} s"
-            raise SceneError([f"series: {problem}; give more members, a wider spread, or larger std"])
+            raise SceneError([f"series: {problem}. Give more members, a wider spread, or larger std"])
         self.log_likelihood += float(np.logaddexp.reduce(self.log_weights))
         weights, n = filters.normalised(self.log_weights), self.fleet.members
         self.effective = filters.effective_number(weights, self.copies)
@@ -484,13 +485,13 @@ class _Track:
         remarks = []
         if self.filter == "particles" and not self.noisy and not (self.targets and self.discount):
             remarks.append(
-                "copies of a particle stay copies: nothing is drawn on the way; add noise, or learn a number"
+                "copies of a particle stay copies: nothing is drawn on the way. Add noise, or learn a number"
             )
         if self.stopped:
             problem = (
                 f"an event of the scene stopped {self.stopped} of {self.fleet.members} members, which go no further"
             )
-            remarks.append(f"{problem}; leave the event out, or narrow what is known before")
+            remarks.append(f"{problem}. Leave the event out, or narrow what is known before")
         worst = min(self.notes["effective"])
         if self.filter == "particles" and worst < 20.0:
             remarks.append(f"at one time {worst:.1f} members had all the weight: give more members or larger std")

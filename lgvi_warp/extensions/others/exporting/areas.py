@@ -35,7 +35,7 @@ def _on_map(polygon: tuple[np.ndarray, ...], plane: LocalPlane) -> Rings:
         latitude, longitude = plane.geodetic(ring[:, 0], ring[:, 1])
         longitude = np.unwrap(longitude, period=360.0)
         if not (np.isfinite(longitude).all() and abs(longitude[-1] - longitude[0]) < 180.0):
-            raise SceneError(["regions: one holds a pole or reaches around the Earth; draw it by lw.plots.footprint"])
+            raise SceneError(["regions: one holds a pole or reaches around the Earth. Draw it by lw.plots.footprint"])
         if rings:
             longitude += 360.0 * round((rings[0][:, 0].mean() - longitude.mean()) / 360.0)
         rings.append(np.stack([longitude, latitude], axis=1))

@@ -147,7 +147,7 @@ def test_a_run_goes_on_with_its_function_alone(tmp_path, version):
             lambda: lw.resume(path, other),
             lambda: lw.solve(other, **settings, store=lw.Store(path, existing="resume")),
         ):
-            with pytest.raises(lw.SceneError, match=r"functions\.laws\.callback is .*go on with the functions"):
+            with pytest.raises(lw.SceneError, match=r"functions\.laws\.callback is .*Go on with the functions"):
                 existing()
     resumed = lw.resume(path, same if version is None else other, threads=1)
     assert not any("functions" in text or "version" in text for text in resumed.messages)

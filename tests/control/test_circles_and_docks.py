@@ -336,7 +336,7 @@ def test_a_contact_of_a_cubic_path_is_exact():
 
 @pytest.mark.parametrize(("part", "numbers", "words"), [
     ("Waypoints", WAY | {"times": (0, 2, 1, 4)}, r"waypoints.times.*not rising"),
-    ("Waypoints", WAY | {"times": (0, 2, 3)}, r"waypoints.times.*give 4 numbers"),
+    ("Waypoints", WAY | {"times": (0, 2, 3)}, r"waypoints.times.*Give 4 numbers"),
     ("Waypoints", WAY | {"loiter_turns": (0, 1, 0, 0)}, r"waypoints.loiter_radius = None is missing. Give the radius"),
     ("Waypoints", WAY | {"at_end": "loiter"}, r"waypoints.loiter_radius = None is missing"),
     ("Waypoints", WAY | {"loiter_radius": 3.0}, r"waypoints.loiter_radius = 3.0 is given, and nothing is circled"),

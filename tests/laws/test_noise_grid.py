@@ -140,14 +140,14 @@ def test_a_scene_file_keeps_it_and_nothing_varies_it():
 @pytest.mark.parametrize("kind", [terms.WrenchNoise, terms.GaussMarkovCurrent])
 def test_what_is_no_time_is_refused(kind, value):
     numbers = WANDER if kind is terms.GaussMarkovCurrent else {}
-    with pytest.raises(lw.SceneError, match=rf"{kind.type}.noise_step = .*give a number"):
+    with pytest.raises(lw.SceneError, match=rf"{kind.type}.noise_step = .*Give a number"):
         kind(**numbers, noise_step=value)
 
 
 @pytest.mark.parametrize(("h", "every", "text"), [
     # 0.075 is nearer, but does not divide a second.
     (0.08, 1.0, r"step = 0.0769.*not a whole multiple of wrench_noise.noise_step = 0.025 s. Use a step of 0.1 s"),
-    (0.01, 1.0, r"step = 0.01: .*use a step of 0.025 s"),
+    (0.01, 1.0, r"step = 0.01: .*Use a step of 0.025 s"),
     (0.05, 0.11, r"Give a noise_step that divides the 0.11 s between samples"),
 ])  # fmt: skip
 def test_a_step_that_is_no_multiple_is_refused_with_the_nearest(h, every, text):
@@ -223,7 +223,7 @@ def test_check_law_takes_it_and_a_device_that_hides_its_noise_is_refused():
         type: ClassVar[str] = "quiet_gust_of_test"
         device: ClassVar[Any] = QuietDevice
 
-    with pytest.raises(lw.SceneError, match=r"quiet_gust_of_test.device.*write NOISE = True"):
+    with pytest.raises(lw.SceneError, match=r"quiet_gust_of_test.device.*Write NOISE = True"):
         lw.laws.check_law(Quiet(strength=S))
 
 

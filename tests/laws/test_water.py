@@ -275,7 +275,7 @@ def test_waves_want_gravity():
     drifter = lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0), added_mass=(1.0, 1.0, 1.0))
     here = lw.Scene(drifter, lw.Environment(gravity=0.0), terms=[terms.Waves(**WAVES)])
     with pytest.raises(
-        lw.SceneError, match=r"environment.gravity = 0.*leaves the length of waves unknown.*give gravity"
+        lw.SceneError, match=r"environment.gravity = 0.*leaves the length of waves unknown.*Give gravity"
     ):
         lw.solve(one(here), "psi_s", h=0.1, t1=0.1)
 

@@ -45,7 +45,7 @@ NO_POTENTIAL = "needs potentials of position plus those of attitude; {} has none
     ("bm4(psi_x)", [MATRIX], "keeps its order only if a step of -h undoes one of h"),
     *(("gauss6", [term], "takes forces of position and time only")
       for term in (DRAG, MATRIX, terms.Current(velocity=[0.1, 0.0, 0.0]), NOISE)),
-    *((method, [WANDERING], "gauss_markov_current, a term that remembers what is not known.*use psi_s")
+    *((method, [WANDERING], "gauss_markov_current, a term that remembers what is not known.*Use psi_s")
       for method in ("rk4", "rkmk4", "rkw3")),
     *((method, [term], "noise more than once|undoes one of h")
       for method in ("psi", "psi_1", "tj4(psi_s)") for term in (NOISE, WANDERING)),

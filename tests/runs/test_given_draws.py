@@ -373,6 +373,6 @@ def test_what_varies_without_being_named_may_not_draw(white):
     state = np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3))
     torque = {"wrench_noise.torque": np.ones((2, 3))}
     with pytest.raises(
-        lw.SceneError, match=r"parameters = 'wrench_noise.torque': make something draw .*name what varies"
+        lw.SceneError, match=r"parameters = 'wrench_noise.torque': make something draw .*Name what varies"
     ):
         given.states(*state, torque, xi=np.zeros((2, 30)))

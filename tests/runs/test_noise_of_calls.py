@@ -67,7 +67,7 @@ def test_common_noise_is_that_of_member_0_of_the_seed(prepared):
 
 
 @pytest.mark.parametrize(("more", "words"), [
-    ({"indices": [0, 1]}, r"indices = .*give an array of shape \(3,\)"), ({"indices": [0.0, 1.0, 2.0]}, "indices = "),
+    ({"indices": [0, 1]}, r"indices = .*Give an array of shape \(3,\)"), ({"indices": [0.0, 1.0, 2.0]}, "indices = "),
     ({"indices": [-1, 0, 1]}, "indices = .*from 0"), ({"indices": [0, 1, 2**31]}, "indices = .*below 2147483648"),
     ({"indices": "abc"}, "indices = "), ({"seed": -1}, "seed = "), ({"seed": 1.5}, "seed = "), ({"members": 3}, "members = 3"),
     ({"X": None, "indices": [0, 1, 2]}, "indices = .*there is no X"),

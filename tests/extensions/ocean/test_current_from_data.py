@@ -148,7 +148,7 @@ def test_a_run_that_lasts_longer_than_the_field_is_refused():
     ds = data.cmems(lambda lat, lon, z, t: 0.1 + 0.0 * t, data.still)
     for outside in ("hold", "stop"):
         read = lw.terms.CurrentField.from_dataset(ds, ORIGIN, duration=100.0, outside=outside)
-        with pytest.raises(lw.SceneError, match=r"current_field.duration = 3600.*give duration = 3601 to the field"):
+        with pytest.raises(lw.SceneError, match=r"current_field.duration = 3600.*Give duration = 3601 to the field"):
             lw.solve(drifting(read), "rk4", h=1.0, t1=3601.0)
 
 

@@ -196,7 +196,7 @@ def holed():
 
 
 @pytest.mark.parametrize(("ds", "more", "words"), [
-    (gebco(), {"region": [[0.0, 9e4], [0.0, 1e3]]}, r"region = .* is not within the data, .* of the origin; give one within"),
+    (gebco(), {"region": [[0.0, 9e4], [0.0, 1e3]]}, r"region = .* is not within the data, .* of the origin. Give one within"),
     (gebco(), {"region": [[0.0, 1e3], [1e3, 0.0]]}, "ends before it begins"),
     (gebco(), {"spacing": [1.0, 0.01]}, "are too many nodes for a scene. Give a smaller region or a wider spacing"),
     (gebco(), {"spacing": [1.0, -1.0]}, "spacing = .* is not positive"),

@@ -263,7 +263,7 @@ def test_only_regular_files_of_this_machine(kind, reader, tmp_path, pipes, serve
         (path / ".zgroup").write_text('{"zarr_format": 2}')
     read = lw.terms.CurrentField.from_dataset if reader == "current" else lw.events.Floor.from_file
     known = "No such file" if "address" in kind else "it is not a regular file"
-    with pytest.raises(lw.SceneError, match=f"^file = .*{known}.*give the path of a NetCDF file"):
+    with pytest.raises(lw.SceneError, match=f"^file = .*{known}.*Give the path of a NetCDF file"):
         read(path, ORIGIN)
     time.sleep(0.02)
     assert not pipes.opened

@@ -254,7 +254,7 @@ REFUSALS = {
         {"s_rho": {"standard_name": "ocean_s_coordinate_g1"}},
         "does not tell one formula of its depths",
     ),
-    "no stretching": ("roms", [without("Cs_r")], r"does not tell the depths of its levels: C; name s, C, depth"),
+    "no stretching": ("roms", [without("Cs_r")], r"does not tell the depths of its levels: C. Name s, C, depth"),
     "a floor elsewhere": (
         "roms",
         [without("h"), lambda f: f.createVariable("h", "f8", ("s_rho",))],

@@ -337,11 +337,11 @@ def test_bluerov2_holds_its_depth_by_thrusters():
     ({"rate_limit": [0.0, 1.0]}, "linear_mpc.rate_limit.*not positive"),
     ({"limit": [0.0, 1.0]}, "linear_mpc.limit.*not positive"),
     ({"P": np.diag([1.0, -1.0, 1.0])}, "linear_mpc.P.*is not symmetric and at least 0"),
-    ({"A": np.eye(2)}, r"linear_mpc\.B.*give 2 x"),
+    ({"A": np.eye(2)}, r"linear_mpc\.B.*Give 2 x"),
     ({"states": STATES[:2]}, r"linear_mpc.states.*are 2. Name the 3 of A and B"),
     ({"states": ("depth", *STATES[1:])}, r"linear_mpc.states\[0\] = 'depth'"),
     ({"tracked": ["velocity[0]"]}, r"linear_mpc.tracked\[0\] = 'velocity\[0\]'"),
-    ({"tracked": STATES}, "linear_mpc.tracked.*are 3; name at most 2"),
+    ({"tracked": STATES}, "linear_mpc.tracked.*are 3. Name at most 2"),
     # The depth follows from its rate: no inputs hold another rate.
     ({"B": np.zeros((3, 2))}, "linear_mpc.tracked.*has no steady inputs"),
 ])  # fmt: skip

@@ -170,7 +170,7 @@ def test_tables_are_laws_in_code_too(scene):
     assert fleet.vary == {"vehicle.mass": Normal(relative=0.01)}
     again = lw.Ensemble(scene, **fleet.to_dict())
     np.testing.assert_array_equal(again.parameters(0, 4)["vehicle.mass"], fleet.parameters(0, 4)["vehicle.mass"])
-    with pytest.raises(lw.SceneError, match=r'vary."vehicle.mass".*did you mean .normal.'):
+    with pytest.raises(lw.SceneError, match=r'vary."vehicle.mass".*Did you mean .normal.'):
         lw.Ensemble(scene, 4, 1, {"vehicle.mass": {"norml": {"relative": 0.01}}})
 
 

@@ -386,7 +386,7 @@ def test_a_viewer_that_takes_no_more_leaves_the_whole_file(tmp_path, mixed, monk
     ({"members": [-1]}, lw.SceneError, "members = -1 is negative; count members from 0"),
     ({"members": []}, lw.SceneError, "names no member"),
     ({"members": "3"}, lw.SceneError, "is not a list of members"), ({"path": None}, ValueError, "Give path="),
-    ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*start a viewer with "rerun"'),
+    ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*Start a viewer with "rerun"'),
     ({"to": "nowhere"}, OSError, "no viewer answers"),
 ])  # fmt: skip
 def test_bad_input_is_one_line_with_the_remedy(mixed, tmp_path, arguments, kind, words):

@@ -20,6 +20,8 @@ FREE, FREE_MEAN = (0.5, 1.6), 0.6
 # When weights are the answer: effective number of them, in all and for each number of a covariance; the largest share of
 # one; most normals.
 EFFECTIVE, EFFECTIVE_EACH, LARGEST, MOST_NORMALS = 150.0, 3.0, 0.02, 30
+# Multiplications of one product that OpenBLAS still makes in one thread.
+UNTHREADED = 200_000
 # Spreads by which weights and chains may differ; the part of a run's failing members that may lie where weights are large.
 AGREEMENT, UNCOVERED = 3.0, 0.05
 
@@ -43,7 +45,7 @@ class Mixture:
         logs = []
         for share, mean, root in zip(self.shares, self.means, self.roots, strict=True):
             # A triangular solve, however small, wakes all threads of LAPACK: 20 ms on a busy machine.
-            z = (u - mean) @ np.linalg.inv(root).T
+            z = _by_rows(u - mean, np.linalg.inv(root).T)
             scale = np.log(np.diag(root)).sum() + 0.5 * u.shape[1] * math.log(2.0 * math.pi)
             logs.append(math.log(share) - 0.5 * (z**2).sum(axis=1) - scale)
         return np.stack(logs, axis=1)
@@ -61,6 +63,20 @@ class Mixture:
         roots = np.concatenate([WIDER * fitted, WIDER * WIDE * fitted])
         shares = np.concatenate([(1.0 - WIDE_SHARE) * self.shares, WIDE_SHARE * self.shares])
         return Mixture(shares, np.concatenate([means] * 2), roots)
+
+
+def _parts(u: np.ndarray, columns: int) -> list[np.ndarray]:
+    """Rows of u (n, d) in parts whose product with so many columns BLAS makes without threads.
+
+    Its threads wait for each other at each product: on a busy machine that takes fifty times as long as the products.
+    """
+    step = max(UNTHREADED // (u.shape[1] * columns), 1)
+    return [u[i : i + step] for i in range(0, max(len(u), 1), step)]
+
+
+def _by_rows(u: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """The product u @ matrix, without threads."""
+    return np.concatenate([part @ matrix for part in _parts(u, matrix.shape[1])])
 
 
 def together(mixtures: Sequence[Mixture], shares: np.ndarray) -> Mixture:
@@ -132,7 +148,7 @@ def _of_shares(points: np.ndarray, shares: np.ndarray) -> Mixture:
     roots = []
     for j in range(len(count)):
         away = points - means[j]
-        covariance = (shares[:, j, None] * away).T @ away / count[j]
+        covariance = sum(part.T @ part for part in _parts(np.sqrt(shares[:, j, None]) * away, d)) / count[j]
         # Few points do not tell a whole matrix: it is mixed with its diagonal.
         trust = count[j] / (count[j] + d)
         covariance = trust * covariance + (1.0 - trust) * np.diag(np.diag(covariance))

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.special import ndtr, ndtri
-from scipy.stats import chi2
+from scipy.stats import chi2, multivariate_normal
 
 from lgvi_warp.uncertainty.rare import search
 from lgvi_warp.uncertainty.rare.cheaper import compared
@@ -320,3 +320,15 @@ def test_limits_are_compared_where_both_are_numbers():
     assert missed == pytest.approx(0.0, abs=1e-12)
     assert compared(own, -x)[3] == 0.0
     assert compared(own, np.zeros(40))[3] == 0.0
+
+
+@pytest.mark.parametrize("n", [0, 1, 499, 501, 2000])
+def test_a_mixture_has_the_density_of_its_parts(n):
+    """Products are made in parts of rows; SciPy has the density of each normal part as a whole."""
+    rng = np.random.default_rng(n)
+    roots = np.tril(0.1 * rng.standard_normal((2, 20, 20))) + np.eye(20)
+    mixture, u = Mixture(np.array([0.3, 0.7]), rng.standard_normal((2, 20)), roots), rng.standard_normal((n, 20))
+    parts = zip(mixture.shares, mixture.means, roots, strict=True)
+    density = sum((p * multivariate_normal(m, root @ root.T).pdf(u) for p, m, root in parts), np.zeros(n))
+    # Exponents are of the order 100, and condition numbers of the covariances below 1e3: 1e5 eps.
+    np.testing.assert_allclose(mixture.log_density(u), np.log(density), rtol=0.0, atol=2e-11)

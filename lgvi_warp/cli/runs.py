@@ -218,7 +218,7 @@ def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> 
         return None
     if not (isinstance(scene.run.keep, str) and scene.run.keep == "all") or scene.run.until is not None:
         fault = 'is checked on samples of all members. Give run.keep="all", no run.until'
-        raise SceneError([f"--error {chosen.error:g}: {fault}"])
+        raise SceneError([f"--error {chosen.error:g} {fault}"])
     for name in ("step", "dtype"):
         if getattr(chosen, name) is not None:
             text = f"--{name} {getattr(chosen, name)} is what --error chooses"

@@ -125,5 +125,5 @@ def block_range(chosen: argparse.Namespace) -> range | None:
     first, colon, stop = chosen.blocks.partition(":")
     if not (colon and first.isdigit() and stop.isdigit()):
         fault = "is not a range of blocks. Write --blocks 0:100 for the first hundred"
-        raise SceneError([f"--blocks {chosen.blocks}: {fault}"])
+        raise SceneError([f"--blocks {chosen.blocks} {fault}"])
     return range(int(first), int(stop))

@@ -21,6 +21,7 @@ from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import named
 from lgvi_warp.common.scratch import UNFINISHED
+from lgvi_warp.common.sentences import sentences
 
 # Files of at least this size are synced as soon as they are written, so that the disk works while others are made [bytes].
 EARLY_BYTES = 200_000
@@ -219,7 +220,7 @@ def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None =
     target = Path(os.path.realpath(path)) if root is None else safe_files.inside(root, path.absolute())
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         if problem := safe_files.kind(os.lstat(target).st_mode):
-            raise SceneError([f"{path}: {problem}, which is not replaced. Give the name of a file"])
+            raise SceneError([sentences(path, f"{problem}, which is not replaced", "give the name of a file")])
     return target
 
 

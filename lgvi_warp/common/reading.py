@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 from lgvi_warp.common import safe_files
 from lgvi_warp.common.arguments import of_a_file, path_of
 from lgvi_warp.common.errors import NothingToDraw, SceneError
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import capital, sentences
 
 # Largest size of each kind of file [bytes]. Scenes and coefficients (YAML, XML) are written by hand or by a script; parsers
 # read one or two megabytes a second of TOML, and a tenth of that of YAML. A table may hold millions of numbers; arrays are
@@ -132,7 +132,7 @@ def corrupt_file_as_scene_error(path: str | os.PathLike[str], otherwise: str, re
     except SceneError as error:
         raise error if all(name in text for text in error.faults) else error.prefixed(f"{name}: ") from error
     except UnreadableError as error:
-        raise SceneError([f"{name}: {error.what}. {capital(remedy)}"]) from error
+        raise SceneError([sentences(name, error.what, remedy)]) from error
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise SceneError([f"{name} is damaged, or {otherwise}: {reason}. {capital(remedy)}"]) from error

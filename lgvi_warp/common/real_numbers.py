@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import sentences
 
 # Most entries of a range or an iterator that is read: a longer range is left as it is, and an iterator may be endless.
 MOST_ENTRIES = 10_000_000
@@ -103,7 +103,7 @@ def answered(who: str, values: Any) -> np.ndarray:
     try:
         return real_numbers(values)
     except NotReal as error:
-        raise ValueError(f"{who}: {error.what}. {capital(error.remedy or 'give real numbers')}") from None
+        raise ValueError(sentences(who, error.what, error.remedy or "give real numbers")) from None
 
 
 def real_results(values: Any) -> np.ndarray:

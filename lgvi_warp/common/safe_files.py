@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import capital, sentences
 
 # Most bytes of a JSON file: a store's has a few kilobytes, with millions of indices some tens of megabytes; and most tables
 # and lists within each other: a scene has up to 24, which a study's file holds in some more.
@@ -30,7 +30,7 @@ _FOLDER = getattr(os, "O_DIRECTORY", 0) | os.O_RDONLY | _PLAIN
 def refused(path: Path, problem: str) -> SceneError:
     """Make the error for a file that a store never holds."""
     remedy = "take it away, and what it leads to is left alone" if problem == "is a link" else "take it away"
-    return SceneError([f"{path}: {problem}, where a run has plain files and folders only. {capital(remedy)}"])
+    return SceneError([sentences(path, f"{problem}, where a run has plain files and folders only", remedy)])
 
 
 KINDS = {

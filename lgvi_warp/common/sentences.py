@@ -15,7 +15,7 @@ PREDICATES = frozenset(
 WORD = re.compile(r"[a-z]+(?=[ ,:]|$)")
 
 
-def sentences(subject: str, problem: str, remedy: str) -> str:
+def sentences(subject: object, problem: str, remedy: str) -> str:
     """Say what is wrong with a subject, and the remedy: "vehicle.mass = -1.0 is not positive. Give a number above 0 [kg]"."""
     colon = "" if problem.partition(" ")[0].rstrip(",") in PREDICATES else ":"
     return f"{subject}{colon} {problem}. {capital(remedy)}"

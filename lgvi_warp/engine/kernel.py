@@ -14,7 +14,7 @@ from lgvi_kernels.advance.kernel import Advance, make_advance
 from lgvi_kernels.advance.spec import Spec
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.phases import Phases
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.control.base import Part
 from lgvi_warp.engine import kernel_cache
@@ -75,9 +75,7 @@ class Kernel:
                 True: "lw.laws.check_controller(part) says where, docs/develop/add_a_controller.md how",
             }
             remedy = " and ".join(remedies[kind] for kind in sorted({isinstance(term, Part) for term in of_user}))
-            raise SceneError(
-                [f"law {', '.join(term.key for term in of_user)}: {problem}. {capital(remedy)}"]
-            ) from error
+            raise SceneError([sentences(f"law {', '.join(term.key for term in of_user)}", problem, remedy)]) from error
 
 
 @functools.lru_cache(maxsize=256)

@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.results.quantities import samples_of
 from lgvi_warp.results.result import Result
@@ -89,5 +89,5 @@ def compared_in(of: Any) -> Distance:
     if parsed.over_path:
         problem = "is taken over the whole path, and errors are of a quantity at each time"
         remedy = f"give {parsed.inner.name!r}, whose largest error over the path is reported"
-        raise SceneError([f"of = {parsed.label!r}: {problem}. {capital(remedy)}"])
+        raise SceneError([sentences(f"of = {parsed.label!r}", problem, remedy)])
     return Distance(parsed.label, parsed.unit or "1", parsed)

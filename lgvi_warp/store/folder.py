@@ -25,7 +25,7 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine, safe_files, scratch
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.safe_files import parsed
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import capital, sentences
 from lgvi_warp.common.write_lock import write_lock
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.methods.saveat import TimeGrid
@@ -72,7 +72,7 @@ class Folder:
             good = False
         if not good:
             problem = "is damaged, or of another version of the format"
-            raise SceneError([f"{path / ROOT}: {problem}. Run again (--overwrite)"])
+            raise SceneError([sentences(f"{path / ROOT}", problem, "run again (--overwrite)")])
         with corrupt_store_as_scene_error(path / ROOT):
             self.provenance, self.recipe, messages, self.shared = (parsed(text) for text in texts)
             store_texts.check_texts(self.attributes, self.provenance, self.recipe, messages, self.shared)
@@ -288,4 +288,4 @@ def foreign(path: Path) -> str | None:
 def refuse_foreign(path: Path) -> None:
     """Check that a folder that is to be replaced holds only what a run wrote."""
     if os.path.lexists(path) and (fault := foreign(Path(os.path.realpath(path)))):
-        raise SceneError([f"{path}: {fault}, and is not overwritten. Move it away, or give another folder"])
+        raise SceneError([sentences(path, f"{fault}, and is not overwritten", "move it away, or give another folder")])

@@ -14,7 +14,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import members_of, path_of
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.common.status import Status
 from lgvi_warp.common.summaries import as_table, few_digits
 from lgvi_warp.common.write_lock import writer_of
@@ -116,7 +116,7 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
     else:
         fault = "is not there" if not location.exists() else "is a file" if location.is_file() else "holds no store"
         remedy = "give the folder of a run made with --store zarr"
-    raise SceneError([f"{location}: {fault}. {capital(remedy)}"])
+    raise SceneError([sentences(location, fault, remedy)])
 
 
 def open_run(

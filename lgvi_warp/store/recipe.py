@@ -15,7 +15,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.identity import UNKNOWN, comparable
 from lgvi_warp.common.safe_files import parsed
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.drawn import DrawnParameters
 from lgvi_warp.sampling.designs.table import Table, moved
@@ -215,7 +215,7 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
             problem = "the same bits cannot be promised"
             where = "with the functions that it had" if "functions." in " ".join(mismatches) else "where it began"
             remedy = f"go on {where}, or give --force (force=True) and take it that some differ"
-        raise SceneError(f"{path}: {text}: {problem}. {capital(remedy)}" for text in mismatches)
+        raise SceneError(sentences(f"{path}: {text}", problem, remedy) for text in mismatches)
     return tuple(f"continued although {text}" for text in mismatches) + tuple(
         f"went on with {name}, which {UNTOLD}" for name in _functions(stored, now)[1]
     )

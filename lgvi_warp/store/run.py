@@ -12,7 +12,7 @@ from typing import Any
 
 from lgvi_warp.common import safe_files, scratch
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import capital, sentences
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
@@ -106,7 +106,7 @@ class StoredRun:
         exists = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
         if exists and store.existing == "refuse":
             if fault := foreign(path):
-                raise SceneError([f"{path}: {fault}. Give another folder"])
+                raise SceneError([sentences(path, fault, "give another folder")])
             remedy = 'go on with `lgvi-warp resume` (existing="resume"), or replace it with --overwrite (existing="overwrite")'
             raise SceneError([f"{path} holds a run already. {capital(remedy)}"])
         if exists and store.existing == "resume":

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.executors.base import Executor
@@ -141,7 +142,7 @@ def blocks_there(only: range | None, plan: Plan) -> range | None:
     present = range(only.start, min(only.stop, count))
     if only.step != 1 or only.start < 0 or not present:
         problem = f"are not within the {count} of this run"
-        raise SceneError([f"blocks {only.start}:{only.stop}: {problem}. Give 0:{count} or less"])
+        raise SceneError([sentences(f"blocks {only.start}:{only.stop}", problem, f"give 0:{count} or less")])
     return present
 
 

@@ -147,7 +147,7 @@ def test_what_is_no_time_is_refused(kind, value):
 @pytest.mark.parametrize(("h", "every", "text"), [
     # 0.075 is nearer, but does not divide a second.
     (0.08, 1.0, r"step = 0.0769.*not a whole multiple of wrench_noise.noise_step = 0.025 s. Use a step of 0.1 s"),
-    (0.01, 1.0, r"step = 0.01: .*Use a step of 0.025 s"),
+    (0.01, 1.0, r"step = 0.01 .*Use a step of 0.025 s"),
     (0.05, 0.11, r"Give a noise_step that divides the 0.11 s between samples"),
 ])  # fmt: skip
 def test_a_step_that_is_no_multiple_is_refused_with_the_nearest(h, every, text):

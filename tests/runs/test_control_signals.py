@@ -368,7 +368,7 @@ def test_statistics_and_quantities_of_interest(complete):
     ({"statistics": [Mean("command[0]")]}, "statistics = 'command'"),
 ])  # fmt: skip
 def test_a_scene_without_a_controller_has_none(requested, text):
-    why = r": is a signal of a controller, which this scene has not. Give \[controller\]"
+    why = r" is a signal of a controller, which this scene has not. Give \[controller\]"
     with pytest.raises(lw.SceneError, match=text + why):
         lw.solve(scene(controller=False), "psi_s", h=H, t1=1.0, **requested)
 

@@ -342,7 +342,7 @@ def test_other_arguments_that_do_not_go_together_are_refused(white):
     scene = everything()
     with pytest.raises(lw.SceneError, match=r'common_noise = True says whose noise.*draws="given"'):
         lw.prepare(scene, NAMES, draws="given", common_noise=True, h=H, t1=1.0)
-    with pytest.raises(lw.SceneError, match=r"draws = 'givn': .*given"):
+    with pytest.raises(lw.SceneError, match=r"draws = 'givn' .*given"):
         lw.prepare(scene, NAMES, draws="givn", h=H, t1=1.0)
     with pytest.raises(lw.SceneError, match=r"members = 3 is given beside indices"):
         lw.uq.draws_of(given, [0, 1], members=3)
@@ -373,6 +373,6 @@ def test_what_varies_without_being_named_may_not_draw(white):
     state = np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3))
     torque = {"wrench_noise.torque": np.ones((2, 3))}
     with pytest.raises(
-        lw.SceneError, match=r"parameters = 'wrench_noise.torque': make something draw .*Name what varies"
+        lw.SceneError, match=r"parameters = 'wrench_noise.torque' make something draw .*Name what varies"
     ):
         given.states(*state, torque, xi=np.zeros((2, 30)))

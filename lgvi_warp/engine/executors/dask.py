@@ -15,7 +15,7 @@ from typing import Any
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import SceneError, install
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.executors.base import MOST_DEATHS, Advanced, deaf, received, sent
 from lgvi_warp.engine.work import Work
@@ -88,7 +88,7 @@ class Dask:
             except (OSError, ValueError, MemoryError) as error:  # memory: what answers is no scheduler
                 problem = f"does not answer ({type(error).__name__}: {error})"
                 remedy = "give the address that dask scheduler prints"
-                raise SceneError([f"scheduler = {self.scheduler!r}: {problem}. {capital(remedy)}"]) from error
+                raise SceneError([sentences(f"scheduler = {self.scheduler!r}", problem, remedy)]) from error
             with client:
                 yield client
             return

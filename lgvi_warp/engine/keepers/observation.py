@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.control.signals import SIGNALS, ordered
 from lgvi_warp.engine.keepers.statistics import Gathered
@@ -127,7 +128,7 @@ def observation_of(saved: Mapping[str, Any] | None, statistics: Any = None) -> O
     if statistics is None and saved.get("functions"):
         names = ", ".join(saved["functions"])
         problem = "are of functions that a store does not hold"
-        raise SceneError([f"statistics: {names}: {problem}. Give statistics=[...] again"])
+        raise SceneError([sentences(f"statistics: {names}", problem, "give statistics=[...] again")])
     keep = saved["keep"] if isinstance(saved["keep"], str) else tuple(saved["keep"])
     until = from_dict(saved["until"]) if "until" in saved else None
     observation = Observation(from_list(saved.get("statistics", ()) if statistics is None else statistics), keep, until)

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.extensions.importers.poses import HERE, Pose
 from lgvi_warp.extensions.importers.robot_xml import number, numbers_in, read_floats, text_of
 from lgvi_warp.physics.notation import hat
@@ -213,4 +213,4 @@ def link_named(links: Mapping[str, Link], name: str) -> str:
     if len(fitting) == 1:
         return fitting[0]
     problem = "is not in the file" if not fitting else f"stands for several: {', '.join(fitting)}"
-    raise SceneError([f"SDF link = {name!r}: {problem}. {capital(closest(name, links))}"])
+    raise SceneError([sentences(f"SDF link = {name!r}", problem, closest(name, links))])

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import capital, sentences
 from lgvi_warp.extensions.importers.includes import names_of
 from lgvi_warp.extensions.importers.links import (
     MOST_LINKS,
@@ -78,7 +78,7 @@ def refuse_crowd(elements: Sequence[Element]) -> None:
     """Refuse more elements than any vehicle has, since the time to read them would have no bound."""
     if len(elements) > MOST_LINKS:
         problem = f"the model has {len(elements):,} of <{elements[0].tag}>, more than {MOST_LINKS:,}"
-        raise SceneError([f"SDF model: {problem}. Give the vehicle alone"])
+        raise SceneError([sentences("SDF model", problem, "give the vehicle alone")])
 
 
 # URDF and SDF -------------------------------------------------------------------------------------------------------
@@ -146,7 +146,7 @@ def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Ele
         problem = "the file has none of its own" + (" that can move" if known else "")
         problem += f", it includes {listed(included)}" if included else ""
         remedy = f"pass include={{{included[0]!r}: 'model.sdf'}}" if included else "give an SDF model with a <link>"
-        raise SceneError([f"SDF link: {problem}. {capital(remedy)}"])
+        raise SceneError([sentences("SDF link", problem, remedy)])
     if name is not None:
         fitting = [pair for pair in known if pair[0].get("name") == name]
         if not fitting:

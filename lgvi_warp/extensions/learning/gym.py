@@ -15,6 +15,7 @@ from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, MissingExtra, brief, closest, ragged, refusal
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import answered
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.common.times import of_step, whole_steps
 from lgvi_warp.control.callback import Callback
 from lgvi_warp.engine.block import Block
@@ -496,5 +497,5 @@ def _mask(options: Mapping[str, Any] | None, count: int) -> np.ndarray:
         raise TypeError(f"options['reset_mask'] = {brief(mask)} is not a NumPy array of truth values. Give one")
     if mask.shape != (count,) or not mask.any():
         problem = f"has shape {mask.shape} and {int(mask.sum())} True"
-        raise ValueError(f"options['reset_mask']: {problem}. Give shape ({count},) with one True at least")
+        raise ValueError(sentences("options['reset_mask']", problem, f"give shape ({count},) with one True at least"))
     return mask

@@ -11,6 +11,7 @@ from typing import Any
 from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.common.names import folded
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.physics.terms.base import AnyTerm, Term, build, check_list
 from lgvi_warp.physics.terms.hydrostatics import Restoring, Weight
 
@@ -45,7 +46,9 @@ def register(kind: type[AnyTerm]) -> type[AnyTerm]:
     if not registry.add(kind.kinds, kind):
         former = kind.kinds.get(kind.type)
         problem = f"is that of {former.__module__}.{former.__qualname__}" if former else "is missing"
-        raise ValueError(f"{kind.__name__}.type = {kind.type!r}: {problem}. Give a type that no other term has")
+        raise ValueError(
+            sentences(f"{kind.__name__}.type = {kind.type!r}", problem, "give a type that no other term has")
+        )
     return kind
 
 

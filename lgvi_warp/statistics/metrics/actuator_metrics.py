@@ -13,6 +13,7 @@ from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.control.signals import CHANNELS, ENERGY_USED, SAVED, SIGNALS, field_of, ordered
 from lgvi_warp.statistics.metrics.metric import Metric, OfOne, State, Ticks, Total
 from lgvi_warp.statistics.values.quantity import Quantity, named
@@ -300,7 +301,7 @@ class CustomMetric(Metric):
         try:
             return np.asarray(real_results(values), np.float64)
         except NotReal as error:
-            raise ValueError(f"metric {self.key}: {error.what}. Return real numbers") from None
+            raise ValueError(sentences(f"metric {self.key}", error.what, "return real numbers")) from None
 
     def _divided(self, x: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
         """The samples by name, (n, ...)."""

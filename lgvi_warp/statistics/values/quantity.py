@@ -15,6 +15,7 @@ import numpy as np
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results, settle
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.control.base import ControlLaw, Guidance, MeasuringPart
 from lgvi_warp.control.signals import CHANNELS, SIGNALS, ordered
 from lgvi_warp.physics import energy as invariants
@@ -79,7 +80,9 @@ class Quantity:
         try:
             values = real_results(self.function(samples, members))
         except NotReal as error:
-            raise ValueError(f"quantity {self.name}: {error.what}. Return real numbers, true or false") from None
+            raise ValueError(
+                sentences(f"quantity {self.name}", error.what, "return real numbers, true or false")
+            ) from None
         k, n = len(samples.time), members.count
         if values.shape not in ((k, n), (k, n, self.size)) or (values.ndim == 2 and self.size != 1):
             wanted = f"({k}, {n})" if self.size == 1 else f"({k}, {n}, {self.size})"

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.uncertainty.estimating.bias import APART, Bias, StepChange
 from lgvi_warp.uncertainty.estimating.choice import candidates
 from lgvi_warp.uncertainty.estimating.levels import Setting
@@ -60,7 +61,7 @@ def setting_of(pilot: Pilot, ladders: Sequence[Sequence[Setting]], fixed: bool, 
         ladder = climb(pilot, steps, asked, most)
         if asked is not None and asked not in ladder.settings:
             why = ladder.refused.get(str(asked), "it was not run")
-            raise SceneError([f"setting = {asked}: {why}. Give a shorter step, or leave h out"])
+            raise SceneError([sentences(f"setting = {asked}", why, "give a shorter step, or leave h out")])
         if ladder.settings:
             climbed.append(choice_of(pilot, ladder, asked))
         elif i == len(ladders) - 1 and not climbed:

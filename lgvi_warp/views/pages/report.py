@@ -21,7 +21,7 @@ from lgvi_warp.common.errors import NothingToDraw, SceneError, printable
 from lgvi_warp.common.files import place_of, write_text
 from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_bytes, file_json, file_text
 from lgvi_warp.common.safe_files import inside
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import sentences
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.criteria.files import of_study, study_files
 from lgvi_warp.results.outcomes import outcome_text, outcomes
@@ -104,7 +104,7 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
         if run is None and not studies:
             fault = "holds no run and no study"
             remedy = f"give a folder that lgvi-warp run wrote, or a study: {', '.join(study_files())}".replace("_", "-")
-            raise SceneError([f"{folder}: {fault}. {capital(remedy)}"])
+            raise SceneError([sentences(folder, fault, remedy)])
         place, parts = folder.resolve().name, list[str]()
         if run is not None:
             held, file = run
@@ -275,7 +275,7 @@ def _pictures_in(folder: Path, has_run: bool) -> list[Path]:
     # One large file may have many names.
     if (size := sum(path.stat().st_size for path in pictures)) > MOST_PICTURES:
         fault = f"its pictures have {size / 1e6:,.0f} MB, more than the {MOST_PICTURES / 1e6:,.0f} MB of a report"
-        raise SceneError([f"{folder}: {fault}. Take some away"])
+        raise SceneError([sentences(folder, fault, "take some away")])
     return pictures
 
 

@@ -93,7 +93,7 @@ def test_plugins_that_differ_on_the_water_are_refused():
     with pytest.raises(lw.SceneError, match=r"<default_current> = .* differs from plugin to plugin"):
         from_sdf(two(current(0.5), current(0.4)))
     densities = two("<water_density>1025</water_density>", "<water_density>1000</water_density>")
-    with pytest.raises(lw.SceneError, match=r"<water_density> = '1025; 1000' differs .*; pass water_density="):
+    with pytest.raises(lw.SceneError, match=r"<water_density> = '1025; 1000' differs .*. Pass water_density="):
         from_sdf(densities)
     assert from_sdf(densities, water_density=1020.0)["environment"]["water_density"] == 1020.0
 
@@ -167,7 +167,7 @@ def test_a_merged_model_lies_where_its_pose_says():
 
 
 @pytest.mark.parametrize(("include", "words"), [
-    (None, "the file has none of its own that can move, it includes .*swimmer; pass include="),
+    (None, "the file has none of its own that can move, it includes .*swimmer. Pass include="),
     ({"swimer": HULL}, "include = 'swimer' is none that the file includes. Did you mean 'swimmer'"),
     ({"swimmer": EQUIPPED.format("", "", ""), "tethys": EQUIPPED.format("", "", "")}, "nested more than 8 deep"),
     ({"swimmer": "<sdf/>"}, "the file has no <model>"),

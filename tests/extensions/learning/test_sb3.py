@@ -144,14 +144,14 @@ def test_attributes_and_methods():
 
 def test_what_is_refused():
     env = lw.gym.sb3(environment(**SEEN))
-    with pytest.raises(RuntimeError, match="call step_async"):
+    with pytest.raises(RuntimeError, match="Call step_async"):
         env.step_wait()
     with pytest.raises(ValueError, match="share their attributes"):
         env.set_attr("colour", "red", [0])
     env.set_options({"reset_mask": np.ones(N, bool)})
     with pytest.raises(ValueError, match="there are none to set"):
         env.reset()
-    with pytest.raises(lw.SceneError, match=r"has actions without bounds.* give scale="):
+    with pytest.raises(lw.SceneError, match=r"has actions without bounds.* Give scale="):
         lw.gym.sb3(environment(observe=["heading_error"]))
     with pytest.raises(lw.SceneError, match=r"'One' is not a lw.gym.VectorEnv"):
         lw.gym.sb3(One())

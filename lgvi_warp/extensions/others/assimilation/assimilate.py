@@ -15,7 +15,7 @@ from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import listed, names_of, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import capital, sentences
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.common.times import of_step, whole_steps
 from lgvi_warp.criteria.running import step_of
@@ -207,7 +207,7 @@ def _check_times(times: np.ndarray, steps: _Steps) -> None:
             near = round(float(time) / steps.h) * steps.h
             problem = f"is not a whole number of steps of {steps.h:g} s"
             raise SceneError(
-                [f"series.time = {time:.9g}: {problem}. Give {near:.9g}, or a step that divides all times"]
+                [sentences(f"series.time = {time:.9g}", problem, f"give {near:.9g}, or a step that divides all times")]
             )
 
 
@@ -289,7 +289,13 @@ class _Track:
         if ended.any() and self.filter != "particles":
             problem = f"{int(ended.sum())} of {len(ended)} members failed before {time:g} s"
             raise SceneError(
-                [f"fleet: {problem}, and a Kalman filter needs all. Give a shorter step, or filter='particles'"]
+                [
+                    sentences(
+                        "fleet",
+                        f"{problem}, and a Kalman filter needs all",
+                        "give a shorter step, or filter='particles'",
+                    )
+                ]
             )
         self.log_weights = np.where(ended, -np.inf, self.log_weights)
 
@@ -311,14 +317,14 @@ class _Track:
             numbers = one.quantity.values(now).T
             if len(numbers) != len(values):
                 problem = f"has {len(numbers)} numbers, and {len(values)} were measured"
-                raise SceneError([f"series.of = {one.label!r}: {problem}. Give a column for each"])
+                raise SceneError([sentences(f"series.of = {one.label!r}", problem, "give a column for each")])
             there = np.isfinite(values)
             Y, y, sigma = one.near(values, numbers)[there], values[there], one.std[there]
             w_there = np.where(np.isfinite(Y).all(axis=0), w, 0.0)
             if w_there.sum() <= 0.0 or (self.filter != "particles" and (w_there == 0.0).any()):
                 missing = int((w_there == 0.0).sum())
                 problem = f"{missing} of {len(w)} members predict no number of it at {time:g} s"
-                raise SceneError([f"series = {one.label!r}: {problem}. Leave that time out, or give NaN"])
+                raise SceneError([sentences(f"series = {one.label!r}", problem, "leave that time out, or give NaN")])
             apart, S = filters.innovation(Y, y, sigma, w_there / w_there.sum())
             z, total, _ = filters.whitened(apart, S)
             note[:, there] = apart, np.sqrt(np.diag(S)), z
@@ -374,7 +380,7 @@ class _Track:
         self.log_weights = before + filters.log_likelihood(Y, y, sigma)
         if not np.isfinite(self.log_weights).any():
             problem = f"no member is near what was measured at {self.time:g} s"
-            raise SceneError([f"series: {problem}. Give more members, a wider spread, or larger std"])
+            raise SceneError([sentences("series", problem, "give more members, a wider spread, or larger std")])
         self.log_likelihood += float(np.logaddexp.reduce(self.log_weights))
         weights, n = filters.normalised(self.log_weights), self.fleet.members
         self.effective = filters.effective_number(weights, self.copies)

@@ -108,11 +108,12 @@ def file_text(path: str | os.PathLike[str], kind: str) -> str:
     try:
         content = file_bytes(path, kind)
     except UnreadableError as error:
-        raise SceneError([f"{kind} {_name(path)}: {error}"]) from None
+        raise SceneError([sentences(f"{kind} {_name(path)}", error.what, error.remedy)]) from None
     try:
         return text_of(content)
     except UnreadableError as error:
-        raise SceneError([f"{kind} {_name(path)}: {error}, or {PATHS.get(kind, OTHER_PATHS)}"]) from None
+        remedy = f"{error.remedy}, or {PATHS.get(kind, OTHER_PATHS)}"
+        raise SceneError([sentences(f"{kind} {_name(path)}", error.what, remedy)]) from None
 
 
 def file_json(path: str | os.PathLike[str]) -> Any:

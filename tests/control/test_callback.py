@@ -94,7 +94,7 @@ ODD = {
 @pytest.mark.parametrize("odd, words", ODD.values(), ids=ODD)
 def test_what_is_no_real_number_is_refused(odd, words):
     """Imaginary parts and masks would be lost without a word."""
-    with pytest.raises(ValueError, match=f"callback 'callback' at t = 0 s, members 0 to 19: .*{words}"):
+    with pytest.raises(ValueError, match=f"callback 'callback' at t = 0 s, members 0 to 19.*{words}"):
         run([lw.control.Callback(lambda t, y, r, members: odd(heading(t, y, r, members)))])
 
 

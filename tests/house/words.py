@@ -17,6 +17,8 @@ RIDDLES = {"told", "made", "found", "asked", "given", "together", "pieces", "loo
            "left", "seen", "said", "known", "each", "one"}  # fmt: skip
 WORDS_OF_A_DOCSTRING, WORDS_OF_A_PAGE, CHARACTERS = 30, 25, 160
 FOLDERS = ("lgvi_warp", "kernels", "tests", "examples", "benchmarks", "docs")
+# A message is two sentences, the problem and the remedy: lgvi_warp/common/sentences.py.
+ONE_SENTENCE = re.compile(r"; (give|leave|write|use|did you mean) |^: (is|are|has|have|does) ")
 DEFINITIONS = (ast.FunctionDef, ast.ClassDef, ast.Module)
 
 
@@ -44,6 +46,9 @@ def of_python(text):
             yield from ((node.body[0].lineno, fault) for fault in of_docstring(ast.get_docstring(node) or "x"))
             if getattr(node, "name", "").strip("_") in RIDDLES:
                 yield node.lineno, f"name that says little: {node.name}"
+        texts = [getattr(each, "value", "") for each in node.values] if isinstance(node, ast.JoinedStr) else []
+        if any(ONE_SENTENCE.search(str(text)) for text in texts):
+            yield node.lineno, "message that is no sentence"
         if isinstance(node, ast.arg) and node.arg in RIDDLES:
             yield node.lineno, f"argument that says little: {node.arg}"
 

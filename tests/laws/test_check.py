@@ -389,7 +389,7 @@ def plain_law(w, view, p):
 
 UNBUILT = {
     "signature": (with_role("law", short_law), "Write law(w, view, p)"),
-    "not a Warp function": (with_role("law", plain_law), "decorate it with @wp.func"),
+    "not a Warp function": (with_role("law", plain_law), "Decorate it with @wp.func"),
     "no role": (with_role("other", None), "has none of law, damping"),
     "no such field": (with_role("law", unknown_law), "does not compile"),
     "no key": (with_device(SimpleNamespace(params=stirred_params, law=hasty_law)), "Give a module, or a class"),

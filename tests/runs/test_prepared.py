@@ -113,7 +113,7 @@ def test_given_states_are_not_drawn(paper):
     fleet = lw.Ensemble.from_states(paper, still, np.repeat(np.eye(3)[None], 4, axis=0), still + 1.0, still)
     run = lw.prepare(fleet, of="position", **SETTINGS)
     assert run(seed=3).shape == (4, 3)
-    with pytest.raises(lw.SceneError, match=r"members = 9: .* 4 "):
+    with pytest.raises(lw.SceneError, match=r"members = 9 .* 4 "):
         run(members=9)
 
 
@@ -122,7 +122,7 @@ def test_columns_that_a_sampling_has_are_not_dropped(paper):
     for sampling in (Table(values={"vehicle.mass": np.full(4, 120.0)}), Grid({"vehicle.mass": [120.0, 121.0]})):
         run = lw.prepare(lw.Ensemble(paper, None, 0, vary, sampling), of="position", **SETTINGS)
         assert len(run()) in (2, 4)
-        with pytest.raises(lw.SceneError, match=r"X: .*vehicle\.mass"):
+        with pytest.raises(lw.SceneError, match=r"X.*vehicle\.mass"):
             run(np.full((1, 1), 1215.8))
 
 

@@ -204,7 +204,7 @@ def test_samples_that_are_asked_for_bring_what_the_quantity_reads():
 
 def test_a_part_of_the_distance_is_refused_where_a_run_goes_on():
     half = lw.solve(fleet(4), **RUN | {"t1": 50.0}, save=GOES_ON)
-    with pytest.raises(lw.SceneError, match=r"navigation.of = 'percent': .* goes on from another"):
+    with pytest.raises(lw.SceneError, match=r"navigation.of = 'percent' .* goes on from another"):
         lw.solve(fleet(4), **RUN, start=half.final, statistics=[lw.metrics.NavigationError("percent")])
 
 

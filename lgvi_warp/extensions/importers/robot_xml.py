@@ -13,7 +13,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, brief
 from lgvi_warp.common.reading import MOST_OTHERS, UnreadableError, file_bytes
-from lgvi_warp.common.sentences import capital
+from lgvi_warp.common.sentences import capital, sentences
 
 # Limits of one file. The largest robot descriptions are far below: some 1 MB, 20,000 elements, 20 levels.
 MOST_BYTES, MOST_ELEMENTS, MOST_LEVELS = MOST_OTHERS, 100_000, 200
@@ -91,7 +91,7 @@ def read_bytes(source: Any, format_name: str) -> bytes:
     try:
         return file_bytes(source, f"{format_name} file")
     except UnreadableError as error:
-        raise SceneError([f"{format_name} file {brief(source)}: {error}"]) from None
+        raise SceneError([sentences(f"{format_name} file {brief(source)}", error.what, error.remedy)]) from None
 
 
 # Values -------------------------------------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ def test_sdf(text, more, words):
 
 YAML = [
     ("inertia: [1, 2, 2.5]\n", "mass = ''", "is missing", "Add mass to the file, or pass mass="),
-    ("mass: 10\ninertia:\n", "inertia = ''", "is missing", "pass inertia="),
+    ("mass: 10\ninertia:\n", "inertia = ''", "is missing", "Pass inertia="),
     ("mass: ten\ninertia: [1, 2, 2.5]\n", "mass = 'ten'", "not numeric", "[kg]"),
     ("mass: 10\ninertia: [1, 2, 2.5]\nvolume: 0.1\n", "density = 'not given'", "[kg/m3 (with volume)]"),
     ("mass: 10\ninertia: [1, 2, 2.5]\ncolour: red\n", "colour = 'red'", "unknown key", "ignore="),

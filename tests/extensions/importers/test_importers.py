@@ -301,7 +301,7 @@ def circle(names):
 
 # Text, words of its refusal, and settings.
 REFUSED = {
-    "a mass to calculate": no_mass("@calculated", "generate the file"),
+    "a mass to calculate": no_mass("@calculated", "Generate the file"),
     "a mass of xacro's": no_mass("${mass}", "xacro"),
     "a mass of Jinja's": no_mass("{{ mass }}", "Jinja"),
     "a mass in words": no_mass("about 20", "Write a finite"),
@@ -311,7 +311,7 @@ REFUSED = {
     "an empty mass": no_mass("", "Give the mass"),
     "a negative mass": (link(outside=NAMED.format("b", -1)), ("is negative",)),
     "a template": ("<sdf><%= mass %></sdf>", ("erb",)),
-    "xacro": (XACRO, ('xacro:property name="mass"', "not executed", "run xacro")),
+    "xacro": (XACRO, ('xacro:property name="mass"', "not executed", "Run xacro")),
     "a type that is not read": (URDF, ("a <type> = 'sphere'",)),
     "a property of xacro's": (URDF.replace("'3'", "'${m}'"), ("${m}",)),
     "several models": (f"<sdf><world>{TWO}</world></sdf>", ("several: a, b", "model=")),

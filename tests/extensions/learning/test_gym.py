@@ -69,10 +69,10 @@ def test_the_bits_of_a_run(env):
 def test_what_is_no_real_number_is_refused(env, odd, words):
     actions, names = np.zeros((N, 1)), ("observe", "reward", "terminated")
     env.reset()
-    with pytest.raises(ValueError, match=f"actions: .*{words}"):
+    with pytest.raises(ValueError, match=f"actions.*{words}"):
         env.step(odd(actions))
     for name in names[: 2 if odd is ODD["truth"][0] else 3]:  # truth values are what `terminated` gives
-        with pytest.raises(ValueError, match=f"{name}: .*{words}"):
+        with pytest.raises(ValueError, match=f"{name}.*{words}"):
             other = environment(
                 **{name: lambda t, y, r, *, name=name: odd(np.zeros((N, 2) if name == "observe" else N))}
             )

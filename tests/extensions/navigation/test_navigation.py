@@ -600,5 +600,5 @@ def test_the_page_has_all_keys_and_its_blocks_run(capsys, monkeypatch):
 )
 def test_a_filter_has_no_linear_model(study):
     told = refused(study, scene(parts(), period=PERIOD))
-    assert "leave it out of this scene" in told
+    assert "Leave it out of this scene" in told
     assert "error_state_filter" in told

@@ -396,7 +396,7 @@ def test_a_scene_without_a_precise_method_has_no_reference(scene):
 
     said = refusal(make_reference, Refusing(fleet_of(scene), 4.0))
     assert "method: the scene takes none of kl8(psi_x), rk8, " in said
-    assert "name one that it takes: methods=[...]" in said
+    assert "Name one that it takes: methods=[...]" in said
 
 
 def test_a_reference_too_rough_is_refused_with_what_would_do(scene):

@@ -526,7 +526,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"grid": {"vehicle.mass": 0}}, None, ["whole number from 1"]),
         ({"grid": {"environment.gravity": 3}}, None, ["has no distribution"]),
         ({"grid": {"environment.gravity": [9.8, 9.9]}}, 3, ["is not the 2 of the grid"]),
-        ({"grid": {"vehicle.mass": [1.0, 2.0]}}, None, ["drop one of them"]),
+        ({"grid": {"vehicle.mass": [1.0, 2.0]}}, None, ["Drop one of them"]),
         ({"table": {}}, None, ["one of file and values"]),
         ({"table": {"file": "/nowhere.csv"}}, None, ["cannot be read"]),
         ({"table": {"values": {"environment.gravity": [9.8], "environment.water_density": [1.0, 2.0]}}}, None,
@@ -665,7 +665,7 @@ def test_attitudes_that_are_no_rotations(scene):
 
 def test_the_attitude_varies_in_one_way_only(scene):
     vary = {"start.attitude": UniformRotation(), "start.rotation_vector": Normal(std=0.1)}
-    assert "keep one of them" in faults(lw.Ensemble, scene, 4, 0, vary)[0]
+    assert "Keep one of them" in faults(lw.Ensemble, scene, 4, 0, vary)[0]
     assert "RotationNormal" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude[0,0]": Normal(std=0.1)})[0]
 
 

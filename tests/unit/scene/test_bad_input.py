@@ -267,7 +267,7 @@ FOSSEN = [
     ({3: -1.0}, "3 = -1.0", "not a coefficient's name", "Known: X_udot"),
     ({"X_u": NAN}, "X_u = nan", "not finite", "Give a number"),
     ([1.0], "coefficients = [1.0]", "not a map", "X_udot"),
-    ({"X_qdot": -1e3}, "total mass matrix", "not positive definite", "check mass"),
+    ({"X_qdot": -1e3}, "total mass matrix", "not positive definite", "Check mass"),
 ]
 ENERGY = [({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, "drag_matrix.linear", "creates energy", "minus Fossen's")]
 
@@ -287,11 +287,11 @@ NAMES = [({"type": "drag"}, "drag.quadrtic", "Did you mean 'drag.quadratic'?"),
 
 SCHEDULED = THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}
 IDLE = [
-    (SCHEDULED, "thrusters.command", "vary thrusters.command_schedule"),
-    (THRUSTER, "thrusters.command_schedule", "vary thrusters.command"),
+    (SCHEDULED, "thrusters.command", "Vary thrusters.command_schedule"),
+    (THRUSTER, "thrusters.command_schedule", "Vary thrusters.command"),
     (THRUSTER, "thrusters.polynomial", "Give thrusters.polynomial in the scene"),
     (THRUSTER, "thrusters.time_constant", "Give thrusters.time_constant above 0 [s] in the scene"),
-    (STEERED, "control_fins.times", "vary control_fins.command"),
+    (STEERED, "control_fins.times", "Vary control_fins.command"),
     (STEERED, "control_fins.rate_limit", "Give control_fins.rate_limit below 1e+06 rad/s in the scene"),
 ]
 
@@ -307,7 +307,7 @@ RUNS = [
     ({"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]}, {"method": "kl6(psi_s)"}, "goes backward by",
      "drag number up to", "Use psi_s, or a step"),
     (MATRIX, {"method": "psi_q"}, "method = 'psi_q'", "not known", "Did you mean 'psi_"),
-    (MATRIX, {"method": "kl6(phi)"}, "method = 'kl6(phi)'", "not symmetric", "compose psi_s"),
+    (MATRIX, {"method": "kl6(phi)"}, "method = 'kl6(phi)'", "not symmetric", "Compose psi_s"),
     (MATRIX, {"dtype": "float16"}, "dtype = 'float16'", "Did you mean 'float64'?"),
     (MATRIX, {"device": "cuda:0"}, "device = 'cuda:0'", "runs are on CPU cores", 'Leave it out, or give "cpu"'),
     (MATRIX, {"h": NAN}, "h = nan", "not finite", "[s]"),
@@ -441,7 +441,7 @@ def test_a_law_without_a_struct_whose_numbers_make_none():
 def test_a_law_that_returns_nothing():
     term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
     (fault,) = faults(lw.laws.check_law, term)
-    says(fault, "pull.device", "does not compile", "return what the role adds to")
+    says(fault, "pull.device", "does not compile", "Return what the role adds to")
 
 
 @pytest.mark.kernel
@@ -472,7 +472,7 @@ def test_numbers_of_the_wrong_shape():
 def test_what_is_no_fleet():
     for make in (lw.solve, lw.Ensemble):
         (fault,) = faults(make, lw.Vehicle(1.0, inertia=1.0 * np.ones(3), added_mass=np.ones(3), buoyancy=0.0))
-        assert "give lw.Scene(" in fault
+        assert "Give lw.Scene(" in fault
     (fault,) = faults(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
     says(fault, "vary = [1]", "lw.distributions.Normal")
 

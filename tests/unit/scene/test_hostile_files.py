@@ -62,8 +62,8 @@ SCENES = {
     "spaces": (b" \n\t\n", ("vehicle", "is missing")),
     "text": (b"dear reader", ("is not TOML", "line 1")),
     "random bytes": (bytes(range(256)) * 9, ("UTF-8",)),
-    "invalid UTF-8": (b"a = '\xc3\x28'", ("byte 0xc3 at 5", "save it in UTF-8")),
-    "UTF-16 with its mark": (BODY.encode("utf-16"), ("UTF-16", "save it in UTF-8")),
+    "invalid UTF-8": (b"a = '\xc3\x28'", ("byte 0xc3 at 5", "Save it in UTF-8")),
+    "UTF-16 with its mark": (BODY.encode("utf-16"), ("UTF-16", "Save it in UTF-8")),
     "UTF-16, large end first": (b"\xfe\xff" + BODY.encode("utf-16-be"), ("UTF-16",)),
     "UTF-32": (BODY.encode("utf-32"), ("UTF-16",)),
     "a zero byte": (BODY.encode() + b"a = \0\n", ("is not TOML",)),
@@ -217,7 +217,7 @@ def check_refused(load, kind, tmp_path):
         made(tmp_path / "odd", tmp_path)
     before = tree(tmp_path)
     error = refused(load, tmp_path / "odd" if callable(made) else made, words=(words,))
-    assert "give" in str(error) or "leave out" in str(error)
+    assert "Give" in str(error) or "Leave out" in str(error)
     assert tree(tmp_path) == before
 
 

@@ -74,7 +74,7 @@ def test_what_is_not_known_is_known_nowhere(text):
     for make in (compared_in, quantities, lw.statistics.Mean, lambda of: functional("of", of)):
         message = refused(make, text)
         assert "of = " in message
-        assert "give" in message or "write" in message or "did you" in message or "known" in message
+        assert "Give" in message or "Write" in message or "Did you" in message or "Known" in message
 
 
 def test_statistics_and_sensitivity_have_the_same_numbers(result):

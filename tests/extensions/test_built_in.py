@@ -25,7 +25,7 @@ def test_lists_have_the_words_of_extensions():
     assert "polar" in list(TYPES)
     assert TYPES["polar"] is lw.terms.Polar
     assert {"seawing", "remus_100"} <= set(lw.vehicles.names())
-    with pytest.raises(lw.SceneError, match="did you mean 'polar'"):
+    with pytest.raises(lw.SceneError, match="Did you mean 'polar'"):
         lw.Scene.named("torpedo", terms=[{"type": "polarr"}])
 
 

@@ -355,7 +355,7 @@ WRONG = {
         with_role("damping", resisting_damping, 1e308), ["damping: power", ...], "power is not finite at velocity"),
     "a memory that depends on the state": (
         Drifting(strength=0.3), ["follow: blind to the state", "follow: exact"],
-        "leave follow() out", "by the exact solution over view.h"),
+        "Leave follow() out", "by the exact solution over view.h"),
     "numbers that do not fit": (
         Forgetful(strength=0.3), ["numbers"],
         "strength is not in packed().values", "strange is not a field of params()"),

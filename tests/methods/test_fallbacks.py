@@ -192,5 +192,5 @@ def test_what_cannot_be_divided_is_refused(method, laws, text):
 def test_failures_must_be_seen(scene, on_failure):
     with pytest.raises(lw.SceneError, match="does not see failures"):
         lw.solve(one(scene), h=0.1, t1=1.0, checks="none", on_failure=on_failure)
-    with pytest.raises(lw.SceneError, match="did you mean 'substep'"):
+    with pytest.raises(lw.SceneError, match="Did you mean 'substep'"):
         lw.solve(one(scene), h=0.1, t1=1.0, on_failure="substeps")

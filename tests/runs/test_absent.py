@@ -224,7 +224,7 @@ def test_a_varied_member_is_as_if_alone_with_its_numbers(method):
 def test_unphysical_members_are_counted():
     with pytest.raises(lw.SceneError, match=r"tether.stiffness of member \d+.*unphysical \(\d+ of 50"):
         lw.Ensemble(scene(), 50, 1, {"tether.stiffness": lw.distributions.Normal(relative=2.0)})
-    with pytest.raises(lw.SceneError, match=r"did you mean 'current\.velocity'"):
+    with pytest.raises(lw.SceneError, match=r"Did you mean 'current\.velocity'"):
         lw.Ensemble(scene(), 50, 1, {"current.velocty": lw.distributions.Normal(std=0.1)})
 
 

@@ -436,7 +436,7 @@ def test_the_command_says_what_is_wrong(tmp_path, capsys):
     assert run("--samples", "0") == 2
     assert "samples = 0" in capsys.readouterr().err
     assert run("--set", "ensemble.vary.vehicle.buoyancy={ normal = { stdd = 1.0 } }") == 2
-    assert "did you mean 'std'" in capsys.readouterr().err
+    assert "Did you mean 'std'" in capsys.readouterr().err
     fast = ["--set", "start.angular_velocity=[900.0, 0.0, 0.0]", "--duration", "0.02"]
     assert run(*fast) == 1
     assert "80 of 80 members failed (step_too_large 80" in capsys.readouterr().err

@@ -81,7 +81,7 @@ def test_a_case_that_is_refused_is_noted_and_the_others_go_on(found):
     rows = found.rows()
     assert [row["case"] for row in rows] == [name for name in ("soft", "stiff", "unknown") for _ in range(2)]
     assert [bool(row["refused"]) for row in rows] == [False] * 4 + [True] * 2
-    assert "did you mean 'heading_pid.kp'" in rows[4]["refused"]
+    assert "Did you mean 'heading_pid.kp'" in rows[4]["refused"]
     assert "refused" in str(found)
     assert found.table["success"].shape == (3, 2)
     assert np.isnan(found.table["success"].values[2]).all()
@@ -311,7 +311,7 @@ baseline = "stiff"
     assert "by the same lgvi-warp sweep" in capsys.readouterr().err
     (tmp_path / "sweep.toml").write_text(text.replace('overshoot heading" = { below', 'overshot heading" = { below'))
     assert main(["sweep", str(tmp_path / "sweep.toml"), "--out", str(out)]) == 2
-    assert "did you mean 'overshoot heading'" in capsys.readouterr().err
+    assert "Did you mean 'overshoot heading'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("more", "text"), [

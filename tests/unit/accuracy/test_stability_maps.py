@@ -255,7 +255,7 @@ def test_limits_are_the_last_good_step_of_a_row():
     assert found.limit("psi_s", Cell.ACCURATE)[0] == 1.0
     assert list(found.limit("psi_s", Cell.FLAGGED)) == [4.0, 4.0]
     assert found.counts("psi_s") == {"accurate": 3, "bounded": 1, "flagged": 2, "failed": 0, "silent": 0}
-    with pytest.raises(lw.SceneError, match="did you mean 'psi_s'"):
+    with pytest.raises(lw.SceneError, match="Did you mean 'psi_s'"):
         found.limit("psi")
 
 

@@ -105,7 +105,7 @@ def test_options_reach_the_run(tmp_path, capsys):
     (["--step", "-1", "--members", "0", "--set", "vehicle.mass=-2"], ["3 faults", "step", "members", "mass"]),
     (["--method", "psy"], ["psy", "Did you mean"]), (["--set", "nonsense"], ["nonsense", "vehicle.buoyancy=300"]),
     (["--dtype", "float16"], ["float16"]), (["--width", "5"], ["width = 5"]), (["--threads", "0"], ["threads = 0"]),
-    (["--device", "cuda"], ["run.device = 'cuda'", "runs are on CPU cores", 'Give "cpu"']),
+    (["--device", "cuda"], ["run.device = 'cuda'", "runs are on CPU cores", 'give "cpu"']),
     (["--resume"], ["--resume", "--store zarr"]),
     (["--blocks", "0:2", "--overwrite"], ["--blocks and --overwrite", "--store zarr"]),
     (["--store", "zarr", "--blocks", "3"], ["--blocks 3", "--blocks 0:100"]),

@@ -83,7 +83,7 @@ def test_contents_of_a_folder(tmp_path):
         place = tmp_path / ("empty" if "results" in words else name)
         with pytest.raises(lw.SceneError) as caught:
             contents(place)
-        assert str(caught.value) == f"{place}: {words}. Give the folder of a run or of a study"
+        assert str(caught.value) == f"{place} {words}. Give the folder of a run or of a study."
 
 
 def test_info_of_a_folder_with_everything(store, tmp_path, capsys):
@@ -147,7 +147,7 @@ def test_pictures_are_drawn_again(tmp_path, capsys):
 
 def test_the_last_run_of_a_folder_is_viewed(tmp_path):
     (tmp_path / "sweep.json").write_text("{}")
-    with pytest.raises(lw.SceneError, match=rf"^{tmp_path} holds a study, and no run. Give the folder of a run$"):
+    with pytest.raises(lw.SceneError, match=rf"^{tmp_path} holds a study, and no run. Give the folder of a run\.$"):
         view.run_in(tmp_path)
     (tmp_path / "result.npz").touch()
     assert view.run_in(tmp_path) == Content("result", tmp_path / "result.npz")
@@ -177,7 +177,7 @@ def test_a_viewed_run_says_its_file(tmp_path, capsys):
     assert main(["view", str(tmp_path), "-q", "--members", "0"], viewer=shown) == 0
     assert [(result.members, named["members"]) for (result,), named in shown.calls] == [(4, None), (4, [0])]
     assert json.loads(capsys.readouterr().out)["files"] == []
-    for error in (lw_error("no member"), OSError("no display")):
+    for error in (lw_error("no member."), OSError("no display")):
         assert main(["view", str(tmp_path), "-q"], viewer=Study(error)) == (2 if "member" in str(error) else 1)
         assert capsys.readouterr().err == f"lgvi-warp: {error}\n"
 
@@ -208,8 +208,8 @@ def test_merging_says_what_is_missing(tmp_path, capsys):
     study = Study([Merged(path, 2), Merged(path, 0), Merged(path, 0, True), Merged(path, 1, True)])
     verb, line = ["merge", "a", "b", "--out", "c"], f"file        {path} (0.1 MB)"
     resume = f"lgvi-warp resume {path} runs them"
-    for text in (f"2 of 3 blocks are in none of the folders; {resume}",
-                 f"the members that it keeps are missing; {resume}, or says why not"):  # fmt: skip
+    for text in (f"2 of 3 blocks are in none of the folders. {resume}",
+                 f"the members that it keeps are missing. {resume}, or says why not"):  # fmt: skip
         assert main(verb, join=study) == 1
         assert capsys.readouterr() == (f"{line}\n", f"lgvi-warp: {path}: {text}\n")
     assert main([*verb, "--overwrite"], join=study) == 0
@@ -255,7 +255,7 @@ def test_files_that_were_written_and_why_not(tmp_path):
     assert written.files == [tmp_path / "a"]
     assert written.empty == [f"{tmp_path}/c was not written: nothing"]
     assert written.faults == [f"{tmp_path}/{name}" for name in ("b was not written: odd", "e was not written: broken")]
-    libraries = f"not made without matplotlib and pandas; to have pictures: {install('viz,io')}"
+    libraries = f"not made without matplotlib and pandas. To have pictures: {install('viz,io')}"
     assert written.note_lines() == [f"note        d, f, g: {libraries}"]
     assert Written().note_lines() == []
     with pytest.raises(KeyError):

@@ -27,7 +27,7 @@ def test_every_option_of_a_run_replaces_its_key():
     assert settings.overrides(chosen(*plainly)) == {
         "run.keep": "[3,17]", "ensemble.members": "1000000", "ensemble.seed": "-3", "vehicle.mass": "a=b"}  # fmt: skip
     with pytest.raises(
-        lw.SceneError, match=r"^--set = 'vehicle\.mass' is not a NAME=VALUE. Write --set vehicle\.buoyancy=300$"
+        lw.SceneError, match=r"^--set = 'vehicle\.mass' is not a NAME=VALUE. Write --set vehicle\.buoyancy=300\.$"
     ):
         settings.overrides(chosen("--set", "vehicle.mass"))
 
@@ -78,7 +78,7 @@ def test_the_store_and_its_options(tmp_path):
         assert (store.path, store.dtype, store.existing) == (tmp_path / "run.zarr", "float32", existing)
     assert settings.store_settings(chosen(*out, "--store", "zarr")).dtype is None
     every = ["--store-dtype", "float32", "--blocks", "0:1", "--overwrite"]
-    text = "--store-dtype and --blocks and --overwrite is for runs in a store. Add --store zarr, or leave it out"
+    text = "--store-dtype and --blocks and --overwrite is for runs in a store. Add --store zarr, or leave it out."
     with pytest.raises(lw.SceneError) as caught:
         settings.store_settings(chosen(*out, *every))
     assert str(caught.value) == text
@@ -90,5 +90,5 @@ def test_blocks_are_a_range():
     for text in ("3", "3:", ":3", "a:3", "3:a", "1:2:3"):
         with pytest.raises(lw.SceneError) as caught:
             settings.block_range(chosen("--blocks", text))
-        words = f"--blocks {text} is not a range of blocks. Write --blocks 0:100 for the first hundred"
+        words = f"--blocks {text} is not a range of blocks. Write --blocks 0:100 for the first hundred."
         assert str(caught.value) == words

@@ -197,13 +197,13 @@ def test_a_run_with_an_error_takes_what_is_suggested_and_checks_it(tmp_path, cap
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (["--of", "depth"], "--of depth has no effect without --error. Add --error 1e-3"),
-        (["--error", "0.01", "--step", "0.5"], "--step 0.5 is what --error chooses. Leave out --step or --error"),
-        (["--error", "1", "--dtype", "float32"], "--dtype float32 is what --error chooses. Leave out --dtype or --error"),
+        (["--of", "depth"], "--of depth has no effect without --error. Add --error 1e-3."),
+        (["--error", "0.01", "--step", "0.5"], "--step 0.5 is what --error chooses. Leave out --step or --error."),
+        (["--error", "1", "--dtype", "float32"], "--dtype float32 is what --error chooses. Leave out --dtype or --error."),
         (["--error", "0.01", "--keep", "3"],
-         '--error 0.01 is checked on samples of all members. Give run.keep="all", no run.until'),
+         '--error 0.01 is checked on samples of all members. Give run.keep="all", no run.until.'),
         (["--error", "0.01", "--keep", "none"],
-         '--error 0.01 is checked on samples of all members. Give run.keep="all", no run.until'),
+         '--error 0.01 is checked on samples of all members. Give run.keep="all", no run.until.'),
     ],
 )  # fmt: skip
 def test_what_contradicts_an_error_is_refused(tmp_path, capsys, options, text):

@@ -188,7 +188,7 @@ def test_new_keeps_a_file_that_is_there_and_knows_its_vehicles(tmp_path, capsys)
     assert "is there already" in capsys.readouterr().err
     assert path.read_text() == "mine"
     assert cli.main(["new", str(tmp_path / "a.toml"), "--vehicle", "remus"]) == 2
-    assert "did you mean 'remus_100'?" in capsys.readouterr().err
+    assert "Did you mean 'remus_100'?" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -259,7 +259,7 @@ def test_help_of_a_verb_is_what_its_option_prints(capsys):
         assert "usage: lgvi-warp" in text
     with pytest.raises(SystemExit):
         cli.main(["help", "rum"])
-    assert "did you mean 'run'?" in capsys.readouterr().err
+    assert "Did you mean 'run'?" in capsys.readouterr().err
 
 
 def test_the_options_of_run_stand_in_groups():

@@ -243,7 +243,7 @@ def test_given_parameters_that_do_not_fit(drifting):
     def message(parameters):
         return refused(lw.Ensemble.from_states, drifting, zero, R, zero, zero, parameters)
 
-    assert "did you mean 'vehicle.mass'" in message(pd.DataFrame({"vehicle.masss": ROWS[:, 0]}))
+    assert "Did you mean 'vehicle.mass'" in message(pd.DataFrame({"vehicle.masss": ROWS[:, 0]}))
     assert "columns of one name" in message(pd.concat([FRAME, FRAME], axis=1))
     assert "is not an entry" in message({"current.velocity[3]": ROWS[:, 0]})
     assert "is varied by" in message({"current.velocity[1]": ROWS[:, 0], "current.velocity": ROWS[:, 2:]})
@@ -274,7 +274,7 @@ def test_levels_with_names(drifting):
             np.testing.assert_array_equal(one.parameters(0, 2)[MASS], by_order[MASS])
             np.testing.assert_array_equal(one.parameters(0, 2)[BUOYANCY], by_order[BUOYANCY])
     message = refused(lw.Ensemble, drifting, None, 0, vary, UnitCubePoints({"mass": u[:, 0], BUOYANCY: u[:, 1]}))
-    assert "did you mean 'vehicle.mass'" in message
+    assert "Did you mean 'vehicle.mass'" in message
     assert "do not name 2 columns" in refused(UnitCubePoints, u, [MASS])
 
 

@@ -41,7 +41,7 @@ def test_names_in_another_case():
         (lambda: lw.Scene.named("REMUS_100"), "remus_100"),
         (lambda: lw.Scene.from_dict({"vehicle": {"Mass": 3.0}}), "mass"),
     ):
-        with pytest.raises(lw.SceneError, match=f"did you mean '{name}'"):
+        with pytest.raises(lw.SceneError, match=f"Did you mean '{name}'"):
             call()
 
 
@@ -74,7 +74,7 @@ def test_public_names_behind_another_door(place, word, name):
 
 def test_a_word_that_several_names_end_with_names_all_of_them():
     scene = lw.Scene.load(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml", {"ensemble.members": 2})
-    with pytest.raises(lw.SceneError, match=r"did you mean 'depth_pid\.kp' or 'heading_pid\.kp'"):
+    with pytest.raises(lw.SceneError, match=r"Did you mean 'depth_pid\.kp' or 'heading_pid\.kp'"):
         scene.with_numbers({"kp": 1.0})
 
 
@@ -107,7 +107,7 @@ def test_an_unknown_keyword_of_a_class_gets_the_nearest(path):
     meant = nearest(word, tuple(inspect.signature(kind).parameters))
     with pytest.raises(lw.SceneError) as caught:
         kind(**{word: None})
-    remedy = f"did you mean {meant!r}?" if meant else f"known: {', '.join(inspect.signature(kind).parameters)}"
+    remedy = f"Did you mean {meant!r}?" if meant else f"known: {', '.join(inspect.signature(kind).parameters)}"
     text = f"{kind.__qualname__}() got an unexpected keyword argument {word!r}; {remedy}"
     assert str(caught.value) == text
     assert isinstance(caught.value, TypeError)

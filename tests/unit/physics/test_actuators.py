@@ -40,8 +40,8 @@ FAULTY_TERMS = {
     "is given beside a table": lambda: thrusters(**TABLE, polynomial=(1.0, 2.0)),
     "torque_loss = [0.1, 0.1] is given without torque_coefficient": lambda: thrusters(torque_loss=0.1),
     "thrusters.rate_limit": lambda: thrusters(rate_limit=-1.0),
-    "give (n,) [N per unit^2], a table [N], or a polynomial [N]": lambda: lw.terms.Thrusters(**PAIR),
-    "give it [1/rad], or a table of lift": lambda: lw.terms.ControlFins(**FIN),
+    "Give (n,) [N per unit^2], a table [N], or a polynomial [N]": lambda: lw.terms.Thrusters(**PAIR),
+    "Give it [1/rad], or a table of lift": lambda: lw.terms.ControlFins(**FIN),
     "does not begin with no lift at 0": lambda: fins(lift_angles=(0.1, 0.3), lift_coefficients=(0.0, 0.9)),
     "control_fins.lift_angles = [0.0, 0.3] is given alone": lambda: fins(lift_angles=(0.0, 0.3)),
     "control_fins.flow_angle = 'no' is neither true nor false": lambda: fins(flow_angle="no"),
@@ -62,7 +62,7 @@ FAULTY_LOOPS = {
         [thrusters()], laws=[DEPTH]
     ),
     "thrusters.limit": lambda: scene([thrusters(**POLYNOMIAL)], laws=[HEADING]),
-    "give 2, one for each channel of thrusters": lambda: scene(
+    "Give 2, one for each channel of thrusters": lambda: scene(
         [thrusters()], laws=[HEADING], allocation=[lw.control.PseudoInverse(to="thrusters", weights=(1.0, 1.0, 1.0))]
     ),
     "fault.known = 1 is neither true nor false": lambda: lw.control.Fault(of="thrusters", known=1),

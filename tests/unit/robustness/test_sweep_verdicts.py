@@ -112,7 +112,7 @@ def test_a_sweep_file_says_what_matters(tmp_path, capsys):
     assert study.calls[0][1]["matters"] == {"success": 2.0}
     path.write_text('scene = "scene.toml"\n[compare]\nmattters = 1.0\n')
     assert main(["sweep", str(path), "--out", str(tmp_path / "out"), "-q"], study=study) == 2
-    assert "did you mean 'matters'?" in capsys.readouterr().err
+    assert "Did you mean 'matters'?" in capsys.readouterr().err
 
 
 def test_cells_that_are_alike_are_told_once():

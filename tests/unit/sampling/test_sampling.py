@@ -400,7 +400,7 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
     frame.to_csv(path)
     found = faults(Table, path, columns=["vehicle.mass", "id"])
     assert len(found) == 2
-    assert all('Leave the column out: ignore = ["id"]' in fault for fault in found)
+    assert all('leave the column out: ignore = ["id"]' in fault for fault in found)
     tables = [Table(path, ignore=["", "id"]), Table(path, columns=("start.position[2]", "vehicle.mass")),
               Table(frame, ignore=["id"]),
               Table(values=frame, columns=["vehicle.mass", "start.position[2]"])]  # fmt: skip
@@ -535,7 +535,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"table": {"values": {"vehicle.mass": [9.8]}}}, None, ["varied by", "Keep one"]),
         ({"table": {"values": {"vehicle.center_of_buoyancy": [9.8]}}}, None, ["shape (1,)", "(1, 3)"]),
         ({"table": {"values": {"environment.gravity": [9.8, 9.9]}}}, 5, ["more than the 2 of the table", "2 or less"]),
-        ({"table": {"values": {"id": [1.0], "environment.gravity": [9.8]}}}, None, ['Leave it out: ignore = ["id"]']),
+        ({"table": {"values": {"id": [1.0], "environment.gravity": [9.8]}}}, None, ['leave it out: ignore = ["id"]']),
         ({"table": {"values": {"environment.gravity": [9.8]}, "columns": ["gravity"]}}, None,
          ["columns = 'gravity'", "Did you mean 'environment.gravity'?"]),
         ({"table": {"values": {"environment.gravity": [9.8]}, "ignore": ["id"]}}, None, ["ignore = 'id'", "not a column"]),
@@ -571,7 +571,7 @@ BAD_FILES = {
                                           'no number in line 8, column "y"'],
     "x,y\n1e400,-inf\n": ['1e400, which is not finite, in line 2, column "x"', '-inf|column "y"'],
     "120,121\n1,2\n": ["numbers where the names should be (line 1)"],
-    "\nvehicle.inertia[0,0],vehicle.mass\n5,120\n": ["'vehicle.inertia[0' (line 2); quote a name"],
+    "\nvehicle.inertia[0,0],vehicle.mass\n5,120\n": ["'vehicle.inertia[0' (line 2). Quote a name"],
     ",vehicle.mass\n0,120\n": ['without a name, number 1|ignore = [""]'],
     "x;y\n120,5;7\n": ["'120,5', which is not a number|with a point"],
     'x\n"120\n121\n': ["which is not a number, in line 3"],
@@ -722,7 +722,7 @@ def test_a_hypercube_without_its_group_is_told_so():
     for make in (LatinHypercube, lambda: sampling.sampling_of("latin_hypercube"), lambda: LatinHypercube(replicates=2)):
         (fault,) = faults(make)
         assert fault == (
-            "ensemble.sampling.latin_hypercube.group = None is missing. Give how many members make a hypercube: group = 256"
+            "ensemble.sampling.latin_hypercube.group = None is missing. Give how many members make a hypercube: group = 256."
         )
     assert "is not a whole number from 2" in faults(LatinHypercube, 0)[0]
 

@@ -86,10 +86,10 @@ TERMS = [
     (THRUSTER | {"command_schedule": 3.0, "times": [0.0]}, "thrusters.command_schedule = 3.0", "Give 1 x 1 numbers"),
     (THRUSTER | {"command_schedule": [[1.0, 2.0], [3.0]]}, "thrusters.command_schedule", "not numeric", "Give numbers"),
     (THRUSTER | {"command": [[1.0], [2.0, 3.0]]}, "thrusters.command = [[1.0], [2.0, 3.0]]", "not numeric",
-     "give numbers"),
+     "Give numbers"),
     (THRUSTER | {"limit": [[1.0, 2.0], [3.0]]}, "thrusters.limit = [[1.0, 2.0], [3.0]]", "not numeric", "Give numbers"),
     (THRUSTER | {"command": [1.0], "times": [0.0], "command_schedule": [[2.0]]}, "thrusters.command",
-     "keep one of them"),
+     "Keep one of them"),
     (FIN | {"chord": POINT}, "fins.chord[0] = [0.0, 0.0, 0.0]", "zero length", "trailing to leading edge"),
     (FIN | {"normal": AHEAD}, "fins.normal[0] = [1.0, 0.0, 0.0]", "along the chord", "across the fin's plane"),
     (FIN | {"drag": [0.1, 0.2]}, "fins.drag = [0.1, 0.2]", "shape (2,)", "Give 1 numbers [1]"),
@@ -213,12 +213,12 @@ STARTS = [
     (
         {"velocity": (1, 0, 0), "velocity_inertial": (1, 0, 0)},
         "start.velocity and velocity_inertial = ",
-        "keep one of them",
+        "Keep one of them",
     ),
     (
         {"rotation_vector": (1, 0, 0), "euler_deg": (1, 0, 0)},
         "start.rotation_vector and euler_deg = ",
-        "keep one of them",
+        "Keep one of them",
     ),
 ]
 
@@ -257,7 +257,7 @@ FOSSEN = [
         {"Y_rdot": -1.0, "N_vdot": -2.0},
         "Y_rdot = -1.0",
         "from its partner N_vdot = -2.0",
-        "correct one or leave it out",
+        "Correct one or leave it out",
     ),
     ({"X_u": -1.0, "Xu": -2.0}, "Xu = -2.0", "given twice", "Leave one out"),
     ({"X_udot": -1.0, "Xdu": -1.0}, "Xdu = -1.0", "also as X_udot", "Leave one out"),
@@ -301,7 +301,7 @@ MATRIX = {"type": "drag_matrix", "linear": np.eye(6).tolist()}
 RUNS = [
     (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix prevents that", "Use psi_s"),
     (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only if a step of -h undoes",
-     "use psi_x"),
+     "Use psi_x"),
     (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies prevents that", "Use psi_s"),
     (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "Use psi_s"),
     ({"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]}, {"method": "kl6(psi_s)"}, "goes backward by",

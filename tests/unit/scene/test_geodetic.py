@@ -143,10 +143,10 @@ def test_a_start_varies_in_metres_around_its_place():
         ({"environment": {"origin": [5.0]}}, r"environment.origin = \[5.0\] has shape \(1,\)"),
         ({"environment": {"origin": ORIGIN, "start": "soon"}}, "environment.start = 'soon' is not a date and time"),
         ({"environment": {"origin": ORIGIN, "start": 5}}, "environment.start = 5 is not a date and time"),
-        ({"start": {"geodetic": [10.4, 163.0, 0.0], "position": [0.0, 0.0, 0.0]}}, "position and geodetic = .*: say the same"),
+        ({"start": {"geodetic": [10.4, 163.0, 0.0], "position": [0.0, 0.0, 0.0]}}, "position and geodetic = .* say the same"),
         ({"start": {"geodetic": [-91.0, 10.0, 0.0]}}, "start.geodetic = -91.0 is not a latitude"),
         ({"start": {}, "environment": {}, "controller": guided({"geodetic": WAY})}, "waypoints.geodetic = .*is not known"),
-        ({"controller": guided({"geodetic": WAY, "points": WAY})}, "points and geodetic = .*: say the same thing twice"),
+        ({"controller": guided({"geodetic": WAY, "points": WAY})}, "points and geodetic = .* say the same thing twice"),
         ({"controller": guided({})}, "points = None are missing. Give points"),
         ({"controller": guided({"geodetic": WAY[:1]})}, "geodetic = .* are less than two"),
         ({"controller": guided({"geodetic": [*WAY, WAY[-1]]})}, r"geodetic\[3\] = .* is at the same place of the map"),
@@ -163,7 +163,7 @@ def test_faults(sections, words):
 def test_faults_of_members():
     scene, table = scene_of(), lw.designs.Table
     with pytest.raises(
-        lw.SceneError, match=r'vary "start.position" \[m\] around the place, or give every member its own'
+        lw.SceneError, match=r'Vary "start.position" \[m\] around the place, or give every member its own'
     ):
         lw.Ensemble(
             scene_of({"geodetic": WAY[0]}), members=2, vary={"start.geodetic": lw.distributions.Normal(std=1.0)}

@@ -235,9 +235,9 @@ PAPER = str(ROOT / "examples" / "paper.toml")
 OPTIONS = [
     ("run --members", "ensemble.members",
      {"nan": "nan", "-1": "-1", "1e300": str(int(1e300))[:60], "1e999": "inf", "": "''", "2.5": "2.5", "true": "True"}),
-    ("run --seed", "ensemble.seed", {"-1": "-1", "9" * 26: "9" * 26 + ": is beyond"}),
+    ("run --seed", "ensemble.seed", {"-1": "-1", "9" * 26: "9" * 26 + " is beyond"}),
     ("run --step", "run.step", {"nan": "nan", "-1": "-1", "0": "0", "": "''"}),
-    ("check --step", "step", {"1e-300": "1e-300: needs"}),
+    ("check --step", "step", {"1e-300": "1e-300 needs"}),
     ("check --duration", "save.every", {"1e300": "1.0: asks for more"}),
     ("run --duration", "run.duration", {"inf": "inf"}),
     ("run --tolerance", "run.tolerance", {"nan": "nan"}),
@@ -247,7 +247,7 @@ OPTIONS = [
     ("predict --threads", "threads", {"0": "0"}),
     ("run --members 8 --error", "error", {"nan": "nan", "inf": "inf", "-1": "-1"}),
     ("tradeoff --seconds", "seconds", {"nan": "nan", "inf": "inf", "-1": "-1", "0": "0"}),
-    ("stability --points", "points", {"0": "(0, 0)", "1000000": "(1000000, 1000000): make"}),
+    ("stability --points", "points", {"0": "(0, 0)", "1000000": "(1000000, 1000000) make"}),
     ("stability --error", "error", {"nan": "nan"}),
     ("sensitivity --of depth --samples", "samples", {"0": "0", "-4": "-4"}),
 ]  # fmt: skip
@@ -305,7 +305,7 @@ def test_so_many_faults_are_said_and_the_rest_is_counted():
     error = refused(faults.raise_if_any)
     lines = str(error).splitlines()
     assert lines[0] == "63 faults:"
-    assert lines[1] == "  key0 = 0 is odd. Correct it"
+    assert lines[1] == "  key0 = 0 is odd. Correct it."
     assert lines[-1] == "  and 43 more"
     assert len(lines) == 22
     assert len(error.faults) == 20
@@ -323,7 +323,7 @@ def test_faults_within_faults_are_counted_once():
             raise inner.prefixed("here: ")
     error = refused(outer.raise_if_any)
     assert (len(error.faults), error.more) == (20, 81)
-    assert error.faults[1] == "here: fault 0"
+    assert error.faults[1] == "here: fault 0."
     again = error.__reduce__()
     assert str(again[0](*again[1])) == str(error)
 

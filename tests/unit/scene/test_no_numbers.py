@@ -178,7 +178,7 @@ def test_what_a_quantity_of_the_users_gives():
     )
     np.testing.assert_array_equal(hidden(samples, members)[:, 0], [[np.nan, np.nan, 6.0], [9.0, 12.0, 15.0]])
     for odd in (lambda s, m: s["position"][..., 0] + 0j, lambda s, m: s["position"][..., 0].astype(str)):
-        with pytest.raises(ValueError, match="quantity odd: gave"):
+        with pytest.raises(ValueError, match="quantity odd gave"):
             lw.statistics.Quantity("odd", odd)(samples, members)
 
 

@@ -113,14 +113,14 @@ def test_overrides_that_fit_nothing(key):
 
 
 def test_unknown_names_are_told_what_was_meant():
-    assert "did you mean 'vehicle'?" in faults(SMALL.replace("[vehicle]", "[vehicel]"))[0]
+    assert "Did you mean 'vehicle'?" in faults(SMALL.replace("[vehicle]", "[vehicel]"))[0]
     assert only_fault(SMALL + "buoyency = 1.0\n").startswith("vehicle.buoyency = 1.0 is an unknown key. Did you mean")
-    assert "did you mean 'save_every'?" in only_fault(SMALL + "[run]\nsave_evry = 1.0\n")
-    assert "did you mean 'members'?" in only_fault(SMALL + "[ensemble]\nmember = 5\n")
+    assert "Did you mean 'save_every'?" in only_fault(SMALL + "[run]\nsave_evry = 1.0\n")
+    assert "Did you mean 'members'?" in only_fault(SMALL + "[ensemble]\nmember = 5\n")
     vary = SMALL + "[ensemble.vary]\n"
-    assert "did you mean 'vehicle.mass'?" in only_fault(vary + '"vehicle.mas" = { normal = { std = 1.0 } }\n')
-    assert "did you mean 'normal'?" in only_fault(vary + '"vehicle.mass" = { norml = { std = 1.0 } }\n')
-    assert "did you mean 'std'?" in only_fault(vary + '"vehicle.mass" = { normal = { sdt = 0.1 } }\n').split("\n")[0]
+    assert "Did you mean 'vehicle.mass'?" in only_fault(vary + '"vehicle.mas" = { normal = { std = 1.0 } }\n')
+    assert "Did you mean 'normal'?" in only_fault(vary + '"vehicle.mass" = { norml = { std = 1.0 } }\n')
+    assert "Did you mean 'std'?" in only_fault(vary + '"vehicle.mass" = { normal = { sdt = 0.1 } }\n').split("\n")[0]
 
 
 def test_a_faulty_term_is_no_reason_to_doubt_the_names_of_its_numbers():
@@ -129,7 +129,7 @@ def test_a_faulty_term_is_no_reason_to_doubt_the_names_of_its_numbers():
     text += '"drag.linear[0]" = { normal = { std = 1.0 } }\n"vehicle.mas" = { normal = { std = 1.0 } }\n'
     term, name = faults(text)
     assert term.startswith("drag.linear = [1.0, 2.0]")
-    assert "did you mean 'vehicle.mass'?" in name
+    assert "Did you mean 'vehicle.mass'?" in name
 
 
 def test_what_is_missing_is_named():

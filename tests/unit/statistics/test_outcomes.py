@@ -145,7 +145,7 @@ def test_words_for_outcomes():
         np.testing.assert_array_equal(ends.are(word), members)
     known = outcomes(EVENTS, [FLOOR, SURFACE])
     check_outcomes("outcome.of", ("top", "surface", "failed", "not_converged"), known)
-    with pytest.raises(lw.SceneError, match="did you mean 'floor'"):
+    with pytest.raises(lw.SceneError, match="Did you mean 'floor'"):
         check_outcomes("outcome.of", ("flor",), known)
     with pytest.raises(lw.SceneError, match="is not an outcome of this scene"):
         check_outcomes("mean.at", ("box",), known)

@@ -28,7 +28,7 @@ def term(name, kind):
 def test_the_list():
     assert NAMES == ["bluerov2_heavy", "dsrv", "eca_a9", "girona_500", "lauv", "nordkvist_sanyal", "remus_100", "rexrov",
                      "seawing", "slocum", "sphere", "torpedo"]  # fmt: skip
-    with pytest.raises(lw.SceneError, match="did you mean 'remus_100'"):
+    with pytest.raises(lw.SceneError, match="Did you mean 'remus_100'"):
         co.vehicle_file("remus100")
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.real_numbers import NotReal, holds_words, plain, real_numbers
-from lgvi_warp.common.sentences import sentences
+from lgvi_warp.common.sentences import sentences, with_stop
 
 # Most faults in one message; the rest are only counted, since a file may have a million of them.
 MOST_FAULTS = 20
@@ -45,7 +45,7 @@ class SceneError(ValueError):
 
     def __init__(self, faults: Iterable[str], more: int = 0):
         texts = list(faults)
-        self.faults = tuple(one_line(fault) for fault in texts[:MOST_FAULTS])
+        self.faults = tuple(with_stop(one_line(fault)) for fault in texts[:MOST_FAULTS])
         self.more = more + len(texts) - len(self.faults)
         count = len(self.faults) + self.more
         lines = [f"{count:,} faults:"] * (count != 1) + list(self.faults)
@@ -216,12 +216,11 @@ def cut(name: Any) -> str:
 
 
 def one_line(fault: str) -> str:
-    """Put a fault on one printable line of limited length, with the stop of its last sentence.
+    """Put a fault on one printable line of limited length.
 
     A file may hold line ends, or control codes that a terminal would obey.
     """
-    stop = "." * (not fault.endswith((".", "?", "!")))
-    return printable(fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}") + stop
+    return printable(fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}")
 
 
 def printable(text: str, kept: str = "") -> str:

@@ -24,3 +24,8 @@ def sentences(subject: object, problem: str, remedy: str) -> str:
 def capital(text: str) -> str:
     """Begin a text as a sentence, unless it begins with a name of the program, such as save=... or lw.solve."""
     return text[:1].upper() + text[1:] if WORD.match(text) else text
+
+
+def with_stop(text: str) -> str:
+    """End the last sentence of a text, unless a command or a name in quotes ends it, which is copied from there."""
+    return text if text.endswith((".", "?", "!", "'", '"', "`")) else f"{text}."

@@ -79,8 +79,8 @@ def compared_in(of: Any) -> Distance:
     if isinstance(of, str) and of.strip().startswith(MEAN):
         entry = compared_in(of.strip().removeprefix(MEAN))
         if entry.name == "attitude" or entry.mean:
-            problem = "is not a mean of numbers. Give the mean of an entry, such as 'mean attitude[2,2]'"
-            raise SceneError([f"of = {of!r}: {problem}"])
+            remedy = "give the mean of an entry, such as 'mean attitude[2,2]'"
+            raise SceneError([sentences(f"of = {of!r}", "is not a mean of numbers", remedy)])
         inner = entry.functional or functional("of", entry.name)
         return replace(entry, name=MEAN + entry.name, functional=inner, mean=True)
     if not callable(of) and items_of(of) is not None:

@@ -563,10 +563,10 @@ def test_a_function_of_ones_own(fleet, complete):
     np.testing.assert_allclose(found["mean drop"].value[:, 0], expected, atol=1e-14)
     np.testing.assert_allclose(found["mean pair"].value, complete.velocity[..., :2].mean(axis=1), atol=1e-14)
     wrong = Quantity("wrong", lambda s, m: s["velocity"][0], "m/s")
-    with pytest.raises(ValueError, match=r"quantity wrong gave shape .*; \(\d+, \d+\) is wanted"):
+    with pytest.raises(ValueError, match=r"quantity wrong gave shape .*. It must be \(\d+, \d+\):"):
         lw.solve(fleet, **SETTINGS, statistics=[Mean(wrong)])
     two = Quantity("two", lambda s, m: s["velocity"], "m/s", ("velocity",), ("u", "v"))
-    with pytest.raises(ValueError, match=r"quantity two gave shape .*; \(\d+, \d+, 2\) is wanted"):
+    with pytest.raises(ValueError, match=r"quantity two gave shape .*. It must be \(\d+, \d+, 2\):"):
         lw.solve(fleet, **SETTINGS, statistics=[Mean(two)])
 
 

@@ -137,7 +137,7 @@ def test_a_loop_that_grows_has_an_open_loop_and_no_margins():
     one = scene(law, (5.0, 8.0, J), delay=0.0)
     found = lw.linear.margins(one, of=("phase",), **RUN)
     assert found.why.tolist() == ["does not settle"]
-    says(found.answer, "The loop of all laws has no margins in any of 1 member (1 does not settle).")
+    says(found.answer, "The loop of all laws has no margins in any of 1 member (1: does not settle).")
     A, B, C = opened([6.0], [0.0], [2.1 * J / PERIOD], J, 0)
     grows = lw.linear.loop(one, **RUN)
     w = np.array([0.5, 3.0, 30.0])

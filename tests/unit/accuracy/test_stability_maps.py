@@ -593,7 +593,7 @@ def test_a_column_that_is_refused_is_tried_in_halves(scene):
 
     of, parts = compared_in("position"), {"plan_of": plan_of, "run": run_plan, "prepare": lambda plan: 0.0}
     found, why = runs.run_method(grid, [one], "psi_s", "float32", of, "conservative", 1, **parts)
-    assert why == "too heavy"
+    assert why == "too heavy."
     assert asked[0] == (10, "psi_s", "float32", "all")
     assert found.status.tolist() == [0] * 6 + [REFUSED] * 4
     assert (found.error[6:] == np.inf).all()

@@ -138,7 +138,7 @@ def test_arrays_are_refused_where_a_word_is_meant(name):
 def test_a_device_other_than_the_cpu_is_refused(call):
     scene = lw.Scene(lw.Vehicle(**odd_calls.BODY))
     with pytest.raises(
-        lw.SceneError, match=r"^device = 'cuda:0': .* runs are on CPU cores. Leave it out, or give \"cpu\"$"
+        lw.SceneError, match=r"^device = 'cuda:0' .* runs are on CPU cores. Leave it out, or give \"cpu\"$"
     ):
         call(scene, h=0.1, t1=0.2, device="cuda:0")
 

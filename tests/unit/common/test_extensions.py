@@ -104,4 +104,4 @@ def test_a_package_that_cannot_be_imported_is_left_out_with_a_warning(foreign):
     (foreign / "far_away" / "__init__.py").write_text("import no_such_module_at_all")
     told, warned = told_by("import json; import lgvi_warp as lw; print(json.dumps(lw.vehicles.names()))", foreign)
     assert "remus_100" in told
-    assert "extension far cannot be imported (ModuleNotFoundError" in warned
+    assert "extension far: cannot be imported (ModuleNotFoundError" in warned

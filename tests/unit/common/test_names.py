@@ -34,7 +34,7 @@ def test_a_name_that_is_no_folder_everywhere_is_refused(name, words, section):
         from_dict({"vehicle": BODY, section: [table | {"name": name}]})
     (fault,) = caught.value.faults
     assert fault.isprintable()
-    says(fault, ".name = ", "; ")
+    says(fault, ".name = ", ". ")
     assert one_line(words) in fault
 
 

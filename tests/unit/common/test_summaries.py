@@ -140,7 +140,7 @@ def test_the_thumbnail_has_depth_down_and_marks_who_did_not_end_ok():
     assert lower > middle > y
     assert max(point[1] for line in lines for point in line) == 84.0
     assert [line.get("stroke-dasharray") for line in svg] == [None, "4 2"]
-    assert "depth [m], down, over 0 to 2 s; dashed did not end ok: 10 to 30" in one.summary_picture()
+    assert "depth [m], down, over 0 to 2 s; dashed: did not end ok: 10 to 30" in one.summary_picture()
 
 
 def test_the_thumbnail_says_of_how_many_and_is_left_out_where_there_are_no_paths():
@@ -188,9 +188,9 @@ def test_a_statistic_that_is_not_there_is_answered_with_those_that_are():
     statistics = result().statistics
     with pytest.raises(KeyError, match=r"'mean dept' is not a statistic of this run. Did you mean 'mean depth'"):
         statistics["mean dept"]
-    with pytest.raises(KeyError, match="known: mean depth, mean speed"):
+    with pytest.raises(KeyError, match="Known: mean depth, mean speed"):
         statistics["xyz"]
-    with pytest.raises(KeyError, match="none were asked for"):
+    with pytest.raises(KeyError, match="None were asked for"):
         Estimates()["mean depth"]
     assert "mean dept" not in statistics
     assert statistics.get("mean dept") is None

@@ -268,7 +268,7 @@ def test_margins_are_those_that_all_members_bear():
     assert text.endswith("member 0 has the least margin.")
     some = both("does not settle", "", "").answer
     near(some, 0.25, 4.0, 0.4, 2, 3, 1)
-    assert some.endswith("in 2 of 3 members (1 does not settle); member 1 has the least margin.")
+    assert some.endswith("in 2 of 3 members (1: does not settle); member 1 has the least margin.")
     assert loops("failed", "failed").answer == "The loop of heading_pid has no margins in any of 2 members (2: failed)."
     one = Margins(
         "all laws", {"disk": np.array([0.6]), "sensitivity_peak": np.array([1.7])}, {}, np.array([""], object), 0.1

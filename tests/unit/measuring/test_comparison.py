@@ -335,7 +335,7 @@ def test_a_mean_is_compared_by_the_end_of_its_interval(scene):
 @pytest.mark.parametrize(("of", "words"), [
     ("mean attitude", "of = 'mean attitude' is not a mean of numbers. Give the mean of an entry, such as 'mean attitude"),
     ("mean mean depth", "is not a mean of numbers"),
-    (("depth", "speed"), "of = ('depth', 'speed') is several quantities; errors are of one of them: give its name"),
+    (("depth", "speed"), "of = ('depth', 'speed') is several quantities, and an error is of one of them. Give its name"),
     ("max(depth)", "is taken over the whole path, and errors are of a quantity at each time. Give 'depth', whose"),
 ])  # fmt: skip
 def test_quantities_that_cannot_be_compared_are_refused(of, words):
@@ -405,16 +405,16 @@ def test_a_reference_too_rough_is_refused_with_what_would_do(scene):
     said = refusal(tradeoff_by, early, fleet_of(scene), methods=["rk4"])
     assert said.startswith("no reference: rk8 at h = ")
     assert said.endswith(
-        "differ by 0.2 m after 0.2 s, and agree no better with shorter steps. Give a shorter t1 (--duration)"
+        "differ by 0.2 m after 0.2 s, and agree no better with shorter steps. Give a shorter t1 (--duration)."
     )
     said = refusal(suggestion_by, late, fleet_of(scene), 1e-2, ["rk4"])
     assert said.startswith("error = 0.01 m of position up to 4 s cannot be checked: rk8 at h = ")
     assert "differ by 4.0e+00 m, and agree no better with shorter steps; " in said
-    assert said.endswith(". Ask for t1 (--duration) up to 0.8 s, or for a larger error")
+    assert said.endswith(". Ask for t1 (--duration) up to 0.8 s, or for a larger error.")
     said = refusal(suggestion_by, early, fleet_of(scene), 1e-2, ["rk4"])
     assert ". Ask for a shorter t1 (--duration), or for a larger error" in said
     said = refusal(suggestion_by, busy, fleet_of(scene), 1e-9, ["rk4"], seconds=1e-6)
-    assert said.startswith("1e-06 s were over; ")
+    assert said.startswith("1e-06 s were over. ")
     assert " of position up to 4 s cannot be checked yet: rk8 at h" in said
     said = refusal(tradeoff_by, busy, fleet_of(scene), methods=["rk4"], seconds=1e-6)
     assert said.startswith("1e-06 s were over. Give more seconds. There is no reference: rk8 at h")
@@ -836,7 +836,7 @@ def test_a_suggestion_that_no_step_keeps_is_refused(scene):
     with pytest.raises(lw.SceneError) as caught:
         suggestion_by(Runs({"psi_x": 1e12, "rk8": 0.0}), fleet_of(scene), 1e-3, ["psi_x"])
     assert str(caught.value) == ("error = 0.001 m of position: no step of psi_x kept it. Ask for a larger error or a shorter "
-                                 "t1")  # fmt: skip
+                                 "t1.")  # fmt: skip
 
 
 def test_others_are_tried_where_the_short_list_fails(scene):

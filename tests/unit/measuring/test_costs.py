@@ -192,7 +192,7 @@ def test_a_damaged_file_is_said_to_be_damaged(tmp_path):
         with pytest.raises(lw.SceneError) as caught, files.of_study(tmp_path / "x.json"):
             raise error
         head = f"{tmp_path / 'x.json'} is damaged, or of another version"
-        assert str(caught.value) == f"{head}: {error}. Run the study again"
+        assert str(caught.value) == f"{head}: {error}. Run the study again."
         assert caught.value.__cause__ is error
     with pytest.raises(lw.SceneError, match="itself"), files.of_study(tmp_path):
         raise lw.SceneError(["itself"])
@@ -208,10 +208,10 @@ def test_whose_members_a_study_is_about(scene):
     assert ensemble_of(scene).members == scene.ensemble_settings.members
     with pytest.raises(lw.SceneError) as caught:
         ensemble_of(3)
-    assert str(caught.value) == "fleet = 3 is neither an Ensemble nor a Scene. Give lw.Scene(...) or lw.Ensemble(...)"
+    assert str(caught.value) == "fleet = 3 is neither an Ensemble nor a Scene. Give lw.Scene(...) or lw.Ensemble(...)."
     with pytest.raises(lw.SceneError) as caught:
         scene_of(3, "scene")
-    assert str(caught.value) == "scene = 3 is neither an Ensemble nor a Scene. Give lw.Scene(...) or lw.Ensemble(...)"
+    assert str(caught.value) == "scene = 3 is neither an Ensemble nor a Scene. Give lw.Scene(...) or lw.Ensemble(...)."
 
 
 def test_speeds_beside_the_peak_of_the_core():

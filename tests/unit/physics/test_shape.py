@@ -25,7 +25,7 @@ def test_a_wrong_shape_is_refused(shape, words):
     with pytest.raises(lw.SceneError) as caught:
         lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0), shape=shape)
     assert words in str(caught.value)
-    assert all(";" in fault for fault in caught.value.faults)
+    assert all(". " in fault for fault in caught.value.faults)
 
 
 @pytest.mark.parametrize("name", lw.vehicles.names())

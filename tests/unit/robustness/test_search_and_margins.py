@@ -170,7 +170,7 @@ def test_places_of_the_cube_are_numbers_of_the_box():
     ({"vehicle.mass": (1.0, 2.0, "lin")}, 'over."vehicle.mass"'), ({"vehicle.mass": (1.0,)}, 'over."vehicle.mass"'),
     ({"vehicle.mas": (1.0, 2.0)}, "vehicle.mas"), ({"x": 3}, '"x"'),
     ({5: (1.0, 2.0)}, 'over = 5 is not a name of a number. Give {"heading_pid.kp": (0.5, 5.0)}'),
-    ({}, 'over = {}: maps no names to bounds. Give {"heading_pid.kp": (0.5, 5.0)}'), ([], "maps no names to bounds"),
+    ({}, 'over = {} maps no names to bounds. Give {"heading_pid.kp": (0.5, 5.0)}'), ([], "maps no names to bounds"),
 ])  # fmt: skip
 def test_bounds_that_are_none(bounds, words):
     with pytest.raises(lw.SceneError) as caught:

@@ -632,7 +632,7 @@ def test_conditions_are_read_and_written():
                   'success."z" = \'...\' is not a metric of this sweep', 'success."x" = {} is not a condition',
                   'success."y".below'):  # fmt: skip
         assert words in str(caught.value)
-    with pytest.raises(lw.SceneError, match=r"give metrics=\[...\]"):
+    with pytest.raises(lw.SceneError, match=r"Give metrics=\[...\]"):
         success.success_of({"z": {"below": 1.0}}, ())
     with pytest.raises(lw.SceneError, match="success = 3 is not a table"):
         success.success_of(3, ())

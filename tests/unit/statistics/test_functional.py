@@ -216,7 +216,7 @@ def test_what_a_statistic_of_one_number_cannot_do(make, words, capsys):
 ])  # fmt: skip
 def test_what_is_watched_is_one_of_the_statistics_or_a_mean(statistics, name, words, capsys):
     message = said_by(lambda: watch(lw.Until(name, 1.0), statistics, np.zeros(1)), capsys)
-    assert f"until.statistic = {name!r} is not a statistic of the run; {words}" in message
+    assert f"until.statistic = {name!r} is not a statistic of the run. {words}" in message
 
 
 def test_a_watched_name_may_have_other_spaces():

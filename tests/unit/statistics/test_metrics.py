@@ -179,7 +179,7 @@ def test_the_users_own_sees_each_tick():
     np.testing.assert_array_equal(number(metric, x, t, batches=(1,)), expected)
     assert seen == [(0.0, 0.0, (4, 3), (4, 2)), (1.0, 1.0, (4, 3), (4, 2)), (3.0, 2.0, (4, 3), (4, 2))]
     assert metric.key == "worst"
-    with pytest.raises(ValueError, match=r"gave shape \(2,\); \(..., 4\) is wanted"):
+    with pytest.raises(ValueError, match=r"gave shape \(2,\). It must be \(..., 4\)"):
         number(lw.metrics.CustomMetric(lambda state, tick: np.zeros(2), fields=("position",)), x[:, :3], t)
 
 

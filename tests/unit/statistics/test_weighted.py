@@ -176,7 +176,7 @@ def test_a_table_keeps_its_weights(tmp_path):
         assert set(table.own_values()) == {"vehicle.mass"}
         ((_, settings),) = table.to_dict().items()
         np.testing.assert_array_equal(lw.designs.Table(**settings).own_weights(), table.own_weights())
-    with pytest.raises(lw.SceneError, match="name a column of the file"):
+    with pytest.raises(lw.SceneError, match="Name a column of the file"):
         lw.designs.Table(tmp_path / "draws.csv", weights=[1.0, 2.0, 3.0])
 
 

@@ -302,7 +302,7 @@ def test_what_is_asked():
 @pytest.mark.parametrize(
     ("of", "words"),
     [
-        (lw.statistics.Mean("position"), "name one, such as 'position[0]'"),
+        (lw.statistics.Mean("position"), "Name one, such as 'position[0]'"),
         (lw.statistics.EndTime("floor"), "is not a mean, probability or quantile of all members"),
         (lw.statistics.Covariance("position"), "is not a mean, probability or quantile"),
         (lw.statistics.Quantiles("depth"), "Ask for one: levels=[0.95]"),

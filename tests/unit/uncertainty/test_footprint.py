@@ -338,7 +338,7 @@ def test_what_cannot_be_is_refused():
         refused(lw.studies.footprint, result, "flor"),
         "at = 'flor'",
         'neither "end", a time nor an outcome',
-        "known: end, a time [s], as 12.5, ",
+        "Known: end, a time [s], as 12.5, ",
     )
     says(refused(lw.studies.footprint, result, None), "at = None")
     says(refused(lw.studies.footprint, result.position), "result", "lw.solve")

@@ -102,7 +102,7 @@ def test_an_analysis_comes_back_from_its_files(built, tmp_path):
     assert (content["mean"], content["provenance"]) == ([1.23456789, None], {"seed": 3})
     assert content["name"] == found.name
     (tmp_path / "x.json").write_text(json.dumps(content | {"name": "heat"}))
-    with pytest.raises(ValueError, match=r"x\.json: .*'heat' is not an analysis"):
+    with pytest.raises(ValueError, match=r"x\.json .*'heat' is not an analysis"):
         Indices.load(tmp_path / "x.json")
 
 
@@ -274,7 +274,7 @@ def test_samples_are_shared_among_replicates():
 
 @pytest.mark.parametrize(("entry", "arguments", "words"), [
     (lw.uq.sobol, {"store": "a"}, r"lw\.uq\.sobol\(\) has no argument 'store'"),
-    (lw.uq.sobol, {"sample": 8}, "Did you mean 'samples'"), (lw.uq.sobol, {"resamples": 100}, "Give replicates=8"),
+    (lw.uq.sobol, {"sample": 8}, "Did you mean 'samples'"), (lw.uq.sobol, {"resamples": 100}, "give replicates=8"),
     (lw.uq.morris, {"groups": {}}, r"lw\.uq\.morris\(\) has no argument 'groups'"),
     (lw.uq.evaluate, {"fields": ()}, r"lw\.uq\.evaluate\(\) has no argument 'fields'"),
     (lw.uq.model, {"survey_all": True}, r"lw\.uq\.model\(\) has no argument 'survey_all'"),
@@ -316,12 +316,12 @@ def test_groups_with_failures_are_refused_or_left_out():
     with pytest.raises(outputs.FailedMembers) as caught:
         analyses.whole_groups(made, 4, "refuse")
     assert (
-        'fix the failing members (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
+        'Fix the failing members (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
         in str(caught.value)
     )
     whole, messages = analyses.whole_groups(made, 4, "drop")
     assert whole.tolist() == [True, False, True]
-    assert "the 1 of 3 groups that they are in were left out, and what remains may not be typical" in messages[0]
+    assert "The 1 of 3 groups that they are in were left out, and what remains may not be typical" in messages[0]
     assert messages[1] == "2 of 12 members were stopped by events: their numbers are those at the stop"
     assert len(messages) == 2
     with pytest.raises(outputs.FailedMembers, match="1 groups of the design are whole, too few for an estimate"):
@@ -418,7 +418,7 @@ def test_outputs_are_of_all_groups_of_members(monkeypatch):
     assert found.provenance["run"] == 4
     assert found.provenance["ensemble"] == fleet.to_dict()
     assert shares == pytest.approx([0.2, 0.6, 0.9])
-    assert "again" in found.text("again")
+    assert "Again" in found.text("again")
     runs.clear()
     outputs.evaluate(
         fleet, lambda result: np.zeros((result.group.members, 1)), common_noise=True, progress=lambda part: None

@@ -39,9 +39,9 @@ def test_files_of_the_benchmarks_are_read_and_pictures_written(tmp_path):
 
 
 def test_rows_of_another_kind_are_refused():
-    with pytest.raises(NothingToDraw, match="give rows of `python -m benchmarks run members threads`"):
+    with pytest.raises(NothingToDraw, match="Give rows of `python -m benchmarks run members threads`"):
         lw.plots.scaling(TERMS)
-    with pytest.raises(NothingToDraw, match=r"give rows of lw.bench.term_cost\(scene\)"):
+    with pytest.raises(NothingToDraw, match=r"Give rows of lw.bench.term_cost\(scene\)"):
         lw.plots.term_cost(RUNS)
 
 

@@ -383,7 +383,7 @@ def test_a_viewer_that_takes_no_more_leaves_the_whole_file(tmp_path, mixed, monk
 
 @pytest.mark.parametrize(("arguments", "kind", "words"), [
     ({"members": [40]}, lw.SceneError, "members = 40 is none of the 40 members. Give indices from 0 to 39"),
-    ({"members": [-1]}, lw.SceneError, "members = -1 is negative; count members from 0"),
+    ({"members": [-1]}, lw.SceneError, "members = -1 is negative. Count members from 0"),
     ({"members": []}, lw.SceneError, "names no member"),
     ({"members": "3"}, lw.SceneError, "is not a list of members"), ({"path": None}, ValueError, "Give path="),
     ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*Start a viewer with "rerun"'),
@@ -409,8 +409,8 @@ def test_nothing_to_draw_is_said(mixed, tmp_path):
 
 @pytest.mark.parametrize(("text", "words"), [
     ("exec sleep 0.5", None),
-    ("echo no display >&2; exit 1", r"did not start \(no display\); the recording is .*fleet.rrd: open it"),
-    (None, "cannot be started .* the recording is"),
+    ("echo no display >&2; exit 1", r"did not start \(no display\). The recording is .*fleet.rrd: open it"),
+    (None, "cannot be started .* The recording is"),
 ])  # fmt: skip
 def test_show_starts_a_viewer(mixed, tmp_path, monkeypatch, text, words):
     started_by(monkeypatch, tmp_path, text and f'echo "$1" > "{tmp_path}/opened"\n{text}')
@@ -422,7 +422,7 @@ def test_show_starts_a_viewer(mixed, tmp_path, monkeypatch, text, words):
     else:
         with pytest.raises(OSError, match=words) as caught:
             lw.show(mixed)
-        shutil.rmtree(Path(re.search(r"the recording is (.*): open it", str(caught.value))[1]).parent)
+        shutil.rmtree(Path(re.search(r"The recording is (.*): open it", str(caught.value))[1]).parent)
 
 
 def test_a_viewer_that_stays_is_started(tmp_path, monkeypatch):

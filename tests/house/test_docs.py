@@ -40,7 +40,7 @@ def test_toml(text, tmp_path):
 
 def test_there_are_snippets():
     assert len(TOML) >= 6
-    assert len(blocks("docs/guide/statistics.md", "python")) == 8
+    assert len(blocks("docs/guide/statistics.md", "python")) == 4
 
 
 REMUS = '[vehicle]\nname = "remus_100"\n'

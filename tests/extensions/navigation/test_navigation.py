@@ -590,7 +590,7 @@ def test_the_page_has_all_keys_and_its_blocks_run(capsys, monkeypatch):
     base = remus(listed)
     assert base.parameters()["gps.deepest"] == 0.3
     assert base.controller.sensors[-1].uses["delayed_fix"] == "usbl"
-    (code,) = blocks(page, "python")
+    (code,) = blocks("docs/controllers/filter_consistency.md", "python")
     exec(code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.02, threads=1'), {})
     assert "Consistency of 200 filters at 2 times" in capsys.readouterr().out
 

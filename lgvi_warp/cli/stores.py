@@ -48,7 +48,11 @@ def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
 
 def export_arguments(verb: Any) -> None:
     """Add the arguments of the verb export."""
-    add_shared(verb, "dir", dir="a store, a result.npz, a folder with one of the two, the footprint.json of a run, or a scene file")
+    add_shared(
+        verb,
+        "dir",
+        dir="a store, a result.npz, a folder with one of the two, the footprint.json of a run, or a scene file",
+    )
     verb.add_argument(
         "--to",
         metavar="FILE",

@@ -239,7 +239,9 @@ def _of_scene(run: Any, ending: str, inputs: Any, arguments: dict[str, Any]) -> 
         raise refusal("run", name or "a Scene", f"is a scene, of which no {ending} file can be made", remedy)
     if not (named or isinstance(run, Scene)):
         problem = f"is no scene, of which a {ending} file is made: one vehicle with the scene's own numbers"
-        raise refusal("run", name or type(run).__name__, problem, "give a lw.Scene or a scene file, and no run or ensemble")
+        raise refusal(
+            "run", name or type(run).__name__, problem, "give a lw.Scene or a scene file, and no run or ensemble"
+        )
     for key, value in arguments.items():
         if value is not None:
             raise refusal(key, value, f"is given for a {ending} file", "leave it out")

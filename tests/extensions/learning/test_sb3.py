@@ -252,18 +252,13 @@ def test_two_learners_keep_the_depth_better_than_the_law(tmp_path):
 
 
 @pytest.mark.slow
-def test_ppo_learns():
+def test_ppo_learns(monkeypatch):
     """Returns of whole episodes from the same seeds: trained, as it begins, and with planes amidships."""
     pytest.importorskip("stable_baselines3")
     pytest.importorskip("torch")
-    folder = str(ROOT / "examples" / "controllers")
-    learn = runpy.run_path(f"{folder}/learn_depth_keeping.py") if folder in sys.path else None
-    if learn is None:
-        sys.path.insert(0, folder)
-        try:
-            learn = runpy.run_path(f"{folder}/learn_depth_keeping.py")
-        finally:
-            sys.path.remove(folder)
+    folder = ROOT / "examples" / "controllers"
+    monkeypatch.syspath_prepend(folder)
+    learn = runpy.run_path(str(folder / "learn_depth_keeping.py"))
     vehicles, length = learn["VEHICLES"], round(learn["EPISODE"] / learn["PERIOD"])
 
     def returns(layers):

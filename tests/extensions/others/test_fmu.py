@@ -202,7 +202,10 @@ def test_what_the_file_says(unit):
     numbers = scene().parameters()
     assert all(float(known[f"drag.linear[{i}]"].start) == numbers["drag.linear"][i] for i in range(6))
     with zipfile.ZipFile(unit) as archive:
-        assert {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries")} >= {"linux64", "win64"}
+        assert {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries")} >= {
+            "linux64",
+            "win64",
+        }
         assert json.loads(archive.read("resources/vehicle.json"))["inputs"] == "commands"
 
 
@@ -223,9 +226,9 @@ def test_what_a_unit_cannot_be_made_of(changes, settings, said, tmp_path):
 
 def test_files_functions_and_ensembles_are_refused(tmp_path, monkeypatch):
     target = tmp_path / "none.fmu"
-    with pytest.raises(lw.SceneError, match="is no scene, of which a .fmu file is made: one vehicle"):
+    with pytest.raises(lw.SceneError, match=r"is no scene, of which a .fmu file is made: one vehicle"):
         lw.export(lw.Ensemble(scene(), 3), target)
-    with pytest.raises(lw.SceneError, match="is a scene, of which no .csv file can be made; run it first"):
+    with pytest.raises(lw.SceneError, match=r"is a scene, of which no .csv file can be made; run it first"):
         lw.export(scene(), tmp_path / "none.csv")
     with pytest.raises(lw.SceneError, match="is given for a run; leave it out"):
         lw.export(tmp_path, tmp_path / "none.csv", inputs="commands")

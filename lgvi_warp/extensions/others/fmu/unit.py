@@ -220,7 +220,7 @@ class VehicleUnit:
 
 def _held(scene: Scene, term: Any) -> bool:
     """Whether the commands of a term are inputs: a schedule of its own goes on."""
-    return scene.controller is not None and term.key in scene.controller.actuators or getattr(term, "holds", True)
+    return (scene.controller is not None and term.key in scene.controller.actuators) or getattr(term, "holds", True)
 
 
 def _free(term: Any) -> Any:
@@ -254,5 +254,3 @@ def _unfit(value: np.ndarray) -> bool:
 def _nothing(t: float, y: Any, r: Any, members: Any) -> Any:
     """Stands for the caller, who answers each tick himself."""
     raise AssertionError
-
-

@@ -19,6 +19,9 @@ CONTENT = "vehicle.json"
 class Vehicle:
     """A vehicle of the file's scene. Value references are places in its list of variables."""
 
+    # Of PythonFMU's base class.
+    log: Any
+
     def __init__(self, **kwargs: Any):
         super().__init__(**kwargs)
         self.modelName = "Vehicle"
@@ -41,8 +44,14 @@ class Vehicle:
         self.unit.begin()
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Make a communication step."""
-        self.unit.step(current_time, step_size)
+        """Make a communication step; False for one that cannot be made, of which the log says why."""
+        from pythonfmu.enums import Fmi2Status
+
+        try:
+            self.unit.step(current_time, step_size)
+        except ValueError as error:
+            self.log(str(error), Fmi2Status.error)
+            return False
         return True
 
     def get_real(self, places: Sequence[int]) -> list[float]:

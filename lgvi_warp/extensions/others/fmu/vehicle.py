@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
+import warp as wp
 
 from lgvi_warp.control.signals import row_of
 from lgvi_warp.engine.host_callback import write_answer
@@ -27,9 +29,15 @@ NEVER = 2**31 - 1
 class EachLaunch(Launches):
     """Launches each of which ends with a sample, whatever the steps that it makes."""
 
+    @functools.cached_property
+    def times(self) -> tuple[Any, Any, Any]:
+        """The same as of `Launches`, with the step of the launch in hand as the only one of a sample."""
+        stages, leads, _ = super().times
+        return stages, leads, wp.array(np.array([NEVER, NEVER], np.int32), dtype=wp.int32, device="cpu")
+
     def samples_due(self, k0: int, k1: int) -> tuple[int, int]:
         """Let a sample be due after step k1."""
-        self.times[2].numpy()[:] = k1, NEVER
+        self.times[2].numpy()[0] = k1
         return 0, int(k1 > k0)
 
 

@@ -49,12 +49,11 @@ def commands(t):
     return np.array([3.0 * np.sin(t), 0.5, -0.3, 0.02, 0.1 * np.cos(2.0 * t), 0.2])
 
 
-def inputs(held=PERIOD):
-    """The commands as signals of FMPy, held over a period."""
-    names = [f"control_wrench.command[{i}]" for i in range(6)]
+def inputs():
+    """The commands as signals of FMPy, as ticks see them."""
+    names, every = [f"control_wrench.command[{i}]" for i in range(6)], round(PERIOD / H)
     kind = np.dtype([("time", float)] + [(name, float) for name in names])
-    rows = [(k * H, *commands(round(k * H // held * held, 9) if held else k * H)) for k in range(STEPS + 1)]
-    return np.array([tuple(row) for row in rows], kind)
+    return np.array([(k * H, *commands(k // every * every * H)) for k in range(STEPS + 1)], kind)
 
 
 def simulated(file, **settings):

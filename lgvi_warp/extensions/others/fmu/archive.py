@@ -42,8 +42,17 @@ except ImportError as error:
     ) from error
 
 
+# With each instance the wrapper of PythonFMU 0.7 gives back a reference to the names of this module that it does not own
+# (findClass in PySlaveInstance.cpp). These stand for it: without them the names are freed while they are used.
+SPARE = [globals(), globals()]
+
+
 class Vehicle(Base, Fmi2Slave):
     """The vehicle of vehicle.json."""
+
+    def __init__(self, **kwargs):
+        SPARE.append(globals())
+        super().__init__(**kwargs)
 '''
 NEEDS = (
     f"Runs in a Python that has lgvi_warp {__version__} (pip install lgvi-warp): that of the program which loads it. "

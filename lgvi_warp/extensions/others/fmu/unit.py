@@ -74,6 +74,7 @@ class VehicleUnit:
         acted = self._acted(scene)
         self._fields = self._outputs(acted)
         self.variables = tuple(self._variables())
+        self._inputs = {variable.name: variable.start for variable in self.variables if variable.causality == "input"}
         self._values: dict[str, float | int] = {v.name: v.start for v in self.variables if v.start is not None}
         self._changed: set[str] = set()
         self._vehicle: SteppedVehicle | None = None
@@ -106,16 +107,21 @@ class VehicleUnit:
     def _variables(self) -> Iterator[Variable]:
         numbers = {name: np.asarray(value) for name, value in numbers_of(self.scene).items()}
         units = units_of_numbers(self.scene, numbers)
-        given = {f"{term.key}.command" for term in self._terms}
-        given |= {f"{part.key}.{name}" for part in self._guidance for name in part.parameters()}
-        driven = {f"{term.key}.{name}" for term in self._terms for name in term.driven_fields} - given
-        for causality in ("input", "parameter"):
-            for name, value in numbers.items():
-                if (name in given) != (causality == "input") or name in driven or _unfit(value):
-                    continue
-                word = "held from a tick to the next" if causality == "input" else "number of the scene"
-                for label, number in _entries(name, value):
-                    yield Variable(label, causality, units.get(name, "1"), f"{word}: {name}", number)
+        held = "held from a tick to the next"
+        for term in self._terms:
+            # Limits are in the unit of what they limit.
+            names = [f"{term.key}.limit[{i}]" for i in range(term.channels)]
+            for i, unit in enumerate(units_of_numbers(self.scene, names).values()):
+                start = float(term.command[i]) if isinstance(term, Commanded) else 0.0
+                yield Variable(f"{term.key}.command[{i}]", "input", unit, f"command of {term.key}, {held}", start)
+        wished = {f"{part.key}.{name}" for part in self._guidance for name in part.parameters()}
+        for name in (name for name in numbers if name in wished):
+            for label, number in _entries(name, numbers[name]):
+                yield Variable(label, "input", units[name], f"set-point of {name}", number)
+        driven = {f"{term.key}.{name}" for term in self._terms for name in ("command", *term.driven_fields)}
+        for name in (name for name, value in numbers.items() if name not in wished | driven and not _unfit(value)):
+            for label, number in _entries(name, numbers[name]):
+                yield Variable(label, "parameter", units[name], f"number of the scene: {name}", number)
         yield Variable(SEED, "parameter", "1", "seed of the noise", self.seed)
         for field in self._fields:
             for label in field.labels:
@@ -138,15 +144,15 @@ class VehicleUnit:
 
     def set(self, name: str, value: float | int) -> None:
         """Give a parameter, before the first step, or an input."""
-        variable = next(v for v in self.variables if v.name == name)
         if value == self._values[name]:
             return
-        if variable.causality == "parameter" and self.time > 0.0:
+        fixed = name not in self._inputs
+        if fixed and self.time > 0.0:
             raise ValueError(f"{name} = {value}: is a parameter, and the vehicle has moved; reset the unit first")
         self._values[name] = value
-        if variable.causality == "parameter":
+        if fixed:
             self._changed.add(name)
-        if variable.causality == "parameter" or (self.time == 0.0 and not self.of_commands):
+        if fixed or (self.time == 0.0 and not self.of_commands):
             self._vehicle = self._shown = None
 
     def begin(self) -> SteppedVehicle:
@@ -154,7 +160,7 @@ class VehicleUnit:
         if self._vehicle is None:
             chosen = self._changed - {SEED}
             if not self.of_commands:
-                chosen |= {v.name for v in self.variables if v.causality == "input" and v.start != self._values[v.name]}
+                chosen |= {name for name, start in self._inputs.items() if start != self._values[name]}
             scene = self._acted(self.scene.with_numbers({name: self._values[name] for name in sorted(chosen)}))
             signals = tuple(field.name for field in self._fields if field.name in SIGNALS)
             self._vehicle = SteppedVehicle(scene, int(self._values[SEED]), signals, tuple(self._set_points()))
@@ -183,10 +189,9 @@ class VehicleUnit:
         if steps < 1 or abs(last - round(last)) > SAME_STEP:
             problem = f"communication step {length:.9g} s: is not a whole number of steps of {vehicle.h:.9g} s"
             raise ValueError(f"{problem}; give a multiple, or export a scene with another [run] step")
-        names = [v.name for v in self.variables if v.causality == "input"]
         if not self.of_commands and vehicle.steps:
             vehicle.change(self._set_points())
-        vehicle.advance(steps, np.array([self._values[name] for name in names]))
+        vehicle.advance(steps, np.array([self._values[name] for name in self._inputs]))
         self._shown = None
         if vehicle.status and not Status(vehicle.status).stopped:
             raise ValueError(f"the vehicle failed before {self.time:.9g} s: {Status(vehicle.status).text}")

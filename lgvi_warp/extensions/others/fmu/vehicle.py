@@ -22,6 +22,8 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.request import Request, longest
 from lgvi_warp.scene.ensemble import Ensemble
 
+# The signal that follows from another one.
+HEADING = "measured_heading"
 # A number of a step that no run reaches.
 NEVER = 2**31 - 1
 
@@ -77,10 +79,15 @@ class SteppedVehicle:
     def _read(self) -> dict[str, np.ndarray]:
         """The signals that the last tick noted."""
         rows, table = self._packets.laws.memory.view[0, :, 0], self.plan.layout.table
-        return {
+        noted = {
             name: rows[place.start : place.stop].astype(np.float64).reshape(table[name].shape)
             for name, place in self._noted.items()
         }
+        if HEADING in noted:
+            # Which the host computes, as for a function that it asks.
+            R = noted["measured_attitude"]
+            noted[HEADING] = np.arctan2(R[1, 0], R[0, 0])
+        return noted
 
     def _first(self) -> dict[str, np.ndarray]:
         """Samples and signals at the start."""

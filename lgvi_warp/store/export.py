@@ -245,9 +245,11 @@ def _of_scene(run: Any, ending: str, inputs: Any, arguments: dict[str, Any]) -> 
     for key, value in arguments.items():
         if value is not None:
             raise refusal(key, value, f"is given for a {ending} file", "leave it out")
-    write: Write = extensions.load(OF_SCENES, ending).scene_writer(
-        run if isinstance(run, Scene) else Scene.load(run), "commands" if inputs is None else inputs
-    )
+    scene = run if isinstance(run, Scene) else Scene.load(run)
+    try:
+        write: Write = extensions.load(OF_SCENES, ending).scene_writer(scene, "commands" if inputs is None else inputs)
+    except MissingExtra as error:
+        raise SceneError([f"to = {ending!r}: {error}"]) from error
     return write
 
 

@@ -120,6 +120,9 @@ def _content(scene: Scene, inputs: str) -> dict[str, Any]:
     for key, name in _files(tables):
         problem = "is a file, which a unit does not carry"
         faults.add(key, name, problem, "give its numbers in the scene, or leave the part out")
+    if scene.controller is not None and scene.controller.callback is not None:
+        problem = "is a function of Python, which a unit does not carry"
+        faults.add("controller.laws", "callback", problem, "leave it out: a unit takes commands from outside")
     faults.raise_if_any()
     seed = 0 if scene.ensemble_settings is None else scene.ensemble_settings.seed
     kept = ("method", "step", "dtype", "solver", "iterations", "tolerance", "rtol", "atol", "checks", "on_failure")

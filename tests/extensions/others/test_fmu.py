@@ -59,7 +59,7 @@ def inputs():
 def simulated(file, **settings):
     """Outputs by name at each step, of FMPy."""
     chosen = {"stop_time": STEPS * H, "output_interval": H, "input": inputs(), **settings}
-    names = settings.pop("output", [*MOTION, "measured_depth", "measured_heading", "status"])
+    names = [*MOTION, "measured_depth", "measured_heading", "status"]
     return fmpy.simulate_fmu(str(file), output=names, validate=True, **chosen)
 
 
@@ -158,7 +158,7 @@ def test_long_communication_steps_reset_and_states(unit):
 
 def test_set_points_steer_the_controller_inside(tmp_path):
     file = lw.export(scene(), tmp_path / "loop.fmu", inputs="set_points")
-    rows = simulated(file, input=None, start_values={"set_point.heading": 0.8}, output=[*MOTION, "measured_depth"])
+    rows = simulated(file, input=None, start_values={"set_point.heading": 0.8})
     fields = (*FIELDS, *(f"measured_{name}" for name in ("position", "attitude", "velocity", "water_velocity",
               "angular_velocity", "depth", "heading")))  # fmt: skip
     changed = scene(**{"set_point.heading": 0.8})

@@ -156,6 +156,7 @@ def test_long_communication_steps_reset_and_states(unit):
     instance.freeInstance()
 
 
+@pytest.mark.slow
 def test_set_points_steer_the_controller_inside(tmp_path):
     file = lw.export(scene(), tmp_path / "loop.fmu", inputs="set_points")
     rows = simulated(file, input=None, start_values={"set_point.heading": 0.8})
@@ -177,6 +178,7 @@ def test_set_points_steer_the_controller_inside(tmp_path):
     instance.freeInstance()
 
 
+@pytest.mark.slow
 def test_an_event_of_the_scene_ends_the_vehicle(tmp_path):
     ended = replace(scene(), events=[lw.events.Box(lower=(-9.0, -9.0, -9.0), upper=(0.5, 9.0, 9.0))])
     rows = simulated(lw.export(ended, tmp_path / "box.fmu"), input=None)

@@ -48,12 +48,17 @@ def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
 
 def export_arguments(verb: Any) -> None:
     """Add the arguments of the verb export."""
-    add_shared(verb, "dir", dir="a store, a result.npz, a folder with one of the two, or the footprint.json of a run")
+    add_shared(
+        verb,
+        "dir",
+        dir="a store, a result.npz, a folder with one of the two, the footprint.json of a run, or a scene file",
+    )
     verb.add_argument(
         "--to",
         metavar="FILE",
         required=True,
-        help="file name ending in .csv, .parquet, .nc, .geojson, .kml or .mcap; or netcdf or parquet, for the whole store",
+        help="file name ending in .csv, .parquet, .nc, .geojson, .kml or .mcap, or in .fmu for a scene; or netcdf or parquet, "
+        "for the whole store",
     )
     verb.add_argument("--out", metavar="FILE", type=Path,
                       help="with --to netcdf or --to parquet: the file (default: beside the run)")  # fmt: skip
@@ -64,16 +69,20 @@ def export_arguments(verb: Any) -> None:
     verb.add_argument(
         "--start", metavar="DATE", help="date and time at t = 0, as 2026-06-01T00:00:00Z (default: the scene's)"
     )
+    verb.add_argument(
+        "--inputs", choices=("commands", "set_points"), help="inputs of a .fmu (default: commands of the actuators)"
+    )
     verb.add_argument("--overwrite", action="store_true", help="replace an existing file")
 
 
-@as_verb("export", "convert a run to one file for other programs: table, NetCDF, map or MCAP", export_arguments)
+@as_verb("export", "convert a run to one file for other programs: table, NetCDF, map or MCAP; a scene to an FMU",
+         export_arguments)  # fmt: skip
 def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
-    """Run the verb export: write a run, or members of it, as one file of another program."""
+    """Run the verb export: write a run, members of it, or a scene as one file of another program."""
     from lgvi_warp.store.export import export as write_as
 
     settings = {"members": _members(chosen.members), "origin": _origin(chosen.origin), "start": chosen.start,
-                "overwrite": chosen.overwrite}  # fmt: skip
+                "inputs": chosen.inputs, "overwrite": chosen.overwrite}  # fmt: skip
     run = chosen.dir
     if run.suffix == ".json":
         from lgvi_warp.uncertainty.footprint.answer import Footprint

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -29,8 +29,8 @@ class Callback(ControlLaw):
 
     Args:
         function: The function; it must be picklable where other processes run it.
-        to: Key of a term: then the function returns the commands of its channels, (m, channels), and no law or allocation
-            acts on them. None, the default, for demands.
+        to: Key of a term, or of several: then the function returns the commands of their channels, side by side,
+            (m, channels), and no law or allocation acts on them. None, the default, for demands.
         version: What tells the function from others in sweeps and stores, a text or a number, changed whenever the function
             does. None, the default: what its code says. Give one where it reads files, or holds what cannot be compared.
 
@@ -47,14 +47,14 @@ class Callback(ControlLaw):
     demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
 
     function: Callable[..., Any] | None = None
-    to: str | None = None
+    to: str | Sequence[str] | None = None
     version: Any = None
 
     def __init__(
         self,
         function: Callable[..., Any] | None = None,
         *,
-        to: str | None = None,
+        to: str | Sequence[str] | None = None,
         version: str | int | float | None = None,
         name: str = "",
     ) -> None:
@@ -67,10 +67,27 @@ class Callback(ControlLaw):
             faults.add("function", self.function, PROBLEM if self.function is None else "is not a function", REMEDY)
         check_version(faults, self.version)
 
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Keys of the terms whose commands the function returns; none where it returns demands."""
+        return (self.to,) if isinstance(self.to, str) and self.to else tuple(self.to or ())
+
+    def answers(self, channels: Mapping[str, int]) -> int:
+        """Count of numbers that the function returns for a member.
+
+        Args:
+            channels: Commands of each actuator, by its key.
+
+        Returns:
+            Those of `to` together, or six demands.
+        """
+        return sum(channels[key] for key in self.targets) or len(self.demands)
+
     def to_dict(self) -> dict[str, Any]:
         # Its type and the name of its function, which a scene file cannot hold.
         name = getattr(self.function, "__qualname__", repr(self.function))
-        options = {"to": self.to or None, "version": self.version}
+        to = self.to if isinstance(self.to, str) else list(self.targets)
+        options = {"to": to or None, "version": self.version}
         return {"type": self.type, "function": name} | {
             key: value for key, value in options.items() if value is not None
         }
@@ -85,6 +102,9 @@ class CallbackCommands(Allocation):
 
     device: ClassVar[str] = "callback_commands"
 
+    # Keys of the terms whose commands stand before those of this one in the answer.
+    before: tuple[str, ...] = ()
+
     def reach(self) -> np.ndarray:
         # Everything: no law asks it for a demand.
         return np.eye(6)
@@ -93,7 +113,8 @@ class CallbackCommands(Allocation):
         # Where the answer is, and the limits of the commands.
         first, count = self.bus.commands[self.to]
         limit = context.own(self.actuator)["limit"]
-        return Packed({"answer": self.bus.answer, "commands": first, "count": count}, limit)
+        answer = self.bus.answer + sum(self.bus.commands[key][1] for key in self.before)
+        return Packed({"answer": answer, "commands": first, "count": count}, limit)
 
 
 def refuse_second(callbacks: list[Callback]) -> None:

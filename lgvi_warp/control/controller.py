@@ -220,7 +220,7 @@ class Controller(Documented):
         faults.raise_if_any()
         channels = {key: term.channels for key, term in actuators.items()}
         callback = self.callback
-        answers = 0 if callback is None else channels[callback.to] if callback.to else 6
+        answers = 0 if callback is None else callback.answers(channels)
         shared = max(law.shared_rows for law in self.laws)
         altimeters = [part.key for part in self.sensors if isinstance(part, Altimeter)]
         ending = [part.key for part in self.guidance if part.ends and part.key in {event.follows for event in events}]
@@ -332,8 +332,9 @@ class Controller(Documented):
     def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
         """The allocation, or the default one, checked."""
         parts = tuple(self.allocation)
-        if self.callback is not None and self.callback.to:
-            parts = (CallbackCommands(to=self.callback.to), *(part for part in parts if part.type))
+        if self.callback is not None and (keys := self.callback.targets):
+            own = (CallbackCommands(to=key, before=keys[:i]) for i, key in enumerate(keys))
+            parts = (*own, *(part for part in parts if part.type))
         if not parts:
             if len(able) != 1:
                 if able:

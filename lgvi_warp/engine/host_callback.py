@@ -92,7 +92,8 @@ def call_host(packets: Packets, t: float) -> None:
     except Exception as error:
         error.add_note(where)
         raise
-    values, shape = answered(where, returned), (packets.members.count, controller.bus.rows - controller.bus.answer)
+    channels = {key: count for key, (_, count) in controller.bus.commands.items()}
+    values, shape = answered(where, returned), (packets.members.count, callback.answers(channels))
     if values.shape != shape:
         raise ValueError(f"{where}: returned shape {values.shape}. Return {shape}, a row for each member")
     write_answer(packets, values)

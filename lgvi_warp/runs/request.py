@@ -10,6 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
+from lgvi_warp.common.times import of_step
 from lgvi_warp.control.signals import check_signals
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.executors.base import Executor
@@ -19,6 +20,7 @@ from lgvi_warp.engine.plan import NotSurveyed, Plan, choose_plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, TimeGrid, time_grid
 from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.default_method import planned
 from lgvi_warp.runs.run import refuse_failed, run_plan
@@ -30,6 +32,8 @@ from lgvi_warp.scene.settings import check_device
 MOST_FIXED = 4
 # From so many members on, a result holds what another run needs to go on only where SaveAt says so.
 MOST_FINALS = 100_000
+# Numbers of steps are signed words of 32 bits in the kernel.
+MOST_STEPS = 2**31 - 2
 # What a run keeps that says nothing of it.
 ALL_SAMPLES = Observation()
 
@@ -194,6 +198,15 @@ def ensemble_of(fleet: Any) -> Ensemble:
     """The members that are meant: those of an Ensemble, or of a Scene with its [ensemble]."""
     scene = scene_of(fleet)
     return fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(scene)
+
+
+def longest(scene: Scene, h: Any) -> float:
+    """The end of the longest run of a scene with steps of h [s]; 1 s where h is no step, of which a run tells."""
+    if not (isinstance(h, float | int) and np.isfinite(h) and h > 0.0):
+        return 1.0
+    draws = [term.draws(h) for term in scene.terms if isinstance(term, NoisyTerm)]
+    every = 1 if scene.controller is None else scene.controller.every(h)
+    return float(of_step(h) * (MOST_STEPS // max(draws, default=1) // every * every))
 
 
 def enough_iterations(fleet: Ensemble, method: Method, h: float, dtype: str) -> int | None:

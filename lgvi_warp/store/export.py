@@ -19,6 +19,8 @@ from lgvi_warp.common.errors import MissingExtra, SceneError, install, refusal
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.results.result import Result
+from lgvi_warp.scene.examples import PREFIX
+from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment
 from lgvi_warp.store.exporting import tables, trajectories, whole_store
 from lgvi_warp.store.exporting.tracks import Report, plane_of, recorded, tracks_of
@@ -35,6 +37,9 @@ WRITERS: dict[str, Callable[..., None]] = {
     ".nc": trajectories.netcdf,
 }
 
+# The table of extensions whose words are endings of files that are made of scenes.
+OF_SCENES = "scene_exporters"
+
 
 @shows_progress
 def export(
@@ -45,18 +50,21 @@ def export(
     members: slice | Sequence[int] | None = None,
     origin: Sequence[float] | None = None,
     start: str | None = None,
+    inputs: str | None = None,
     overwrite: bool = False,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Path:
-    """Export a run, or some of its members, to a file for other programs; the file's ending chooses the format.
+    """Export a run, some of its members, or a scene to a file for other programs; the file's ending chooses the format.
 
     ".csv" and ".parquet": a table with a row for each member and time of the samples, else for each member. ".nc": NetCDF-4
     with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and transforms in the
     axes of ROS. docs/guide/exports.md has their columns, names, units and axes. Of a footprint the regions are
-    written, as ".geojson" or ".kml".
+    written, as ".geojson" or ".kml". Of a scene ".fmu" is its vehicle as a unit of the FMI standard
+    (docs/guide/exports.md).
 
     Args:
-        run: A result, a result.npz, a store, or a folder with one of the two; or what `lw.studies.footprint` returns.
+        run: A result, a result.npz, a store, or a folder with one of the two; or what `lw.studies.footprint` returns. For
+            ".fmu" a scene, or a scene file.
         to: The file. Or "netcdf", all that a store holds with its arrays as they are, or "parquet": for these `out` is the
             file.
         out: The file for these two words; by default beside the run.
@@ -64,6 +72,8 @@ def export(
             1,000 at most.
         origin: Latitude and longitude of the axes' origin [deg]; by default that of the run's environment, if it has one.
         start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; by default that of the run's environment.
+        inputs: Of ".fmu" alone: "commands" (default) of the actuators, in place of the scene's laws; or "set_points" of its
+            controller, which then is a part of the unit.
         overwrite: Whether to replace a file that exists; by default it is kept, and the export refused.
         progress: Function of the fraction done, or True to show it; by default nothing.
 
@@ -90,11 +100,13 @@ def export(
     if word is None and out is not None:
         raise refusal("out", out, f"is given beside the file {os.fspath(to)!r}", "keep one of them")
     chosen = {"members": members, "origin": origin, "start": start}
+    of_scene = _of_scene(run, ending, inputs, chosen)
     if word == "netcdf" and (extra := [name for name, value in chosen.items() if value is not None]):
         raise refusal(extra[0], chosen[extra[0]], "is given for all that a store holds", "give a file: to='run.nc'")
     replaces = flag("overwrite", overwrite)
     of_regions = _regions(run, ending, chosen) if getattr(run, "study", "") == "footprint" else None
-    source = _source(run) if of_regions is None else Source(lambda: run)
+    directly = of_regions or of_scene
+    source = _source(run) if directly is None else Source(lambda: run)
     beside = source.path if word and out is None else None
     target = _beside(source, ending) if word and out is None else file_path("to", to if out is None else out)
     root = None if beside is None else beside.parent
@@ -103,8 +115,8 @@ def export(
         raise SceneError([f"{target} is there already. Give overwrite=True (--overwrite), or another name"])
     if source.folder is not None:
         check_whole(source.folder)
-    if of_regions is not None:
-        write = of_regions
+    if directly is not None:
+        write = directly
     elif word == "netcdf":
         write = _whole_store(source)
     else:
@@ -153,7 +165,7 @@ def _only_result(path: Path) -> Path | None:
 def _ending(to: Any) -> str:
     """The ending of the file that the user names, in lower case; refuse what no file can be made of."""
     ending = Path(to).suffix.lower() if isinstance(to, str | os.PathLike) else ""
-    if ending not in (known := [*WRITERS, *extensions.words("exporters")]):
+    if ending not in (known := [*WRITERS, *extensions.words("exporters"), *extensions.words(OF_SCENES)]):
         remedy = f"give a name that ends in {', '.join(known)}, or a word of {', '.join(FORMATS)}"
         raise refusal("to", to, "is not a file of a known kind", remedy)
     return ending
@@ -211,6 +223,34 @@ def _some_members(result: Result, ending: str, members: Any, given: Environment 
         problem = f"are {tracks.count:,}, more than the {most:,} that a {ending} file of all members may have"
         raise refusal("members", None, problem, "choose some: members=range(100) (--members 0:100)")
     return functools.partial(exporter.write, tracks)
+
+
+def _of_scene(run: Any, ending: str, inputs: Any, arguments: dict[str, Any]) -> Write | None:
+    """Writer of a scene into a file with this ending; None for a run."""
+    name = os.fspath(run) if isinstance(run, str | os.PathLike) else ""
+    named = name.lower().endswith(".toml") or name.startswith(PREFIX)
+    made_of_scenes = ending in extensions.words(OF_SCENES)
+    if not (made_of_scenes or named or isinstance(run, Scene)):
+        if inputs is not None:
+            raise refusal("inputs", inputs, "is given for a run", "leave it out; a .fmu of a scene has inputs")
+        return None
+    if not made_of_scenes:
+        remedy = "run it first, and export the run; or name a file that ends in .fmu"
+        raise refusal("run", name or "a Scene", f"is a scene, of which no {ending} file can be made", remedy)
+    if not (named or isinstance(run, Scene)):
+        problem = f"is no scene, of which a {ending} file is made: one vehicle with the scene's own numbers"
+        raise refusal(
+            "run", name or type(run).__name__, problem, "give a lw.Scene or a scene file, and no run or ensemble"
+        )
+    for key, value in arguments.items():
+        if value is not None:
+            raise refusal(key, value, f"is given for a {ending} file", "leave it out")
+    scene = run if isinstance(run, Scene) else Scene.load(run)
+    try:
+        write: Write = extensions.load(OF_SCENES, ending).scene_writer(scene, "commands" if inputs is None else inputs)
+    except MissingExtra as error:
+        raise SceneError([f"to = {ending!r}: {error}"]) from error
+    return write
 
 
 def _regions(footprint: Any, ending: str, arguments: dict[str, Any]) -> Write:

@@ -16,7 +16,7 @@ from lgvi_warp.common.errors import Faults, MissingExtra, brief, closest, ragged
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import answered
 from lgvi_warp.common.sentences import sentences
-from lgvi_warp.common.times import of_step, whole_steps
+from lgvi_warp.common.times import whole_steps
 from lgvi_warp.control.callback import Callback
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.host_callback import CallbackInput
@@ -26,15 +26,11 @@ from lgvi_warp.extensions.learning.observations import bounds, observer
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
-from lgvi_warp.physics.terms.noisy import NoisyTerm
-from lgvi_warp.runs.request import Request, ensemble_of
+from lgvi_warp.runs.request import Request, ensemble_of, longest
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import MOST_MEMBERS
-
-# Numbers of steps are signed words of 32 bits in the kernel.
-MOST_STEPS = 2**31 - 2
 
 # Of (t, y, r), or (t, y, r, actions): see `Vehicles`.
 OfTicks = Callable[..., Any]
@@ -155,12 +151,7 @@ class Vehicles:
     def _planned(self, method: Any, h: float | None, dtype: str | None, width: int | None) -> Plan:
         """The plan of a run as long as there can be."""
         scene = self._fleet.scene
-        step = scene.run.step if h is None else h
-        t1 = 1.0
-        if isinstance(step, float | int) and np.isfinite(step) and step > 0.0:
-            draws = [term.draws(step) for term in scene.terms if isinstance(term, NoisyTerm)]
-            every = scene.controller.every(step)
-            t1 = float(of_step(step) * (MOST_STEPS // max(draws, default=1) // every * every))
+        t1 = longest(scene, scene.run.step if h is None else h)
         members = max(self.num_envs, self._fleet.members) if self._random else self._fleet.members
         planned = self._fleet.with_seed(self._fleet.seed, members) if self._random else self._fleet
         save = SaveAt(fields=("position",))

@@ -148,3 +148,41 @@ def test_gains_that_are_left_out_are_zero(law):
     gains = [field for field in fields if field.default is not dataclasses.MISSING]
     assert gains
     assert all(field.default is None or not np.any(field.default) for field in gains), gains
+
+
+def nothing(t, y, r, members):
+    return np.zeros((len(members), 6))
+
+
+def test_a_callback_commands_several_terms():
+    """Its answer has the channels side by side in the order of `to`, whatever that of the terms."""
+    terms = [lw.terms.ControlWrench(name="one"), lw.terms.ControlWrench(name="two")]
+    callback = lw.control.Callback(nothing, to=["two", "one"])
+    controller = lw.Controller(period=0.1, laws=[callback])
+    scene = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), terms=terms, controller=controller)
+    bus = scene.controller.bus
+    assert bus.rows - bus.answer == 12
+    assert callback.answers({"one": 6, "two": 6}) == 12
+    assert callback.to_dict()["to"] == ["two", "one"]
+    found = {part.to: part.before for part in scene.controller.allocation}
+    assert found == {"two": (), "one": ("two",)}
+    with pytest.raises(lw.SceneError, match="is named by 2 allocations"):
+        lw.Scene(
+            lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)),
+            terms=terms,
+            controller=lw.Controller(period=0.1, laws=[lw.control.Callback(nothing, to=["one", "one"])]),
+        )
+
+
+@pytest.mark.needs("navigation")
+def test_a_callback_is_asked_for_its_own_numbers_alone():
+    """Rows that sensors hand to a filter lie behind those of the answer."""
+    sensors = [
+        {"type": "sensor", "name": "compass", "of": "heading", "noise": 0.01},
+        {"type": "imu", "name": "imu"},
+        {"type": "error_state_filter", "name": "filter", "imu": "imu", "heading": "compass"},
+    ]
+    controller = lw.Controller(period=0.1, laws=[lw.control.Callback(nothing)], sensors=sensors)
+    bus = lw.Scene.named("bluerov2_heavy", controller=controller).controller.bus
+    assert bus.rows - bus.answer > 6
+    assert controller.callback.answers({"thrusters": 8}) == 6

@@ -31,13 +31,13 @@ class Vehicle:
         if self.names != content["variables"]:
             raise ValueError(
                 f"the unit was exported by lgvi_warp {content['version']}, and the one installed here names other "
-                "variables; export the scene with the version here, or install that one"
+                "variables. Export the scene with the version here, or install that one"
             )
 
     def setup_experiment(self, start_time: float, *others: Any) -> None:
         """Begin at t = 0."""
         if start_time != 0.0:
-            raise ValueError(f"start time {start_time:.9g} s: a vehicle begins at 0; give 0, and [start] in the scene")
+            raise ValueError(f"start time {start_time:.9g} s: a vehicle begins at 0. Give 0, and [start] in the scene")
 
     def exit_initialization_mode(self) -> None:
         """Load the kernel, compiled first if Warp's cache has none."""

@@ -148,7 +148,7 @@ class VehicleUnit:
             return
         fixed = name not in self._inputs
         if fixed and self.time > 0.0:
-            raise ValueError(f"{name} = {value}: is a parameter, and the vehicle has moved; reset the unit first")
+            raise ValueError(f"{name} = {value} is a parameter, and the vehicle has moved. Reset the unit first")
         self._values[name] = value
         if fixed:
             self._changed.add(name)
@@ -184,11 +184,11 @@ class VehicleUnit:
         vehicle = self.begin()
         last = (time + length) / vehicle.h
         if abs(time / vehicle.h - vehicle.steps) > SAME_STEP:
-            raise ValueError(f"time {time:.9g} s: the vehicle is at {self.time:.9g} s; go on from there")
+            raise ValueError(f"time {time:.9g} s: the vehicle is at {self.time:.9g} s. Go on from there")
         steps = round(last) - vehicle.steps if math.isfinite(last) else 0
         if steps < 1 or abs(last - round(last)) > SAME_STEP:
-            problem = f"communication step {length:.9g} s: is not a whole number of steps of {vehicle.h:.9g} s"
-            raise ValueError(f"{problem}; give a multiple, or export a scene with another [run] step")
+            problem = f"communication step {length:.9g} s is not a whole number of steps of {vehicle.h:.9g} s"
+            raise ValueError(f"{problem}. Give a multiple, or export a scene with another [run] step")
         if not self.of_commands and vehicle.steps:
             vehicle.change(self._set_points())
         vehicle.advance(steps, np.array([self._values[name] for name in self._inputs]))

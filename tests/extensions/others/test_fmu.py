@@ -219,9 +219,9 @@ def test_what_the_file_says(unit):
     ("changes", "settings", "said"),
     [
         ({}, {"inputs": "wishes"}, "inputs = 'wishes'"),
-        ({}, {"members": [0]}, r"members = \[0\]: is given for a .fmu file"),
+        ({}, {"members": [0]}, r"members = \[0\] is given for a .fmu file"),
         ({"controller": None}, {"inputs": "set_points"}, "need a set-point, which the scene has not"),
-        ({"run": lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0))).run}, {}, r"run.step = None: is missing"),
+        ({"run": lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0))).run}, {}, r"run.step = None is missing"),
     ],
 )
 def test_what_a_unit_cannot_be_made_of(changes, settings, said, tmp_path):
@@ -234,7 +234,7 @@ def test_files_functions_and_ensembles_are_refused(tmp_path):
     target = tmp_path / "none.fmu"
     with pytest.raises(lw.SceneError, match=r"is no scene, of which a .fmu file is made: one vehicle"):
         lw.export(lw.Ensemble(scene(), 3), target)
-    with pytest.raises(lw.SceneError, match=r"is a scene, of which no .csv file can be made; run it first"):
+    with pytest.raises(lw.SceneError, match=r"is a scene, of which no .csv file can be made. Run it first"):
         lw.export(scene(), tmp_path / "none.csv")
     with pytest.raises(lw.SceneError, match="is given for a run; leave it out"):
         lw.export(tmp_path, tmp_path / "none.csv", inputs="commands")

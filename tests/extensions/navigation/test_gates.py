@@ -31,12 +31,12 @@ SENSORS = {
 NAMES = {"dvl": "dvl", "fix": "gps", "delayed_fix": "usbl", "depth": "cell", "heading": "compass"}
 
 
-def parts(gate=3.0, most_rejected=10.0, unit=UNIT, each=None, filter_numbers=None, **changes):
-    """IMU, all sensors with changed numbers, `each` for all of them, and the filter with a gate."""
+def parts(gate=3.0, most_rejected=10.0, unit=UNIT, of_all=None, filter_numbers=None, **changes):
+    """IMU, all sensors with changed numbers, `of_all` for each of them, and the filter with a gate."""
     sensors = [lw.control.IMU(**unit)]
     for name, numbers in SENSORS.items():
         kind = lw.control.DVL if name == "dvl" else lw.control.Sensor
-        sensors.append(kind(name=name, **numbers | (each or {}) | changes.get(name, {})))
+        sensors.append(kind(name=name, **numbers | (of_all or {}) | changes.get(name, {})))
     numbers = dict(gate=gate, most_rejected=most_rejected) | (filter_numbers or {})
     return [*sensors, lw.control.ErrorStateFilter(**NAMES, **numbers)]
 
@@ -62,7 +62,7 @@ CASES = {"many in a row": (3.0, 2.0, 0.3), "by sensor": ((4.0, 2.0, np.inf, 3.0,
 def test_a_gated_filter_is_its_twin(case):
     # Many rejections in a row: the covariance is widened, too. Three fixes are on their way, and the tilt is up to 0.18 rad.
     gate, most, share = CASES[case]
-    listed, truth = parts(gate, most, each={"outlier": share}, dvl={"greatest_tilt": 0.15}), voyage(300)
+    listed, truth = parts(gate, most, of_all={"outlier": share}, dvl={"greatest_tilt": 0.15}), voyage(300)
     seen, nees, rejected = ran(listed, truth)
     for member in range(2):
         each = twins(listed, member)
@@ -87,7 +87,7 @@ KNOWN = dict.fromkeys(
 def test_a_gate_rejects_the_tails_of_a_normal_distribution(gate, share):
     # Where the state is known each innovation is a normal number by itself: what is rejected leaves no error behind.
     members, ticks = 300, 200
-    listed = parts(gate, np.inf, unit=EXACT, filter_numbers=KNOWN, each=CLEAN, dvl={"dropout": NO})
+    listed = parts(gate, np.inf, unit=EXACT, filter_numbers=KNOWN, of_all=CLEAN, dvl={"dropout": NO})
     _, _, rejected = ran(listed, still(ticks), members)
     # Of four beams, three coordinates, depth and heading; of the late fix those that have arrived.
     late = len(range(12, ticks, 5))
@@ -101,7 +101,7 @@ def test_with_a_gate_outliers_are_readings_that_are_lost():
     noises = {"dvl": 0.01, "cell": 0.02, "compass": 0.02, "gps": 1.0, "usbl": 0.5}
     wild = {name: {"outlier": 0.05, "outlier_std": 10.0 * noise} for name, noise in noises.items()}
     gated = ran(parts(3.0, **RIGHT, **wild), truth, members)
-    fewer = ran(parts(np.inf, **RIGHT, each=CLEAN | {"dropout": 0.05}), truth, members)
+    fewer = ran(parts(np.inf, **RIGHT, of_all=CLEAN | {"dropout": 0.05}), truth, members)
     open_to_all = ran(parts(np.inf, **RIGHT, **wild), truth, members)
     # The band of a mean over 300 filters. Noises are the same, so that the difference is mostly what the gate lets pass.
     low, high = chi2.ppf(TAILS, 15 * members) / (15 * members)
@@ -121,7 +121,7 @@ def test_a_filter_that_was_shut_out_finds_back():
     truth, lost = voyage(200), {"usbl": {"dropout": 1.0}, "cell": {"dropout": 1.0}}
     off = {}
     for most in (3.0, np.inf):
-        seen, _, rejected = ran(parts(4.0, most, **wrong, each=CLEAN, **lost), truth, 8)
+        seen, _, rejected = ran(parts(4.0, most, **wrong, of_all=CLEAN, **lost), truth, 8)
         off[most] = np.linalg.norm((seen - truth)[-1, :, :2], axis=-1)
         assert np.all(rejected[1] > 0.0)
     # After three rejections a fix is taken, to 1 m; without that the filter stays where it believes to be.
@@ -134,7 +134,7 @@ def test_three_fixes_on_their_way_are_those_of_a_straight_line():
     place, velocity, noise, members, late, every = 3.0, 0.2, 0.5, 300, 12, 5
     sigmas = KNOWN | {"position_sigma": place, "velocity_sigma": velocity}
     nothing = {name: {"dropout": 1.0} for name in ("dvl", "cell", "compass", "gps")}
-    listed = parts(np.inf, unit=EXACT, filter_numbers=sigmas, each=CLEAN, **nothing)
+    listed = parts(np.inf, unit=EXACT, filter_numbers=sigmas, of_all=CLEAN, **nothing)
     assert listed[-1].uses["delayed_fix"] == "usbl"
     low, high = chi2.ppf(TAILS, 3 * members)
     information = np.diag([place**-2, velocity**-2])

@@ -121,18 +121,20 @@ def p_values(scale, seed=3):
     run = lw.solve(fleet, t1=20.0, save=lw.SaveAt(every=0.5, fields=("nees", "nis", "nis_count")), **SETTINGS)
     found = []
     for i in range(GROUPS):
-        own = slice(i * SIZE, (i + 1) * SIZE)
-        part = {name: run.samples[name][:, own] for name in ("nees", "nis", "nis_count")}
-        judged = lw.metrics.consistency(replace(run, samples=part, **_of_members(run, own)))
+        members = slice(i * SIZE, (i + 1) * SIZE)
+        part = {name: run.samples[name][:, members] for name in ("nees", "nis", "nis_count")}
+        judged = lw.metrics.consistency(replace(run, samples=part, **_of_members(run, members)))
         assert judged.nees_average == time_average(part["nees"])
         found.append((judged.nees_average.p, judged.nis_average.p, judged.verdict != "consistent"))
     return np.array(found).T
 
 
-def _of_members(run, own):
+def _of_members(run, members):
     """The fields of a result that have one entry for each member, of some of them."""
     n = run.members
-    return {name: value[own] for name, value in vars(run).items() if isinstance(value, np.ndarray) and len(value) == n}
+    return {
+        name: value[members] for name, value in vars(run).items() if isinstance(value, np.ndarray) and len(value) == n
+    }
 
 
 @pytest.mark.slow

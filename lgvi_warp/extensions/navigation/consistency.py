@@ -83,7 +83,9 @@ class Consistency(Summarized):
             if np.isfinite(test.p)
         ]
         if not texts:
-            return "It is unknown whether the filters are consistent: NEES has lost its digits, and no reading was taken."
+            return (
+                "It is unknown whether the filters are consistent: NEES has lost its digits, and no reading was taken."
+            )
         return f"The filters are {self.verdict}: {' and '.join(texts)}."
 
     @property

@@ -100,7 +100,6 @@ class ErrorStateFilter(MeasuringPart):
     every_feature: ClassVar[tuple[str, ...]] = (*AIDS, REPORT, GATE, WATCHED)
     # The sensors that it uses, by what they are to it; set for a part of a scene.
     used: ClassVar[Mapping[str, Any]] = {}
-    ends: ClassVar[str] = "position_uncertain"
 
     imu: str = _sensor("imu")
     dvl: str = _sensor()
@@ -139,6 +138,10 @@ class ErrorStateFilter(MeasuringPart):
     @property
     def estimates_position(self) -> bool:
         return True
+
+    @property
+    def ends(self) -> str:
+        return "position_uncertain"
 
     @property
     def uses(self) -> Mapping[str, str]:

@@ -36,7 +36,7 @@ class DVL(Part):
     angle, noise, dropout, every = math.radians(30.0), 0.0, 0.0, 1
     burst = outlier = outlier_std = 0.0
     floor, least_range, greatest_range, silent_from, silent_to = math.inf, 0.0, math.inf, math.inf, math.inf
-    greatest_tilt = None
+    greatest_tilt: Any = None
     seed0 = seed1 = channel = 0
 
     def begin(self) -> None:

@@ -47,7 +47,8 @@ class ErrorStateFilter(Part):
     process_scale = measurement_scale = start_error = 1.0
     place = dvl_place = fix_place = delayed_fix_place = depth_place = np.zeros(3)
     dvl_angle, gravity, latency, copies = np.radians(30.0), 9.81, 0, 1
-    gate, most_rejected = None, 10.0
+    most_rejected = 10.0
+    gate: Any = None
     errors = np.zeros(9)
 
     def begin(self) -> None:

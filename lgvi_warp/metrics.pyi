@@ -6,6 +6,7 @@ from lgvi_warp.extensions.navigation.consistency import Consistency as Consisten
 from lgvi_warp.extensions.navigation.consistency import consistency as consistency
 from lgvi_warp.extensions.navigation.metrics import NEES as NEES
 from lgvi_warp.extensions.navigation.metrics import NIS as NIS
+from lgvi_warp.extensions.navigation.metrics import Rejected as Rejected
 from lgvi_warp.statistics.metrics.actuator_metrics import ActuatorEnergy as ActuatorEnergy
 from lgvi_warp.statistics.metrics.actuator_metrics import CustomMetric as CustomMetric
 from lgvi_warp.statistics.metrics.actuator_metrics import Effort as Effort

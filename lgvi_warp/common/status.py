@@ -51,6 +51,7 @@ class Status(IntEnum):
     BATTERY = 21
     OUTSIDE = 22
     MISSION_DONE = 23
+    POSITION_UNCERTAIN = 24
 
     @property
     def stopped(self) -> bool:
@@ -90,7 +91,12 @@ _TEXT = {
     Status.BATTERY: "stopped by an event: it used the capacity of its battery",
     Status.OUTSIDE: "stopped by an event: left the data of a field",
     Status.MISSION_DONE: "stopped by an event: reached all waypoints of its mission",
+<<<<<<< HEAD
     Status.NON_FINITE: "a number of the state is not finite. Check the start state, the parameters and the step",
+=======
+    Status.POSITION_UNCERTAIN: "stopped by an event: its filter's standard deviation of the position passed a limit",
+    Status.NON_FINITE: "a number of the state is not finite; check the start state, the parameters and the step",
+>>>>>>> filters
 }
 
 
@@ -149,6 +155,7 @@ class Warnings(IntFlag):
     ENERGY = 512
     CONTROL_NOT_CONVERGED = 1024
     ABOVE_SURFACE = 2048
+    FILTER_DIVERGED = 4096
 
     @classmethod
     def _missing_(cls, value: object) -> Any:
@@ -191,6 +198,8 @@ _WARNING_TEXT = {
     'are not those asked for. Give it more iterations (the signal "unconverged" counts them)',
     Warnings.ABOVE_SURFACE: "the member rose more than 0.1 m above the mean surface, where the model knows no air. Stop "
     "it there by the event surface, or let it float by the term surface_buoyancy",
+    Warnings.FILTER_DIVERGED: "the filter's error was far beyond what it believes: NEES above 150, where 15 is right; give it "
+    "the noises that its sensors have, a gate against outliers, or a better first estimate",
 }
 
 _WARNING_VALUE = {
@@ -206,6 +215,7 @@ _WARNING_VALUE = {
     Warnings.ENERGY: "energy created over the energy available",
     Warnings.CONTROL_NOT_CONVERGED: "solutions that had not converged",
     Warnings.ABOVE_SURFACE: "height above the mean surface [m]",
+    Warnings.FILTER_DIVERGED: "ticks with NEES above 150",
 }
 
 

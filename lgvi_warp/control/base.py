@@ -56,9 +56,13 @@ class Bus(NamedTuple):
     handed: First rows of what sensors hand to an estimator, by their keys; belief: first row of what the estimator believes.
     acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and the
         row of the step from which the former act. period: Time between two ticks [s]. ranges: Row of each altimeter's reading.
+    rejected: First of the rows with the counts of readings that an estimator's gate rejects; -1 where none has a gate.
+    diverged: Row of the number of ticks at which an estimator's error was far beyond what it believes, the last but one of
+        those of what it believes; the row behind it as that of `unconverged`. -1 where no estimator reports.
     unconverged: Row of the number of solutions by iterations that had not converged at their tick; the row behind it holds the
         time of the first one, a period later [s]. -1 where no part iterates.
-    done: First of two rows of each guidance at whose end an event looks, by its key: 1 once it is done, and since when [s].
+    done: First of two rows of each part at which an event looks, by its key. Of guidance: 1 once it is done, and since when
+        [s]; of an estimator: the standard deviation of its position [m], and the time of that tick [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -72,6 +76,8 @@ class Bus(NamedTuple):
     ranges: Mapping[str, int] = MappingProxyType({})
     handed: Mapping[str, int] = MappingProxyType({})
     belief: int = -1
+    rejected: int = -1
+    diverged: int = -1
     unconverged: int = -1
     done: Mapping[str, int] = MappingProxyType({})
 
@@ -89,14 +95,15 @@ class Bus(NamedTuple):
         altimeters: Sequence[str] = (),
         handed: Mapping[str, int] = MappingProxyType({}),
         belief: int = 0,
+        rejected: int = 0,
         iterates: bool = False,
         ending: Sequence[str] = (),
     ) -> Bus:
         """The bus of some actuators, with a time between two ticks [s].
 
         channels: Commands of each. answers: Rows for answers of the host. altimeters: Their keys. handed: Rows that sensors
-            hand to an estimator, by their keys; belief: rows of what it believes. iterates: Whether a part does.
-            ending: Keys of the guidance at whose end an event looks.
+            hand to an estimator, by their keys; belief: rows of what it believes, of which `rejected` are counts of what its
+            gate rejects. iterates: Whether a part does. ending: Keys of the parts at which an event looks.
         """
         commands, row = {}, 0
         for key, count in channels.items():
@@ -110,6 +117,7 @@ class Bus(NamedTuple):
             end += count
         places: dict[str, Any] = {
             "answer": rows, "ranges": ranges, "handed": handing, "belief": end if belief else -1,
+            "rejected": end + belief - 2 - rejected if rejected else -1, "diverged": end + belief - 2 if belief else -1,
             "unconverged": end + belief if iterates else -1,
         }  # fmt: skip
         end += belief + 2 * iterates
@@ -156,6 +164,11 @@ class Part(Term):
     def gives(self) -> tuple[str, ...]:
         """Quantities that it wants of the motion, among `WISHES`; by default nothing."""
         return ()
+
+    @property
+    def ends(self) -> str:
+        """Type of the event that may look at it, in the rows `bus.done`; by default "", none."""
+        return ""
 
     @property
     def ticks_before(self) -> int:
@@ -271,8 +284,9 @@ class MeasuringPart(Part):
     )
     # Whether linear models of a loop may have it.
     linear: ClassVar[bool] = True
-    # Rows of the bus with what it believes, beside the measurement.
+    # Rows of the bus with what it believes, beside the measurement; of these, counts of readings that its gate rejects.
     belief_rows: ClassVar[int] = 0
+    rejected_rows: ClassVar[int] = 0
     # For faults: what it reads, among READINGS; of the rows that it hands on those behind its numbers that tell what is new,
     # and whether its numbers are sums over a period.
     reading: ClassVar[str] = ""
@@ -328,11 +342,6 @@ class Guidance(Part):
     kinds: ClassVar[registry.Kinds] = _built_in(
         "guidance", "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
-
-    @property
-    def ends(self) -> bool:
-        """Whether it can tell an event `mission_done` that it is done, in the rows `bus.done`; by default False."""
-        return False
 
     @property
     def wanted(self) -> tuple[str, ...]:

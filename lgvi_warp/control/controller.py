@@ -223,8 +223,15 @@ class Controller(Documented):
         answers = 0 if callback is None else callback.answers(channels)
         shared = max(law.shared_rows for law in self.laws)
         altimeters = [part.key for part in self.sensors if isinstance(part, Altimeter)]
-        ending = [part.key for part in self.guidance if part.ends and part.key in {event.follows for event in events}]
-        rows = self.handed_rows, self.belief_rows, any(part.iterates for part in wired.parts), ending
+        watched = {(event.follows, event.type) for event in events}
+        ending = [part.key for part in (*self.sensors, *self.guidance) if (part.key, part.ends) in watched]
+        rows = (
+            self.handed_rows,
+            self.belief_rows,
+            self.rejected_rows,
+            any(part.iterates for part in wired.parts),
+            ending,
+        )
         controller = wired.on(Bus.of(channels, self.period, max(answers, shared), altimeters, *rows))
         for part in controller.allocation:
             part.check_actuator(faults)
@@ -249,6 +256,11 @@ class Controller(Documented):
     def belief_rows(self) -> int:
         """Rows of what an estimator believes."""
         return sum(part.belief_rows for part in self.sensors)
+
+    @property
+    def rejected_rows(self) -> int:
+        """Rows, among those, of the counts of readings that its gate rejects."""
+        return sum(part.rejected_rows for part in self.sensors)
 
     def _effect(self) -> np.ndarray:
         """Effect of all channels on the demanded components, each column of unit size, (6, channels)."""

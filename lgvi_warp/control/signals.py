@@ -65,8 +65,8 @@ _REFERENCE = _KINDS | {
 }
 
 
-# The group of signals that lie in the rows of what an estimator believes: an estimator adds its own.
-ESTIMATE = "estimate"
+# The groups of signals that lie in the rows of what an estimator believes, and of what its gate rejects: it adds its own.
+ESTIMATE, REJECTED = "estimate", "rejected"
 
 
 def _noted(group: str, word: str, kinds: Mapping[str, Field], rows: Mapping[str, int]) -> tuple[Signal, ...]:
@@ -169,7 +169,7 @@ def saved_fields(controller: Controller | None, accounted: bool = False) -> dict
 
 def _absent(controller: Controller) -> set[str]:
     """The groups of signals, and the single ones, that a wired controller has not."""
-    rows = {ESTIMATE: controller.bus.belief, UNCONVERGED: controller.bus.unconverged}
+    rows = {ESTIMATE: controller.bus.belief, REJECTED: controller.bus.rejected, UNCONVERGED: controller.bus.unconverged}
     rows[NAVIGATION_ERROR] = max((int(part.estimates_position) for part in controller.sensors), default=0) - 1
     return {group for group, row in rows.items() if row < 0}
 
@@ -191,7 +191,13 @@ def row_of(name: str, bus: Bus, noted: Mapping[str, int]) -> int:
     signal = SIGNALS[name]
     if signal.group == ESTIMATE:
         return bus.belief + signal.row
-    firsts = {"command": 0, "unmet": bus.unmet, "actuator": bus.report, UNCONVERGED: bus.unconverged}
+    firsts = {
+        "command": 0,
+        "rejected": bus.rejected,
+        "unmet": bus.unmet,
+        "actuator": bus.report,
+        UNCONVERGED: bus.unconverged,
+    }
     return firsts[name] if name in firsts else noted[signal.group] + signal.row
 
 

@@ -159,8 +159,8 @@ class Waypoints(Guidance):
         return self.loiter_radius is not None
 
     @property
-    def ends(self) -> bool:
-        return self.at_end != "go_on"
+    def ends(self) -> str:
+        return "" if self.at_end == "go_on" else "mission_done"
 
     def device_in(self, aligned: bool) -> Any:
         has = {"timed": self.times is not None, "circles": self.circles, "ends": self.key in self.bus.done}

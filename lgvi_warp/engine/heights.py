@@ -47,12 +47,13 @@ class Heights:
         self._height = np.fmax(self._height, np.where(self._above, -np.inf, -np.fmin.reduce(depth, axis=0)))
 
     def added(self, bits: np.ndarray, step: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Add the warning, the most serious one, of members that rose too high; arrays (m,) each, as of `Warnings`."""
+        """Add the warning of members that rose too high; arrays (m,) each, as of `Warnings`."""
         high = self._height > self._limit
         if not high.any():
             return bits, step, value
+        most = high & (bits < Warnings.ABOVE_SURFACE)
         warned = bits | np.uint16(Warnings.ABOVE_SURFACE) * high
-        return warned, np.where(high, self._step, step), np.where(high, self._height, value)
+        return warned, np.where(most, self._step, step), np.where(most, self._height, value)
 
     def left(self) -> np.ndarray:
         """Rows (m, 3) from which a run goes on exactly; none where no member was above the surface."""

@@ -427,7 +427,7 @@ class Packets:
         step = np.zeros(len(bits), np.int64)
         value = value if len(value) else np.full(len(bits), np.nan)
         if not self.plan.spec.warning_rows:
-            return self._with_unconverged(bits, step, value)
+            return self._with_counted(bits, step, value)
         monitor = self.monitor
         noted = self._of_members(monitor.warned, np.uint16)
         # The kernel's warning is more serious if its highest bit is above all bits of the start.
@@ -435,23 +435,27 @@ class Packets:
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
         found = bits | noted, step, value
-        return self._with_unconverged(*(self._with_departed(*found) if leaves_rotations(self.plan.method) else found))
+        return self._with_counted(*(self._with_departed(*found) if leaves_rotations(self.plan.method) else found))
 
-    def _with_unconverged(
+    def _with_counted(
         self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same with a warning of the members at whose ticks iterations had not converged."""
-        controller, h, m = self.plan.kernel_choice.controller, self.plan.grid.h, len(bits)
-        if controller is None or controller.bus.unconverged < 0 or self.plan.checks == "none":
+        """The same with warnings of the members at whose ticks iterations had not converged, or whose filter diverged."""
+        controller, m = self.plan.kernel_choice.controller, len(bits)
+        if controller is None or self.plan.checks == "none":
             return bits, step, value
-        rows = self._values(self.laws.memory.view[:, controller.bus.unconverged :][:, :2])
-        count, later = rows.transpose(1, 0, 2).reshape(2, -1)[:, :m].astype(np.float64)
-        first = np.rint(later / h).astype(np.int64) - controller.every(h)
-        # Ticks of a member that ended go on, at rest.
-        own = np.where(self._status[:m] == 0, np.inf, (self._failed_step[:m] - first) // controller.every(h) + 1)
-        seen = (count > 0.0) & (own > 0)
-        bits = bits | np.uint16(Warnings.CONTROL_NOT_CONVERGED) * seen
-        return bits, np.where(seen, first, step), np.where(seen, np.minimum(count, own), value)
+        bus, h = controller.bus, self.plan.grid.h
+        counted = ((bus.unconverged, Warnings.CONTROL_NOT_CONVERGED), (bus.diverged, Warnings.FILTER_DIVERGED))
+        for row, warning in (each for each in counted if each[0] >= 0):
+            rows = self._values(self.laws.memory.view[:, row:][:, :2])
+            count, later = rows.transpose(1, 0, 2).reshape(2, -1)[:, :m].astype(np.float64)
+            first = np.rint(later / h).astype(np.int64) - controller.every(h)
+            # Ticks of a member that ended go on, at rest.
+            own = np.where(self._status[:m] == 0, np.inf, (self._failed_step[:m] - first) // controller.every(h) + 1)
+            seen = (count > 0.0) & (own > 0)
+            bits = bits | np.uint16(warning) * seen
+            step, value = np.where(seen, first, step), np.where(seen, np.minimum(count, own), value)
+        return bits, step, value
 
     def _warned_at_start(self) -> tuple[np.ndarray, np.ndarray]:
         """(bits, value) of the warnings at the start; no value where there are none."""

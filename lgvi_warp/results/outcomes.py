@@ -67,15 +67,18 @@ def above_surface(warnings: np.ndarray, value: np.ndarray) -> tuple[str, ...]:
     """Count the members that rose above the surface without a term or an event for it.
 
     warnings: Bits of `Warnings` of each member, (n,).
-    value: Value of the most serious warning, which this is, (n,).
+    value: Value of the most serious warning, (n,).
     """
     bits = np.asarray(warnings)
     high = np.flatnonzero(bits & np.uint16(Warnings.ABOVE_SURFACE)) if bits.any() else bits[:0]
     if not len(high):
         return ()
-    height = np.asarray(value)[high]
     some = f"{RISEN}{len(high):,} of {len(bits):,} members rise above the surface, where no water is"
-    most = f"the highest, member {high[int(height.argmax())]}, by {height.max():.4g} m"
+    known = high[bits[high] < 2 * int(Warnings.ABOVE_SURFACE)]
+    if not len(known):
+        return (f"{some}; {STOP}",)
+    height = np.asarray(value)[known]
+    most = f"the highest, member {known[int(height.argmax())]}, by {height.max():.4g} m"
     return (f"{some} ({most}); {STOP}",)
 
 
@@ -104,15 +107,16 @@ def remarks_on(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
     """List what the fields of members (n,), by name, tell of how they ran."""
     warned = [fields[name] for name in ("warnings", "warning_time", "warning_value")]
     begun = begun_beyond(fields["status"], fields["failure_time"])
-    return above_surface(warned[0], warned[2]) + begun + unconverged(*warned)
+    counted = (ticks_with(*warned, kind) for kind in (Warnings.CONTROL_NOT_CONVERGED, Warnings.FILTER_DIVERGED))
+    return sum(counted, above_surface(warned[0], warned[2]) + begun)
 
 
-def unconverged(warnings: np.ndarray, time: np.ndarray, value: np.ndarray) -> tuple[str, ...]:
-    """Tell of members at whose ticks iterations of the controller had not converged.
+def ticks_with(warnings: np.ndarray, time: np.ndarray, value: np.ndarray, kind: Warnings) -> tuple[str, ...]:
+    """Tell of members with a warning of their ticks, such as iterations that had not converged.
 
     warnings, time, value: Bits of each member, when the most serious one was first seen [s], and its value, (n,).
     """
-    bits, bit = np.asarray(warnings), int(Warnings.CONTROL_NOT_CONVERGED)
+    bits, bit = np.asarray(warnings), int(kind)
     count = int(np.count_nonzero(bits & bit))
     if not count:
         return ()
@@ -121,7 +125,7 @@ def unconverged(warnings: np.ndarray, time: np.ndarray, value: np.ndarray) -> tu
     if len(of):
         first = int(of[np.asarray(time)[of].argmin()])
         times = f" ({int(np.asarray(value)[of].max()):,} times at most, first in member {first} at {time[first]:g} s)"
-    return (f"{count:,} of {len(bits):,} members{times}: {Warnings.CONTROL_NOT_CONVERGED.text}",)
+    return (f"{count:,} of {len(bits):,} members{times}: {kind.text}",)
 
 
 def failure_text(result: Result) -> str:

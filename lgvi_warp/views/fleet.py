@@ -41,6 +41,7 @@ OUTCOME_STYLES = {
     Status.BATTERY: OutcomeStyle("#6A3D9A", "p"),
     Status.OUTSIDE: OutcomeStyle("#56B4E9", "h"),
     Status.MISSION_DONE: OutcomeStyle("#117733", "*"),
+    Status.POSITION_UNCERTAIN: OutcomeStyle("#882255", "<"),
 }
 FAILURES = [code for code in Status if code not in OUTCOME_STYLES]
 OUTCOME_STYLES |= {code: OutcomeStyle("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1+23", strict=True)}

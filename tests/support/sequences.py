@@ -106,7 +106,7 @@ GOOD = {
     "control.Docking": [{"position": THREE, "heading": 0.0, "contact_speed": 0.5, "slowing": 9.0, "mouth": 0.5,
                          "funnel": 0.2, "approach": 20.0, "judged": 5.0, "look_ahead": 2.0, "speed": 1.0}],
     "control.ErrorStateFilter": [{"position_sigma": THREE, "velocity_sigma": THREE, "attitude_sigma": THREE,
-                                  "accelerometer_sigma": THREE, "gyroscope_sigma": THREE}],
+                                  "accelerometer_sigma": THREE, "gyroscope_sigma": THREE, "gate": [3.0] * 5}],
     "control.IMU": [dict.fromkeys(("place", "accelerometer_noise", "gyroscope_noise", "accelerometer_walk", "gyroscope_walk",
                                    "accelerometer_bias", "gyroscope_bias", "accelerometer_turn_on", "gyroscope_turn_on"),
                                   THREE)],

@@ -4,9 +4,11 @@
 # Where the device code of the parts is.
 DEVICE = f"{__name__}.device"
 HOLDS = {
+    "events": {"position_uncertain": ".events"},
     "sensors": {"dvl": ".control.dvl", "error_state_filter": ".control.error_state_filter", "imu": ".control.imu"},
     "signals": dict.fromkeys(
-        ("estimate_sigma", "estimate_bias", "nees", "nis", "nis_count", "innovation", "innovation_sigma"), ".signals"
+        ("estimate_sigma", "estimate_bias", "nees", "nis", "nis_count", "innovation", "innovation_sigma", "rejected"),
+        ".signals",
     ),
-    "statistics": {"nees": ".metrics", "nis": ".metrics"},
+    "statistics": {"nees": ".metrics", "nis": ".metrics", "rejected": ".metrics"},
 }

@@ -74,6 +74,21 @@ class Consistency(Summarized):
         return "too sure" if worst.mean > worst.degrees else "too careful"
 
     @property
+    def answer(self) -> str:
+        """One sentence with the verdict, both means and their p-values."""
+        tests = ("NEES", self.nees_average), ("NIS", self.nis_average)
+        texts = [
+            f"{name} is {test.mean:.4g} on average where {test.degrees:g} is right (p = {test.p:.2g})"
+            for name, test in tests
+            if np.isfinite(test.p)
+        ]
+        if not texts:
+            return (
+                "It is unknown whether the filters are consistent: NEES has lost its digits, and no reading was taken."
+            )
+        return f"The filters are {self.verdict}: {' and '.join(texts)}."
+
+    @property
     def nees_share(self) -> float:
         """Share of the times at which NEES is in its band."""
         return _share(self.nees, self.nees_band)
@@ -99,7 +114,7 @@ class Consistency(Summarized):
             rows.append((name, text))
             worth = f"{test.effective:,.4g} independent values"
             rows.append(("", f"over all times {test.mean:.5g} from {worth}, right {test.degrees:g}, p = {test.p:.2g}"))
-        rows.append(("verdict", self.verdict))
+        rows.append(("verdict", self.answer))
         return f"Consistency of {self.members.max():,} filters at {len(self.time):,} times, {percent:g} % bands", rows
 
 

@@ -76,4 +76,36 @@ class NIS(NEES):
         return {name: accumulated(state[name], ticks, ticks.x[:, i]) for i, name in enumerate(names)}
 
 
-_BELIEFS = {"nees": all_of("nees"), "nis": all_of("nis", "nis_count")}
+@dataclass(frozen=True, eq=False)
+class Rejected(OfFilter):
+    """The number of readings that the gate of a member's filter has rejected until the end; then statistics of it.
+
+    Each number of a reading counts, a beam or a coordinate of a fix, of all sensors together; the signal "rejected" has the
+    counts by sensor. It needs a filter with a gate that reports.
+
+    Args:
+        of: "rejected", the default.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.metrics.Rejected(then=[lw.statistics.Quantiles(levels=(0.5, 0.95))]).key
+        'rejected'
+    """
+
+    type: ClassVar[str] = "rejected"
+    default: ClassVar[str | None] = "rejected"
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"last": x.sum(axis=0)}
+
+    def follow(self, state: State, ticks: Ticks) -> State:
+        # It never falls while a member is under way.
+        counts = ticks.of_living(ticks.x.sum(axis=1), 0.0)
+        return {"last": np.maximum(state["last"], counts.max(axis=0))}
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["last"]
+
+
+_BELIEFS = {"nees": all_of("nees"), "nis": all_of("nis", "nis_count"), "rejected": all_of("rejected")}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimates of the filter: rows of the bus, as device/error_state_filter.py writes them."""
 
-from lgvi_warp.control.signals import ESTIMATE, Signal, add_signals
+from lgvi_warp.control.signals import ESTIMATE, REJECTED, Signal, add_signals
 from lgvi_warp.physics.fields import Field
 
 _BLOCKS = "position [m], velocity [m/s], attitude [rad], biases of accelerometer [m/s^2] and gyroscope [rad/s]"
@@ -27,5 +27,20 @@ add_signals(
     absent=(
         "is reported by a filter; this scene has none, or its filter does not report it",
         'give [[controller.sensors]] type = "error_state_filter" with report = true',
+    ),
+)
+add_signals(
+    Signal(
+        Field(
+            "rejected",
+            (5,),
+            "1",
+            "numbers rejected by the gate since the start, of dvl, fix, delayed_fix, depth, heading",
+        ),
+        REJECTED,
+    ),
+    absent=(
+        "is counted by a filter with a gate that reports, and this scene has none",
+        'give [[controller.sensors]] type = "error_state_filter" with gate = 4 and report = true',
     ),
 )

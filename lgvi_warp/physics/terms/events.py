@@ -37,11 +37,11 @@ class Event(Term):
 
     @property
     def follows(self) -> str:
-        """Key of the guidance at whose end it looks; by default "", none."""
+        """Key of the part of the controller at which it looks; by default "", none."""
         return ""
 
     def wired(self, bus: Any) -> Any:
-        """Tell the event where it finds what guidance writes.
+        """Tell the event where it finds what a part of the controller writes.
 
         Args:
             bus: Rows of the controller's memory; None in a scene without a controller.
@@ -50,7 +50,7 @@ class Event(Term):
             A copy, or the event where it needs nothing; by default the latter.
 
         Raises:
-            SceneError: Where no such guidance ends.
+            SceneError: Where there is no such part.
         """
         return self
 

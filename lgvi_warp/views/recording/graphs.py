@@ -92,6 +92,7 @@ MARKERS = {
     Status.BATTERY: "plus",
     Status.OUTSIDE: "asterisk",
     Status.MISSION_DONE: "cross",
+    Status.POSITION_UNCERTAIN: "left",
 }
 MOST_MARKS = 12
 

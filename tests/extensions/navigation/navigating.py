@@ -94,6 +94,7 @@ def twin_of_filter(listed, handed, member, seed, gravity):
     ]
     log = by_key.get(design.dvl, lw.control.DVL())
     latency = int(by_key[design.delayed_fix].latency) if design.delayed_fix else 0
+    copies = 1 + latency // int(by_key[design.delayed_fix].every) if design.delayed_fix else 1
     places = {
         f"{role}_place": by_key[key].place
         for role, key in design.uses.items()
@@ -101,7 +102,7 @@ def twin_of_filter(listed, handed, member, seed, gravity):
     }
     return twin_filter.ErrorStateFilter(
         **numbers, **dict(design.uses), handed=handed, believed=believed, place=unit.place, dvl_place=log.place,
-        dvl_angle=float(log.angle), gravity=gravity, latency=latency, errors=np.concatenate(errors), **places,
+        dvl_angle=float(log.angle), gravity=gravity, latency=latency, copies=copies, errors=np.concatenate(errors), **places,
     )  # fmt: skip
 
 

@@ -370,8 +370,8 @@ FAULTS = {
          lw.control.ErrorStateFilter(depth="cell")],
         "cell.latency",
     ),
-    "two on their way": (
-        [lw.control.IMU(), lw.control.Sensor(name="usbl", of="position", noise=0.1, latency=5, every=5),
+    "many on their way": (
+        [lw.control.IMU(), lw.control.Sensor(name="usbl", of="position", noise=0.1, latency=40, every=5),
          lw.control.ErrorStateFilter(delayed_fix="usbl")],
         "usbl.latency",
     ),
@@ -590,9 +590,22 @@ def test_the_page_has_all_keys_and_its_blocks_run(capsys, monkeypatch):
     base = remus(listed)
     assert base.parameters()["gps.deepest"] == 0.3
     assert base.controller.sensors[-1].uses["delayed_fix"] == "usbl"
+<<<<<<< HEAD
     (code,) = blocks("docs/controllers/filter_consistency.md", "python")
     exec(code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.02, threads=1'), {})
+=======
+    first, gated = (
+        code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.02, threads=1') for code in blocks(page, "python")
+    )
+    names: dict[str, object] = {}
+    exec(first, names)
+>>>>>>> filters
     assert "Consistency of 200 filters at 2 times" in capsys.readouterr().out
+    exec(gated, names)
+    # Of 35 readings of a member 5 % are outliers, of which the gate lets one in four pass.
+    told, count = capsys.readouterr().out.splitlines()
+    assert told.startswith("The filters are ")
+    assert re.fullmatch("[12] readings of a member are rejected on average", count)
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,7 @@ OTHERS = {
     "Loiter": lambda: lw.control.Loiter(center=V, radius=4.0, speed=1.0, look_ahead=2.0),
     "DockContact": lambda: lw.metrics.DockContact("speed"),
     "Battery": lambda: lw.events.Battery(capacity=3.6e6),
+    "PositionUncertain": lambda: lw.events.PositionUncertain(sigma=20.0),
     "Factor": lambda: lw.distributions.Factor(lw.distributions.Uniform(low=0.8, high=1.2)),
     "Consistency": lambda: lw.metrics.Consistency(*[np.ones(2)] * 3, np.ones((2, 2)), np.ones(2), np.ones((2, 2)), 0.95,
                                                          *[time_average()] * 2),

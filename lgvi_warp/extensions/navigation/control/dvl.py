@@ -21,7 +21,7 @@ from lgvi_warp.physics.terms.noisy import key_of
 BEAMS = 4
 # Beams stand at 45 degrees from the bow.
 DIAGONAL = float(np.sqrt(0.5))
-MOST_ANGLE = 1.5
+MOST_ANGLE, MOST_TILT = 1.5, 3.14
 # How far a beam looks for a floor on a grid where its range has no end [m].
 FARTHEST = 2e4
 
@@ -33,8 +33,9 @@ class DVL(MeasuringPart):
         reading_i = u_i . (nu + Omega x place) + noise xi_i
         u_i = (+-sin(angle) / sqrt(2), +-sin(angle) / sqrt(2), cos(angle))
 
-    A beam has no echo where it is lost by chance, where it looks upward, and where the way along it to the floor, flat or on a
-    grid, is not within its range. An `error_state_filter` takes each beam by itself, so one is of use too; without a filter
+    A beam has no echo where it is lost by chance, where it looks upward, where the way along it to the floor, flat or on a
+    grid, is not within its range, and where the body is tilted too far. An `error_state_filter` takes each beam by itself, so
+    one is of use too; without a filter
     the measured velocity becomes that of the log's place by least squares of three beams or four, else it stays the last one,
     and is 0 before the first: a log without bottom lock tells no velocity.
 
@@ -49,6 +50,7 @@ class DVL(MeasuringPart):
         every: Ticks from one new reading to the next, a whole number; 1 by default.
         floor: Key of the scene's `lw.events.Floor` that is the ground; "" by default: always an echo.
         least_range: Shortest way along a beam to the floor [m]; 0 by default.
+        greatest_tilt: Angle of the body's third axis from straight down above which no beam has an echo [rad]; by default any.
         greatest_range: Longest way along a beam to the floor [m]; inf by default.
         silent_from: Time from which it gives no readings [s]; inf by default, never.
         silent_to: Time until which it gives none [s]; inf by default, to the end.
@@ -75,6 +77,7 @@ class DVL(MeasuringPart):
         "floor",
         "grid",
         "silent",
+        "tilt",
         HANDED,
     )
     reading: ClassVar[str] = "velocity"
@@ -93,6 +96,7 @@ class DVL(MeasuringPart):
     floor: str = text("is not a text", "give the name of a floor among the scene's events", "")
     least_range: Any = number((), "m", 0.0, least=0.0)
     greatest_range: Any = number((), "m", np.inf, least=0.0, infinite=True)
+    greatest_tilt: Any = number((), "rad", None, above=0.0, most=MOST_TILT, optional=True)
     silent_from: Any = number((), "s", np.inf, infinite=True)
     silent_to: Any = number((), "s", np.inf, infinite=True)
 
@@ -128,6 +132,7 @@ class DVL(MeasuringPart):
         acting += ["outlier"] if far else []
         acting += [] if self.ground is None else ["grid" if self.ground.on_grid else "floor"]
         acting += ["silent"] if np.any(np.isfinite(numbers["silent_from"])) else []
+        acting += ["tilt"] if self.greatest_tilt is not None else []
         return (*acting, HANDED) if self.is_handed else tuple(acting)
 
     def device_in(self, aligned: bool) -> Any:
@@ -145,6 +150,8 @@ class DVL(MeasuringPart):
         values |= burst_levels(numbers) if "burst" in self.chosen else {}
         if "outlier" in self.chosen:
             values |= {"outlier": level_of(numbers["outlier"]), "outlier_std": numbers["outlier_std"]}
+        if "tilt" in self.chosen:
+            values["least_down"] = np.cos(numbers["greatest_tilt"])
         # Without a filter its own memory has the rows of the beams, behind the last velocity.
         values["handed"] = self.bus.handed[self.key] if self.is_handed else 0
         first = 0 if self.is_handed else 3 + 2 * BEAMS

@@ -29,12 +29,16 @@ ROLES: dict[str, tuple[type[MeasuringPart], str]] = {
     "heading": (Sensor, "heading"),
 }
 AIDS = tuple(role for role in ROLES if role != "imu")
-REPORT = "report"
+REPORT, GATE, WATCHED = "report", "gate", "watched"
 # Numbers of a sensor that the filter would not see, each with what to do.
 UNSEEN = {"latency": "leave it out: delayed_fix alone may be late"}
-# Rows of what it believes, and of its memory before the covariance (see its device code).
-BELIEF_ROWS, STATE_ROWS, WAITING_ROW = 48, 70, 33
-STATES, COPIED = 15, 3
+# Rows of what it believes, and behind them of counts by sensor, and of what tells whether it diverged (see its device code).
+BELIEF_ROWS, DIVERGED_ROWS = 48, 2
+# Rows of its memory: before those of fixes on their way, and of each of these; numbers of which each counts its rejections.
+STATE_ROWS, FIX_ROWS, RUN_ROWS = 27, 7, 12
+STATES, COPIED, MOST_COPIES = 15, 3, 8
+# A gate so wide that all pass, within float32; one whose tails are 0. Rejections in a row where the scene has no number.
+OPEN, FAR, MOST_REJECTED = 1e9, 30.0, 10.0
 _KEY = "give the name of a sensor that stands before the filter, or leave it out"
 
 
@@ -50,9 +54,9 @@ class ErrorStateFilter(MeasuringPart):
     List it after the sensors that it names. These hand their readings to it alone, and it replaces the measured position,
     attitude, velocity over ground and angular velocity by its estimate. At each tick it goes on by what the IMU has
     gained; then it takes each new reading, number by number in Joseph's form. A delayed fix corrects the position copied
-    as the fix was taken, with its covariances (stochastic cloning), one at a time. The filter believes the noises that the
-    scene gives for its sensors, whatever a member's are, times `process_scale` and `measurement_scale`; it knows nothing of
-    their bias, drift and quantum, but for the biases of the IMU.
+    as the fix was taken, with its covariances (stochastic cloning), of up to 8 fixes on their way. The filter believes the
+    noises that the scene gives for its sensors, whatever a member's are, times `process_scale` and `measurement_scale`; it
+    knows nothing of their bias, drift and quantum, but for the biases of the IMU.
 
     The first estimate is the truth with an error as large as the sigmas below say, drawn once a member.
 
@@ -64,7 +68,8 @@ class ErrorStateFilter(MeasuringPart):
         depth: Key of a `Sensor` of "depth".
         heading: Key of a `Sensor` of "heading".
         fix: Key of a `Sensor` of "position" without latency, as GPS with `deepest`.
-        delayed_fix: Key of a `Sensor` of "position" whose `latency` may be up to its `every`, as USBL.
+        delayed_fix: Key of a `Sensor` of "position" whose `latency` is below 8 times its `every`, as USBL. Where the numbers
+            of a member would have more fixes on their way than those of the scene, the filter leaves out the others.
         position_sigma: Of the first estimate (3,) [m], inertial axes; 1 by default; one number for all axes.
         velocity_sigma: The same of the velocity (3,) [m/s], inertial axes; 0.1 by default.
         attitude_sigma: The same of the attitude (3,) [rad], body axes; 0.02 by default.
@@ -73,6 +78,11 @@ class ErrorStateFilter(MeasuringPart):
         start_error: Factor of the error of the first position, velocity and attitude; 1 by default, 0 for the truth.
         process_scale: Factor of the IMU's noises and walks as the filter believes them; 1 by default.
         measurement_scale: Factor of the other noises; 1 by default.
+        gate: Standard deviations of an innovation beyond which it is rejected, each number of a reading by itself: a beam, a
+            coordinate of a fix. One number, or five (5,), for dvl, fix, delayed_fix, depth and heading; inf takes all. By
+            default there is no gate.
+        most_rejected: Rejections in a row of one number after which the next is taken, whatever it is: the covariance is first
+            widened, along what that number sees, until the innovation is at the gate. 10 by default, inf for never.
         report: Whether it notes sigmas, innovations, NEES and NIS for signals and statistics; True by default.
 
     Raises:
@@ -87,7 +97,7 @@ class ErrorStateFilter(MeasuringPart):
     type: ClassVar[str] = "error_state_filter"
     device: ClassVar[str] = f"{DEVICE}.error_state_filter"
     linear: ClassVar[bool] = False
-    every_feature: ClassVar[tuple[str, ...]] = (*AIDS, REPORT)
+    every_feature: ClassVar[tuple[str, ...]] = (*AIDS, REPORT, GATE, WATCHED)
     # The sensors that it uses, by what they are to it; set for a part of a scene.
     used: ClassVar[Mapping[str, Any]] = {}
 
@@ -105,15 +115,33 @@ class ErrorStateFilter(MeasuringPart):
     start_error: Any = number((), "1", 1.0, least=0.0)
     process_scale: Any = number((), "1", 1.0, above=0.0)
     measurement_scale: Any = number((), "1", 1.0, above=0.0)
+    gate: Any = number((len(AIDS),), "1", None, above=0.0, infinite=True, optional=True)
+    most_rejected: Any = number((), "1", None, least=1.0, infinite=True, optional=True)
     report: bool = flag(True)
 
     def __post_init__(self) -> None:
-        self.repeat(3, *(item.name for item in self.number_fields() if item.metadata["shape"]))
+        self.repeat(3, *(item.name for item in self.number_fields() if item.metadata["shape"] == (3,)))
+        self.repeat(len(AIDS), GATE)
+        if self.gate is not None and self.most_rejected is None:
+            object.__setattr__(self, "most_rejected", MOST_REJECTED)
         super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        if self.gate is None and self.most_rejected is not None:
+            faults.add(
+                "most_rejected",
+                float(self.most_rejected),
+                "has no meaning without a gate",
+                "give gate = 4, or leave it out",
+            )
 
     @property
     def estimates_position(self) -> bool:
         return True
+
+    @property
+    def ends(self) -> str:
+        return "position_uncertain"
 
     @property
     def uses(self) -> Mapping[str, str]:
@@ -122,7 +150,18 @@ class ErrorStateFilter(MeasuringPart):
     @property
     def belief_rows(self) -> int:  # type: ignore[override]
         """Rows of the bus with what it believes."""
-        return BELIEF_ROWS if self.report else 0
+        return BELIEF_ROWS + self.rejected_rows + DIVERGED_ROWS if self.report else 0
+
+    @property
+    def rejected_rows(self) -> int:  # type: ignore[override]
+        """Rows of these with the counts of rejected readings, by sensor."""
+        return len(AIDS) if self.report and self.gate is not None else 0
+
+    @property
+    def copies(self) -> int:
+        """Fixes that may be on their way at once by the numbers of the scene; 1 without a delayed fix."""
+        late = self.used.get("delayed_fix")
+        return _on_their_way(late) if late is not None else 1
 
     def check_used(self, faults: Faults, sensors: Sequence[Any]) -> None:
         # Each sensor is there, before the filter, of the right kind, and with a noise to believe; no other part is before it.
@@ -156,9 +195,10 @@ class ErrorStateFilter(MeasuringPart):
             faults.add(f"{key}.noise", 0.0, "is 0: the filter would believe it blindly", "give the noise of a reading")
         elif isinstance(sensor, Sensor) and role != "delayed_fix" and np.any(sensor.latency):
             faults.add(f"{key}.latency", float(sensor.latency), f"is not known to {self.key}", UNSEEN["latency"])
-        elif isinstance(sensor, Sensor) and role == "delayed_fix" and np.any(sensor.latency >= sensor.every):
-            problem = f"is not below every = {float(sensor.every):g}: two fixes would be on their way"
-            faults.add(f"{key}.latency", float(sensor.latency), problem, "give more ticks between two fixes")
+        elif isinstance(sensor, Sensor) and role == "delayed_fix" and _on_their_way(sensor) > MOST_COPIES:
+            problem = f"has {_on_their_way(sensor)} fixes on their way at once, with every = {float(sensor.every):g}"
+            remedy = f"give less than {MOST_COPIES * float(sensor.every):g}, or more ticks between two fixes"
+            faults.add(f"{key}.latency", float(sensor.latency), problem, remedy)
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         part = super().wired(bus, others)
@@ -166,30 +206,51 @@ class ErrorStateFilter(MeasuringPart):
         return part
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
-        # The sensors that it has, and whether it notes what it believes.
-        return (*(role for role in AIDS if getattr(self, role)), *((REPORT,) if self.report else ()))
+        # The sensors that it has, and what else its device code does.
+        more = {REPORT: self.report, GATE: self.gate is not None, WATCHED: self.key in self.bus.done}
+        return (*(role for role in AIDS if getattr(self, role)), *(word for word, wanted in more.items() if wanted))
 
     def device_in(self, aligned: bool) -> Any:
         return f"{self.device}:{','.join(self.chosen)}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # What it believes of its sensors, where it finds their readings, and the first estimate.
-        states = STATES + (COPIED if self.delayed_fix else 0)
-        values = self._process(numbers) | self._readings(numbers, context)
+        copies = self.copies
+        states, wide = STATES + (COPIED * copies if self.delayed_fix else 0), STATES + COPIED * copies
+        values = self._process(numbers) | self._readings(numbers, context) | self._gates(numbers)
         rows = {role: self.bus.handed[self.uses[role]] if role in self.uses else 0 for role in ROLES}
-        rows |= {"size": states, "count": STATES, "belief": self.bus.belief}
-        size = states * (states + 1) // 2
-        work = size if self.report else 0
-        memory = np.zeros((len(context.members), STATE_ROWS + size + work))
-        memory[:, WAITING_ROW] = -1.0
+        rows |= {"size": states, "count": STATES, "belief": self.bus.belief, "copies": copies}
+        error = STATE_ROWS + FIX_ROWS * copies
+        rows |= {"error": error, "work": error + wide, "covariance": error + 2 * wide}
+        rows |= {"watched": self.bus.done.get(self.key, 0), "diverged": self.bus.diverged}
+        size, first = states * (states + 1) // 2, error + 2 * wide
+        last = first + size + (size if self.report else 0)
+        if self.gate is not None:
+            rows |= {"runs": last, "rejected": self.bus.rejected}
+        memory = np.zeros((len(context.members), last + (RUN_ROWS if self.gate is not None else 0)))
+        memory[:, error - copies : error] = -1.0
         sigmas = [numbers[f"{name}_sigma"] for name in ("position", "velocity", "attitude")]
         for i, (name, sigma) in enumerate(zip(("position", "velocity", "attitude"), sigmas, strict=True)):
             xi = normals_at_start(context.seed, f"{self.key}.{name}", context.members)
             memory[:, 3 * i : 3 * i + 3] = numbers["start_error"][:, None] * sigma * xi
         sigmas += [numbers["accelerometer_sigma"], numbers["gyroscope_sigma"]]
         for i in range(STATES):
-            memory[:, STATE_ROWS + i * (i + 3) // 2] = sigmas[i // 3][:, i % 3] ** 2
+            memory[:, first + i * (i + 3) // 2] = sigmas[i // 3][:, i % 3] ** 2
         return Packed(values | rows, memory=memory)
+
+    def _gates(self, numbers: Numbers) -> dict[str, Any]:
+        """The gate of each sensor, and the mean square of the innovations of a right filter that pass, in their variances."""
+        if self.gate is None:
+            return {}
+        from scipy.special import erf
+
+        gates = np.minimum(numbers[GATE], OPEN)
+        tails = np.sqrt(2.0 / np.pi) * gates * np.exp(-0.5 * np.minimum(gates, FAR) ** 2)
+        shares = 1.0 - tails / erf(gates / np.sqrt(2.0))
+        values = {"most_rejected": np.minimum(numbers["most_rejected"], OPEN)}
+        for i, role in enumerate(AIDS):
+            values |= {f"{role}_gate": gates[:, i], f"{role}_share": shares[:, i]}
+        return values
 
     def _process(self, numbers: Numbers) -> dict[str, Any]:
         """Variances over a period of what the IMU gains, and of the walks of its biases, as the filter believes them."""
@@ -214,6 +275,11 @@ class ErrorStateFilter(MeasuringPart):
             places[f"{role}_lever"] = (unit.place - (0.0 if place is None else place))[None]
         beams = {"ahead": DIAGONAL * np.sin(log.angle)[None], "down": np.cos(log.angle)[None]}
         return values | places | beams | {"gravity": context.parameters["environment.gravity"]}
+
+
+def _on_their_way(sensor: Any) -> int:
+    """Count of fixes of a sensor that may be on their way at once."""
+    return 1 + int(np.rint(sensor.latency) // np.rint(sensor.every))
 
 
 def _noise(sensor: Any) -> np.ndarray:

@@ -132,11 +132,12 @@ def copy_block(rows: Any, k: int, first: int, size: int, i: int, j: int, taken: 
 
 
 @wp.func(inline=False)
-def updated(
+def foreseen(
     rows: Any,
     k: int,
     first: int,
     x: int,
+    work: int,
     size: int,
     b: int,
     hb: Any,
@@ -144,37 +145,58 @@ def updated(
     ht: Any,
     hw: Any,
     z: Any,
-    r: Any,
-    new: Any,
 ):
-    """One number measured, in the lanes where `new` is positive: the error and the covariance, in Joseph's form.
+    """One number measured, as the estimate foresees it; P h goes into the rows from `work` on.
 
-    x: first row of the error; behind its 18 rows there are 18 to work with. b, hb: a block and its part of h; hv, ht, hw:
-    those of blocks 1, 2 and 4. z: what was measured less what the estimate before all updates expects. r: its variance.
+    x: first row of the error. b, hb: a block and its part of h; hv, ht, hw: those of blocks 1, 2 and 4. z: what was measured
+    less what the estimate before all updates expects.
 
-    Returns: the innovation, and its variance.
+    Returns: the innovation, and h P h, its variance but for that of the reading.
     """
-    unity = ones(r)
     for j in range(size):
         g = dot(hb, column(rows, k, first, b, j)) + dot(hv, column(rows, k, first, 1, j))
         g = g + dot(ht, column(rows, k, first, 2, j)) + dot(hw, column(rows, k, first, 4, j))
-        set_element(rows, k, x + 18 + j, 0, g)
-    seen = dot(hb, get3(rows, k, x + 18 + 3 * b)) + dot(hv, get3(rows, k, x + 21))
-    seen = seen + dot(ht, get3(rows, k, x + 24)) + dot(hw, get3(rows, k, x + 30))
+        set_element(rows, k, work + j, 0, g)
+    seen = dot(hb, get3(rows, k, work + 3 * b)) + dot(hv, get3(rows, k, work + 3))
+    seen = seen + dot(ht, get3(rows, k, work + 6)) + dot(hw, get3(rows, k, work + 12))
     innovation = z - dot(hb, get3(rows, k, x + 3 * b)) - dot(hv, get3(rows, k, x + 3))
     innovation = innovation - dot(ht, get3(rows, k, x + 6)) - dot(hw, get3(rows, k, x + 12))
+    return innovation, seen
+
+
+@wp.func(inline=False)
+def updated(rows: Any, k: int, first: int, x: int, work: int, size: int, innovation: Any, seen: Any, r: Any, new: Any):
+    """The error and the covariance after such a number, in the lanes where `new` is positive, in Joseph's form.
+
+    r: the variance of the reading. Returns: that of the innovation.
+    """
+    unity = ones(r)
     s = seen + r
     over = positive(new, unity / s, unity - unity)
     for i in range(size):
-        g_i = element(rows, k, x + 18 + i, 0)
+        g_i = element(rows, k, work + i, 0)
         gain = over * g_i
         rest = g_i - gain * seen - gain * r
         for j in range(i + 1):
-            g_j = element(rows, k, x + 18 + j, 0)
+            g_j = element(rows, k, work + j, 0)
             at = first + i * (i + 1) // 2 + j
             set_element(rows, k, at, 0, element(rows, k, at, 0) - gain * g_j - rest * (over * g_j))
         set_element(rows, k, x + i, 0, element(rows, k, x + i, 0) + gain * innovation)
-    return innovation, s
+    return s
+
+
+@wp.func(inline=False)
+def widened(rows: Any, k: int, first: int, work: int, size: int, seen: Any, factor: Any):
+    """The covariance P + (factor - 1) P h h^T P / (h P h), of which h sees `factor` times as much; and P h of it."""
+    unity = ones(seen)
+    part = (factor - unity) / seen
+    for i in range(size):
+        g_i = part * element(rows, k, work + i, 0)
+        for j in range(i + 1):
+            at = first + i * (i + 1) // 2 + j
+            set_element(rows, k, at, 0, element(rows, k, at, 0) + g_i * element(rows, k, work + j, 0))
+    for i in range(size):
+        set_element(rows, k, work + i, 0, factor * element(rows, k, work + i, 0))
 
 
 @wp.func(inline=False)

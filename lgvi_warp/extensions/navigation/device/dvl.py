@@ -38,21 +38,22 @@ def made(features):
     """The device code of a log.
 
     features: "noise", "dropout", "burst", "outlier", "silent" where some member has them, "floor" or "grid" where there is
-    one, flat or on a grid, and "handed" where a filter takes the beams.
+    one, flat or on a grid, "tilt" where it is lost by an angle, and "handed" where a filter takes the beams.
     """
-    noisy, lossy, bursting, wild, floored, gridded, silent, handed = (
-        name in features for name in ("noise", "dropout", "burst", "outlier", "floor", "grid", "silent", "handed")
+    noisy, lossy, bursting, wild, floored, gridded, silent, tilted, handed = (
+        name in features
+        for name in ("noise", "dropout", "burst", "outlier", "floor", "grid", "silent", "tilt", "handed")
     )
     first = 0 if handed else 11
 
     def params(width, real):
         """Params: the numbers by member; key of the random numbers; first of its rows of memory, and of what it hands on.
 
-        floor: its depth; or most, how far the beams look, and the grid.
+        floor: its depth; or most, how far the beams look, and the grid. least_down: cosine of the greatest tilt.
         """
         names = ("noise", "ahead", "down", "every", "dropout", "least_range", "greatest_range")
         ground = ("most",) if gridded else ("floor",)
-        more = ("begins", "stays") * bursting + ("outlier", "outlier_std") * wild
+        more = ("begins", "stays") * bursting + ("outlier", "outlier_std") * wild + ("least_down",) * tilted
         lanes = dict.fromkeys((*names, *ground, "silent_from", "silent_to", *more), lane(width, real))
         words = dict.fromkeys(("memory", "handed"), wp.int32)
         grid = grid_fields(width, real) if gridded else {}
@@ -68,6 +69,8 @@ def made(features):
             t = (y.t + y.h.dtype(1e-3) * y.h) * unity
             off = positive(t - p.silent_from, positive(p.silent_to - t, unity, unity - unity), unity - unity)
             fresh = positive(off, unity - unity, fresh)
+        if wp.static(tilted):
+            fresh = positive(p.least_down - y.down.z, unity - unity, fresh)
         return fresh
 
     @wp.func

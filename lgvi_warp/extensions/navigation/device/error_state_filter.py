@@ -2,7 +2,7 @@
 """An error-state Kalman filter for inertial navigation: Sola 2017, arXiv:1711.02508, chapters 5 and 6.
 
 Blocks of the error: 0 position, 1 velocity (inertial), 2 attitude (body axes), 3 and 4 biases of accelerometer and gyroscope;
-5 the position at the tick of a fix that is on its way.
+from 5 on the positions at the ticks of fixes that are on their way.
 """
 
 import functools
@@ -14,6 +14,7 @@ from lgvi_kernels import device
 from lgvi_kernels.lanes.arithmetic import any_positive, element, set_element
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.complementary_filter import orthonormal
+from lgvi_kernels.laws.control.convergence import count_unconverged
 from lgvi_kernels.laws.control.readings import (
     heading,
     put_attitude,
@@ -27,40 +28,45 @@ from lgvi_warp.extensions.navigation.device.covariance import (
     add_block,
     add_noise,
     copy_block,
+    foreseen,
     squared_size,
     turn_block,
     updated,
 )
 from lgvi_warp.extensions.navigation.device.dvl import beam
+from lgvi_warp.extensions.navigation.device.gate import AIDS, DELAYED_FIX, DEPTH, FIX, HEADING, gate_fields, make_gate
 
-# Rows of its memory: position, velocity, attitude, both biases, rate, its last mean; position as the fix was sent, the fix,
-# ticks to wait; the error, rows to work with, the covariance; a Cholesky factor.
-VELOCITY, ATTITUDE, BIAS_A, BIAS_W, RATE, MEAN = 3, 6, 15, 18, 21, 24
-THEN, SENT, WAITING, ERROR, COVARIANCE = 27, 30, 33, 34, 70
-# Rows of what it believes: sigmas, biases, NEES, NIS, how many numbers; innovations, their sigmas.
+# Rows of its memory: position, velocity, attitude, both biases, rate, its last mean; of each fix on its way the position as it
+# was sent, the fix, and ticks to wait; the error, rows to work with, the covariance; a Cholesky factor; rejections in a row.
+VELOCITY, ATTITUDE, BIAS_A, BIAS_W, RATE, MEAN, THEN = 3, 6, 15, 18, 21, 24, 27
+# Rows of what it believes: sigmas, biases, NEES, NIS, how many numbers; innovations, their sigmas. Behind them are counts of
+# what the gate rejects, and two rows that tell whether it diverged.
 BELIEF_BIAS, BELIEF_NEES, BELIEF_NIS, BELIEF_COUNT, BELIEF_INNOVATION, BELIEF_SIGMA, BELIEF = 15, 21, 22, 23, 24, 36, 48
-# Places of the innovations.
-FIX, DELAYED_FIX, DEPTH, HEADING = 4, 7, 10, 11
 TURN = 6.283185307179586
 # The square of the bow's level part, up to which it has no heading: 6 degrees from the vertical.
 LEVEL = 0.01
 # Variance of the rate at a tick, from the means of two periods, over that of a mean.
 OF_RATE = 2.5
+# NEES above which it counts as diverged: ten times that of a right filter, which has it with a chance of 1e-24.
+DIVERGED = 150.0
 
 
-def params(width, real):
+@functools.cache
+def make_struct(gated, width, real):
     """Params: variances over a period and of readings, places of the sensors; rows of memory and of what sensors hand on.
 
     lever: place of the unit; arm: that of the log less it; fix_lever and so on: lever less the places of these.
-    size: rows of the covariance, count: those of the estimate.
+    size: rows of the covariance, count: those of the estimate; copies: fixes that may be on their way. error, work,
+    covariance: rows of the memory from its first on; watched: those at which an event looks; diverged: rows of the bus.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
     names = ("lever", "arm", "gained_q", "turned_q", "bias_a_q", "bias_w_q", "fix_r", "delayed_fix_r")
     names += ("fix_lever", "delayed_fix_lever", "depth_lever")
     lanes = ("gravity", "ahead", "down", "dvl_r", "depth_r", "heading_r", "latency")
     words = ("memory", "size", "count", "imu", "dvl", "fix", "delayed_fix", "depth", "heading", "belief")
+    words += ("copies", "error", "work", "covariance", "watched", "diverged")
     kinds = dict.fromkeys(names, Lane3) | dict.fromkeys(lanes, Lane) | dict.fromkeys(words, wp.int32)
-    return struct("ErrorStateFilter", **kinds)
+    return struct("ErrorStateFilter", **kinds, **(gate_fields(width, real) if gated else {}))
 
 
 @wp.func
@@ -145,7 +151,7 @@ def started(y: Any, p: Any):
 @wp.func
 def spread_by_motion(rows: Any, k: int, z: Any, p: Any, gained: Any, turn: Any, T: Any):
     """The covariance over a period: F P F^T + Q, one block after another. z: with the attitude before."""
-    P = p.memory + wp.static(COVARIANCE)
+    P = p.memory + p.covariance
     n = p.size
     x = unit_x(gained.x)
     y = unit_y(gained.x)
@@ -203,12 +209,12 @@ def propagated(y: Any, p: Any):
 
 
 @wp.func(inline=False)
-def note_innovation(rows: Any, k: int, belief: int, slot: int, innovation: Any, s: Any, new: Any):
-    """Write an innovation, its standard deviation, and its part of the sums."""
+def note_innovation(rows: Any, k: int, belief: int, slot: int, innovation: Any, s: Any, right: Any, new: Any):
+    """Write an innovation, its standard deviation, and its part of the sums; right: mean square of those that are taken."""
     zero = ones(s) - ones(s)
     set_row(rows, k, belief + wp.static(BELIEF_INNOVATION) + slot, positive(new, innovation, zero))
     set_row(rows, k, belief + wp.static(BELIEF_SIGMA) + slot, positive(new, root(s), zero))
-    add_row(rows, k, belief + wp.static(BELIEF_NIS), positive(new, innovation * innovation / s, zero))
+    add_row(rows, k, belief + wp.static(BELIEF_NIS), positive(new, innovation * innovation / right, zero))
     add_row(rows, k, belief + wp.static(BELIEF_COUNT), positive(new, ones(s), zero))
 
 
@@ -222,17 +228,26 @@ def add_row(rows: Any, k: int, row: int, value: Any):
     set_element(rows, k, row, 0, element(rows, k, row, 0) + value)
 
 
-def make_take(reports):
+def make_take(reports, gated):
     """(y, p, slot, b, hb, hv, ht, hw, difference, r, new): take one number that was measured into the error."""
+    gate = make_gate(reports) if gated else None
 
     @wp.func
     def take(y: Any, p: Any, slot: int, b: int, hb: Any, hv: Any, ht: Any, hw: Any, difference: Any, r: Any, new: Any):
         if any_positive(new):
-            P = p.memory + wp.static(COVARIANCE)
-            x = p.memory + wp.static(ERROR)
-            innovation, s = updated(y.memory, y.packet, P, x, p.size, b, hb, hv, ht, hw, difference, r, new)
+            P = p.memory + p.covariance
+            x = p.memory + p.error
+            g = p.memory + p.work
+            innovation, seen = foreseen(y.memory, y.packet, P, x, g, p.size, b, hb, hv, ht, hw, difference)
+            kept = new
+            if wp.static(gated):
+                kept, seen, share = gate(y, p, slot, innovation, seen, r, new)
+            s = updated(y.memory, y.packet, P, x, g, p.size, innovation, seen, r, kept)
+            right = s
+            if wp.static(gated):
+                right = share * s
             if wp.static(reports):
-                note_innovation(y.memory, y.packet, p.belief, slot, innovation, s, new)
+                note_innovation(y.memory, y.packet, p.belief, slot, innovation, s, right, kept)
 
     return take
 
@@ -279,49 +294,56 @@ def make_by_delayed(take):
     """
 
     @wp.func
-    def copied(y: Any, z: Any, p: Any, sent: Any):
-        P = p.memory + wp.static(COVARIANCE)
-        x = p.memory + wp.static(ERROR)
+    def copied(y: Any, z: Any, p: Any, c: int, sent: Any):
+        P = p.memory + p.covariance
+        x = p.memory + p.error
         like = p.latency
-        copy_block(y.memory, y.packet, P, p.size, 5, 0, sent)
+        copy_block(y.memory, y.packet, P, p.size, 5 + c, 0, sent)
         # The copy is that of the sensor's place: less the lever's turn.
         some = positive(sent, ones(like), ones(like) - ones(like))
         a = some * cross(p.delayed_fix_lever, unit_x(like))
         b = some * cross(p.delayed_fix_lever, unit_y(like))
-        c = some * cross(p.delayed_fix_lever, unit_z(like))
+        d = some * cross(p.delayed_fix_lever, unit_z(like))
         a = to_inertial(z, a)
         b = to_inertial(z, b)
-        c = to_inertial(z, c)
-        add_block(y.memory, y.packet, P, p.size, 5, 2, a, b, c)
+        d = to_inertial(z, d)
+        add_block(y.memory, y.packet, P, p.size, 5 + c, 2, a, b, d)
         t = remembered3(y, x + 6)
-        copy = remembered3(y, x) + t.x * a + t.y * b + t.z * c
-        remember3(y, x + 15, positive(sent, copy, remembered3(y, x + 15)))
-        then = p.memory + wp.static(THEN)
+        copy = remembered3(y, x) + t.x * a + t.y * b + t.z * d
+        own = x + 15 + 3 * c
+        remember3(y, own, positive(sent, copy, remembered3(y, own)))
+        then = p.memory + wp.static(THEN) + 3 * c
         place = remembered3(y, p.memory) - to_inertial(z, p.delayed_fix_lever)
         remember3(y, then, positive(sent, place, remembered3(y, then)))
-        fix = p.memory + wp.static(SENT)
+        fix = p.memory + wp.static(THEN) + 3 * (p.copies + c)
         remember3(y, fix, positive(sent, remembered3(y, p.delayed_fix), remembered3(y, fix)))
 
     @wp.func
     def by_delayed(y: Any, z: Any, p: Any):
         unity = ones(p.latency)
         half = unity.dtype(0.5) * unity
-        waiting = remembered(y, p.memory + wp.static(WAITING))
-        free = positive(waiting + half, unity - unity, unity)
-        sent = positive(remembered(y, p.delayed_fix + 3), free, unity - unity)
-        if any_positive(sent):
-            copied(y, z, p, sent)
-        waiting = positive(sent, p.latency, waiting)
-        new = positive(half - absolute(waiting), unity, unity - unity)
-        difference = remembered3(y, p.memory + wp.static(SENT)) - remembered3(y, p.memory + wp.static(THEN))
+        left = remembered(y, p.delayed_fix + 3)
         none = p.arm - p.arm
-        for i in range(3):
-            take(
-                y, p, wp.static(DELAYED_FIX) + i, 5, axis(half, i), none, none, none, number_of(difference, i),
-                number_of(p.delayed_fix_r, i), new,
-            )  # fmt: skip
-        still = positive(waiting + half, waiting - unity, waiting)
-        remember(y, p.memory + wp.static(WAITING), still)
+        for c in range(p.copies):
+            row = p.memory + wp.static(THEN) + 6 * p.copies + c
+            waiting = remembered(y, row)
+            free = positive(waiting + half, unity - unity, unity)
+            sent = positive(left, free, unity - unity)
+            if any_positive(sent):
+                copied(y, z, p, c, sent)
+            # The first free copy takes a fix.
+            left = positive(sent, unity - unity, left)
+            waiting = positive(sent, p.latency, waiting)
+            new = positive(half - absolute(waiting), unity, unity - unity)
+            then = p.memory + wp.static(THEN) + 3 * c
+            difference = remembered3(y, then + 3 * p.copies) - remembered3(y, then)
+            for i in range(3):
+                take(
+                    y, p, wp.static(DELAYED_FIX) + i, 5 + c, axis(half, i), none, none, none, number_of(difference, i),
+                    number_of(p.delayed_fix_r, i), new,
+                )  # fmt: skip
+            still = positive(waiting + half, waiting - unity, waiting)
+            remember(y, row, still)
 
     return by_delayed
 
@@ -352,7 +374,7 @@ def make_by_heading(take):
 def injected(y: Any, p: Any):
     """Put the error into the estimate, and turn its covariance with the attitude (section 6.3)."""
     at = p.memory
-    x = at + wp.static(ERROR)
+    x = at + p.error
     t = remembered3(y, x + 6)
     remember3(y, at, remembered3(y, at) + remembered3(y, x))
     for j in range(3):
@@ -366,6 +388,7 @@ def injected(y: Any, p: Any):
         remember(y, row_r, remembered(y, row_r) - remembered(y, x + 12 + j))
         row_m = at + wp.static(MEAN) + j
         remember(y, row_m, remembered(y, row_m) - remembered(y, x + 12 + j))
+    for j in range(3 * p.copies):
         row_t = at + wp.static(THEN) + j
         remember(y, row_t, remembered(y, row_t) + remembered(y, x + 15 + j))
     z = orthonormal(turned(taken_attitude(y, at + wp.static(ATTITUDE)), t))
@@ -377,14 +400,14 @@ def injected(y: Any, p: Any):
     a = a - half * cross(t, a)
     b = b - half * cross(t, b)
     c = c - half * cross(t, c)
-    turn_block(y.memory, y.packet, at + wp.static(COVARIANCE), p.size, 2, a, b, c)
+    turn_block(y.memory, y.packet, at + p.covariance, p.size, 2, a, b, c)
 
 
 @wp.func(inline=False)
 def note_spread(rows: Any, k: int, p: Any):
     """Write the standard deviations of the estimate."""
     for i in range(p.count):
-        at = p.memory + wp.static(COVARIANCE) + i * (i + 3) // 2
+        at = p.memory + p.covariance + i * (i + 3) // 2
         set_row(rows, k, p.belief + i, root(element(rows, k, at, 0)))
 
 
@@ -397,23 +420,37 @@ def note_belief(y: Any, z: Any, p: Any):
     w = remembered3(y, at + wp.static(BIAS_W))
     remember3(y, p.belief + wp.static(BELIEF_BIAS), a)
     remember3(y, p.belief + wp.static(BELIEF_BIAS) + 3, w)
-    e = at + wp.static(ERROR)
+    e = at + p.error
     v = to_inertial(y, y.velocity + cross(y.angular_velocity, p.lever))
     remember3(y, e, y.position + to_inertial(y, p.lever) - remembered3(y, at))
     remember3(y, e + 3, v - remembered3(y, at + wp.static(VELOCITY)))
     remember3(y, e + 6, turn_to(z, y))
     remember3(y, e + 9, remembered3(y, p.imu + 6) - a)
     remember3(y, e + 12, remembered3(y, p.imu + 9) - w)
-    P = at + wp.static(COVARIANCE)
+    P = at + p.covariance
     nees = squared_size(y.memory, y.packet, P, p.count, e, P + p.size * (p.size + 1) // 2)
     remember(y, p.belief + wp.static(BELIEF_NEES), nees)
+    count_unconverged(y, p.diverged, nees - y.h.dtype(wp.static(DIVERGED)) * ones(nees))
+
+
+@wp.func
+def note_spread_of_position(y: Any, p: Any):
+    """Write the standard deviation of the position, and the time, for an event."""
+    P = p.memory + p.covariance
+    spread = remembered(y, P) + remembered(y, P + 2) + remembered(y, P + 5)
+    remember(y, p.watched, root(spread))
+    remember(y, p.watched + 1, y.t * ones(spread))
 
 
 @functools.cache
 def made(features):
-    """The device code of a filter. features: the sensors that it has, and "report" where it notes what it believes."""
-    has = {name: name in features for name in ("dvl", "fix", "delayed_fix", "depth", "heading", "report")}
-    take = make_take(has["report"])
+    """The device code of a filter.
+
+    features: the sensors that it has, "report" where it notes what it believes, "gate" where it rejects readings, and
+    "watched" where an event looks at the standard deviation of its position.
+    """
+    has = {name: name in features for name in (*AIDS, "report", "gate", "watched")}
+    take = make_take(has["report"], has["gate"])
     by_beams, by_number, by_delayed, by_heading = (
         make(take) for make in (make_by_beams, make_by_position, make_by_delayed, make_by_heading)
     )
@@ -422,8 +459,8 @@ def made(features):
     def corrected(y: Any, z: Any, p: Any):
         """All that has been measured at this tick, one number after another."""
         zero = ones(p.dvl_r) - ones(p.dvl_r)
-        for j in range(18):
-            remember(y, p.memory + wp.static(ERROR) + j, zero)
+        for j in range(p.work - p.error):
+            remember(y, p.memory + p.error + j, zero)
         if wp.static(has["report"]):
             for j in range(wp.static(BELIEF_NIS), wp.static(BELIEF)):
                 remember(y, p.belief + j, zero)
@@ -444,8 +481,8 @@ def made(features):
             by_heading(y, z, p)
         injected(y, p)
         # What a lane remembers must not tell whether another one had a reading.
-        for j in range(18):
-            remember(y, p.memory + wp.static(ERROR + 18) + j, zero)
+        for j in range(p.work - p.error):
+            remember(y, p.memory + p.work + j, zero)
 
     @wp.func
     def measure(y: Any, p: Any):
@@ -458,10 +495,12 @@ def made(features):
         z = taken_attitude(y, p.memory + wp.static(ATTITUDE))
         if wp.static(has["report"]):
             note_belief(y, z, p)
+        if wp.static(has["watched"]):
+            note_spread_of_position(y, p)
         rate = remembered3(y, p.memory + wp.static(RATE))
         z.position = remembered3(y, p.memory) - to_inertial(z, p.lever)
         z.velocity = to_body(z, remembered3(y, p.memory + wp.static(VELOCITY))) - cross(rate, p.lever)
         z.angular_velocity = rate
         return z
 
-    return device(__name__, features, params=functools.cache(params), measure=measure)
+    return device(__name__, features, params=functools.partial(make_struct, has["gate"]), measure=measure)

@@ -36,6 +36,7 @@ class DVL(Part):
     angle, noise, dropout, every = math.radians(30.0), 0.0, 0.0, 1
     burst = outlier = outlier_std = 0.0
     floor, least_range, greatest_range, silent_from, silent_to = math.inf, 0.0, math.inf, math.inf, math.inf
+    greatest_tilt: Any = None
     seed0 = seed1 = channel = 0
 
     def begin(self) -> None:
@@ -48,6 +49,8 @@ class DVL(Part):
         four = normals(self.seed0, self.seed1, y.member, y.tick, self.channel + 1)
         kept = np.array([not losses.next(chance_of(z)) for losses, z in zip(self.losses, four, strict=True)])
         kept &= not self.silent_from <= y.t < self.silent_to
+        if self.greatest_tilt is not None:
+            kept &= y.R[2, 2] >= math.cos(self.greatest_tilt)
         if math.isfinite(self.floor):
             altitude = self.floor - (y.position + y.R @ self.place)[2]
             down = directions @ y.R[2]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """An error-state Kalman filter for inertial navigation: Sola 2017, arXiv:1711.02508, chapters 5 and 6."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -11,14 +12,16 @@ from lgvi_warp.reference.control import Measurement, Part
 from lgvi_warp.reference.control.readings import heading, turn_to
 from lgvi_warp.reference.rotation import Array, exp, hat, norm
 
-# Blocks of the error: position, velocity (inertial), attitude (body axes), biases of accelerometer and gyroscope; and the
-# position at the tick of a fix that is on its way.
-P, V, THETA, A, W, THEN = (slice(3 * i, 3 * i + 3) for i in range(6))
+# Blocks of the error: position, velocity (inertial), attitude (body axes), biases of accelerometer and gyroscope. Behind them
+# are the positions at the ticks of fixes that are on their way.
+P, V, THETA, A, W = (slice(3 * i, 3 * i + 3) for i in range(5))
 # The square of the bow's level part, up to which it has no heading: 6 degrees from the vertical.
 LEVEL = 0.01
 # Variance of the rate at a tick, from the means of two periods, over that of a mean.
 OF_RATE = 2.5
 INNOVATIONS = {"dvl": 0, "fix": 4, "delayed_fix": 7, "depth": 10, "heading": 11}
+# Number of the sensor of each innovation.
+SENSORS = np.repeat(np.arange(5), (4, 3, 3, 1, 1))
 
 
 def right_jacobian(w: Array) -> Array:
@@ -36,24 +39,28 @@ class ErrorStateFilter(Part):
     believed: deviations: of accelerometer_noise, accelerometer_walk, gyroscope_noise, gyroscope_walk, fix, delayed_fix
     (3,), of dvl, depth, heading one number. place, dvl_place, fix_place, delayed_fix_place, depth_place (3,): of the IMU and
     of these; dvl_angle [rad].
-    latency: ticks of the delayed fix. errors: (9,) standard normals, the error of the first estimate.
+    latency: ticks of the delayed fix; copies: how many may be on their way. errors: (9,) standard normals, the error of the
+    first estimate. gate: (5,) of the sensors in the order of INNOVATIONS; None for none.
     """
 
     imu = dvl = depth = heading = fix = delayed_fix = ""
     process_scale = measurement_scale = start_error = 1.0
     place = dvl_place = fix_place = delayed_fix_place = depth_place = np.zeros(3)
-    dvl_angle, gravity, latency = np.radians(30.0), 9.81, 0
+    dvl_angle, gravity, latency, copies = np.radians(30.0), 9.81, 0, 1
+    most_rejected = 10.0
+    gate: Any = None
     errors = np.zeros(9)
 
     def begin(self) -> None:
         """No estimate yet."""
         self.P: Any = None
-        self.x: Any = np.zeros(18)
+        self.size = 15 + 3 * self.copies
+        self.rejected, self.runs = np.zeros(5), np.zeros(12)
         self.begin_tick()
 
     def begin_tick(self) -> None:
         """No error yet, and no innovation."""
-        self.x = np.zeros(18)
+        self.x = np.zeros(self.size)
         self.innovation, self.innovation_sigma = np.zeros(12), np.zeros(12)
         self.nis, self.nis_count = 0.0, 0
 
@@ -64,11 +71,11 @@ class ErrorStateFilter(Part):
         p, v, R = self.of_imu(y)
         self.p, self.v, self.R = p + error[P], v + error[V], R @ exp(error[THETA])
         self.a, self.w = np.zeros(3), np.zeros(3)
-        self.then: Any = np.zeros(3)
+        self.then, self.sent = np.zeros((self.copies, 3)), np.zeros((self.copies, 3))
         self.rate, self.mean = y.angular_velocity.copy(), y.angular_velocity.copy()
-        self.waiting = -1
+        self.waiting = [-1] * self.copies
         spread = np.concatenate([*sigmas, self.accelerometer_sigma, self.gyroscope_sigma])
-        self.P = np.zeros((18, 18))
+        self.P = np.zeros((self.size, self.size))
         self.P[:15, :15] = np.diag(spread**2)
 
     def of_imu(self, y: Measurement) -> tuple[Array, Array, Array]:
@@ -81,11 +88,11 @@ class ErrorStateFilter(Part):
         unit, b = self.handed[self.imu], self.believed
         gained, turned = unit["gained"] - T * self.a, unit["turned"] - T * self.w
         g = np.array([0.0, 0.0, self.gravity])
-        F = np.eye(18)
+        F = np.eye(self.size)
         F[V, THETA], F[V, A] = -self.R @ hat(gained), -T * self.R
         F[P, V], F[P, THETA], F[P, A] = T * np.eye(3), 0.5 * T * F[V, THETA], 0.5 * T * F[V, A]
         F[THETA, THETA], F[THETA, W] = exp(turned).T, -T * right_jacobian(turned)
-        G = np.zeros((18, 12))
+        G = np.zeros((self.size, 12))
         G[V, 0:3], G[P, 0:3], G[THETA, 3:6] = self.R, 0.5 * T * self.R, right_jacobian(turned)
         G[A, 6:9], G[W, 9:12] = np.eye(3), np.eye(3)
         names = ("accelerometer_noise", "gyroscope_noise", "accelerometer_walk", "gyroscope_walk")
@@ -102,17 +109,42 @@ class ErrorStateFilter(Part):
         r = (self.measurement_scale * sigma) ** 2
         innovation = difference - h @ self.x
         s = h @ self.P @ h + r
+        share = 1.0
+        if self.gate is not None:
+            g = self.gate[SENSORS[slot]]
+            if not self.passes(slot, g, h, innovation, r):
+                return
+            s = h @ self.P @ h + r
+            # The mean square of a standard normal that is within the gate.
+            inside = math.erf(g / math.sqrt(2.0))
+            share = 1.0 - math.sqrt(2.0 / math.pi) * g * math.exp(-0.5 * g**2) / inside if g < 30.0 else 1.0
         k = self.P @ h / s
-        J = np.eye(18) - np.outer(k, h)
+        J = np.eye(self.size) - np.outer(k, h)
         self.P = J @ self.P @ J.T + r * np.outer(k, k)
         self.x = self.x + k * innovation
         self.innovation[slot], self.innovation_sigma[slot] = innovation, np.sqrt(s)
-        self.nis += innovation**2 / s
+        self.nis += innovation**2 / (share * s)
         self.nis_count += 1
 
+    def passes(self, slot: int, g: float, h: Array, innovation: float, r: float) -> bool:
+        """Whether a number is taken; after too many rejections in a row it is, with a covariance that makes it fit."""
+        seen = h @ self.P @ h
+        if innovation**2 <= g**2 * (seen + r):
+            self.runs[slot] = 0
+        elif self.runs[slot] < self.most_rejected:
+            self.runs[slot] += 1
+            self.rejected[SENSORS[slot]] += 1
+            return False
+        else:
+            self.runs[slot] = 0
+            wanted = innovation**2 / g**2 - r
+            along = self.P @ h
+            self.P = self.P + (wanted - seen) / seen**2 * np.outer(along, along)
+        return True
+
     def by_position(self, now: slice, i: int, place: Array) -> Array:
-        """Row that maps the error to number i of the position of a sensor's `place`; `now`: P, or THEN, as a fix was sent."""
-        h = np.zeros(18)
+        """Row that maps the error to number i of the position of a sensor's `place`; `now`: P, or that as a fix was sent."""
+        h = np.zeros(self.size)
         h[now.start + i] = 1.0
         if now == P:
             h[THETA] = (self.R @ hat(self.place - place))[i]
@@ -124,13 +156,13 @@ class ErrorStateFilter(Part):
 
     def by_beam(self, u: Array) -> tuple[float, Array]:
         """The velocity along a beam, and how it follows from the error."""
-        V_body, arm, h = self.R.T @ self.v, self.dvl_place - self.place, np.zeros(18)
+        V_body, arm, h = self.R.T @ self.v, self.dvl_place - self.place, np.zeros(self.size)
         h[V], h[THETA], h[W] = self.R @ u, np.cross(u, V_body), np.cross(u, arm)
         return float(u @ (V_body + np.cross(self.rate, arm))), h
 
     def by_heading(self) -> Array:
         """Row that maps the error to the heading."""
-        R, h = self.R, np.zeros(18)
+        R, h = self.R, np.zeros(self.size)
         h[7:9] = R[0, 0] * R[1, 2] - R[1, 0] * R[0, 2], R[0, 0] * R[1, 1] - R[1, 0] * R[0, 1]
         h[7] = -h[7]
         return h / (R[0, 0] ** 2 + R[1, 0] ** 2)
@@ -168,31 +200,34 @@ class ErrorStateFilter(Part):
     def correct_by_delayed(self) -> None:
         """Correct by a delayed fix: copy the position with its covariances as it is sent; correct the copy as it arrives.
 
-        Stochastic cloning: Roumeliotis & Burdick 2002. One fix is on its way at a time.
+        Stochastic cloning: Roumeliotis & Burdick 2002. The first copy that is free takes a fix; a fix that finds none is lost.
         """
         read = self.handed[self.delayed_fix]
-        if read["fresh"] and self.waiting < 0:
-            # The copy is that of the place where the fix is taken, before the other numbers of this tick.
-            copy = np.eye(18)
-            copy[THEN] = np.stack([self.by_position(P, i, self.delayed_fix_place) for i in range(3)])
-            self.P, self.x = copy @ self.P @ copy.T, copy @ self.x
-            self.then, self.sent, self.waiting = self.at(self.delayed_fix_place), read["values"].copy(), self.latency
-        if self.waiting == 0:
-            for i in range(3):
-                slot, difference = INNOVATIONS["delayed_fix"] + i, self.sent[i] - self.then[i]
-                self.update(
-                    slot, self.by_position(THEN, i, self.delayed_fix_place), difference, self.believed["delayed_fix"][i]
-                )
-        if self.waiting >= 0:
-            self.waiting -= 1
+        new, place = read["fresh"], self.delayed_fix_place
+        for c in range(self.copies):
+            then = slice(15 + 3 * c, 18 + 3 * c)
+            if new and self.waiting[c] < 0:
+                # The copy is that of the place where the fix is taken, before the other numbers of this tick.
+                copy = np.eye(self.size)
+                copy[then] = np.stack([self.by_position(P, i, place) for i in range(3)])
+                self.P, self.x = copy @ self.P @ copy.T, copy @ self.x
+                self.then[c], self.sent[c], self.waiting[c] = self.at(place), read["values"], self.latency
+                new = False
+            if self.waiting[c] == 0:
+                for i in range(3):
+                    slot, difference = INNOVATIONS["delayed_fix"] + i, self.sent[c, i] - self.then[c, i]
+                    h = self.by_position(then, i, place)
+                    self.update(slot, h, difference, self.believed["delayed_fix"][i])
+            if self.waiting[c] >= 0:
+                self.waiting[c] -= 1
 
     def inject(self) -> None:
         """Put the error into the estimate, and turn its covariance with the attitude (Sola, section 6.3)."""
         x = self.x
-        self.p, self.v, self.then = self.p + x[P], self.v + x[V], self.then + x[THEN]
+        self.p, self.v, self.then = self.p + x[P], self.v + x[V], self.then + x[15:].reshape(-1, 3)
         self.a, self.w, self.R = self.a + x[A], self.w + x[W], self.R @ exp(x[THETA])
         self.rate, self.mean = self.rate - x[W], self.mean - x[W]
-        G = np.eye(18)
+        G = np.eye(self.size)
         G[THETA, THETA] -= hat(0.5 * x[THETA])
         self.P = G @ self.P @ G.T
 

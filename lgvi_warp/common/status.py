@@ -91,12 +91,8 @@ _TEXT = {
     Status.BATTERY: "stopped by an event: it used the capacity of its battery",
     Status.OUTSIDE: "stopped by an event: left the data of a field",
     Status.MISSION_DONE: "stopped by an event: reached all waypoints of its mission",
-<<<<<<< HEAD
-    Status.NON_FINITE: "a number of the state is not finite. Check the start state, the parameters and the step",
-=======
     Status.POSITION_UNCERTAIN: "stopped by an event: its filter's standard deviation of the position passed a limit",
-    Status.NON_FINITE: "a number of the state is not finite; check the start state, the parameters and the step",
->>>>>>> filters
+    Status.NON_FINITE: "a number of the state is not finite. Check the start state, the parameters and the step",
 }
 
 
@@ -198,7 +194,7 @@ _WARNING_TEXT = {
     'are not those asked for. Give it more iterations (the signal "unconverged" counts them)',
     Warnings.ABOVE_SURFACE: "the member rose more than 0.1 m above the mean surface, where the model knows no air. Stop "
     "it there by the event surface, or let it float by the term surface_buoyancy",
-    Warnings.FILTER_DIVERGED: "the filter's error was far beyond what it believes: NEES above 150, where 15 is right; give it "
+    Warnings.FILTER_DIVERGED: "the filter's error was far beyond what it believes: NEES above 150, where 15 is right. Give it "
     "the noises that its sensors have, a gate against outliers, or a better first estimate",
 }
 

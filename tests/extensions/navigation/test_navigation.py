@@ -590,16 +590,13 @@ def test_the_page_has_all_keys_and_its_blocks_run(capsys, monkeypatch):
     base = remus(listed)
     assert base.parameters()["gps.deepest"] == 0.3
     assert base.controller.sensors[-1].uses["delayed_fix"] == "usbl"
-<<<<<<< HEAD
-    (code,) = blocks("docs/controllers/filter_consistency.md", "python")
-    exec(code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.02, threads=1'), {})
-=======
     first, gated = (
-        code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.02, threads=1') for code in blocks(page, "python")
+        code.replace("t1=60.0", 't1=1.0, method="psi_x", h=0.02, threads=1')
+        for name in ("docs/controllers/filter_consistency.md", page)
+        for code in blocks(name, "python")
     )
     names: dict[str, object] = {}
     exec(first, names)
->>>>>>> filters
     assert "Consistency of 200 filters at 2 times" in capsys.readouterr().out
     exec(gated, names)
     # Of 35 readings of a member 5 % are outliers, of which the gate lets one in four pass.

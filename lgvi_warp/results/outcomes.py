@@ -105,10 +105,11 @@ def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...
 
 def remarks_on(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
     """List what the fields of members (n,), by name, tell of how they ran."""
-    warned = [fields[name] for name in ("warnings", "warning_time", "warning_value")]
+    bits, time, value = (fields[name] for name in ("warnings", "warning_time", "warning_value"))
     begun = begun_beyond(fields["status"], fields["failure_time"])
-    counted = (ticks_with(*warned, kind) for kind in (Warnings.CONTROL_NOT_CONVERGED, Warnings.FILTER_DIVERGED))
-    return sum(counted, above_surface(warned[0], warned[2]) + begun)
+    kinds = (Warnings.CONTROL_NOT_CONVERGED, Warnings.FILTER_DIVERGED)
+    counted = [text for kind in kinds for text in ticks_with(bits, time, value, kind)]
+    return (*above_surface(bits, value), *begun, *counted)
 
 
 def ticks_with(warnings: np.ndarray, time: np.ndarray, value: np.ndarray, kind: Warnings) -> tuple[str, ...]:

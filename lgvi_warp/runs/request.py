@@ -25,6 +25,7 @@ from lgvi_warp.results.result import Result
 from lgvi_warp.runs.default_method import planned
 from lgvi_warp.runs.run import refuse_failed, run_plan
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import check_device
 
@@ -200,7 +201,7 @@ def ensemble_of(fleet: Any) -> Ensemble:
     return fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(scene)
 
 
-def longest(scene: Scene, h: Any) -> float:
+def longest(scene: SceneLike, h: Any) -> float:
     """The end of the longest run of a scene with steps of h [s]; 1 s where h is no step, of which a run tells."""
     if not (isinstance(h, float | int) and np.isfinite(h) and h > 0.0):
         return 1.0

@@ -111,7 +111,7 @@ class ErrorStateFilter(Part):
         s = h @ self.P @ h + r
         share = 1.0
         if self.gate is not None:
-            g = self.gate[SENSORS[slot]]
+            g = float(self.gate[SENSORS[slot]])
             if not self.passes(slot, g, h, innovation, r):
                 return
             s = h @ self.P @ h + r

@@ -112,7 +112,7 @@ class VehicleUnit:
             # Limits are in the unit of what they limit.
             names = [f"{term.key}.limit[{i}]" for i in range(term.channels)]
             for i, unit in enumerate(units_of_numbers(self.scene, names).values()):
-                start = float(term.command[i]) if isinstance(term, Commanded) else 0.0
+                start = float(term.command[i]) if isinstance(term, Commanded) else 0.0  # type: ignore[attr-defined]
                 yield Variable(f"{term.key}.command[{i}]", "input", unit, f"command of {term.key}, {held}", start)
         wished = {f"{part.key}.{name}" for part in self._guidance for name in part.parameters()}
         for name in (name for name in numbers if name in wished):

@@ -65,7 +65,8 @@ class SteppedVehicle:
         self.h, self.every = plan.grid.h, plan.launches.every
         self._noted = self._rows(signals if asked else ())
         self._members = ensemble.select(0, 1)
-        self._packets, self._aside = Packets(self.plan, self._members), None
+        self._packets = Packets(self.plan, self._members)
+        self._aside: Packets | None = None
         self.steps, self.status = 0, 0
         self.values = self._first()
 

@@ -213,8 +213,8 @@ class Controller(Documented):
         object.__setattr__(wired, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
         object.__setattr__(wired, "actuators", actuators)
         object.__setattr__(wired, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
-        for section in ("sensors", "guidance"):
-            known = (part.beside((*terms, *events)) for part in getattr(self, section))
+        for section in ("sensors", "guidance", "laws"):
+            known = (part.beside((*terms, *events)) for part in getattr(wired, section))
             parts = tuple(part.in_scene(faults, events, wired.sensors) for part in known)
             object.__setattr__(wired, section, parts)
         faults.raise_if_any()

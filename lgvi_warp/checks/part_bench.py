@@ -16,8 +16,8 @@ from lgvi_kernels.advance.examine_part import OUT_FIELDS, TICK_FIELDS, make_exam
 from lgvi_kernels.maps.in_turn import ROLES
 from lgvi_warp.checks.bench import Device, TermBench, packing_context, short, sizes
 from lgvi_warp.common.machine import register_width
-from lgvi_warp.control.gain_tables import packed_with_tables
 from lgvi_warp.control.base import Part
+from lgvi_warp.control.gain_tables import packed_with_tables
 from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.arrays import Lanes, memory_rows, put_rows
 from lgvi_warp.physics import notation

@@ -51,7 +51,9 @@ class EffortAllocation(Allocation):
         if self.measured and self.least_speed is None:
             faults.add("least_speed", "", "is missing", 'give the least speed [m/s] beside speed = "measured"')
         elif self.least_speed is not None and not self.measured:
-            faults.add("least_speed", float(self.least_speed), "is not used", 'give speed = "measured", or leave it out')
+            faults.add(
+                "least_speed", float(self.least_speed), "is not used", 'give speed = "measured", or leave it out'
+            )
 
     @property
     def unused(self) -> tuple[str, ...]:

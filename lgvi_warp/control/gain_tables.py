@@ -79,7 +79,9 @@ def sounder_of(law: Any, faults: Faults, sensors: Sequence[Any]) -> Any:
     able = [sensor for sensor in sensors if sensor.type == "altimeter"]
     if names and len(able) != 1:
         problem = f"needs one altimeter, and the controller has {len(able)}"
-        faults.add(f"{law.key}.{names[0]}.over", "altitude", problem, 'give one [[controller.sensors]] type = "altimeter"')
+        faults.add(
+            f"{law.key}.{names[0]}.over", "altitude", problem, 'give one [[controller.sensors]] type = "altimeter"'
+        )
     return able[0] if names and len(able) == 1 else None
 
 

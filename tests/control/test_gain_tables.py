@@ -98,7 +98,7 @@ STARTS = ((0.2, 0.1, 0.0, 0.05, 0.0, 1.5), (1.6, -0.2, 0.1, 0.0, 2.0, 3.0), (-0.
 def test_the_loop_is_that_of_a_simulator_by_hand_to_the_order_of_the_step():
     s = np.array(STARTS)
     zero = np.zeros(len(s))
-    attitude = Rotation.from_euler("z", s[:, 4]).as_matrix()
+    attitude = Rotation.from_euler("z", s[:, 4:5]).as_matrix()
     given = np.column_stack([zero, zero, s[:, 5]]), attitude, s[:, :3], np.column_stack([zero, zero, s[:, 3]])
     fleet = lw.Ensemble.from_states(scene(), *given)
     true = np.stack([by_hand(start, 12.0) for start in s], axis=1)
@@ -137,7 +137,8 @@ def test_the_loop_is_its_twins_in_any_attitude():
 # A demand of fins is the place and the rates.
 SHIFTED = StateFeedback(K=-np.eye(12)[[0, 1, 2, 9, 10, 11]])
 FINS = {
-    "position": [[-1.0, 0.0, 0.0], [-0.9, 0.0, 0.1], [-1.0, 0.0, 0.0]], "area": [0.02, 0.015, 0.02],
+    "position": [[-1.0, 0.0, 0.0], [-0.9, 0.0, 0.1], [-1.0, 0.0, 0.0]], "chord": [[1.0, 0.0, 0.0]] * 3,
+    "drag": [0.01] * 3, "area": [0.02, 0.015, 0.02],
     "normal": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0]], "lift_slope": [3.0, 2.5, 3.0], "limit": [0.4, 0.4, 0.4],
 }  # fmt: skip
 

@@ -332,6 +332,9 @@ class Guidance(Part):
         "guidance", "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
 
+    # Whether what it wants follows from the time alone, so that laws may look ahead.
+    foreseeable: ClassVar[bool] = False
+
     @property
     def ends(self) -> bool:
         """Whether it can tell an event `mission_done` that it is done, in the rows `bus.done`; by default False."""
@@ -373,6 +376,11 @@ class ControlLaw(Part):
     # The nodes of numbers that are tables over what is measured, and the altimeter that these read; set for an object.
     gain_tables: ClassVar[Mapping[str, GainTable]] = {}
     sounder: ClassVar[Any] = None
+
+    @property
+    def foresees(self) -> bool:
+        """Whether it looks ahead at what guidance will want; by default False."""
+        return False
 
     def __post_init__(self) -> None:
         # Numbers may be tables: see gain_tables.py.

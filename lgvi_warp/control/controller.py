@@ -116,6 +116,10 @@ class Controller(Documented):
                     remedy = 'give guidance that wants it, such as [[controller.guidance]] type = "set_point"'
                     faults.add(part.section, part.key, f"needs a wanted {wish}, which no guidance gives", remedy)
             wishes |= set(part.gives)
+        for law in (law for law in self.laws if law.foresees):
+            for part in (part for part in self.guidance if not part.foreseeable):
+                problem = f"looks ahead, and what {part.key} will want is not known"
+                faults.add("laws", law.key, problem, "give a set_point or a trajectory, or leave preview out")
 
     @property
     def parts(self) -> tuple[Part, ...]:

@@ -302,12 +302,20 @@ def with_tables(part: Any, module: Any) -> Any:
     tables = getattr(part, "gain_tables", None)
     if not tables:
         return module
-    # Where a scene has tables, here: other runs do without this code.
-    from lgvi_kernels.laws.control import gain_table
-
     kinds = {word_of(item): 3 if item.metadata["shape"] == (3,) else 1 for item in part.number_fields()}
     fields = ((field, kinds[name], table.over) for name, table in tables.items() for field in part.device_fields(name))
-    return gain_table.made(module, part.lanes(), tuple(fields))
+    return _tabled(module, part.lanes(), tuple(fields))
+
+
+@functools.cache
+def _tabled(module: Any, lanes: Any, fields: tuple[tuple[str, int, str], ...]) -> Any:
+    """As `with_tables`; cached, since the device code of a kernel is its key. lanes: as of `Term.lanes`."""
+    # Where a scene has tables, here: other runs do without this code.
+    from lgvi_kernels.laws.control.gain_table import tabled
+    from lgvi_kernels.maps.compose import numbers_struct
+
+    of_numbers = functools.partial(numbers_struct, module, lanes)
+    return tabled(module, getattr(module, "params", of_numbers), fields)
 
 
 def _folder_and_roles(term: Term) -> tuple[str, Sequence[str]]:

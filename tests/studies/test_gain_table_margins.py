@@ -10,7 +10,7 @@ import lgvi_warp as lw
 from lgvi_warp.control import HeadingPID, SetPoint, SpeedPID
 
 SPEEDS = np.array([0.5, 1.0, 2.0])
-GAINS = {"kp": (24.0, 9.0, 3.0), "kd": (18.0, 9.0, 4.0)}
+GAINS = {"kp": (24.0, 14.0, 9.0), "kd": (18.0, 9.0, 4.0)}
 PUSH = 10.0
 
 
@@ -19,7 +19,7 @@ def scene(kp, kd, yaw=6.0, heading=0.3):
     laws = [HeadingPID(kp=kp, kd=kd), SpeedPID(kp=20.0, drag=PUSH)]
     controller = lw.Controller(period=0.1, guidance=[SetPoint(heading=heading, speed=1.0)], laws=laws)
     # The moment of the added mass turns its head, and lets its pitch be.
-    body = dict(inertia=[4.0, 5.0, yaw], added_mass=(5.0, 40.0, 5.0), center_of_buoyancy=(0.0, 0.0, -0.02))
+    body = dict(inertia=[4.0, 5.0, yaw], added_mass=(5.0, 8.0, 5.0), center_of_buoyancy=(0.0, 0.0, -0.02))
     vehicle = lw.Vehicle(50.0, buoyancy=500.0, **body)
     drag = lw.terms.Drag(linear=(0.0, 30.0, 30.0, 4.0, 5.0, 6.0), quadratic=(PUSH, 40.0, 40.0, 1.0, 2.0, 3.0))
     return lw.Scene(vehicle, lw.Environment(10.0), [lw.terms.ControlWrench(), drag], controller=controller)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A law whose numbers are tables over what is measured: at each tick they are looked up, and the law goes on with them."""
 
-import functools
 import linecache
 from typing import Any
 
@@ -9,7 +8,6 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.law import *
-from lgvi_kernels.maps.compose import numbers_struct
 
 
 @wp.func
@@ -33,19 +31,17 @@ def altitude(y: Any, p: Any):
 MEASURED = {"speed": speed, "depth": depth, "altitude": altitude}
 
 
-@functools.cache
-def made(law, numbers, fields):
+def tabled(law, own_params, fields):
     """The device code of a law with tables.
 
-    law: its own device code. numbers: as of numbers_struct. fields: (name, kind, over) of each field of its struct that has a
-    table; kind 1 for a lane, 3 for a vector; over: a word of MEASURED.
+    law: its own device code; own_params: (width, real) -> its struct. fields: (name, kind, over) of each field of that which
+    has a table; kind 1 for a lane, 3 for a vector; over: a word of MEASURED.
     """
     sounds = any(over == "altitude" for _, _, over in fields)
 
     def params(width, real):
         """Params: those of the law; the first row of its part of the table, where each field's rows begin, their pieces."""
-        own = law.params(width, real) if hasattr(law, "params") else numbers_struct(law, numbers, width, real)
-        kinds = {name: var.type for name, var in own.vars.items()}
+        kinds = {name: var.type for name, var in own_params(width, real).vars.items()}
         kinds |= {f"{name}_{word}": wp.int32 for name, _, _ in fields for word in ("row", "pieces")}
         beam = dict.fromkeys(("beam", "beam_point"), lane3(width, real)) | {"range_row": wp.int32} if sounds else {}
         return struct("GainTables", **kinds | beam | {"first": wp.int32})

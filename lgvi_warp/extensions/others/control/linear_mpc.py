@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from lgvi_warp.common.declared import real, whole
+from lgvi_warp.common.declared import flag, real, whole
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.times import whole_steps
@@ -39,11 +39,13 @@ class Condensed(NamedTuple):
     """A problem of a horizon in its inputs alone, v (k,), each a part of its limit.
 
     cost: H (k, k) of v H v / 2 + f v. slope: f = slope (x, d), (k, 2 n). best: v = best (x, d) without limits.
+    ahead: f gains ahead times the shifts of the reference at each tick, (k, horizon n).
     """
 
     cost: np.ndarray
     slope: np.ndarray
     best: np.ndarray
+    ahead: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,6 +84,8 @@ class LinearMPC(ControlLaw):
         output_limit: Largest outputs (p,), each in the unit of its line of C x.
         excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0. A limit that can be kept is, if
             this is above what it saves; where inputs cannot keep it, it is exceeded.
+        preview: Whether it looks ahead at what guidance will want over the horizon, which must be set-points and trajectories;
+            False by default: the reference goes on at its present velocity.
         horizon: Number of periods, 1 to 100; 10 by default.
         iterations: Largest number of iterations at a tick, of which most take about ten; 50 by default.
         period: Period of the model [s]; a controller of another period is refused. By default whatever it has.
@@ -125,6 +129,7 @@ class LinearMPC(ControlLaw):
     outputs: Any = number(("p", "n"), "1", None, optional=True)
     output_limit: Any = number(("p",), "unit of the output", None, optional=True)
     excess_cost: Any = number(("p",), "1 per unit of the output", None, optional=True, above=0.0)
+    preview: bool = flag(False)
     horizon: int = whole(1, "is not a number of periods", f"give 1 to {LONGEST}", default=10)
     iterations: int = whole(1, "is not a number of iterations", "give 1 or more", default=50)
     period: float | None = real(None, unit="s", least=1e-9)
@@ -207,16 +212,22 @@ class LinearMPC(ControlLaw):
         S_x, S_u = (np.zeros((n, n)), np.zeros((m, n))) if steady is None else np.split(steady, [n])
         at_once = weighted.T @ Phi
         slope = np.hstack([at_once, -at_once @ S_x - cost @ np.tile(S_u / limit[:, None], (N, 1))])
-        return Condensed(cost, slope, -np.linalg.solve(cost, slope))
+        return Condensed(cost, slope, -np.linalg.solve(cost, slope), weighted.T)
 
     @property
     def limits_more(self) -> bool:
-        """Whether inputs have unequal limits, or outputs any."""
-        return self.lower is not None or self.outputs is not None
+        """Whether inputs have unequal limits, outputs any, or the law looks ahead."""
+        return self.lower is not None or self.outputs is not None or self.preview
+
+    @property
+    def foresees(self) -> bool:
+        return self.preview
 
     def device_in(self, aligned: bool) -> str:
         # Code for the symmetric problem alone is shorter.
-        return f"{DEVICE}.limited_mpc" if self.limits_more else self.device
+        if not self.limits_more:
+            return self.device
+        return f"{DEVICE}.limited_mpc:{f'preview{self.horizon}' if self.preview else ''}"
 
     def output_rows(self, own: Numbers) -> np.ndarray:
         """Rows of the limits of outputs of a member, tick by tick (horizon p, 2 + 2 n + k).
@@ -236,7 +247,9 @@ class LinearMPC(ControlLaw):
         rows = np.stack(answers)
         unit = np.abs(rows[:, :, 2 * n :]).max(axis=(0, 2))
         unit = np.where(unit > 0.0, unit, 1.0)
-        ends = np.broadcast_to(np.stack([own["output_limit"] / unit, own["excess_cost"] * unit], axis=-1), (N, p, 2))
+        # The problem is half of the sums that are made least.
+        ends = np.stack([own["output_limit"] / unit, 0.5 * own["excess_cost"] * unit], axis=-1)
+        ends = np.broadcast_to(ends, (N, p, 2))
         return np.concatenate([ends, rows / unit[:, None]], axis=-1).reshape(N * p, -1)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
@@ -257,6 +270,7 @@ class LinearMPC(ControlLaw):
             member = {name: value[i] for name, value in own.items()}
             lower = (member.get("lower", -limit) / limit,) if self.limits_more else ()
             outputs = (self.output_rows(member),) if self.limits_more else ()
+            outputs += (-np.linalg.solve(found.cost, found.ahead), found.ahead) if self.preview else ()
             parts = (places, own["A"][i], own["B"][i], limit, *lower, change, found.best, found.slope, half, *outputs)
             rows.append(np.concatenate([np.ravel(part) for part in parts]))
         words = {"states": n, "inputs": m, "horizon": self.horizon, "iterations": self.iterations}
@@ -267,6 +281,8 @@ class LinearMPC(ControlLaw):
             p = 0 if self.outputs is None else len(self.outputs)
             words["outputs"] = p
             work += 8 * ((1 + rated) * k + self.horizon * p) - m
+            words["shifts"] = work
+            work += self.horizon * n if self.preview else 0
         return Packed(words | {"gain": gain}, np.array(rows), np.zeros((1, 1 + 2 * n + m)), work=work)
 
 

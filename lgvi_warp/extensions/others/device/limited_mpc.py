@@ -1,23 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model predictive control with unequal limits of inputs and soft limits of outputs, by an interior-point method.
+"""Model predictive control with unequal limits, soft limits of outputs and preview, by an interior-point method.
 
 Beside linear_mpc.py, which has the model, the disturbance and the symmetric problem.
 """
 
+import functools
 from typing import Any
 
 import warp as wp
 
+from lgvi_kernels import device
 from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
-from lgvi_kernels.laws.control.integral import remembered3
+from lgvi_kernels.laws.control.integral import remember3, remembered3
 from lgvi_warp.extensions.others.device.linear_mpc import DEMAND, SEEN, advance, entry, estimate, place, see, times
 
 # Rows of the table, with n states, m inputs, k = horizon m and q outputs: places of the states, of the inputs; A, B; largest
 # inputs, and as parts of these the least ones and the limits of changes, m each; best inputs without limits and slope of the
 # cost, (k, 2 n) each; the cost's matrix, line by line up to the diagonal. Then of each output at each tick: its limit, the
-# cost of a unit beyond it, what state and disturbance make of it (2 n), what the inputs make of it (k).
+# cost of a unit beyond it, what state and disturbance make of it (2 n), what the inputs make of it (k). With preview, what
+# shifts of the reference make of the best inputs without limits and of the slope of the cost, (k, horizon n) each.
 # Rows of the memory as in linear_mpc.py.
 # Sides C v <= room are k inputs from above and from below, where `rated` their changes too, and the outputs, which may exceed
 # theirs. Scratch rows of a side: slack, multiplier, excess, room; what a step is to make of slack times multiplier, and of
@@ -28,7 +31,7 @@ SLACK, MULTIPLIER, EXCESS, ROOM, TARGET, TARGET_OF_EXCESS, WEIGHT, MISSED = rang
 params = make_params(
     "LimitedMPC",
     lanes="gain",
-    words="first memory work unmet states inputs horizon iterations rated unconverged outputs",
+    words="first memory work unmet states inputs horizon iterations rated unconverged outputs shifts",
 )
 
 
@@ -308,80 +311,115 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, 
 
 
 @wp.func
-def control(w: Any, r: Any, y: Any, p: Any):
-    """State, disturbance, the best inputs without limits and, where these do not keep them, those within; then the first."""
+def foresee(s: Any, r: Any, y: Any, p: Any):
+    """Keep how the errors of the reference s, y.start ticks ahead, differ from those of r as it goes on at its rates."""
     n = p.states
-    m = p.inputs
-    k = p.horizon * m
-    matrices = p.first + n + m
-    limits = matrices + n * n + n * m
-    free = limits + 3 * m
-    slope_of = free + 2 * n * k
-    cost = slope_of + 2 * n * k
-    outputs = cost + entry(k, 0)
-    # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f,
-    # slope and step of iterations; the sides; the factor.
-    demand = p.work + wp.static(SEEN)
-    x = demand + wp.static(DEMAND)
-    before = x + 2 * n
-    best_of = before + m
-    v = best_of + k
-    f = v + k
-    each = f + 3 * k
-    count = hard_sides(p) + p.horizon * p.outputs
-    L = each + wp.static(OF_SIDE) * count
-    last = p.memory + 1
-    unity = ones(w.force.x)
-    zero = unity - unity
-    see(r, y, p.work)
-    for i in range(n):
-        remember(y, x + i, remembered(y, p.work + place(y, p.first + i)))
-    for i in range(m):
-        # What was not delivered of the last demand did not act.
-        u = remembered(y, last + n + i) - remembered(y, p.unmet + place(y, p.first + n + i))
-        remember(y, last + n + i, u)
-        u = u / row1(y, limits + i)
-        if p.rated > 0:
-            # From beyond the limits they go back at once.
-            reach = y.h.dtype(0.999) * row1(y, limits + 2 * m + i) * unity
-            u = clamp(u, row1(y, limits + m + i) * unity - reach, unity + reach)
-        remember(y, before + i, u)
-    estimate(y, p, x, matrices)
-    for i in range(n):
-        remember(y, x + n + i, remembered(y, last + n + m + i))
-        remember(y, last + i, remembered(y, x + i))
-    over = -unity
-    for i in range(k):
-        best = times(y, free + 2 * n * i, x, 2 * n, zero)
-        remember(y, best_of + i, best)
-        remember(y, f + i, times(y, slope_of + 2 * n * i, x, 2 * n, zero))
-    size = begin(y, p, outputs, limits, x, before, v, f, cost, each, zero)
-    for t in range(count):
-        room = remembered(y, each + wp.static(OF_SIDE) * t + wp.static(ROOM))
-        over = greatest(over, side(y, p, outputs, best_of, t, zero) - room)
-    if any_positive(over):
-        busy = positive(over, unity, zero)
-        for _ in range(p.iterations):
-            if any_positive(busy):
-                busy = iterate(y, p, outputs, v, f, cost, each, L, size, busy)
-        count_unconverged(y, p.unconverged, busy)
+    j = y.start - 1
+    if j < p.horizon:
+        row = p.work + p.shifts + j * n
+        time = y.h.dtype(y.start) * y.period
+        see(s, y, p.work)
+        for i in range(n):
+            remember(y, row + i, remembered(y, p.work + place(y, p.first + i)))
+        see(r, y, p.work)
+        remember3(y, p.work, remembered3(y, p.work) - time * r.velocity)
+        turn = to_body(y, to_inertial(r, r.angular_velocity))
+        remember3(y, p.work + 3, remembered3(y, p.work + 3) - time * turn)
+        for i in range(n):
+            remember(y, row + i, remembered(y, row + i) - remembered(y, p.work + place(y, p.first + i)))
+    return s
+
+
+@functools.cache
+def made(features):
+    """The law; with the feature "preview30" it looks so many ticks ahead."""
+    ahead = sum(int(word.removeprefix("preview")) for word in features)
+
+    @wp.func
+    def control(w: Any, r: Any, y: Any, p: Any):
+        """State, disturbance, the best inputs without limits and, where these break one, those within; then the first."""
+        n = p.states
+        m = p.inputs
+        k = p.horizon * m
+        matrices = p.first + n + m
+        limits = matrices + n * n + n * m
+        free = limits + 3 * m
+        slope_of = free + 2 * n * k
+        cost = slope_of + 2 * n * k
+        outputs = cost + entry(k, 0)
+        # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f,
+        # slope and step of iterations; the sides; the factor.
+        demand = p.work + wp.static(SEEN)
+        x = demand + wp.static(DEMAND)
+        before = x + 2 * n
+        best_of = before + m
+        v = best_of + k
+        f = v + k
+        each = f + 3 * k
+        count = hard_sides(p) + p.horizon * p.outputs
+        L = each + wp.static(OF_SIDE) * count
+        last = p.memory + 1
+        unity = ones(w.force.x)
+        zero = unity - unity
+        see(r, y, p.work)
+        for i in range(n):
+            remember(y, x + i, remembered(y, p.work + place(y, p.first + i)))
         for i in range(m):
-            remember(y, best_of + i, positive(over, remembered(y, v + i), remembered(y, best_of + i)))
-    # A lane leaves nothing behind that others made it calculate.
-    for i in range(L + entry(k, 0) - v):
-        remember(y, v + i, zero)
-    for i in range(wp.static(DEMAND)):
-        remember(y, demand + i, zero)
-    for i in range(m):
-        u = remembered(y, best_of + i)
-        if p.rated > 0:
-            change = row1(y, limits + 2 * m + i)
-            last_u = remembered(y, before + i)
-            u = clamp(u, last_u - change, last_u + change)
-        u = clamp(u, row1(y, limits + m + i) * unity, unity) * row1(y, limits + i)
-        remember(y, last + n + i, u)
-        remember(y, demand + place(y, p.first + n + i), u)
-    remember(y, p.memory, unity)
-    w.force = w.force + remembered3(y, demand)
-    w.torque = w.torque + remembered3(y, demand + 3)
-    return w
+            # What was not delivered of the last demand did not act.
+            u = remembered(y, last + n + i) - remembered(y, p.unmet + place(y, p.first + n + i))
+            remember(y, last + n + i, u)
+            u = u / row1(y, limits + i)
+            if p.rated > 0:
+                # From beyond the limits they go back at once.
+                reach = y.h.dtype(0.999) * row1(y, limits + 2 * m + i) * unity
+                u = clamp(u, row1(y, limits + m + i) * unity - reach, unity + reach)
+            remember(y, before + i, u)
+        estimate(y, p, x, matrices)
+        for i in range(n):
+            remember(y, x + n + i, remembered(y, last + n + m + i))
+            remember(y, last + i, remembered(y, x + i))
+        over = -unity
+        for i in range(k):
+            best = times(y, free + 2 * n * i, x, 2 * n, zero)
+            remember(y, best_of + i, best)
+            remember(y, f + i, times(y, slope_of + 2 * n * i, x, 2 * n, zero))
+            if wp.static(ahead > 0):
+                of_shifts = outputs + p.horizon * p.outputs * (2 + 2 * n + k) + i * p.horizon * n
+                shifts = p.work + p.shifts
+                remember(y, best_of + i, times(y, of_shifts, shifts, p.horizon * n, remembered(y, best_of + i)))
+                of_shifts += k * p.horizon * n
+                remember(y, f + i, times(y, of_shifts, shifts, p.horizon * n, remembered(y, f + i)))
+        size = begin(y, p, outputs, limits, x, before, v, f, cost, each, zero)
+        for t in range(count):
+            room = remembered(y, each + wp.static(OF_SIDE) * t + wp.static(ROOM))
+            over = greatest(over, side(y, p, outputs, best_of, t, zero) - room)
+        if any_positive(over):
+            busy = positive(over, unity, zero)
+            for _ in range(p.iterations):
+                if any_positive(busy):
+                    busy = iterate(y, p, outputs, v, f, cost, each, L, size, busy)
+            count_unconverged(y, p.unconverged, busy)
+            for i in range(m):
+                remember(y, best_of + i, positive(over, remembered(y, v + i), remembered(y, best_of + i)))
+        # A lane leaves nothing behind that others made it calculate.
+        for i in range(L + entry(k, 0) - v):
+            remember(y, v + i, zero)
+        for i in range(wp.static(DEMAND)):
+            remember(y, demand + i, zero)
+        for i in range(m):
+            u = remembered(y, best_of + i)
+            if p.rated > 0:
+                change = row1(y, limits + 2 * m + i)
+                last_u = remembered(y, before + i)
+                u = clamp(u, last_u - change, last_u + change)
+            u = clamp(u, row1(y, limits + m + i) * unity, unity) * row1(y, limits + i)
+            remember(y, last + n + i, u)
+            remember(y, demand + place(y, p.first + n + i), u)
+        remember(y, p.memory, unity)
+        w.force = w.force + remembered3(y, demand)
+        w.torque = w.torque + remembered3(y, demand + 3)
+        return w
+
+    return device(
+        __name__, features, params=params, control=control, foresee=foresee if ahead else None, AHEAD=ahead or None
+    )

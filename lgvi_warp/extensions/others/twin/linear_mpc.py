@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Linear model predictive control: a problem of all inputs of a horizon, by an interior-point method."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,32 @@ class LinearMPC(Part):
     """Numbers as those of `lw.control.LinearMPC`."""
 
     P = rate_limit = tracked = lower = outputs = output_limit = excess_cost = None
+    preview = False
     disturbance_time, horizon, iterations = 5.0, 10, 50
 
     def begin(self) -> None:
         """Nothing is known of the last tick."""
         n, m = np.shape(self.B)
         self.begun, self.x, self.u, self.d = False, np.zeros(n), np.zeros(m), np.zeros(n)
+        self.shifts = [np.zeros(n)] * self.horizon
+
+    @property
+    def ahead(self) -> int:  # type: ignore[override]
+        """The horizon, with preview."""
+        return self.horizon if self.preview else 0
+
+    def errors(self, r: Reference, y: Measurement) -> Array:
+        """The states: what is measured less what is wanted."""
+        position, rotation, velocity, rate = pose_errors(r, y)
+        errors = np.concatenate([-position, rotation, -velocity, -rate])
+        return errors[[COORDINATES.index(name) for name in self.states]]
+
+    def foresee(self, later: Sequence[Reference], r: Reference, y: Measurement) -> None:
+        """Keep how the errors of later references differ from those of r as it goes on at its rates."""
+        going = np.concatenate([r.velocity, y.R.T @ r.R @ r.angular_velocity, np.zeros(6)])
+        going = going[[COORDINATES.index(name) for name in self.states]]
+        now, T = self.errors(r, y), y.period
+        self.shifts = [self.errors(s, y) - now + (j + 1) * T * going for j, s in enumerate(later)]
 
     def steady_state(self, d: Array) -> tuple[Array, Array]:
         """x_s and u_s with x_s = A x_s + B u_s + d and no error of what is tracked."""
@@ -47,7 +68,7 @@ class LinearMPC(Part):
             e0, E = A @ e0 - B @ u_s, A @ E + B @ push
             last = k == self.horizon - 1 and self.P is not None
             W = np.asarray(self.P) if last else np.diag(self.Q)
-            H, f = H + E.T @ W @ E, f + E.T @ W @ e0
+            H, f = H + E.T @ W @ E, f + E.T @ W @ (e0 + self.shifts[k])
         return H, f
 
     def solved(self, H: Array, f: Array, before: Array, change: Array | None) -> Array:
@@ -88,15 +109,13 @@ class LinearMPC(Part):
             units = np.max([np.abs(gains).max(axis=1) for _, gains in answers], axis=0)
             for still, gains in answers:
                 C, room = [*C, gains / units[:, None]], [*room, (self.output_limit - still) / units]
-                cost.append(self.excess_cost * units)
+                cost.append(0.5 * self.excess_cost * units)
         return np.concatenate(C), np.concatenate(room), np.concatenate(cost)
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """The first of the best inputs."""
         limit = np.asarray(self.limit, float)
-        position, rotation, velocity, rate = pose_errors(r, y)
-        errors = np.concatenate([-position, rotation, -velocity, -rate])
-        x = errors[[COORDINATES.index(name) for name in self.states]]
+        x = self.errors(r, y)
         places = [COMPONENTS.index(name) for name in self.inputs]
         u = self.u - unmet[places]
         if self.begun:
@@ -107,7 +126,7 @@ class LinearMPC(Part):
         change = None if self.rate_limit is None else y.period * np.asarray(self.rate_limit) / limit
         scale = np.tile(limit, self.horizon)
         H, f, lower = scale[:, None] * H * scale, scale * f, -np.ones(len(limit))
-        if self.lower is None and self.outputs is None:
+        if self.lower is None and self.outputs is None and not self.preview:
             first = self.solved(H, f, before, change)[0]
         else:
             lower = lower if self.lower is None else np.asarray(self.lower) / limit

@@ -31,6 +31,7 @@ def mpc(
     outputs: Any = None,
     output_limit: Any = None,
     excess_cost: Any = None,
+    preview: bool = False,
     name: str = "",
 ) -> LinearMPC:
     """Design model predictive control of a linear model; the terminal cost is that of its linear quadratic regulator.
@@ -52,6 +53,7 @@ def mpc(
         outputs: Combinations of the states (p, n) that have a limit, C x <= output_limit; by default none.
         output_limit: Largest outputs (p,).
         excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0.
+        preview: Whether it looks ahead at set-points and trajectories; False by default.
         name: Name of the part; by default its type.
 
     Returns:
@@ -94,6 +96,7 @@ def mpc(
         outputs=outputs,
         output_limit=output_limit,
         excess_cost=excess_cost,
+        preview=preview,
         horizon=horizon,
         iterations=iterations,
         period=model.dt,

@@ -7,6 +7,7 @@ from scipy.optimize import lsq_linear, nnls
 
 import lgvi_warp as lw
 from lgvi_warp.extensions.others.twin import linear_mpc
+from tests.support.loops import twin_states
 from tests.support.refusals import refused, says
 
 T = 0.1
@@ -150,6 +151,9 @@ def test_a_loop_that_looks_ahead_is_that_of_exact_programs():
     scene = lw.Scene(body, lw.Environment(gravity=10.0), terms, lw.Start(position=(0, 0, 5.0)), loop)
     save = lw.SaveAt(every=T, fields=("position", "velocity", "demand", "unconverged"))
     result = lw.solve(scene, "rk4", h=T / 5.0, t1=TICKS * T, save=save)
+    at_rest = np.array([0.0, 0.0, 5.0]), np.eye(3), np.zeros(3), np.zeros(3)
+    twins, _ = twin_states(scene, {}, at_rest, 5, T / 5.0, 60, "rk4")
+    np.testing.assert_allclose(result.position[:13, 0], twins, atol=1e-6)
     depths, forces = by_hand()
     # Promised to 1e-3 of the limit.
     np.testing.assert_allclose(result.samples["demand"][:, 0, 2], forces, atol=4e-3)

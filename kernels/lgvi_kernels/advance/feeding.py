@@ -219,7 +219,7 @@ def make_seen(spec, types, method, truth, at_step, opened, notes):
     def seen_ahead(
         x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real
     ):
-        """As seen; laws that look ahead are told what guidance will want at the next ticks."""
+        """Measure and guide; tell laws that look ahead what guidance will want at the next ticks."""
         y, r = seen(x, c, monitor, k, h, opening)
         later = y
         for j in range(1, wp.static(ticks + 1)):

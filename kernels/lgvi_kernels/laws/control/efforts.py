@@ -101,7 +101,7 @@ def at_speed(params, allocate, features):
 
     @functools.cache
     def params_at_speed(width, real):
-        """Those of the allocation, and the least speed."""
+        """Params: those of the allocation, and the least speed."""
         own = {name: var.type for name, var in params(width, real).vars.items()}
         return struct("AtSpeed", **own, least_speed=lane(width, real))
 

@@ -45,7 +45,8 @@ class MeasuredSpeed(Part):
     def measure(self, y: Measurement) -> Measurement:
         """Keep the speed ahead through the water."""
         self.square = max(abs(y.water_velocity[0]), self.least_speed) ** 2
-        return self.allocation.measure(y)  # type: ignore[no-any-return]
+        measured: Measurement = self.allocation.measure(y)
+        return measured
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
         """Commands of the demand over the speed squared; what is left, times it."""

@@ -169,4 +169,4 @@ def test_only_guidance_that_follows_from_the_time_can_be_foreseen():
     part = law(preview=True)
     way = lw.control.Waypoints(points=[(0.0, 0.0, 3.0), (9.0, 0.0, 3.0)], speed=1.0, look_ahead=3.0, radius=1.0)
     text = refused(lw.Controller, period=T, guidance=[way], laws=[part])
-    says(text, "linear_mpc: looks ahead, and what waypoints will want is not known; give a set_point or a trajectory")
+    says(text, "'linear_mpc': looks ahead, and what waypoints will want is not known; give a set_point or a trajectory")

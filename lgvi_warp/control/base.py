@@ -412,7 +412,8 @@ class ControlLaw(Part):
         numbers, tables = self.parameters(), as_given(self)
         kept = {}
         for item in self.number_fields():
-            name, given = word_of(item), fields.get(item.name)
+            name = word_of(item)
+            given: Any = fields.get(item.name)
             if name in tables and (item.name not in fields or np.shape(given) == numbers[name].shape):
                 kept[item.name] = tables[name] | ({} if given is None else {"values": given})
         return super().with_fields({**fields, **kept})

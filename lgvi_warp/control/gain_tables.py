@@ -88,7 +88,8 @@ def sounder_of(law: Any, faults: Faults, sensors: Sequence[Any]) -> Any:
 def packed_with_tables(law: Any, numbers: Numbers, context: PackingContext) -> Packed:
     """Packed numbers of a term, of a law with the rows of its tables behind its own: of each field that a number becomes."""
     if not getattr(law, "gain_tables", None):
-        return law.packed(numbers, context)  # type: ignore[no-any-return]
+        plain: Packed = law.packed(numbers, context)
+        return plain
     first = {name: numbers[name][:, 0] for name in law.gain_tables}
     packed = law.packed({**numbers, **first}, context)
     values = dict(packed.values)

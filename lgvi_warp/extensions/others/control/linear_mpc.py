@@ -269,7 +269,7 @@ class LinearMPC(ControlLaw):
             half = found.cost[np.tril_indices(k)]
             member = {name: value[i] for name, value in own.items()}
             lower = (member.get("lower", -limit) / limit,) if self.limits_more else ()
-            outputs = (self.output_rows(member),) if self.limits_more else ()
+            outputs: tuple[np.ndarray, ...] = (self.output_rows(member),) if self.limits_more else ()
             outputs += (-np.linalg.solve(found.cost, found.ahead), found.ahead) if self.preview else ()
             parts = (places, own["A"][i], own["B"][i], limit, *lower, change, found.best, found.slope, half, *outputs)
             rows.append(np.concatenate([np.ravel(part) for part in parts]))

@@ -17,6 +17,7 @@ from lgvi_kernels.maps.in_turn import ROLES
 from lgvi_warp.checks.bench import Device, TermBench, packing_context, short, sizes
 from lgvi_warp.common.machine import register_width
 from lgvi_warp.control.base import Part
+from lgvi_warp.control.gain_tables import packed_with_tables
 from lgvi_warp.engine import kernel_choice
 from lgvi_warp.engine.arrays import Lanes, memory_rows, put_rows
 from lgvi_warp.physics import notation
@@ -114,7 +115,8 @@ class PartBench(TermBench):
     """A part that is evaluated at random ticks, one `period` [s] apart, in packets of a register and of one."""
 
     def __init__(self, part: Part, scene: Scene, samples: int, seed: int):
-        module, width = kernel_choice.device_module(part, part.device_in(False), built_in), register_width("float64")
+        code = kernel_choice.device_module(part, part.device_in(False), built_in)
+        module, width = kernel_choice.with_tables(part, code), register_width("float64")
         self.part, self.bus, self.period = part, part.bus, float(scene.controller.period)
         count = -(-samples // width) * width
         self.ticks = random_ticks(count, self.bus.rows, seed, scene.start.given()["position"])
@@ -124,7 +126,7 @@ class PartBench(TermBench):
         """Packed numbers of the part; parameters: of the scene by name, each (1, ...) or (n, ...), by default its own."""
         numbers = self.parameters if parameters is None else parameters
         context = packing_context(numbers, self.count, self.seed, self.period / EVERY, elsewhere)
-        return self.part.packed(Ensemble.own(self.part, numbers), context)
+        return packed_with_tables(self.part, Ensemble.own(self.part, numbers), context)
 
     def answers(self, packed: Any, ticks: RandomTicks, width: int | None = None) -> Answers:
         """Let the part act at each tick, from its memory at the start."""

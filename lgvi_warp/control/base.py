@@ -16,6 +16,7 @@ from lgvi_warp.common import registry
 from lgvi_warp.common.arguments import items_of
 from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults, among
+from lgvi_warp.control.gain_tables import GainTable, as_given, sounder_of, taken_tables
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, word_of
 
@@ -159,6 +160,8 @@ class Part(Term):
     iterates: ClassVar[bool] = False
     # Where it finds the numbers of others; set for a part of a scene.
     bus: ClassVar[Bus]
+    # Words that may stand in place of a number, by its name.
+    words_for: ClassVar[Mapping[str, str]] = {}
 
     @property
     def gives(self) -> tuple[str, ...]:
@@ -343,6 +346,9 @@ class Guidance(Part):
         "guidance", "altitude", "docking", "loiter", "reference_model", "set_point", "trajectory", "waypoints"
     )
 
+    # Whether what it wants follows from the time alone, so that laws may look ahead.
+    foreseeable: ClassVar[bool] = False
+
     @property
     def wanted(self) -> tuple[str, ...]:
         """The quantities of `gives` for which the user asked, so that some law should read them; by default all of them."""
@@ -376,6 +382,62 @@ class ControlLaw(Part):
     shared_rows: ClassVar[int] = 0
     # Numbers of the vehicle by name, as the scene has them, whatever a member's are; set for a law of a scene.
     nominal: ClassVar[Numbers] = {}
+    # The nodes of numbers that are tables over what is measured, and the altimeter that these read; set for an object.
+    gain_tables: ClassVar[Mapping[str, GainTable]] = {}
+    sounder: ClassVar[Any] = None
+
+    @property
+    def foresees(self) -> bool:
+        """Whether it looks ahead at what guidance will want; by default False."""
+        return False
+
+    def __post_init__(self) -> None:
+        # Numbers may be tables: see gain_tables.py.
+        object.__setattr__(self, "gain_tables", taken_tables(self))
+        super().__post_init__()
+
+    @classmethod
+    def device_fields(cls, name: str) -> tuple[str, ...]:
+        """Fields of the device struct that a number becomes, for tables of it over what is measured.
+
+        Args:
+            name: Name of the number.
+
+        Returns:
+            Names of fields; none, if the number can be no table. By default the number itself where the class does not define
+            `packed`.
+        """
+        own = cls.packed is Part.packed and cls.lanes() is not None
+        return tuple(item.name for item in cls.number_fields() if own and word_of(item) == name)
+
+    def shape_of(self, item: Any) -> tuple[Any, ...]:
+        # Of a table with its nodes first.
+        shape = super().shape_of(item)
+        table = self.gain_tables.get(word_of(item))
+        return shape if table is None else (len(table.at), *shape)
+
+    def with_fields(self, fields: Mapping[str, Any]) -> Any:
+        # A table stays one where its values are given anew; what has another shape takes its place.
+        numbers, tables = self.parameters(), as_given(self)
+        kept = {}
+        for item in self.number_fields():
+            name = word_of(item)
+            given: Any = fields.get(item.name)
+            if name in tables and (item.name not in fields or np.shape(given) == numbers[name].shape):
+                kept[item.name] = tables[name] | ({} if given is None else {"values": given})
+        return super().with_fields({**fields, **kept})
+
+    def table_without(self, names: Collection[str]) -> dict[str, Any]:
+        tables = {name: table for name, table in as_given(self).items() if name not in names}
+        return super().table_without(names) | tables
+
+    def in_scene(self, faults: Faults, events: Sequence[Term], sensors: Sequence[Any]) -> Any:
+        sounder = sounder_of(self, faults, sensors)
+        if sounder is None:
+            return self
+        law = copy.copy(self)
+        object.__setattr__(law, "sounder", sounder)
+        return law
 
     def of_vehicle(self, nominal: Numbers) -> Any:
         """The same law, knowing the vehicle that its author had in mind.
@@ -421,6 +483,13 @@ class IntegralLaw(ControlLaw):
     limits: ClassVar[tuple[str, ...]] = ()
 
     anti_windup: str = word("conditional", known=ANTI_WINDUP)
+
+    @classmethod
+    def device_fields(cls, name: str) -> tuple[str, ...]:
+        # As `packed` names them.
+        if name == "integral_limit":
+            return cls.limits or (name,)
+        return ("rate",) if name == "lambda" else (name,)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The numbers, each limit by itself, the memory of the integrals, and where the law finds what was not delivered.

@@ -30,7 +30,9 @@ class BoundedLeastSquares(EffortAllocation):
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which fins are judged; 1 by default.
+        speed: Speed ahead [m/s] at which fins are judged; 1 by default. "measured": at each tick the measured speed ahead,
+            through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which fins are judged where `speed` is "measured".
         priorities: How much an error in X, Y, Z, K, M, N counts, (6,), above 0; 1 by default. [1, 1, 1, 10, 10, 10] makes
             moments before forces.
         iterations: Largest number of steps of the active-set method at a tick; 100 by default. A run says in its messages
@@ -54,7 +56,7 @@ class BoundedLeastSquares(EffortAllocation):
     iterations: int = whole(1, "is not a number of iterations", "give 1 or more", default=100)
 
     def device_in(self, aligned: bool) -> str:
-        return f"bounded_least_squares:{self.curve_word}"
+        return f"bounded_least_squares:{self.curve_word}{self.words_at_speed}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The solution without limits, lines and priorities in their order; each channel's numbers and its scaled column.
@@ -86,6 +88,7 @@ class BoundedLeastSquares(EffortAllocation):
             **self.kind_of_curves(actuator_numbers),
             "iterations": self.iterations,
             "unconverged": self.bus.unconverged,
+            **self.at_speed(numbers),
         }
         return Packed(words, side_by_side(*flat, curves), work=WORK + 8 * count)
 

@@ -116,6 +116,10 @@ class Controller(Documented):
                     remedy = 'give guidance that wants it, such as [[controller.guidance]] type = "set_point"'
                     faults.add(part.section, part.key, f"needs a wanted {wish}, which no guidance gives", remedy)
             wishes |= set(part.gives)
+        for law in (law for law in self.laws if law.foresees):
+            for part in (part for part in self.guidance if not part.foreseeable):
+                problem = f"looks ahead, and what {part.key} will want is not known"
+                faults.add("laws", law.key, problem, "give a set_point or a trajectory, or leave preview out")
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -213,8 +217,8 @@ class Controller(Documented):
         object.__setattr__(wired, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
         object.__setattr__(wired, "actuators", actuators)
         object.__setattr__(wired, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
-        for section in ("sensors", "guidance"):
-            known = (part.beside((*terms, *events)) for part in getattr(self, section))
+        for section in ("sensors", "guidance", "laws"):
+            known = (part.beside((*terms, *events)) for part in getattr(wired, section))
             parts = tuple(part.in_scene(faults, events, wired.sensors) for part in known)
             object.__setattr__(wired, section, parts)
         faults.raise_if_any()

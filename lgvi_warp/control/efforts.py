@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from lgvi_warp.physics.terms.actuators import UNLIMITED
 from lgvi_warp.physics.terms.base import Numbers, PackingContext, number, side_by_side
 from lgvi_warp.physics.terms.thrust_curves import polynomial_values, side_of_table, table_values
 
+# The word in place of a speed at which fins are judged.
+MEASURED = "measured"
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class EffortAllocation(Allocation):
@@ -24,14 +27,55 @@ class EffortAllocation(Allocation):
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which fins are judged; 1 by default.
+        speed: Speed ahead [m/s] at which fins are judged; 1 by default. "measured": at each tick the measured speed ahead,
+            through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which fins are judged where `speed` is "measured".
     """
+
+    words_for: ClassVar[Mapping[str, str]] = {"speed": MEASURED}
+    # Whether `speed` is "measured"; set for an object.
+    measured: ClassVar[bool] = False
 
     weights: Any = number(("n",), "1", None, above=0.0, optional=True)
     speed: Any = number((), "m/s", 1.0, above=0.0)
+    least_speed: Any = number((), "m/s", None, above=0.0, optional=True)
+
+    def __post_init__(self) -> None:
+        measured = isinstance(self.speed, str) and self.speed == MEASURED
+        object.__setattr__(self, "measured", measured)
+        if measured:
+            object.__setattr__(self, "speed", 1.0)
+        super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        if self.measured and self.least_speed is None:
+            faults.add("least_speed", "", "is missing", 'give the least speed [m/s] beside speed = "measured"')
+        elif self.least_speed is not None and not self.measured:
+            faults.add(
+                "least_speed", float(self.least_speed), "is not used", 'give speed = "measured", or leave it out'
+            )
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        return (*super().unused, *(("speed",) if self.measured else ()))
+
+    def with_fields(self, fields: Mapping[str, Any]) -> Any:
+        return super().with_fields(({"speed": MEASURED} if self.measured else {}) | dict(fields))
+
+    def table_without(self, names: Collection[str]) -> dict[str, Any]:
+        content = super().table_without(names)
+        return content | ({"speed": MEASURED} if self.measured and "speed" not in names else {})
+
+    @property
+    def words_at_speed(self) -> str:
+        """The word of the device code of an allocation at the measured speed, after a comma."""
+        return ",measured" if self.measured else ""
 
     def check_actuator(self, faults: Faults) -> None:
         count = self.actuator.channels
+        if self.measured and not np.allclose(4.0 * self._effect(1.0), self._effect(2.0)):
+            fault = f"needs fins, whose effect grows with the speed squared, and that of {self.to} does not"
+            faults.add(f"{self.key}.speed", MEASURED, fault, "leave speed out")
         if self.weights is not None and len(self.weights) != count:
             fault = f"has {len(self.weights)} numbers"
             faults.add(f"{self.key}.weights", self.weights, fault, f"give {count}, one for each channel of {self.to}")
@@ -50,15 +94,23 @@ class EffortAllocation(Allocation):
         return f"powers{self.actuator.powers}" if self.shape == "polynomial" else self.shape
 
     def reach(self) -> np.ndarray:
+        return self._effect(self.speed)
+
+    def _effect(self, speed: Any) -> np.ndarray:
+        """Wrench of a unit of effort of each channel at a speed, in water of density 1."""
         numbers = {name: value[None] for name, value in self.actuator.parameters().items()}
-        effect = self.actuator.effect(numbers, {"environment.water_density": np.ones(1)}, np.reshape(self.speed, 1))
+        effect = self.actuator.effect(numbers, {"environment.water_density": np.ones(1)}, np.reshape(speed, 1))
         return np.asarray(effect[0])
 
     def effect_and_weights(self, numbers: Numbers, context: PackingContext) -> tuple[np.ndarray, np.ndarray]:
         """The wrenches of a unit of effort (1 or n, 6, channels), without components for which no law asks, and weights."""
-        effect = self.actuator.effect(context.own(self.actuator), context.parameters, numbers["speed"])
+        effect = self.actuator.effect(context.own(self.actuator), context.parameters, numbers.get("speed", np.ones(1)))
         B = self.asked[:, None] * effect
         return B, numbers.get("weights", np.ones((1, B.shape[2])))
+
+    def at_speed(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        """The numbers of the device code of an allocation at the measured speed; none of another."""
+        return {"least_speed": numbers["least_speed"]} if self.measured else {}
 
     def channel_rows(self, B: np.ndarray, context: PackingContext, *more: np.ndarray) -> np.ndarray:
         """The rows of each channel (1 or n, channels, rows), as of lgvi_kernels.laws.control.efforts; more: columns behind."""

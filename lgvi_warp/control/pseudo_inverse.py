@@ -27,7 +27,9 @@ class PseudoInverse(EffortAllocation):
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which fins are judged; 1 by default.
+        speed: Speed ahead [m/s] at which fins are judged; 1 by default. "measured": at each tick the measured speed ahead,
+            through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which fins are judged where `speed` is "measured".
     """
 
     type: ClassVar[str] = "pseudo_inverse"
@@ -44,7 +46,7 @@ class PseudoInverse(EffortAllocation):
             )
 
     def device_in(self, aligned: bool) -> str:
-        return f"pseudo_inverse:{self.curve_word}{',lost' if self.losses else ''}"
+        return f"pseudo_inverse:{self.curve_word}{',lost' if self.losses else ''}{self.words_at_speed}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses.
@@ -64,5 +66,6 @@ class PseudoInverse(EffortAllocation):
             "sets": 1 << len(lost),
             "size": size,
             **self.kind_of_curves(actuator_numbers),
+            **self.at_speed(numbers),
         }
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))

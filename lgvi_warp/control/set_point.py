@@ -33,6 +33,7 @@ class SetPoint(Guidance):
     """
 
     type: ClassVar[str] = "set_point"
+    foreseeable: ClassVar[bool] = True
 
     position: Any = number((3,), "m", None, optional=True)
     depth: Any = number((), "m", None, optional=True)

@@ -42,6 +42,7 @@ class Trajectory(Guidance):
     """
 
     type: ClassVar[str] = "trajectory"
+    foreseeable: ClassVar[bool] = True
 
     times: Any = number(("k",), "s", rising=True)
     positions: Any = number(("k", 3), "m")

@@ -19,7 +19,7 @@ from lgvi_warp.control.controller import Controller
 from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
-from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.physics.terms.base import Term, word_of
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.oddities import Oddities
@@ -83,7 +83,9 @@ def choose_kernel(
     if controller:
         words = {f"{part.key}.given" for part in controller.sensors} if given else frozenset[str]()
         parts = [part.with_features(facts.features | words) for part in controller.acting_parts]
-    control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
+    control = tuple(
+        (part, with_tables(part, device_module(part, part.device_in(not facts.turned), built_in))) for part in parts
+    )
     acting = _acting(ensemble, facts, built_in, controller, user_axes)
     events = tuple(
         (event, device_module(event, event.device_in(not facts.turned), built_in)) for event in ensemble.scene.events
@@ -293,6 +295,27 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     if isinstance(device, str):
         suitable.add((type(term), device))
     return module
+
+
+def with_tables(part: Any, module: Any) -> Any:
+    """The device code of a part with the tables that its numbers may be, of code without them."""
+    tables = getattr(part, "gain_tables", None)
+    if not tables:
+        return module
+    kinds = {word_of(item): 3 if item.metadata["shape"] == (3,) else 1 for item in part.number_fields()}
+    fields = ((field, kinds[name], table.over) for name, table in tables.items() for field in part.device_fields(name))
+    return _tabled(module, part.lanes(), tuple(fields))
+
+
+@functools.cache
+def _tabled(module: Any, lanes: Any, fields: tuple[tuple[str, int, str], ...]) -> Any:
+    """As `with_tables`; cached, since the device code of a kernel is its key. lanes: as of `Term.lanes`."""
+    # Where a scene has tables, here: other runs do without this code.
+    from lgvi_kernels.laws.control.gain_table import tabled
+    from lgvi_kernels.maps.compose import numbers_struct
+
+    of_numbers = functools.partial(numbers_struct, module, lanes)
+    return tabled(module, getattr(module, "params", of_numbers), fields)
 
 
 def _folder_and_roles(term: Term) -> tuple[str, Sequence[str]]:

@@ -16,6 +16,7 @@ import warp as wp
 
 from lgvi_kernels import built_in
 from lgvi_kernels.maps.collocation import SLOPE_FIELDS
+from lgvi_warp.control.gain_tables import packed_with_tables
 from lgvi_warp.engine.arrays import memory_rows, row_count
 from lgvi_warp.engine.shared import AXES, FRAME, context
 from lgvi_warp.engine.states import Starts
@@ -154,7 +155,8 @@ class Packing:
 
     def _packed(self, kind: str, terms: Iterable[Term]) -> list[Packed]:
         def pack(term: Term, numbers: Any) -> Packed:
-            return self._with_normals(term, numbers, term.packed(Ensemble.own(term, numbers), self._context(numbers)))
+            packed = packed_with_tables(term, Ensemble.own(term, numbers), self._context(numbers))
+            return self._with_normals(term, numbers, packed)
 
         return [self._shared((kind, i), functools.partial(pack, term)) for i, term in enumerate(terms)]
 

@@ -10,7 +10,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from lgvi_warp.control.base import SECTIONS as LISTS
+from lgvi_warp.control.base import ControlLaw, Part
 from lgvi_warp.control.controller import Controller
+from lgvi_warp.control.gain_tables import OVER
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events
@@ -114,12 +116,29 @@ def _value(kind: Any, item: dataclasses.Field[Any]) -> Schema:
                   "exclusiveMinimum": item.metadata["above"]}  # fmt: skip
         number = {"type": "number"} | {name: bound for name, bound in bounds.items() if math.isfinite(bound)}
         # Where an object has shapes of its own, one number may stand for several.
-        fixed = kind.shape_of is Term.shape_of
-        return _numbers(tuple(size if fixed else "k" for size in item.metadata["shape"]), number)
+        fixed = kind.shape_of in (Term.shape_of, ControlLaw.shape_of)
+        value = _numbers(tuple(size if fixed else "k" for size in item.metadata["shape"]), number)
+        return _in_other_forms(kind, word_of(item), value)
     words = str(item.type).replace(" | None", "").split(" | ")
     if all(word in WORDS for word in words):
         return {"type": [WORDS[word] for word in words] if len(words) > 1 else WORDS[words[0]]}
     return {"type": "array"} if words[0].startswith("Sequence") else {}
+
+
+def _in_other_forms(kind: Any, name: str, value: Schema) -> Schema:
+    """A number of a part that may be a word, or a table over what is measured."""
+    forms: list[Schema] = []
+    if issubclass(kind, Part) and name in kind.words_for:
+        forms.append({"const": kind.words_for[name]})
+    if issubclass(kind, ControlLaw) and kind.device_fields(name):
+        values = {"type": "array", "items": value, "minItems": 2}
+        content: dict[str, Schema] = {
+            "over": {"enum": list(OVER)},
+            "at": _numbers(("k",))["anyOf"][1],
+            "values": values,
+        }
+        forms.append({"type": "object", "properties": content, "required": [*content], "additionalProperties": False})
+    return {"anyOf": [value, *forms]} if forms else value
 
 
 def _numbers(shape: tuple[Any, ...], number: Schema | None = None) -> Schema:

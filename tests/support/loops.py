@@ -11,6 +11,7 @@ from lgvi_warp.control.pose_pid import PosePID
 from lgvi_warp.control.pose_smc import PoseSMC
 from lgvi_warp.methods.method import PROGRAMS, Method
 from lgvi_warp.reference import advance, explicit
+from lgvi_warp.reference.control.gain_tables import GainTables
 from lgvi_warp.reference.control.loop import Fault, Loop, closed_loop
 from lgvi_warp.reference.control.policy import Policy
 from lgvi_warp.reference.control.pseudo_inverse import PseudoInverse
@@ -65,6 +66,11 @@ def twin_of(part, numbers, scene):
     twin = kind(**values)
     if isinstance(twin, Policy):
         twin.layers = vars(part)["layers"]
+    tables = getattr(part, "gain_tables", {})
+    if tables:
+        names = {name.removesuffix("_"): name for name in values}
+        nodes = {names[name]: (table.over, table.at, values[names[name]]) for name, table in tables.items()}
+        return GainTables(law=twin, tables=nodes)
     return twin
 
 

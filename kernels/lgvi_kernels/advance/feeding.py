@@ -208,7 +208,31 @@ def make_seen(spec, types, method, truth, at_step, opened, notes):
             put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW), monitor.noting)
         return y, r
 
-    return seen
+    foresee, ticks = (
+        in_turn(spec.control.parts, "foresee"),
+        max(getattr(part, "AHEAD", 0) for part in spec.control.parts),
+    )
+    if foresee is None or guide is None:
+        return seen
+
+    @wp.func
+    def seen_ahead(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: real
+    ):
+        """Measure and guide; tell laws that look ahead what guidance will want at the next ticks."""
+        y, r = seen(x, c, monitor, k, h, opening)
+        later = y
+        for j in range(1, wp.static(ticks + 1)):
+            later.t = y.t + real(j) * y.period
+            later.step = y.step + j * monitor.every
+            later.tick = y.tick + j
+            later.start = j
+            s = upright(y.position.x)
+            s = guide(s, s, later, c.loop)
+            s = foresee(s, r, later, c.loop)
+        return y, r
+
+    return seen_ahead
 
 
 def make_acted(spec, types):

@@ -20,7 +20,7 @@ def _with_all(function, role):
             return function(s, p)
 
         return of_measurement
-    if role == "control":
+    if role in ("control", "foresee"):
 
         @wp.func
         def of_all(s: Any, r: Any, y: Any, p: Any):
@@ -39,7 +39,8 @@ def _with_all(function, role):
 def in_turn(parts, role):
     """(s, r, y, params) -> s: the functions of this role one after another, the first part's first. None if no part has it.
 
-    s: what the role hands on: of "measure" and "send" the measurement, of "guide" the reference, else the wrench.
+    s: what the role hands on: of "measure" and "send" the measurement, of "guide" the reference, of "foresee" a later one,
+        else the wrench.
     """
     if not any(plays(part, role) for part in parts):
         return None

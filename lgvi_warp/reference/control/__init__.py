@@ -61,6 +61,9 @@ class Part:
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"{type(self).__name__} has no number {name!r}")
 
+    # How many ticks it looks ahead.
+    ahead = 0
+
     def begin(self) -> None:
         """Forget everything, before the first tick."""
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.reference.control import NO_WISH, Measurement, Part
+from lgvi_warp.reference.control import NO_WISH, Measurement, Part, Reference
 from lgvi_warp.reference.control.fault import Fault
 from lgvi_warp.reference.rotation import Array
 from lgvi_warp.reference.submaps import Body, State, look, water
@@ -58,6 +58,9 @@ class Loop:
         for part in self.parts:
             r = part.guide(r, y)
         for part in self.parts:
+            if part.ahead:
+                part.foresee([self.wanted_later(y, j) for j in range(1, part.ahead + 1)], r, y)
+        for part in self.parts:
             w = part.control(w, r, y, self.unmet)
         self.measured, self.demand = y, w
         for part in self.parts:
@@ -65,6 +68,13 @@ class Loop:
         self.unmet = w
         self.sent.append((x.step + self.delay, {name: law.command.copy() for name, law in self.actuators.items()}))
         self.change(x, body, self.every * h)
+
+    def wanted_later(self, y: Measurement, ticks: int) -> Reference:
+        """What guidance that follows from the time alone will want some ticks later."""
+        y, r = replace(y, t=y.t + ticks * y.period, step=y.step + ticks * self.every, tick=y.tick + ticks), NO_WISH
+        for part in self.parts:
+            r = part.guide(r, y)
+        return r
 
     def arrived(self, step: int) -> dict[str, Array]:
         """The last commands that have come by a step."""

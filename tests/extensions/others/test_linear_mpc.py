@@ -329,7 +329,7 @@ def test_bluerov2_holds_its_depth_by_thrusters():
 
 
 @pytest.mark.parametrize(("more", "words"), [
-    ({"horizon": 21}, "linear_mpc.horizon = 21 is too long. Give 1 to 20"),
+    ({"horizon": 101}, "linear_mpc.horizon = 101 is too long. Give 1 to 100"),
     ({"horizon": 0}, "linear_mpc.horizon = 0 is not a number of periods"),
     ({"iterations": 0}, "linear_mpc.iterations = 0"),
     ({"R": [0.0, 1.0]}, "linear_mpc.R.*not positive"),

@@ -11,7 +11,7 @@ from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
 from lgvi_kernels.laws.control.efforts import ROWS as effort_rows
-from lgvi_kernels.laws.control.efforts import make_command_for
+from lgvi_kernels.laws.control.efforts import at_speed, make_command_for
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
@@ -333,4 +333,5 @@ def made(features):
         undelivered.torque = beyond3(undelivered.torque + turning, arm * enough)
         return undelivered
 
-    return device(__name__, features, params=params, allocate=allocate_within)
+    own_params, allocate = at_speed(params, allocate_within, features)
+    return device(__name__, features, params=own_params, allocate=allocate)

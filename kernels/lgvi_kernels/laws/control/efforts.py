@@ -7,6 +7,7 @@ known to be lost, what this adds to the number of a set of lost channels, and th
 coefficient.
 """
 
+import functools
 from typing import Any
 
 import warp as wp
@@ -88,3 +89,33 @@ def make_command_for(features):
             put_command(y, p, channels + rows * j, j, u, w)
 
     return command_for
+
+
+def at_speed(params, allocate, features):
+    """(params, allocate) of an allocation; with the feature "measured" its efforts make wrenches in proportion to speed^2.
+
+    Those of its rows are then the ones at 1 m/s.
+    """
+    if "measured" not in features:
+        return params, allocate
+
+    @functools.cache
+    def params_at_speed(width, real):
+        """Params: those of the allocation, and the least speed."""
+        own = {name: var.type for name, var in params(width, real).vars.items()}
+        return struct("AtSpeed", **own, least_speed=lane(width, real))
+
+    @wp.func
+    def allocate_at_speed(w: Any, y: Any, p: Any):
+        """The demand over the square of the measured speed ahead, at least `least_speed`; what is left, times it."""
+        size = greatest(absolute(y.water_velocity.x), p.least_speed)
+        square = size * size
+        inverse = ones(square) / square
+        w.force = inverse * w.force
+        w.torque = inverse * w.torque
+        undelivered = allocate(w, y, p)
+        undelivered.force = square * undelivered.force
+        undelivered.torque = square * undelivered.torque
+        return undelivered
+
+    return params_at_speed, allocate_at_speed

@@ -8,7 +8,7 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.control.efforts import ROWS, make_command_for
+from lgvi_kernels.laws.control.efforts import ROWS, at_speed, make_command_for
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest
@@ -80,4 +80,5 @@ def made(features):
         command_for(y, p, channels, wp.static(ROWS))
         return undelivered
 
-    return device(__name__, features, params=params, allocate=allocate_efforts)
+    own_params, allocate = at_speed(params, allocate_efforts, features)
+    return device(__name__, features, params=own_params, allocate=allocate)

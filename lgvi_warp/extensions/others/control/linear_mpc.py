@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from lgvi_warp.common.declared import real, whole
+from lgvi_warp.common.declared import flag, real, whole
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.times import whole_steps
@@ -30,18 +30,22 @@ COORDINATES = {
     )
     for i, wish in enumerate(wishes)
 }
-LONGEST = 20
+LONGEST = 100
+# Numbers that are given together.
+OF_OUTPUTS = ("outputs", "output_limit", "excess_cost")
 
 
 class Condensed(NamedTuple):
     """A problem of a horizon in its inputs alone, v (k,), each a part of its limit.
 
     cost: H (k, k) of v H v / 2 + f v. slope: f = slope (x, d), (k, 2 n). best: v = best (x, d) without limits.
+    ahead: f gains ahead times the shifts of the reference at each tick, (k, horizon n).
     """
 
     cost: np.ndarray
     slope: np.ndarray
     best: np.ndarray
+    ahead: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -74,7 +78,15 @@ class LinearMPC(ControlLaw):
         disturbance_time: Time over which the disturbance is filtered [s]; infinite: none is estimated. 5 by default.
         tracked: Names of the states whose errors are to vanish, at most as many as inputs; by default the first of `states`,
             as many as inputs.
-        horizon: Number of periods, 1 to 20; 10 by default.
+        lower: Least inputs (m,) [N, N m], below `limit`; by default -limit.
+        outputs: Combinations C of the states (p, n) that have a limit, C x <= output_limit at each tick of the horizon; by
+            default none. A limit from below is that of -C.
+        output_limit: Largest outputs (p,), each in the unit of its line of C x.
+        excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0. A limit that can be kept is, if
+            this is above what it saves; where inputs cannot keep it, it is exceeded.
+        preview: Whether it looks ahead at what guidance will want over the horizon, which must be set-points and trajectories;
+            False by default: the reference goes on at its present velocity.
+        horizon: Number of periods, 1 to 100; 10 by default.
         iterations: Largest number of iterations at a tick, of which most take about ten; 50 by default.
         period: Period of the model [s]; a controller of another period is refused. By default whatever it has.
 
@@ -113,6 +125,11 @@ class LinearMPC(ControlLaw):
     rate_limit: Any = number(("m",), "N/s, N m/s", None, optional=True, above=0.0)
     disturbance_time: Any = number((), "s", 5.0, above=0.0, infinite=True)
     tracked: Sequence[str] | None = None
+    lower: Any = number(("m",), "N, N m", None, optional=True)
+    outputs: Any = number(("p", "n"), "1", None, optional=True)
+    output_limit: Any = number(("p",), "unit of the output", None, optional=True)
+    excess_cost: Any = number(("p",), "1 per unit of the output", None, optional=True, above=0.0)
+    preview: bool = flag(False)
     horizon: int = whole(1, "is not a number of periods", f"give 1 to {LONGEST}", default=10)
     iterations: int = whole(1, "is not a number of iterations", "give 1 or more", default=50)
     period: float | None = real(None, unit="s", least=1e-9)
@@ -130,6 +147,14 @@ class LinearMPC(ControlLaw):
             faults.add("tracked", tracked, f"are {len(tracked)}", f"name at most {len(inputs)}, one for each input")
         if is_whole(self.horizon, LONGEST + 1):
             faults.add("horizon", self.horizon, "is too long", f"give 1 to {LONGEST}")
+        if self.lower is not None and np.any(self.lower >= self.limit):
+            faults.add("lower", self.lower, "is not below limit", f"give numbers below {self.limit.tolist()} [N, N m]")
+        given = {name: getattr(self, name) is not None for name in OF_OUTPUTS}
+        for name in (name for name in OF_OUTPUTS if any(given.values()) and not given[name]):
+            remedy = (
+                "give it, as many numbers as lines of outputs" if name != "outputs" else "give their lines of states"
+            )
+            faults.add(name, "", "is missing beside the others of outputs", remedy)
         if self.P is not None and not faults and not _at_least_zero(self.P):
             faults.add("P", self.P, "is not symmetric and at least 0", "give such weights")
         if faults:
@@ -187,7 +212,45 @@ class LinearMPC(ControlLaw):
         S_x, S_u = (np.zeros((n, n)), np.zeros((m, n))) if steady is None else np.split(steady, [n])
         at_once = weighted.T @ Phi
         slope = np.hstack([at_once, -at_once @ S_x - cost @ np.tile(S_u / limit[:, None], (N, 1))])
-        return Condensed(cost, slope, -np.linalg.solve(cost, slope))
+        return Condensed(cost, slope, -np.linalg.solve(cost, slope), weighted.T)
+
+    @property
+    def limits_more(self) -> bool:
+        """Whether inputs have unequal limits, outputs any, or the law looks ahead."""
+        return self.lower is not None or self.outputs is not None or self.preview
+
+    @property
+    def foresees(self) -> bool:
+        return self.preview
+
+    def device_in(self, aligned: bool) -> str:
+        # Code for the symmetric problem alone is shorter.
+        if not self.limits_more:
+            return self.device
+        return f"{DEVICE}.limited_mpc:{f'preview{self.horizon}' if self.preview else ''}"
+
+    def output_rows(self, own: Numbers) -> np.ndarray:
+        """Rows of the limits of outputs of a member, tick by tick (horizon p, 2 + 2 n + k).
+
+        Each is the limit, the cost of a unit beyond it, what state and disturbance make of the output, and what inputs do, in
+        units of the largest effect of an input as a part of its limit.
+        """
+        A, B, N, p = own["A"], own["B"] * own["limit"], self.horizon, len(own.get("outputs", ()))
+        n, m = B.shape
+        still, made, answers = np.hstack([np.eye(n), np.zeros((n, n))]), np.zeros((n, N * m)), []
+        for j in range(N if p else 0):
+            still, made = A @ still + np.hstack([np.zeros((n, n)), np.eye(n)]), A @ made
+            made[:, j * m : (j + 1) * m] += B
+            answers.append(own["outputs"] @ np.hstack([still, made]))
+        if not p:
+            return np.zeros((0, 2 + 2 * n + N * m))
+        rows = np.stack(answers)
+        unit = np.abs(rows[:, :, 2 * n :]).max(axis=(0, 2))
+        unit = np.where(unit > 0.0, unit, 1.0)
+        # The problem is half of the sums that are made least.
+        ends = np.stack([own["output_limit"] / unit, 0.5 * own["excess_cost"] * unit], axis=-1)
+        ends = np.broadcast_to(ends, (N, p, 2))
+        return np.concatenate([ends, rows / unit[:, None]], axis=-1).reshape(N * p, -1)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Places, A, B, limits, and the matrices of the problem; memory of state, inputs and disturbance.
@@ -204,12 +267,22 @@ class LinearMPC(ControlLaw):
             limit = own["limit"][i]
             change = period * own["rate_limit"][i] / limit if "rate_limit" in own else np.zeros(m)
             half = found.cost[np.tril_indices(k)]
-            parts = (places, own["A"][i], own["B"][i], limit, change, found.best, found.slope, half)
+            member = {name: value[i] for name, value in own.items()}
+            lower = (member.get("lower", -limit) / limit,) if self.limits_more else ()
+            outputs: tuple[np.ndarray, ...] = (self.output_rows(member),) if self.limits_more else ()
+            outputs += (-np.linalg.solve(found.cost, found.ahead), found.ahead) if self.preview else ()
+            parts = (places, own["A"][i], own["B"][i], limit, *lower, change, found.best, found.slope, half, *outputs)
             rows.append(np.concatenate([np.ravel(part) for part in parts]))
         words = {"states": n, "inputs": m, "horizon": self.horizon, "iterations": self.iterations}
         rated = int(self.rate_limit is not None)
         words |= {"rated": rated, "unmet": self.bus.unmet, "unconverged": self.bus.unconverged}
         work = len(COORDINATES) + len(COMPONENTS) + 2 * n + 2 * m + 5 * k + 8 * (1 + rated) * k + k * (k + 1) // 2
+        if self.limits_more:
+            p = 0 if self.outputs is None else len(self.outputs)
+            words["outputs"] = p
+            work += 8 * ((1 + rated) * k + self.horizon * p) - m
+            words["shifts"] = work
+            work += self.horizon * n if self.preview else 0
         return Packed(words | {"gain": gain}, np.array(rows), np.zeros((1, 1 + 2 * n + m)), work=work)
 
 

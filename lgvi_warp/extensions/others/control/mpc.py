@@ -27,6 +27,11 @@ def mpc(
     iterations: int = 50,
     disturbance_time: float = 5.0,
     tracked: Sequence[str] | None = None,
+    lower: Any = None,
+    outputs: Any = None,
+    output_limit: Any = None,
+    excess_cost: Any = None,
+    preview: bool = False,
     name: str = "",
 ) -> LinearMPC:
     """Design model predictive control of a linear model; the terminal cost is that of its linear quadratic regulator.
@@ -40,10 +45,15 @@ def mpc(
         R: Weights of the inputs (m,), above 0.
         limit: Largest inputs (m,) [N, N m].
         rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default none.
-        horizon: Number of periods, 1 to 20; 10 by default.
+        horizon: Number of periods, 1 to 100; 10 by default.
         iterations: Largest number of iterations at a tick; 50 by default.
         disturbance_time: Time over which the disturbance is filtered [s]; infinite: none is estimated. 5 by default.
         tracked: Names of the states whose errors are to vanish; by default the first, as many as inputs.
+        lower: Least inputs (m,) [N, N m]; by default -limit.
+        outputs: Combinations of the states (p, n) that have a limit, C x <= output_limit; by default none.
+        output_limit: Largest outputs (p,).
+        excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0.
+        preview: Whether it looks ahead at set-points and trajectories; False by default.
         name: Name of the part; by default its type.
 
     Returns:
@@ -82,6 +92,11 @@ def mpc(
         rate_limit=rate_limit,
         disturbance_time=disturbance_time,
         tracked=tracked,
+        lower=lower,
+        outputs=outputs,
+        output_limit=output_limit,
+        excess_cost=excess_cost,
+        preview=preview,
         horizon=horizon,
         iterations=iterations,
         period=model.dt,

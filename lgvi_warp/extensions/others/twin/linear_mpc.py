@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Linear model predictive control: a problem of all inputs of a horizon, by an interior-point method."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,13 +16,33 @@ COMPONENTS = "XYZKMN"
 class LinearMPC(Part):
     """Numbers as those of `lw.control.LinearMPC`."""
 
-    P = rate_limit = tracked = None
+    P = rate_limit = tracked = lower = outputs = output_limit = excess_cost = None
+    preview = False
     disturbance_time, horizon, iterations = 5.0, 10, 50
 
     def begin(self) -> None:
         """Nothing is known of the last tick."""
         n, m = np.shape(self.B)
         self.begun, self.x, self.u, self.d = False, np.zeros(n), np.zeros(m), np.zeros(n)
+        self.shifts = [np.zeros(n)] * self.horizon
+
+    @property
+    def ahead(self) -> int:  # type: ignore[override]
+        """The horizon, with preview."""
+        return self.horizon if self.preview else 0
+
+    def errors(self, r: Reference, y: Measurement) -> Array:
+        """The states: what is measured less what is wanted."""
+        position, rotation, velocity, rate = pose_errors(r, y)
+        errors = np.concatenate([-position, rotation, -velocity, -rate])
+        return errors[[COORDINATES.index(name) for name in self.states]]
+
+    def foresee(self, later: Sequence[Reference], r: Reference, y: Measurement) -> None:
+        """Keep how the errors of later references differ from those of r as it goes on at its rates."""
+        going = np.concatenate([r.velocity, y.R.T @ r.R @ r.angular_velocity, np.zeros(6)])
+        going = going[[COORDINATES.index(name) for name in self.states]]
+        now, T = self.errors(r, y), y.period
+        self.shifts = [self.errors(s, y) - now + (j + 1) * T * going for j, s in enumerate(later)]
 
     def steady_state(self, d: Array) -> tuple[Array, Array]:
         """x_s and u_s with x_s = A x_s + B u_s + d and no error of what is tracked."""
@@ -47,7 +68,7 @@ class LinearMPC(Part):
             e0, E = A @ e0 - B @ u_s, A @ E + B @ push
             last = k == self.horizon - 1 and self.P is not None
             W = np.asarray(self.P) if last else np.diag(self.Q)
-            H, f = H + E.T @ W @ E, f + E.T @ W @ e0
+            H, f = H + E.T @ W @ E, f + E.T @ W @ (e0 + self.shifts[k])
         return H, f
 
     def solved(self, H: Array, f: Array, before: Array, change: Array | None) -> Array:
@@ -65,12 +86,36 @@ class LinearMPC(Part):
         both, ends = np.concatenate([C, -C]), np.concatenate([half + middle, half - middle])
         return interior(H, f, both, ends, np.concatenate([half, half]), self.iterations).reshape(-1, m)
 
+    def sides(self, x: Array, d: Array, before: Array, change: Array | None) -> tuple[Array, Array, Array]:
+        """C, room and cost of C v <= room + excess, of all inputs v as parts of their limits; infinite costs of inputs."""
+        limit, m, N = np.asarray(self.limit, float), len(self.limit), self.horizon
+        lower = -np.ones(m) if self.lower is None else np.asarray(self.lower) / limit
+        size, eye = N * m, np.eye(N * m)
+        C, room = [eye, -eye], [np.ones(size), -np.tile(lower, N)]
+        if change is not None:
+            before = np.clip(before, lower - 0.999 * change, 1.0 + 0.999 * change)
+            since, most = np.concatenate([before, np.zeros(size - m)]), np.tile(change, N)
+            steps = eye - np.eye(size, k=-m)
+            C, room = [*C, steps, -steps], [*room, most + since, most - since]
+        cost = [np.full(sum(map(len, room)), np.inf)]
+        if self.outputs is not None:
+            A, B = np.asarray(self.A), np.asarray(self.B) * limit
+            at, made = x, np.zeros((len(x), size))
+            answers = []
+            for j in range(N):
+                at, made = A @ at + d, A @ made
+                made[:, j * m : (j + 1) * m] += B
+                answers.append((self.outputs @ at, self.outputs @ made))
+            units = np.max([np.abs(gains).max(axis=1) for _, gains in answers], axis=0)
+            for still, gains in answers:
+                C, room = [*C, gains / units[:, None]], [*room, (self.output_limit - still) / units]
+                cost.append(0.5 * self.excess_cost * units)
+        return np.concatenate(C), np.concatenate(room), np.concatenate(cost)
+
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """The first of the best inputs."""
         limit = np.asarray(self.limit, float)
-        position, rotation, velocity, rate = pose_errors(r, y)
-        errors = np.concatenate([-position, rotation, -velocity, -rate])
-        x = errors[[COORDINATES.index(name) for name in self.states]]
+        x = self.errors(r, y)
         places = [COMPONENTS.index(name) for name in self.inputs]
         u = self.u - unmet[places]
         if self.begun:
@@ -80,11 +125,17 @@ class LinearMPC(Part):
         before = u / limit
         change = None if self.rate_limit is None else y.period * np.asarray(self.rate_limit) / limit
         scale = np.tile(limit, self.horizon)
-        first = self.solved(scale[:, None] * H * scale, scale * f, before, change)[0]
+        H, f, lower = scale[:, None] * H * scale, scale * f, -np.ones(len(limit))
+        if self.lower is None and self.outputs is None and not self.preview:
+            first = self.solved(H, f, before, change)[0]
+        else:
+            lower = lower if self.lower is None else np.asarray(self.lower) / limit
+            sides = self.sides(x, self.d, before, change)
+            first = softened(H, f, *sides, self.iterations)[: len(limit)]
         if change is not None:
-            before = np.clip(before, -1.0 - 0.999 * change, 1.0 + 0.999 * change)
+            before = np.clip(before, lower - 0.999 * change, 1.0 + 0.999 * change)
             first = np.clip(first, before - change, before + change)
-        self.begun, self.x, self.u = True, x, limit * np.clip(first, -1.0, 1.0)
+        self.begun, self.x, self.u = True, x, limit * np.clip(first, lower, 1.0)
         made: Any = np.zeros(6)
         made[places] = self.u
         return np.asarray(w + made)
@@ -109,4 +160,42 @@ def interior(H: Array, f: Array, C: Array, d: Array, slacks: Array, iterations: 
                 c = c + ds * dm - (ahead / gap) ** 3 * gap
         length = min(1.0, 0.99 / most)
         v, s, multipliers = v + length * move, s + length * ds, multipliers + length * dm
+    return np.asarray(v)
+
+
+def softened(H: Array, f: Array, C: Array, room: Array, cost: Array, iterations: int) -> Array:
+    """v of least v H v / 2 + f v + cost e with C v <= room + e, e >= 0, and e = 0 where the cost is infinite.
+
+    Mehrotra's predictor and corrector, the excess e and the multiplier of e >= 0, cost - multiplier, eliminated.
+    """
+    v = -np.linalg.solve(H, f)
+    if np.all(C @ v <= room):
+        return np.asarray(v)
+    v, size, soft = np.zeros(len(f)), max(H[0, 0], np.abs(f).max()), np.isfinite(cost)
+    s, e = np.maximum(room, 1.0), np.where(soft, np.maximum(-room, 1.0), 0.0)
+    multipliers, count = np.minimum(size, 0.5 * cost), len(room) + soft.sum()
+    for _ in range(iterations):
+        left = np.where(soft, cost - multipliers, 1.0)
+        off, slope = C @ v + s - e - room, H @ v + f + C.T @ multipliers
+        target, of_excess = s * multipliers, e * left
+        gap = (target.sum() + of_excess.sum()) / count
+        if gap <= 1e-12 * size and np.abs(off).max() <= 1e-9 and np.abs(slope).max() <= 1e-9 * size:
+            break
+        weight = 1.0 / (s / multipliers + e / left)
+        K = H + C.T @ (weight[:, None] * C)
+        for corrects in (False, True):
+            rest = off - target / multipliers + of_excess / left
+            move = np.linalg.solve(K, -slope - C.T @ (weight * rest))
+            dm = weight * (C @ move + rest)
+            ds, de = -(target + s * dm) / multipliers, np.where(soft, -(of_excess - e * dm) / left, 0.0)
+            shrinks = [-ds / s, -dm / multipliers, np.where(soft, -de / np.where(soft, e, 1.0), 0.0),
+                       np.where(soft, dm / left, 0.0)]  # fmt: skip
+            most = max(1.0, *(np.max(ratio) for ratio in shrinks))
+            if not corrects:
+                ahead = (s + ds / most) @ (multipliers + dm / most)
+                ahead = (ahead + (soft * (e + de / most)) @ (left - dm / most)) / count
+                aim = (ahead / gap) ** 3 * gap
+                target, of_excess = target + ds * dm - aim, np.where(soft, of_excess - de * dm - aim, 0.0)
+        length = min(1.0, 0.99 / most)
+        v, s, e, multipliers = v + length * move, s + length * ds, e + length * de, multipliers + length * dm
     return np.asarray(v)

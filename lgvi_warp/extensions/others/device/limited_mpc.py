@@ -1,0 +1,425 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model predictive control with unequal limits, soft limits of outputs and preview, by an interior-point method.
+
+Beside linear_mpc.py, which has the model, the disturbance and the symmetric problem.
+"""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels import device
+from lgvi_kernels.lanes.arithmetic import any_positive
+from lgvi_kernels.law import *
+from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
+from lgvi_kernels.laws.control.integral import remember3, remembered3
+from lgvi_warp.extensions.others.device.linear_mpc import DEMAND, SEEN, advance, entry, estimate, place, see, times
+
+# Rows of the table, with n states, m inputs, k = horizon m and q outputs: places of the states, of the inputs; A, B; largest
+# inputs, and as parts of these the least ones and the limits of changes, m each; best inputs without limits and slope of the
+# cost, (k, 2 n) each; the cost's matrix, line by line up to the diagonal. Then of each output at each tick: its limit, the
+# cost of a unit beyond it, what state and disturbance make of it (2 n), what the inputs make of it (k). With preview, what
+# shifts of the reference make of the best inputs without limits and of the slope of the cost, (k, horizon n) each.
+# Rows of the memory as in linear_mpc.py.
+# Sides C v <= room are k inputs from above and from below, where `rated` their changes too, and the outputs, which may exceed
+# theirs. Scratch rows of a side: slack, multiplier, excess, room; what a step is to make of slack times multiplier, and of
+# excess times the rest of its cost; its weight in Newton's matrix, and how far slack and excess are from its inputs.
+OF_SIDE = 8
+SLACK, MULTIPLIER, EXCESS, ROOM, TARGET, TARGET_OF_EXCESS, WEIGHT, MISSED = range(8)
+
+params = make_params(
+    "LimitedMPC",
+    lanes="gain",
+    words="first memory work unmet states inputs horizon iterations rated unconverged outputs shifts",
+)
+
+
+@wp.func
+def hard_sides(p: Any):
+    """Number of sides that are kept whatever it costs."""
+    return 2 * p.horizon * p.inputs * (1 + p.rated)
+
+
+@wp.func
+def row_of_output(p: Any, outputs: int, t: int):
+    """The first row of the output of a side."""
+    return outputs + (t - hard_sides(p)) * (2 + 2 * p.states + p.horizon * p.inputs)
+
+
+@wp.func
+def inputs_of(p: Any, t: int):
+    """Number of inputs that an output depends on: those before its tick."""
+    return ((t - hard_sides(p)) // p.outputs + 1) * p.inputs
+
+
+@wp.func
+def side(y: Any, p: Any, outputs: int, v: int, t: int, zero: Any):
+    """C v of a side."""
+    k = p.horizon * p.inputs
+    value = zero
+    if t < hard_sides(p):
+        i = t % k
+        value = remembered(y, v + i)
+        if t >= 2 * k:
+            if i >= p.inputs:
+                value = value - remembered(y, v + i - p.inputs)
+        if (t // k) % 2 == 1:
+            value = -value
+    else:
+        value = times(y, row_of_output(p, outputs, t) + 2 + 2 * p.states, v, inputs_of(p, t), zero)
+    return value
+
+
+@wp.func
+def spread(y: Any, p: Any, outputs: int, to: int, t: int, value: Any):
+    """Add C^T times a number of a side to rows of inputs."""
+    k = p.horizon * p.inputs
+    if t < hard_sides(p):
+        i = t % k
+        signed = value
+        if (t // k) % 2 == 1:
+            signed = -value
+        remember(y, to + i, remembered(y, to + i) + signed)
+        if t >= 2 * k:
+            if i >= p.inputs:
+                remember(y, to + i - p.inputs, remembered(y, to + i - p.inputs) - signed)
+    else:
+        at = row_of_output(p, outputs, t) + 2 + 2 * p.states
+        for i in range(inputs_of(p, t)):
+            remember(y, to + i, remembered(y, to + i) + row1(y, at + i) * value)
+
+
+@wp.func
+def rest_of_cost(y: Any, p: Any, outputs: int, at: int, t: int):
+    """The cost of a unit of excess less the multiplier, of a side that may be exceeded."""
+    return row1(y, row_of_output(p, outputs, t) + 1) - remembered(y, at + wp.static(MULTIPLIER))
+
+
+@wp.func(inline=False)
+def factor(y: Any, p: Any, outputs: int, cost: int, each: int, L: int, zero: Any):
+    """The Cholesky factor of H + C^T diag(weights) C, with inverses on its diagonal."""
+    k = p.horizon * p.inputs
+    m = p.inputs
+    unity = ones(zero)
+    weights = each + wp.static(WEIGHT)
+    size = wp.static(OF_SIDE)
+    hard = hard_sides(p)
+    for i in range(k):
+        for j in range(i + 1):
+            total = row1(y, cost + entry(i, j)) * unity
+            if i == j:
+                total = total + remembered(y, weights + size * i) + remembered(y, weights + size * (k + i))
+            if p.rated > 0:
+                up = weights + size * 2 * k
+                down = weights + size * 3 * k
+                if i == j:
+                    total = total + remembered(y, up + size * i) + remembered(y, down + size * i)
+                    if i + m < k:
+                        total = total + remembered(y, up + size * (i + m)) + remembered(y, down + size * (i + m))
+                if i - j == m:
+                    total = total - remembered(y, up + size * i) - remembered(y, down + size * i)
+            for r in range((i // m) * p.outputs, p.horizon * p.outputs):
+                at = row_of_output(p, outputs, hard + r) + 2 + 2 * p.states
+                total = total + remembered(y, weights + size * (hard + r)) * (row1(y, at + i) * row1(y, at + j))
+            least_pivot = by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * absolute(total)
+            for q in range(j):
+                total = total - remembered(y, L + entry(i, q)) * remembered(y, L + entry(j, q))
+            if i == j:
+                total = unity / root(positive(total - least_pivot, total, least_pivot))
+            else:
+                total = total * remembered(y, L + entry(j, j))
+            remember(y, L + entry(i, j), total)
+
+
+@wp.func
+def gap_of(y: Any, p: Any, outputs: int, at: int, t: int):
+    """What a change of C v of 0 leaves of a side's equations: missed - target / multiplier + target of excess / rest."""
+    gap = remembered(y, at + wp.static(MISSED)) - remembered(y, at + wp.static(TARGET)) / remembered(
+        y, at + wp.static(MULTIPLIER)
+    )
+    if t >= hard_sides(p):
+        gap = gap + remembered(y, at + wp.static(TARGET_OF_EXCESS)) / rest_of_cost(y, p, outputs, at, t)
+    return gap
+
+
+@wp.func
+def moves(y: Any, p: Any, outputs: int, at: int, t: int, change: Any):
+    """Change of slack, multiplier and excess of a side in a step that changes C v so."""
+    multiplier = remembered(y, at + wp.static(MULTIPLIER))
+    more = remembered(y, at + wp.static(WEIGHT)) * (change + gap_of(y, p, outputs, at, t))
+    slack = -(remembered(y, at + wp.static(TARGET)) + remembered(y, at + wp.static(SLACK)) * more) / multiplier
+    excess = more - more
+    if t >= hard_sides(p):
+        target = remembered(y, at + wp.static(TARGET_OF_EXCESS)) - remembered(y, at + wp.static(EXCESS)) * more
+        excess = -target / rest_of_cost(y, p, outputs, at, t)
+    return slack, more, excess
+
+
+@wp.func(inline=False)
+def step(y: Any, p: Any, outputs: int, slope: int, to: int, each: int, L: int, zero: Any):
+    """Newton's step of the inputs; 1 / its largest length that keeps all that must be positive so, at least 1."""
+    k = p.horizon * p.inputs
+    hard = hard_sides(p)
+    count = hard + p.horizon * p.outputs
+    for i in range(k):
+        remember(y, to + i, -remembered(y, slope + i))
+    for t in range(count):
+        at = each + wp.static(OF_SIDE) * t
+        spread(y, p, outputs, to, t, -(remembered(y, at + wp.static(WEIGHT)) * gap_of(y, p, outputs, at, t)))
+    for i in range(k):
+        total = remembered(y, to + i)
+        for q in range(i):
+            total = total - remembered(y, L + entry(i, q)) * remembered(y, to + q)
+        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+    for m in range(k):
+        i = k - 1 - m
+        total = remembered(y, to + i)
+        for q in range(i + 1, k):
+            total = total - remembered(y, L + entry(q, i)) * remembered(y, to + q)
+        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+    most = ones(zero)
+    for t in range(count):
+        at = each + wp.static(OF_SIDE) * t
+        slack, more, excess = moves(y, p, outputs, at, t, side(y, p, outputs, to, t, zero))
+        most = greatest(most, -slack / remembered(y, at + wp.static(SLACK)))
+        most = greatest(most, -more / remembered(y, at + wp.static(MULTIPLIER)))
+        if t >= hard:
+            most = greatest(most, -excess / remembered(y, at + wp.static(EXCESS)))
+            most = greatest(most, more / rest_of_cost(y, p, outputs, at, t))
+    return most
+
+
+@wp.func(inline=False)
+def begin(
+    y: Any, p: Any, outputs: int, limits: int, x: int, before: int, v: int, f: int, cost: int, each: int, zero: Any
+):
+    """Inputs of 0, slacks of the room or 1, and multipliers of one size, which is returned."""
+    unity = ones(zero)
+    k = p.horizon * p.inputs
+    m = p.inputs
+    hard = hard_sides(p)
+    size = row1(y, cost) * unity
+    for i in range(k):
+        size = greatest(size, absolute(remembered(y, f + i)))
+        remember(y, v + i, zero)
+    for t in range(hard + p.horizon * p.outputs):
+        at = each + wp.static(OF_SIDE) * t
+        room = unity
+        start = size
+        if t >= hard:
+            row = row_of_output(p, outputs, t)
+            room = row1(y, row) - times(y, row + 2, x, 2 * p.states, zero)
+            start = least(size, y.h.dtype(0.5) * (row1(y, row + 1) * unity))
+        elif t >= 2 * k:
+            i = t % k
+            room = row1(y, limits + 2 * m + i % m) * unity
+            if i < m:
+                if t < 3 * k:
+                    room = room + remembered(y, before + i)
+                else:
+                    room = room - remembered(y, before + i)
+        elif t >= k:
+            room = -row1(y, limits + m + t % m) * unity
+        remember(y, at + wp.static(ROOM), room)
+        remember(y, at + wp.static(SLACK), greatest(room, unity))
+        remember(y, at + wp.static(MULTIPLIER), start)
+        remember(y, at + wp.static(EXCESS), greatest(-room, unity))
+    return size
+
+
+@wp.func(inline=False)
+def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, L: int, size: Any, busy: Any):
+    """A step of Mehrotra's predictor and corrector, in the lanes above 0; returns those that have not converged before it."""
+    unity = ones(busy)
+    zero = unity - unity
+    k = p.horizon * p.inputs
+    hard = hard_sides(p)
+    soft = p.horizon * p.outputs
+    count = hard + soft
+    slope = f + k
+    to = slope + k
+    gap = zero
+    off = zero
+    for i in range(k):
+        total = remembered(y, f + i)
+        for j in range(k):
+            total = total + row1(y, cost + entry(wp.max(i, j), wp.min(i, j))) * remembered(y, v + j)
+        remember(y, slope + i, total)
+    for t in range(count):
+        at = each + wp.static(OF_SIDE) * t
+        slack = remembered(y, at + wp.static(SLACK))
+        multiplier = remembered(y, at + wp.static(MULTIPLIER))
+        spread(y, p, outputs, slope, t, multiplier)
+        missed = side(y, p, outputs, v, t, zero) + slack - remembered(y, at + wp.static(ROOM))
+        softness = slack / multiplier
+        gap = gap + slack * multiplier
+        remember(y, at + wp.static(TARGET), slack * multiplier)
+        if t >= hard:
+            excess = remembered(y, at + wp.static(EXCESS))
+            left = rest_of_cost(y, p, outputs, at, t)
+            missed = missed - excess
+            softness = softness + excess / left
+            gap = gap + excess * left
+            remember(y, at + wp.static(TARGET_OF_EXCESS), excess * left)
+        off = greatest(off, absolute(missed))
+        remember(y, at + wp.static(MISSED), missed)
+        remember(y, at + wp.static(WEIGHT), unity / softness)
+    share_of = y.h.dtype(1.0) / y.h.dtype(count + soft)
+    gap = share_of * gap
+    steep = zero
+    for i in range(k):
+        steep = greatest(steep, absolute(remembered(y, slope + i)))
+    rest = greatest(gap - by_digits(y, y.h.dtype(1e-12), y.h.dtype(2e-6)) * size, zero)
+    close = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
+    rest = greatest(rest, greatest(off - close * unity, steep - close * size))
+    busy = positive(rest, busy, zero)
+    if any_positive(busy):
+        factor(y, p, outputs, cost, each, L, zero)
+        length = unity / step(y, p, outputs, slope, to, each, L, zero)
+        ahead = zero
+        for t in range(count):
+            at = each + wp.static(OF_SIDE) * t
+            slack, more, excess = moves(y, p, outputs, at, t, side(y, p, outputs, to, t, zero))
+            multiplier = remembered(y, at + wp.static(MULTIPLIER)) + length * more
+            ahead = ahead + (remembered(y, at + wp.static(SLACK)) + length * slack) * multiplier
+            if t >= hard:
+                left = rest_of_cost(y, p, outputs, at, t) - length * more
+                ahead = ahead + (remembered(y, at + wp.static(EXCESS)) + length * excess) * left
+                target = remembered(y, at + wp.static(TARGET_OF_EXCESS)) - excess * more
+                remember(y, at + wp.static(TARGET_OF_EXCESS), target)
+            remember(y, at + wp.static(TARGET), remembered(y, at + wp.static(TARGET)) + slack * more)
+        share = share_of * ahead / gap
+        aim = share * share * share * gap
+        for t in range(count):
+            at = each + wp.static(OF_SIDE) * t
+            remember(y, at + wp.static(TARGET), remembered(y, at + wp.static(TARGET)) - aim)
+            if t >= hard:
+                remember(y, at + wp.static(TARGET_OF_EXCESS), remembered(y, at + wp.static(TARGET_OF_EXCESS)) - aim)
+        most = step(y, p, outputs, slope, to, each, L, zero)
+        length = positive(busy, least(unity, y.h.dtype(0.99) / most), zero)
+        for t in range(count):
+            at = each + wp.static(OF_SIDE) * t
+            slack, more, excess = moves(y, p, outputs, at, t, side(y, p, outputs, to, t, zero))
+            advance(y, at + wp.static(SLACK), length, slack)
+            advance(y, at + wp.static(MULTIPLIER), length, more)
+            if t >= hard:
+                advance(y, at + wp.static(EXCESS), length, excess)
+        for i in range(k):
+            advance(y, v + i, length, remembered(y, to + i))
+    return busy
+
+
+@wp.func
+def foresee(s: Any, r: Any, y: Any, p: Any):
+    """Keep how the errors of the reference s, y.start ticks ahead, differ from those of r as it goes on at its rates."""
+    n = p.states
+    j = y.start - 1
+    if j < p.horizon:
+        row = p.work + p.shifts + j * n
+        time = y.h.dtype(y.start) * y.period
+        see(s, y, p.work)
+        for i in range(n):
+            remember(y, row + i, remembered(y, p.work + place(y, p.first + i)))
+        see(r, y, p.work)
+        remember3(y, p.work, remembered3(y, p.work) - time * r.velocity)
+        turn = to_body(y, to_inertial(r, r.angular_velocity))
+        remember3(y, p.work + 3, remembered3(y, p.work + 3) - time * turn)
+        for i in range(n):
+            remember(y, row + i, remembered(y, row + i) - remembered(y, p.work + place(y, p.first + i)))
+    return s
+
+
+@functools.cache
+def made(features):
+    """The law; with the feature "preview30" it looks so many ticks ahead."""
+    ahead = sum(int(word.removeprefix("preview")) for word in features)
+
+    @wp.func
+    def control(w: Any, r: Any, y: Any, p: Any):
+        """State, disturbance, the best inputs without limits and, where these break one, those within; then the first."""
+        n = p.states
+        m = p.inputs
+        k = p.horizon * m
+        matrices = p.first + n + m
+        limits = matrices + n * n + n * m
+        free = limits + 3 * m
+        slope_of = free + 2 * n * k
+        cost = slope_of + 2 * n * k
+        outputs = cost + entry(k, 0)
+        # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f,
+        # slope and step of iterations; the sides; the factor.
+        demand = p.work + wp.static(SEEN)
+        x = demand + wp.static(DEMAND)
+        before = x + 2 * n
+        best_of = before + m
+        v = best_of + k
+        f = v + k
+        each = f + 3 * k
+        count = hard_sides(p) + p.horizon * p.outputs
+        L = each + wp.static(OF_SIDE) * count
+        last = p.memory + 1
+        unity = ones(w.force.x)
+        zero = unity - unity
+        see(r, y, p.work)
+        for i in range(n):
+            remember(y, x + i, remembered(y, p.work + place(y, p.first + i)))
+        for i in range(m):
+            # What was not delivered of the last demand did not act.
+            u = remembered(y, last + n + i) - remembered(y, p.unmet + place(y, p.first + n + i))
+            remember(y, last + n + i, u)
+            u = u / row1(y, limits + i)
+            if p.rated > 0:
+                # From beyond the limits they go back at once.
+                reach = y.h.dtype(0.999) * row1(y, limits + 2 * m + i) * unity
+                u = clamp(u, row1(y, limits + m + i) * unity - reach, unity + reach)
+            remember(y, before + i, u)
+        estimate(y, p, x, matrices)
+        for i in range(n):
+            remember(y, x + n + i, remembered(y, last + n + m + i))
+            remember(y, last + i, remembered(y, x + i))
+        over = -unity
+        for i in range(k):
+            best = times(y, free + 2 * n * i, x, 2 * n, zero)
+            remember(y, best_of + i, best)
+            remember(y, f + i, times(y, slope_of + 2 * n * i, x, 2 * n, zero))
+            if wp.static(ahead > 0):
+                of_shifts = outputs + p.horizon * p.outputs * (2 + 2 * n + k) + i * p.horizon * n
+                shifts = p.work + p.shifts
+                remember(y, best_of + i, times(y, of_shifts, shifts, p.horizon * n, remembered(y, best_of + i)))
+                of_shifts += k * p.horizon * n
+                remember(y, f + i, times(y, of_shifts, shifts, p.horizon * n, remembered(y, f + i)))
+        size = begin(y, p, outputs, limits, x, before, v, f, cost, each, zero)
+        for t in range(count):
+            room = remembered(y, each + wp.static(OF_SIDE) * t + wp.static(ROOM))
+            over = greatest(over, side(y, p, outputs, best_of, t, zero) - room)
+        if any_positive(over):
+            busy = positive(over, unity, zero)
+            for _ in range(p.iterations):
+                if any_positive(busy):
+                    busy = iterate(y, p, outputs, v, f, cost, each, L, size, busy)
+            count_unconverged(y, p.unconverged, busy)
+            for i in range(m):
+                remember(y, best_of + i, positive(over, remembered(y, v + i), remembered(y, best_of + i)))
+        # A lane leaves nothing behind that others made it calculate.
+        for i in range(L + entry(k, 0) - v):
+            remember(y, v + i, zero)
+        for i in range(wp.static(DEMAND)):
+            remember(y, demand + i, zero)
+        for i in range(m):
+            u = remembered(y, best_of + i)
+            if p.rated > 0:
+                change = row1(y, limits + 2 * m + i)
+                last_u = remembered(y, before + i)
+                u = clamp(u, last_u - change, last_u + change)
+            u = clamp(u, row1(y, limits + m + i) * unity, unity) * row1(y, limits + i)
+            remember(y, last + n + i, u)
+            remember(y, demand + place(y, p.first + n + i), u)
+        remember(y, p.memory, unity)
+        w.force = w.force + remembered3(y, demand)
+        w.torque = w.torque + remembered3(y, demand + 3)
+        return w
+
+    return device(
+        __name__, features, params=params, control=control, foresee=foresee if ahead else None, AHEAD=ahead or None
+    )

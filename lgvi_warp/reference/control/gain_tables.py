@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A law whose numbers are tables over what is measured, and an allocation at the measured speed."""
+
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.reference.control import Measurement, Part, Reference
+from lgvi_warp.reference.rotation import Array
+
+
+class GainTables(Part):
+    """law: the part with numbers; tables: {number: (over, at, values)}; the Altimeter where one is over the altitude."""
+
+    altimeter: Any = None
+
+    def begin(self) -> None:
+        """Let the law forget everything."""
+        self.law.begin()
+
+    def measured(self, over: str, y: Measurement) -> float:
+        """The speed ahead through the water, the depth, or the height above where the beam meets the floor."""
+        if over == "altitude":
+            beam = np.asarray(self.altimeter.direction, float)
+            hit = self.altimeter.point + self.altimeter.reading * beam / np.linalg.norm(beam)
+            return float((y.R @ hit)[2])
+        return float(y.water_velocity[0] if over == "speed" else y.position[2])
+
+    def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
+        """The law's demand with numbers that are linear between the nodes, and held beyond the ends."""
+        for name, (over, at, values) in self.tables.items():
+            x, flat = self.measured(over, y), np.reshape(values, (len(at), -1))
+            number = np.array([np.interp(x, at, column) for column in flat.T])
+            setattr(self.law, name, number.reshape(np.shape(values)[1:]))
+        return np.asarray(self.law.control(w, r, y, unmet))
+
+
+class MeasuredSpeed(Part):
+    """allocation: one whose effect is that at 1 m/s; least_speed [m/s]. Efforts make that effect times the speed squared."""
+
+    def begin(self) -> None:
+        """Let the allocation forget everything."""
+        self.allocation.begin()
+
+    def measure(self, y: Measurement) -> Measurement:
+        """Keep the speed ahead through the water."""
+        self.square = max(abs(y.water_velocity[0]), self.least_speed) ** 2
+        measured: Measurement = self.allocation.measure(y)
+        return measured
+
+    def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
+        """Commands of the demand over the speed squared; what is left, times it."""
+        return np.asarray(self.square * self.allocation.allocate(w / self.square, actuators))

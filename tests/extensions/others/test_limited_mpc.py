@@ -94,9 +94,9 @@ def test_check_controller_finds_nothing(more):
 
 
 def test_numbers_that_do_not_go_together_are_refused():
-    says(refused(law, lower=[6.0, -2.0]), "linear_mpc.lower", "is not below limit; give numbers below [5.0, 2.0]")
-    says(refused(law, excess_cost=None), "linear_mpc.excess_cost = '': is missing beside the others of outputs")
-    says(refused(law, horizon=101), "linear_mpc.horizon = 101: is too long; give 1 to 100")
+    says(refused(law, lower=[6.0, -2.0]), "linear_mpc.lower", "is not below limit. Give numbers below [5.0, 2.0]")
+    says(refused(law, excess_cost=None), "linear_mpc.excess_cost = '' is missing beside the others of outputs")
+    says(refused(law, horizon=101), "linear_mpc.horizon = 101 is too long. Give 1 to 100")
 
 
 # Heave of a body of 20 kg with a drag of 9 N s/m, over a period of 0.1 s in which the force is held: exact.
@@ -169,4 +169,4 @@ def test_only_guidance_that_follows_from_the_time_can_be_foreseen():
     part = law(preview=True)
     way = lw.control.Waypoints(points=[(0.0, 0.0, 3.0), (9.0, 0.0, 3.0)], speed=1.0, look_ahead=3.0, radius=1.0)
     text = refused(lw.Controller, period=T, guidance=[way], laws=[part])
-    says(text, "'linear_mpc': looks ahead, and what waypoints will want is not known; give a set_point or a trajectory")
+    says(text, "'linear_mpc': looks ahead, and what waypoints will want is not known. Give a set_point or a trajectory")

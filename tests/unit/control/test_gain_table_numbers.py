@@ -30,12 +30,12 @@ def scene(law, allocation=None, **more):
 
 
 @pytest.mark.parametrize(("kp", "words"), [
-    (KP | {"over": "sped"}, ["heading_pid.kp.over = 'sped': is not known; did you mean 'speed'?"]),
-    (KP | {"at": [0.5, 1.0, 1.0]}, ["heading_pid.kp.at", "are not two or more rising numbers; sort them", "m/s"]),
+    (KP | {"over": "sped"}, ["heading_pid.kp.over = 'sped' is not known. Did you mean 'speed'?"]),
+    (KP | {"at": [0.5, 1.0, 1.0]}, ["heading_pid.kp.at", "are not two or more rising numbers. Sort them", "m/s"]),
     (KP | {"at": [1.0], "values": [3.0]}, ["heading_pid.kp.at", "two or more"]),
-    (KP | {"values": [3.0, 2.0]}, ["heading_pid.kp = [3.0, 2.0]: has shape (2,); give numbers of shape (3,)"]),
-    (KP | {"more": 1}, ["heading_pid.kp.more = 1: is an unknown key; known: over, at, values"]),
-    ({}, ["3 faults", "heading_pid.kp.at = '': is missing", "heading_pid.kp.values = '': is missing"]),
+    (KP | {"values": [3.0, 2.0]}, ["heading_pid.kp = [3.0, 2.0] has shape (2,). Give numbers of shape (3,)"]),
+    (KP | {"more": 1}, ["heading_pid.kp.more = 1 is an unknown key. Known: over, at, values"]),
+    ({}, ["3 faults", "heading_pid.kp.at = '' is missing", "heading_pid.kp.values = '' is missing"]),
 ])  # fmt: skip
 def test_a_table_that_is_none_is_refused_with_the_key_and_a_remedy(kp, words):
     with refuses(*words):
@@ -52,7 +52,7 @@ def test_what_cannot_be_a_table_is_refused():
 def test_a_table_over_the_altitude_needs_one_altimeter():
     law = HeadingPID(kp=KP | {"over": "altitude"})
     with refuses(
-        "controller.heading_pid.kp.over = 'altitude': needs one altimeter, and the controller has 0; give one"
+        "controller.heading_pid.kp.over = 'altitude' needs one altimeter, and the controller has 0. Give one"
     ):
         scene(law)
 
@@ -94,8 +94,8 @@ def test_vectors_may_be_tables_and_keep_their_python_names():
 
 
 @pytest.mark.parametrize(("given", "words"), [
-    ({"speed": "measured"}, "pseudo_inverse.least_speed = '': is missing; give the least speed [m/s]"),
-    ({"least_speed": 0.4}, 'pseudo_inverse.least_speed = 0.4: is not used; give speed = "measured", or leave it out'),
+    ({"speed": "measured"}, "pseudo_inverse.least_speed = '' is missing. Give the least speed [m/s]"),
+    ({"least_speed": 0.4}, 'pseudo_inverse.least_speed = 0.4 is not used. Give speed = "measured", or leave it out'),
     ({"speed": "mesured"}, "pseudo_inverse.speed"),
 ])  # fmt: skip
 def test_the_measured_speed_needs_its_least_one(given, words):
@@ -105,6 +105,6 @@ def test_the_measured_speed_needs_its_least_one(given, words):
 
 def test_thrusters_are_not_judged_at_the_measured_speed():
     allocation = PseudoInverse(to="thrusters", speed="measured", least_speed=0.4)
-    with refuses("pseudo_inverse.speed = 'measured': needs fins", "and that of thrusters does not; leave speed out"):
+    with refuses("pseudo_inverse.speed = 'measured' needs fins", "and that of thrusters does not. Leave speed out"):
         lw.Scene.named("bluerov2_heavy", controller=lw.Controller(
             period=0.1, guidance=[SetPoint(heading=0.5)], laws=[HeadingPID(kp=1.0)], allocation=[allocation]))  # fmt: skip

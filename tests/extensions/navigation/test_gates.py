@@ -173,7 +173,7 @@ BAD = {
     "tilt": (lambda: lw.control.DVL(greatest_tilt=-0.1), "dvl.greatest_tilt"),
     "fixes": (
         lambda: scene(parts(usbl={"every": 5, "latency": 40}), period=PERIOD),
-        r"usbl\.latency = 40\.0 has 9 fixes on their way at once.*give less than 40",
+        r"usbl\.latency = 40\.0 has 9 fixes on their way at once.*Give less than 40",
     ),
     "filter": (
         lambda: scene([], period=PERIOD, events=[lw.events.PositionUncertain(sigma=5.0)]),

@@ -107,7 +107,7 @@ class ErrorStateFilter(Part):
     def update(self, slot: int, h: Array, difference: float, sigma: float) -> None:
         """One number measured: Joseph's form. difference: of it from what the estimate before all updates would measure."""
         r = (self.measurement_scale * sigma) ** 2
-        innovation = difference - h @ self.x
+        innovation = float(difference - h @ self.x)
         s = h @ self.P @ h + r
         share = 1.0
         if self.gate is not None:

@@ -101,7 +101,7 @@ class Prediction:
         ]
         lines += [f"note        {text}" for text in self.messages]
         if self.free_memory and self.memory > 0.8 * self.free_memory:
-            lines.append("note        more than the memory holds: use --store zarr, save less often or fewer fields")
+            lines.append("note        more than the memory holds. Use --store zarr, save less often or fewer fields")
         if self.free_disk is not None and self.disk > self.free_disk:
             remedy = "save less often, fewer fields, or --store-dtype float32"
             lines.append(f"note        more than the disk holds: {remedy}")

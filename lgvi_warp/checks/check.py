@@ -392,7 +392,7 @@ def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
     changes = bool(np.any(np.abs(passes.value) > passes.allowed))
     least = "varying" if varies else "uniform" if changes else "steady"
     good = kind in FLOWS and FLOWS.index(kind) >= FLOWS.index(least)
-    text = f"FLOW = {kind!r}" + ("" if good else f": write FLOW = {least!r}")
+    text = f"FLOW = {kind!r}" + ("" if good else f". Write FLOW = {least!r}")
     return Check("flow: FLOW", float(not good), 0.0, good, text)
 
 

@@ -291,7 +291,7 @@ class Result(Summarized):
             AttributeError: If it was not kept.
         """
         if self.end is None:
-            raise AttributeError("the end of the run was not kept: give SaveAt(final=True)")
+            raise AttributeError("the end of the run was not kept. Give SaveAt(final=True)")
         return self.end() if callable(self.end) else self.end
 
     @property

@@ -378,7 +378,10 @@ def with_partners(
         elif abs(matrix[row, column] - matrix[column, row]) > RELATIVE * abs(matrix[row, column]):
             problem = f"differs from its partner {lower} = {coefficients[lower]}"
             faults.add(
-                upper, coefficients[upper], problem, "the added mass matrix is symmetric: correct one or leave it out"
+                upper,
+                coefficients[upper],
+                f"{problem}, and the added mass matrix is symmetric",
+                "correct one or leave it out",
             )
         else:
             full[column, row] = full[row, column]

@@ -283,7 +283,7 @@ def test_what_is_left_out_is_said_with_its_reason(spinning):
     left_out = 'members from the event on that stopped them (stopped = "left_out")'
     for kind, words in (
         (Mean("depth"), None),
-        (Mean(none), "Leave out members where a number of theirs is not finite: 0 of 300"),
+        (Mean(none), "leave out members where a number of theirs is not finite: 0 of 300"),
         (Mean("depth", stopped="left_out"), left_out),
         (PathMean("depth", stopped="left_out"), left_out),
     ):  # fmt: skip

@@ -257,7 +257,7 @@ def test_across_an_event():
     assert (found.error[0] < 1e-4 * np.abs(depth / speed)).all()
     assert np.isnan(found.jacobian[[1, 3, 4]]).all()
     says(found.undefined["depth by vehicle.buoyancy"], "an event stopped the member (floor)", '"end_time NAME"')
-    says(found.undefined["time_to_failure by vehicle.buoyancy"], 'Ask for "end_time NAME"')
+    says(found.undefined["time_to_failure by vehicle.buoyancy"], 'ask for "end_time NAME"')
     says(found.undefined["end_time time by vehicle.buoyancy"], "does not end so")
     s = 2.0 * np.sqrt(F * k) / M
     assert abs(found.jacobian[2, 0] + M / k * np.tanh(s) * s / (2.0 * F)) <= found.error[2, 0]

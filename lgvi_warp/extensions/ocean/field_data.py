@@ -99,7 +99,7 @@ class FieldData:
         if self.error > MUCH * self.speed:
             of_rms = f"{100.0 * self.error / self.speed:.2g} % of the rms" if self.speed else "of no current"
             sentences.append(
-                f"the regular grid changes a velocity by up to {self.error:.3g} m/s, {of_rms}: give a finer spacing"
+                f"the regular grid changes a velocity by up to {self.error:.3g} m/s, {of_rms}. Give a finer spacing"
             )
         return tuple(sentences)
 

@@ -51,9 +51,7 @@ def test_what_cannot_be_a_table_is_refused():
 
 def test_a_table_over_the_altitude_needs_one_altimeter():
     law = HeadingPID(kp=KP | {"over": "altitude"})
-    with refuses(
-        "controller.heading_pid.kp.over = 'altitude' needs one altimeter, and the controller has 0. Give one"
-    ):
+    with refuses("controller.heading_pid.kp.over = 'altitude' needs one altimeter, and the controller has 0. Give one"):
         scene(law)
 
 

@@ -8,6 +8,7 @@ from lgvi_warp.extensions.gliders.terms.moving_mass import MovingMass as MovingM
 from lgvi_warp.extensions.gliders.terms.polar import Polar as Polar
 from lgvi_warp.extensions.gliders.terms.stratification import Stratification as Stratification
 from lgvi_warp.extensions.gliders.terms.surface_buoyancy import SurfaceBuoyancy as SurfaceBuoyancy
+from lgvi_warp.extensions.sea.terms.bottom_contact import BottomContact as BottomContact
 from lgvi_warp.extensions.sea.terms.sea_state import SeaState as SeaState
 from lgvi_warp.extensions.sea.terms.tide import Tide as Tide
 from lgvi_warp.physics.terms.control_fins import ControlFins as ControlFins

@@ -166,7 +166,7 @@ class Scene(Summarized):
         nominal = self._nominal()
         every = (*wired, *self.events)
         object.__setattr__(self, "terms", tuple(below(term.beside(every), wired).of_vehicle(nominal) for term in wired))
-        object.__setattr__(self, "events", tuple(below(event, wired) for event in self.events))
+        object.__setattr__(self, "events", tuple(below(event.beside(every), wired) for event in self.events))
 
     def _nominal(self) -> dict[str, np.ndarray]:
         """The numbers of the vehicle and its environment by name."""

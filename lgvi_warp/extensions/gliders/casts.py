@@ -24,7 +24,7 @@ PLACE = ("latitude", "longitude")
 
 
 def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Depths (k,) [m], rising, and densities (k,) [kg/m3] of a cast in a file, or in columns, which replace those of the file."""
+    """Rising depths (k,) [m] and densities (k,) [kg/m3] of a cast: a file, columns, or columns in place of those of a file."""
     faults = Faults()
     faults.keys("", columns, (*WORDS, *PLACE))
     faults.raise_if_any()
@@ -88,7 +88,9 @@ def _of_csv(path: Path) -> dict[str, Any]:
     lines = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "*"))]
     rows = [[cell.strip() for cell in row] for row in csv.reader(lines, _dialect(lines[:1]))]
     if len(rows) < 2:
-        raise refusal("file", str(path), "has no lines below its names", "give a line of names, then one for each depth")
+        raise refusal(
+            "file", str(path), "has no lines below its names", "give a line of names, then one for each depth"
+        )
     names, table = rows[0], [row for row in rows[1:] if any(map(_real, row))]
     columns = {}
     for name, word in _named(names).items():
@@ -116,7 +118,9 @@ def _of_netcdf(path: Path) -> dict[str, Any]:
     try:
         with xr.open_dataset(path, decode_times=False) as data:
             names = {str(data[key].attrs.get("standard_name", key)): key for key in data.variables}
-            return {name: np.asarray(data[names[word]].values, np.float64).ravel() for name, word in _named(names).items()}
+            return {
+                name: np.asarray(data[names[word]].values, np.float64).ravel() for name, word in _named(names).items()
+            }
     except (OSError, ValueError) as error:
         raise refusal("file", str(path), f"cannot be read ({error})", "give a NetCDF file of one cast") from None
 

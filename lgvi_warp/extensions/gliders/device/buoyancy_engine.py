@@ -202,7 +202,7 @@ def make_powered(pressure_at):
 
     @wp.func
     def powered_follow(state: Any, view: Any, p: Any):
-        """As follow; the work p dV since the last look, with the pressure in the middle of the time in which the pump worked."""
+        """As follow; the work p dV since the last look, with the pressure in the middle of the time of the pump."""
         depth = view.b.z + dot(view.down, p.origin)
         time = view.h * ones(depth)
         volume, side = pumped_and_turned(view, p, depth, time)

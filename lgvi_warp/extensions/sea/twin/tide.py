@@ -36,7 +36,7 @@ class InTide(Law):
 
     def below(self, view: View) -> View:
         """The view from the depth below the surface."""
-        return replace(view, b=view.b + [0.0, 0.0, self.tide.height(view.t)])
+        return replace(view, b=view.b + np.array([0.0, 0.0, self.tide.height(view.t)]))
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """As the law, of the depth below the surface; so are all that follow."""

@@ -86,51 +86,26 @@ def seeing(water_at):
     """Its functions, which look at the water: velocities over ground are those through the water and the water's."""
 
     @wp.func
-    def pressed(view: Any, p: Any, sea: Any, i: int):
-        """(arm, normal, spring, damped velocity of the water, push, sliding): see contact_load."""
-        arm, place, n, sunk = touched(view, p, i)
-        s = to_body(view, stretch(view, p, i, place, n, sunk))
-        n = to_body(view, n)
-        water = water_at(view, arm, sea)
-        u = to_body(view, water.velocity)
-        v = velocity_at(view, arm) + u
-        zero = sunk - sunk
-        # A floor pushes, and never pulls.
-        normal = positive(sunk, greatest(p.stiffness * sunk - p.damping * dot(n, v), zero), zero)
-        across = -(p.stiffness * s + p.damping * (v - dot(n, v) * n))
-        most = p.friction * normal
-        return arm, n, s, u, normal, across, held_within(across, most), sunk
-
-    @wp.func
-    def contact_load(D: Any, w: Any, view: Any, p: Any, sea: Any):
-        """Springs and friction of points that slide into w, dampers into D."""
-        for i in range(p.count):
-            arm, n, s, u, normal, across, friction, sunk = pressed(view, p, sea, i)
-            unity = ones(normal)
-            zero = unity - unity
-            slides = dot(across, across) - dot(friction, friction)
-            along = positive(normal, p.damping, zero)
-            aside = positive(slides, zero, along)
-            spring = positive(normal, p.stiffness * sunk, zero)
-            held = -(positive(normal, p.stiffness, zero) * s) - along * (u - dot(n, u) * n)
-            f = (spring - along * dot(n, u)) * n + positive(slides, unity, zero) * friction
-            f = f + positive(slides, zero, unity) * held
-            w.force = w.force + f
-            w.torque = w.torque + cross(arm, f)
-            D = add_drag_at(D, aside, arm)
-            lever = cross(arm, n)
-            c = along - aside
-            D = add_outer(D, c * n, c * lever, n, lever)
-        return D, w
-
-    @wp.func
     def contact_push(w: Any, view: Any, p: Any, sea: Any):
-        """All of it at these velocities."""
+        """Push out of the floor, never into it, and along it springs and dampers within the cone of friction."""
         for i in range(p.count):
-            arm, n, s, u, normal, across, friction, sunk = pressed(view, p, sea, i)
-            f = normal * n + friction
+            arm, place, n, sunk = touched(view, p, i)
+            s = to_body(view, stretch(view, p, i, place, n, sunk))
+            n = to_body(view, n)
+            water = water_at(view, arm, sea)
+            v = velocity_at(view, arm) + to_body(view, water.velocity)
+            zero = sunk - sunk
+            into = dot(n, v)
+            normal = positive(sunk, greatest(p.stiffness * sunk - p.damping * into, zero), zero)
+            across = -(p.stiffness * s + p.damping * (v - into * n))
+            f = normal * n + held_within(across, p.friction * normal)
             w.force = w.force + f
             w.torque = w.torque + cross(arm, f)
         return w
+
+    @wp.func
+    def contact_load(D: Any, w: Any, view: Any, p: Any, sea: Any):
+        """The same, with no part in D: so the push that friction follows is the push of the same step."""
+        return D, contact_push(w, view, p, sea)
 
     return {"load": contact_load, "push": contact_push}

@@ -18,7 +18,7 @@ from lgvi_warp.physics.terms.base import Array, Numbers, Packed, PackingContext,
 from lgvi_warp.physics.terms.floor import REST, Floor
 
 # Largest angle [rad] by which the stiffest contact turns in a step, and largest part of a velocity that its dampers take.
-ANGLE, PART = 0.5, 1.0
+ANGLE, PART = 1.0, 1.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -28,10 +28,10 @@ class BottomContact(Term):
     A point that is d in the floor is pushed out by stiffness d + damping times its speed into it, never pulled. Along the
     floor a spring and a damper hold it, up to friction times that push; beyond, it slides. What is at rest stays at rest.
 
-    A step h cannot follow a contact that is too stiff for it: stiffness and damping are at most those with which the vehicle
-    on all its points turns by half a radian of its oscillation in a step, and loses its speed in one. Without numbers of
-    their own they are these, so the floor is the harder, the shorter the step: a vehicle of the weight W in water lies about
-    4 W h^2 / m deep, m its mass with that of the water it moves.
+    A step h cannot follow a contact that is too stiff for it: stiffness and damping are at most those with which the fastest
+    oscillation of the vehicle on all its points turns by 1 rad in a step, and loses its speed in one. Those are the defaults,
+    so the floor is the harder, the shorter the step: a net weight W lies W h^2 / m deep or more, m the mass with that of the
+    water that moves along.
 
     Args:
         points: Points of the hull that may touch the floor, (k, 3) [m] from the body's origin.
@@ -108,11 +108,13 @@ class BottomContact(Term):
             (n,) [N/m] and (n,) [N s/m].
         """
         points, inertia = repeated(numbers["points"], vehicle.inertia6(parameters))
-        mobility, total = np.linalg.inv(inertia), np.zeros(len(points))
+        springs = np.zeros((len(points), 6, 6))
         for r in np.moveaxis(points, 1, 0):
             # The velocity of a point is [I, -hat(r)] (nu; Om).
             G = np.concatenate([np.broadcast_to(np.eye(3), (len(r), 3, 3)), -hat(r)], axis=2)
-            total = total + np.linalg.eigvalsh(G @ mobility @ np.swapaxes(G, 1, 2))[:, -1]
+            springs += np.swapaxes(G, 1, 2) @ G
+        # The largest 1 / mass that all points together move.
+        total = np.abs(np.linalg.eigvals(np.linalg.solve(inertia, springs))).max(axis=1)
         k, c = (ANGLE / h) ** 2 / total, PART / h / total
         k = np.minimum(numbers["stiffness"], k) if "stiffness" in numbers else k
         # Aperiodic, where nothing else is asked for.

@@ -3,12 +3,12 @@
 
 import numpy as np
 
-from lgvi_warp.reference.rotation import Array, cross, hat
+from lgvi_warp.reference.rotation import Array, cross
 from lgvi_warp.reference.terms import Law, View, WaterAt
 
 
 class BottomContact(Law):
-    """points (k, 3) [m]; stiffness [N/m], damping [N s/m] at each, as the step has them; friction.
+    """points (k, 3) [m]; stiffness [N/m], damper [N s/m] at each, as the step has them; friction.
 
     depth and slope (2,): the floor is the plane depth + slope . (north, east). Memory: the anchor (3,) of each point, and 1
     once there is one.
@@ -50,27 +50,18 @@ class BottomContact(Law):
         return self.anchored(view)
 
     def load(self, view: View, water_at: WaterAt) -> tuple[Array, Array]:
-        """Dampers in the matrix, springs and sliding friction in the wrench; velocities are those over ground."""
-        D, w = np.zeros((6, 6)), np.zeros(6)
-        n, k, c = view.R.T @ self.normal, self.stiffness, self.damping
+        """Push and friction at each point, by its velocity over ground."""
+        w, n = np.zeros(6), view.R.T @ self.normal
         for arm, memory in zip(self.points, view.memory.reshape(-1, 4), strict=True):
             place = view.b + view.R @ arm
-            u = view.R.T @ water_at(arm).velocity
-            v = view.nu + cross(view.Om, arm) + u
-            push = k * self.sunk(place) - c * n @ v
+            v = view.nu + cross(view.Om, arm) + view.R.T @ water_at(arm).velocity
+            push = self.stiffness * self.sunk(place) - self.damper * n @ v
             if self.sunk(place) <= 0.0 or push <= 0.0:
                 continue
-            s = view.R.T @ self.stretch(memory, place)
-            across = -k * s - c * (v - (n @ v) * n)
-            friction = within(across, self.friction * push)
-            sliding = float(across @ across) > float(friction @ friction)
-            # Of the velocity (nu; Om) the part that is damped, and its matrix.
-            A = np.hstack([np.eye(3), -hat(arm)])
-            C = c * np.outer(n, n) if sliding else c * np.eye(3)
-            force = k * self.sunk(place) * n - C @ u + (friction if sliding else -k * s)
-            D += A.T @ C @ A
-            w += A.T @ force
-        return D, w
+            across = -self.stiffness * view.R.T @ self.stretch(memory, place) - self.damper * (v - (n @ v) * n)
+            force = push * n + within(across, self.friction * push)
+            w += np.concatenate([force, cross(arm, force)])
+        return np.zeros((6, 6)), w
 
 
 def within(v: Array, most: float) -> Array:

@@ -101,3 +101,9 @@ def with_level(thing: Any, packed: Packed, parameters: Numbers) -> Packed:
 def rise_above(thing: Any, time: Array, parameters: Numbers) -> Any:
     """Height (k, n) [m] of the surface at times (k,) [s] for a thing that may know it; 0 where it does not."""
     return 0.0 if thing.level is None else thing.level.height(own(thing.level, parameters), np.asarray(time))
+
+
+def rise_at_start(terms: Sequence[Any], parameters: Numbers) -> Any:
+    """Height (n,) [m] of the surface at t = 0 by the terms of a scene; 0 where it stays at the depth 0."""
+    level = level_of(terms)
+    return 0.0 if level is None else level.height(own(level, parameters), np.zeros(1))[0]

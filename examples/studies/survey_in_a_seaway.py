@@ -63,20 +63,20 @@ def probability(error):
     return off.mean(), interval.low, interval.high
 
 
-def plot(path, found):
+def plot(path, surveys):
     """Errors over time of the shallowest survey, and the largest error of each vehicle by depth."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
-    time, error = found[DEPTHS[0]]
+    time, error = surveys[DEPTHS[0]]
     for share, color in ((0.98, "#c6dbef"), (0.5, "#6baed6")):
         low, high = np.quantile(error, [0.5 - 0.5 * share, 0.5 + 0.5 * share], axis=1)
         left.fill_between(time, low, high, color=color, label=f"{100 * share:.0f} % of vehicles")
     left.plot(time, error[:, 0], color="#D55E00", linewidth=1.0, label="one of them")
     left.set(xlabel="time [s]", ylabel="below its depth [m]", title=f"survey at {DEPTHS[0]:g} m")
     left.legend(loc="upper right", fontsize=8)
-    for (depth, (_, error)), color in zip(found.items(), ("#D55E00", "#0072B2", "#009E73"), strict=True):
+    for (depth, (_, error)), color in zip(surveys.items(), ("#D55E00", "#0072B2", "#009E73"), strict=True):
         largest = np.sort(np.abs(error).max(axis=0))
         right.plot(largest, 1.0 - np.arange(largest.size) / largest.size, color=color, label=f"at {depth:g} m")
     right.axvline(ALLOWED, color="0.6", linestyle="--")
@@ -89,13 +89,13 @@ def plot(path, found):
 if __name__ == "__main__":
     target = Path(sys.argv[1] if len(sys.argv) > 1 else "runs/survey_in_a_seaway.png")
     target.parent.mkdir(parents=True, exist_ok=True)
-    found = {depth: errors(depth, int(sys.argv[2]) if len(sys.argv) > 2 else 400) for depth in DEPTHS}
-    for depth, (_, error) in found.items():
+    surveys = {depth: errors(depth, int(sys.argv[2]) if len(sys.argv) > 2 else 400) for depth in DEPTHS}
+    for depth, (_, error) in surveys.items():
         print(f"at {depth:g} m: {error.std():.2f} m rms, largest {np.abs(error).max():.2f} m")
-    print(plot(target, found))
+    print(plot(target, surveys))
     told = [
         f"{100 * p:.0f} % [{100 * a:.0f}, {100 * b:.0f}] at {d:g} m"
-        for d, e in found.items()
+        for d, e in surveys.items()
         for p, a, b in [probability(e[1])]
     ]
     print(f"P(depth error > {ALLOWED:g} m) = {', '.join(told)}")

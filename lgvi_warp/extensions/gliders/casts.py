@@ -33,34 +33,34 @@ def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.nd
     place = {name: float(columns.get(name, 0.0)) for name in PLACE}
     arrays = {name: faults.real(name, value) for name, value in found.items()}
     faults.raise_if_any()
-    known = {name: array for name, array in arrays.items() if array is not None}
-    lengths = {array.shape for array in known.values()}
+    numbers = {name: array for name, array in arrays.items() if array is not None}
+    lengths = {array.shape for array in numbers.values()}
     if len(lengths) > 1 or any(len(shape) != 1 for shape in lengths):
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in known.items())
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in numbers.items())
         raise SceneError([f"cast: columns differ in length ({shapes}). Give one number of each for each depth."])
-    if "depth" not in known and "pressure" not in known:
+    if "depth" not in numbers and "pressure" not in numbers:
         raise SceneError(["cast: has no depth. Give a column depth [m] or pressure [dbar]."])
-    if "density" not in known and not {"temperature", "salinity"} <= known.keys():
+    if "density" not in numbers and not {"temperature", "salinity"} <= numbers.keys():
         raise SceneError(["cast: has no density. Give a column density [kg/m3], or temperature and salinity."])
-    return _sorted(*_computed(known, **place))
+    return _sorted(*_computed(numbers, **place))
 
 
-def _computed(known: Mapping[str, np.ndarray], latitude: float, longitude: float) -> tuple[np.ndarray, np.ndarray]:
-    """Depths and densities; TEOS-10 where one of them is not known."""
-    if {"depth", "density"} <= known.keys():
-        return known["depth"], known["density"]
+def _computed(numbers: Mapping[str, np.ndarray], latitude: float, longitude: float) -> tuple[np.ndarray, np.ndarray]:
+    """Depths and densities; TEOS-10 where one of them is not numbers."""
+    if {"depth", "density"} <= numbers.keys():
+        return numbers["depth"], numbers["density"]
     try:
         import gsw
     except ImportError:
         raise MissingExtra("densities of temperatures and salinities", "gsw", "ocean") from None
-    pressure = known.get("pressure")
-    pressure = gsw.p_from_z(-known["depth"], latitude) if pressure is None else pressure
-    depth = known.get("depth")
+    pressure = numbers.get("pressure")
+    pressure = gsw.p_from_z(-numbers["depth"], latitude) if pressure is None else pressure
+    depth = numbers.get("depth")
     depth = -gsw.z_from_p(pressure, latitude) if depth is None else depth
-    if "density" in known:
-        return depth, known["density"]
-    absolute = gsw.SA_from_SP(known["salinity"], pressure, longitude, latitude)
-    conservative = gsw.CT_from_t(absolute, known["temperature"], pressure)
+    if "density" in numbers:
+        return depth, numbers["density"]
+    absolute = gsw.SA_from_SP(numbers["salinity"], pressure, longitude, latitude)
+    conservative = gsw.CT_from_t(absolute, numbers["temperature"], pressure)
     return np.asarray(depth), np.asarray(gsw.rho(absolute, conservative, pressure))
 
 

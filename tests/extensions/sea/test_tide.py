@@ -144,16 +144,16 @@ def test_altitude_of_a_vehicle_that_holds_its_depth_by_pressure():
         period=0.1,
         sensors=[lw.control.Sensor(name="depth_cell", of="depth", reads="pressure")],
         guidance=[lw.control.SetPoint(depth=8.0)],
-        laws=[lw.control.HeavePID(kp=40.0, kd=60.0)],
+        laws=[lw.control.HeavePID(kp=4.0, kd=6.0)],
     )
     scene = neutral(
-        [tide, lw.terms.ControlWrench(), lw.terms.Drag(linear=[20.0] * 6)], controller=controller, events=[floor]
+        [tide, lw.terms.ControlWrench(), lw.terms.Drag(linear=[2.0] * 6)], controller=controller, events=[floor]
     )
     fleet = lw.Ensemble.from_states(scene, [[0.0, 0.0, 7.0]], np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, 3)))
     save = lw.SaveAt(every=20.0, fields=("position", "measured_depth"))
     result = lw.solve(fleet, "rk4", h=0.1, t1=1000.0, save=save)
     ended = result.failure_time[0]
-    # A tide of 0.003 m/s leaves a lag of (drag + kd) / kp times that.
+    # A tide of 0.003 m/s leaves a lag of (drag + kd) / kp = 2 s times that.
     assert result.status.counts() == {"floor": 1}
     assert ended == pytest.approx(500.0, abs=5.0)
     at = (result.time > 60.0) & (result.time < ended)

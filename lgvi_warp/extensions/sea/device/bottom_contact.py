@@ -40,7 +40,7 @@ def touched(view: Any, p: Any, i: int):
 
 @wp.func
 def stretch(view: Any, p: Any, i: int, place: Any, n: Any, sunk: Any):
-    """How far the point is from its anchor, along the floor, and no farther than friction lets the spring be."""
+    """Distance of the point from its anchor along the floor, as far as friction lets the spring be stretched."""
     at = p.memory + wp.static(MEMORY) * i
     anchor = vec3(remembered(view, at), remembered(view, at + 1), remembered(view, at + 2))
     s = remembered(view, at + 3) * (place - anchor)

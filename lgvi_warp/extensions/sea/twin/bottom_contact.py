@@ -25,7 +25,7 @@ class BottomContact(Law):
         return np.asarray(n / np.linalg.norm(n))
 
     def sunk(self, place: Array) -> float:
-        """How deep a place is in the floor [m]."""
+        """Depth of a place in the floor [m]."""
         return float((self.depth + self.slope @ place[:2] - place[2]) * self.normal[2])
 
     def stretch(self, memory: Array, place: Array) -> Array:

@@ -39,7 +39,7 @@ class InTide(Law):
         return replace(view, b=view.b + np.array([0.0, 0.0, self.tide.height(view.t)]))
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """As the law, of the depth below the surface; so are all that follow."""
+        """Wrench of the law at its depth below the surface."""
         return self.inner.wrench(self.below(view))
 
     def flow(self, view: View) -> Flow:

@@ -74,7 +74,8 @@ class Sensor(MeasuringPart):
         place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
             reads the position or the depth of this place.
         reads: How a depth is read: "geometry", the default, the distance from the mean surface; or "pressure", as a pressure
-            cell: p / (rho g), which waves change by their linear theory, the less the deeper. It is 0 out of the water.
+            cell: p / (rho g), below the scene's tide, which waves change by their linear theory, the less the deeper. It is 0
+            out of the water.
 
     The reading of the first tick always arrives, at once and whatever the depth: it stands for what was read before the run,
     on deck. A `DVL`, which needs the floor, has no such reading: its velocity is 0 before the first lock.

@@ -15,7 +15,11 @@ from lgvi_warp.reference.terms.waves import Waves
 class Tide(Law):
     """Numbers as those of `lw.terms.Tide`: amplitudes, periods and phases (k,); times and heights (m,); mean."""
 
-    amplitudes = periods = phases = times = heights = ()
+    amplitudes: Any = ()
+    periods: Any = ()
+    phases: Any = ()
+    times: Any = ()
+    heights: Any = ()
     mean = 0.0
 
     def height(self, t: float) -> float:

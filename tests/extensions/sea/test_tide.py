@@ -5,8 +5,18 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.extensions.gliders.twin.buoyancy_engine import BuoyancyEngine
+from lgvi_warp.extensions.gliders.twin.surface_buoyancy import SurfaceBuoyancy
+from lgvi_warp.extensions.sea.twin.tide import InTide
+from lgvi_warp.extensions.sea.twin.tide import Tide as TideTwin
 from lgvi_warp.physics.terms.base import own
+from lgvi_warp.reference.terms.waves import Waves
+from tests.extensions.gliders.cases import BALL, BUOYANCY, CENTER_OF_BUOYANCY, ENGINE, WATER
+from tests.laws.case import Case
+from tests.laws.cases_water import GRAVITY, WAVES, arrays
+from tests.laws.test_parity import both
 from tests.laws.test_waves import cell, neutral
+from tests.support.tools import difference
 
 CONSTITUENTS = dict(amplitudes=[0.5], periods=[400.0], phases=[0.3])
 TABLE = dict(times=[0.0, 100.0, 300.0], heights=[0.0, 0.2, -0.1])
@@ -158,3 +168,21 @@ def test_altitude_of_a_vehicle_that_holds_its_depth_by_pressure():
     assert ended == pytest.approx(500.0, abs=5.0)
     at = (result.time > 60.0) & (result.time < ended)
     np.testing.assert_allclose(result.measured_depth[at, 0], 8.0, atol=0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.kernel
+def test_kernel_and_twin():
+    # Waves, a hull at the surface and an engine, each at its depth below a tide that moves fast; 20 steps of round-off.
+    numbers = dict(amplitudes=[0.3], periods=[2.0], phases=[0.4], times=[0.0, 0.1, 0.3], heights=[0.0, 0.2, -0.1])
+    twin = TideTwin(**numbers, mean=0.2)
+    waves = Waves(**arrays(WAVES), gravity=GRAVITY)
+    hull = SurfaceBuoyancy(**arrays(BALL), section="box", buoyancy=BUOYANCY, center_of_buoyancy=CENTER_OF_BUOYANCY)
+    engine = BuoyancyEngine(**{name: np.asarray(value) for name, value in ENGINE.items()}, **WATER)
+    laws = tuple(InTide(law=law, tide=twin) for law in (waves, hull.beside((waves,)), engine))
+    terms = [
+        *(lw.terms.Tide(**numbers, mean=0.2), lw.terms.Waves(**WAVES)),
+        *(lw.terms.SurfaceBuoyancy(**BALL, section="box"), lw.terms.BuoyancyEngine(**ENGINE)),
+    ]
+    kernel, reference = both(Case(tuple(terms), laws), "psi_s", 0.02, 20)
+    assert difference(kernel, reference) < 1e-12

@@ -14,7 +14,7 @@ FEET = [[0.5, 0.5, 0.6], [0.5, -0.5, 0.6], [-0.5, 0.5, 0.6], [-0.5, -0.5, 0.6]]
 
 frame = lw.Vehicle(
     mass=90.0, inertia=[14.0, 14.0, 12.0], added_mass=[50.0, 50.0, 70.0],
-    buoyancy=820.0, center_of_buoyancy=[0.0, 0.0, -0.25],
+    buoyancy=820.0, center_of_buoyancy=[0.0, 0.0, -0.05],
 )  # fmt: skip
 edge = DEPTH + 500.0 * np.tan(np.radians(SLOPE_DEG)) * np.array([-1.0, 1.0])
 floor = lw.events.Floor(

@@ -45,7 +45,7 @@ def on_slope(friction, current=0.0, height=0.3):
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_rest_below_the_angle_of_friction_and_slide_above_it(method):
     # tan 20 deg = 0.364. Still water, and water that flows by without drag: friction is that of velocities over ground.
-    fleet = on_slope([0.6, 0.2, 0.6, 0.2], [0.0, 0.0, 0.2, 0.2])
+    fleet = on_slope([0.6, 0.2, 0.6, 0.2], [0.0, 0.0, 1.0, 1.0])
     result = lw.solve(fleet, method, h=0.02, t1=8.0, save=lw.SaveAt(every=1.0))
     assert result.status.counts() == {"ok": 4}
     ground = np.einsum("knij,knj->kni", result.attitude, result.velocity)

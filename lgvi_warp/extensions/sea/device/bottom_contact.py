@@ -70,8 +70,9 @@ def drag_along(view: Any, p: Any):
 
 @wp.func
 def evolve(state: Any, view: Any, p: Any):
-    """Before the kick and after it, where water has carried the vehicle."""
-    drag_along(view, p)
+    """After the kick, where its force was: before it the water has not carried the vehicle there yet."""
+    if view.second > 0:
+        drag_along(view, p)
     return state
 
 

@@ -42,8 +42,8 @@ class BottomContact(Law):
         return np.array(rows)
 
     def evolve(self, view: View, second: bool) -> Array:
-        """See `anchored`."""
-        return self.anchored(view)
+        """See `anchored`; after the kick, where its force was."""
+        return self.anchored(view) if second else view.memory
 
     def follow(self, view: View) -> Array:
         """See `anchored`."""

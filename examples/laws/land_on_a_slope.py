@@ -72,7 +72,6 @@ if __name__ == "__main__":
     result = landed(60)
     rests, friction = at_rest(result), result.parameters["bottom_contact.friction"]
     print(f"{rests.sum()} of {rests.size} landers rest, with a friction from {friction[rests].min():.2f}")
-    print(
-        f"the others slide, with up to {friction[~rests].max():.2f}; the slope's tangent is {np.tan(np.radians(SLOPE_DEG)):.2f}"
-    )
+    steep = np.tan(np.radians(SLOPE_DEG))
+    print(f"the others slide, with up to {friction[~rests].max():.2f}; the slope's tangent is {steep:.2f}")
     print(plot(target, result))

@@ -261,7 +261,7 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
     module = built_in(folder, device) if isinstance(device, str) else device
     if isinstance(device, str) and (type(term), device) in suitable:
-        return _below(term, module)
+        return _below(term, module, built_in)
     faults = Faults()
     if module is None:
         faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
@@ -292,16 +292,14 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     faults.raise_if_any()
     if isinstance(device, str):
         suitable.add((type(term), device))
-    return _below(term, module)
+    return _below(term, module, built_in)
 
 
-def _below(term: Term, module: Any) -> Any:
+def _below(term: Term, module: Any, built_in: Callable[[str, str], Any]) -> Any:
     """The device code of a term below the surface of its scene; a sensor reads its height itself."""
     if term.level is None or isinstance(term, Part):
         return module
-    from lgvi_kernels.tide import in_tide
-
-    return in_tide(module)
+    return built_in("laws", term.level.device).in_tide(module)
 
 
 def _folder_and_roles(term: Term) -> tuple[str, Sequence[str]]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, MissingExtra, SceneError, refusal
+from lgvi_warp.common.reading import file_text
 
 # Columns, by the words with which their names may begin.
 WORDS = {
@@ -81,10 +82,7 @@ def _of_file(path: Path) -> dict[str, Any]:
 
 
 def _of_csv(path: Path) -> dict[str, Any]:
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise refusal("file", str(path), f"cannot be read ({error})", "give a text file with a line of names") from None
+    lines = file_text(path, "cast").lstrip("\ufeff").splitlines()
     lines = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "*"))]
     rows = [[cell.strip() for cell in row] for row in csv.reader(lines, _dialect(lines[:1]))]
     if len(rows) < 2:

@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.physics.terms.base import Array, Numbers, Packed, Term, own
 
 
-class Level(Term):
+class SurfaceLevel(Term):
     """A height of the surface that changes with time. Abstract.
 
     Methods:
@@ -73,9 +73,9 @@ class Level(Term):
         raise NotImplementedError
 
 
-def level_of(terms: Sequence[Any]) -> Level | None:
+def level_of(terms: Sequence[Any]) -> SurfaceLevel | None:
     """The height of the surface among the terms of a scene; None where it stays at the depth 0."""
-    return next((term for term in terms if isinstance(term, Level)), None)
+    return next((term for term in terms if isinstance(term, SurfaceLevel)), None)
 
 
 def below(thing: Any, terms: Sequence[Any]) -> Any:

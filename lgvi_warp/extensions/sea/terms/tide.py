@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, knots, number, rows_of, side_by_side
-from lgvi_warp.physics.terms.surface_level import Level
+from lgvi_warp.physics.terms.surface_level import SurfaceLevel
 
 # Seconds of a constituent of 1 deg/h.
 PERIOD = 360.0 * 3600.0
@@ -21,7 +21,7 @@ WHY = "the largest tides are 8 m above their mean: is it in feet or cm?"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Tide(Level):
+class Tide(SurfaceLevel):
     """A tide, which moves the surface and leaves the floor and the inertial axes where they are.
 
     Height of the surface above the depth 0: mean + sum of amplitude cos(2 pi t / period + phase) + table at t. By it go the

@@ -91,6 +91,17 @@ def waves():
     )
 
 
+def sea():
+    """Twenty components, as `sea_state` has by default."""
+    turn = np.arange(20)
+    return terms.Waves(
+        amplitudes=[0.08] * 20,
+        periods=np.linspace(4.5, 9.0, 20),
+        headings_deg=20.0 + 50.0 * np.sin(2.4 * turn),
+        phases=0.8 * turn,
+    )
+
+
 def gauss_markov_current():
     return terms.GaussMarkovCurrent(standard_deviation=[0.1, 0.1, 0.02], time_constant=20.0)
 
@@ -264,6 +275,7 @@ def each_term():
     pumped = replace(buoyancy_engine(), efficiency=0.5)
     glider["buoyancy_engine, energy_use"] = scene(pumped, terms.EnergyUse(hotel=20.0))
     glider["stratification, compressibility"] = scene(replace(stratification(), compressibility=0.003))
+    glider["waves, 20 components"] = scene(sea())
     x = np.linspace(-50.0, 50.0, 101)
     hills = 60.0 + np.sin(x / 5.0)[:, None] * np.cos(x / 7.0)
     floor = lw.events.Floor(depth=hills, origin=[-50.0, -50.0], spacing=[1.0, 1.0])

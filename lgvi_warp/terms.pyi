@@ -3,11 +3,14 @@
 
 from lgvi_warp.extensions.gliders.terms.ballast import Ballast as Ballast
 from lgvi_warp.extensions.gliders.terms.buoyancy_engine import BuoyancyEngine as BuoyancyEngine
+from lgvi_warp.extensions.gliders.terms.density_profile import DensityProfile as DensityProfile
 from lgvi_warp.extensions.gliders.terms.moving_mass import MovingMass as MovingMass
 from lgvi_warp.extensions.gliders.terms.polar import Polar as Polar
 from lgvi_warp.extensions.gliders.terms.stratification import Stratification as Stratification
 from lgvi_warp.extensions.gliders.terms.surface_buoyancy import SurfaceBuoyancy as SurfaceBuoyancy
+from lgvi_warp.extensions.sea.terms.bottom_contact import BottomContact as BottomContact
 from lgvi_warp.extensions.sea.terms.sea_state import SeaState as SeaState
+from lgvi_warp.extensions.sea.terms.tide import Tide as Tide
 from lgvi_warp.physics.terms.control_fins import ControlFins as ControlFins
 from lgvi_warp.physics.terms.control_wrench import ControlWrench as ControlWrench
 from lgvi_warp.physics.terms.cross_flow import CrossFlow as CrossFlow

@@ -125,6 +125,8 @@ MADE = {
     "guide/where_to_search.png": of_example("examples/where_to_search.py", "where_to_search.png"),
     "guide/glider_survey.png": of_script("examples/studies/glider_survey.py"),
     "guide/survey_how_far_off.png": of_script("examples/studies/survey_how_far_off.py"),
+    "guide/survey_in_a_seaway.png": of_script("examples/studies/survey_in_a_seaway.py"),
+    "guide/land_on_a_slope.png": of_script("examples/laws/land_on_a_slope.py"),
     "guide/rescue_vehicle.png": of_script("examples/laws/rescue_vehicle.py"),
     "guide/tune_worst_5_percent.png": of_script("examples/sweeps/tune_worst_5_percent.py"),
     **{

@@ -8,6 +8,7 @@ The rooms; each may import from the earlier ones only:
 - law.py: what the author of a force or of an event imports;
 - cells.py: grids that laws and events look things up in;
 - swell.py: surface and pressure of waves, for laws and sensors that look at them;
+- tide.py: height of the surface over time, for those who look at the depth below it;
 - laws, stops: one file for each force, one file for each event;
 - maps: the maps that a step is made of, and the solvers of equation (24);
 - advance: the kernel. method.py makes a step from maps and laws, stepping.py loops over steps, chunks.py looks at the alarms

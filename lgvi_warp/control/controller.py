@@ -25,6 +25,7 @@ from lgvi_warp.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.physics.terms import from_list
 from lgvi_warp.physics.terms.base import Term, build, check_list
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
+from lgvi_warp.physics.terms.surface_level import below
 from lgvi_warp.physics.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -218,7 +219,7 @@ class Controller(Documented):
         object.__setattr__(wired, "actuators", actuators)
         object.__setattr__(wired, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
         for section in ("sensors", "guidance", "laws"):
-            known = (part.beside((*terms, *events)) for part in getattr(wired, section))
+            known = (below(part.beside((*terms, *events)), terms) for part in getattr(wired, section))
             parts = tuple(part.in_scene(faults, events, wired.sensors) for part in known)
             object.__setattr__(wired, section, parts)
         faults.raise_if_any()

@@ -36,6 +36,8 @@ PLACED = "place"
 GIVEN = "given"
 # What it has where it reads a depth by the pressure: in still water, below waves in deep water, and in water with a floor.
 PRESSURE = ("still", "waves", "finite")
+# What it has where a tide moves the surface above it.
+TIDE = "tide"
 # What it has where an estimator takes its readings.
 HANDED = "handed"
 # Below any depth, within float32.
@@ -72,7 +74,8 @@ class Sensor(MeasuringPart):
         place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
             reads the position or the depth of this place.
         reads: How a depth is read: "geometry", the default, the distance from the mean surface; or "pressure", as a pressure
-            cell: p / (rho g), which waves change by their linear theory, the less the deeper. It is 0 out of the water.
+            cell: p / (rho g), below the scene's tide, which waves change by their linear theory, the less the deeper. It is 0
+            out of the water.
 
     The reading of the first tick always arrives, at once and whatever the depth: it stands for what was read before the run,
     on deck. A `DVL`, which needs the floor, has no such reading: its velocity is 0 before the first lock.
@@ -91,7 +94,7 @@ class Sensor(MeasuringPart):
     """
 
     type: ClassVar[str] = "sensor"
-    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, PLACED, *PRESSURE, GIVEN, HANDED)
+    every_feature: ClassVar[tuple[str, ...]] = (*IDLE, PLACED, *PRESSURE, TIDE, GIVEN, HANDED)
     handed_flags: ClassVar[int] = 1
     # The waves whose pressure it reads; set for a part of a scene.
     waves: ClassVar[tuple[WaveTerm, ...]] = ()
@@ -157,6 +160,10 @@ class Sensor(MeasuringPart):
                 "reads", self.reads, f"has no meaning for a sensor of {self.of}", 'leave it out, or give of = "depth"'
             )
 
+    @property
+    def looks_at_surface(self) -> bool:  # type: ignore[override]
+        return self.reads == "pressure"
+
     def beside(self, terms: Sequence[Term]) -> Any:
         # Knows the waves whose pressure it reads.
         waves = waves_of(terms) if self.reads == "pressure" else ()
@@ -183,7 +190,7 @@ class Sensor(MeasuringPart):
         acting = tuple(name for name in acting if IDLE_WITHOUT.get(name, name) in acting)
         placed: tuple[str, ...] = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
         if self.reads == "pressure":
-            placed += (water_of(self.waves) if self.waves else "still",)
+            placed += (water_of(self.waves) if self.waves else "still",) + (TIDE,) * (self.level is not None)
         return (
             (*(name for name in acting if name != "latency"), *placed, HANDED) if self.is_handed else (*acting, *placed)
         )

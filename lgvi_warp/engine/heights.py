@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.engine.states import into
+from lgvi_warp.physics.terms.surface_level import level_of
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.plausibility import LIMITS, ends_at_the_surface, floats, wave_periods
 
@@ -32,7 +33,8 @@ class Heights:
 
     def __init__(self, scene: SceneLike, depth: np.ndarray):
         self._open = not (ends_at_the_surface(scene) or floats(scene))
-        self._limit = LIMITS["height"].value
+        level = level_of(scene.terms)
+        self._limit = LIMITS["height"].value + (level.highest() if level else 0.0)
         # Of a start above the surface a message of its own tells.
         self._above = depth < 0.0
         self._height, self._step = np.full(len(depth), -np.inf), np.zeros(len(depth), np.int64)

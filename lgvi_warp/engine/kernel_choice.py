@@ -143,7 +143,7 @@ def choose_kernel(
         user_axes=user_axes,
         parts=tuple(name for name, wanted in contents.items() if wanted),
         coupling=tuple(i in facts.couplings for i in range(len(COUPLINGS))),
-        timed=any(term.timed for term, _ in (*acting, *events)) or facts.delayed,
+        timed=any(term.timed or term.level for term, _ in (*acting, *events)) or facts.delayed,
         memory=memory or method.gauss > 0,
         program=maps,
         lead=lead,
@@ -263,7 +263,7 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
     module = built_in(folder, device) if isinstance(device, str) else device
     if isinstance(device, str) and (type(term), device) in suitable:
-        return module
+        return _below(term, module, built_in)
     faults = Faults()
     if module is None:
         faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
@@ -294,7 +294,14 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     faults.raise_if_any()
     if isinstance(device, str):
         suitable.add((type(term), device))
-    return module
+    return _below(term, module, built_in)
+
+
+def _below(term: Term, module: Any, built_in: Callable[[str, str], Any]) -> Any:
+    """The device code of a term below the surface of its scene; a sensor reads its height itself."""
+    if term.level is None or isinstance(term, Part):
+        return module
+    return built_in("laws", term.level.device).in_tide(module)
 
 
 def with_tables(part: Any, module: Any) -> Any:

@@ -25,6 +25,7 @@ from lgvi_warp.methods import modified_inertia
 from lgvi_warp.physics import inertia, notation, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
+from lgvi_warp.physics.terms.surface_level import with_level
 from lgvi_warp.sampling.final import MEMORY, Final
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.draws import KEPT
@@ -129,7 +130,7 @@ class Packing:
         if term in terms.IMPLIED:  # packed when the kernel was chosen; neither depends on the step
             packed = self.plan.shared(("implied", term.key), numbers, lambda own: term.packed({}, self._context(own)))
         elif i > 0 or not self.plan.spec.drag:
-            packed = self._with_normals(term, numbers, term.packed(parameters, self._context(numbers)))
+            packed = self._with_rows(term, numbers, term.packed(parameters, self._context(numbers)))
         elif module is built_in("laws", term.exact_flow[0]):
             frame = numbers[FRAME][0]
             packed = term.packed_exact(parameters, frame, self._scale(frame))
@@ -137,8 +138,9 @@ class Packing:
             packed = term.packed_directions(parameters, self._context(numbers))
         return packed
 
-    def _with_normals(self, term: Term, numbers: Any, packed: Packed) -> Packed:
-        """Packed numbers of a term, with its rows of the normals that the call gives."""
+    def _with_rows(self, term: Term, numbers: Any, packed: Packed) -> Packed:
+        """Packed numbers of a term, with its rows of the surface and of the normals that the call gives."""
+        packed = with_level(term, packed, numbers)
         if self.members.given is None or self.members.given.rows(term.key) is None:
             return packed  # and stays shared, if it was
         given = self._context(numbers).given
@@ -156,7 +158,7 @@ class Packing:
     def _packed(self, kind: str, terms: Iterable[Term]) -> list[Packed]:
         def pack(term: Term, numbers: Any) -> Packed:
             packed = packed_with_tables(term, Ensemble.own(term, numbers), self._context(numbers))
-            return self._with_normals(term, numbers, packed)
+            return self._with_rows(term, numbers, packed)
 
         return [self._shared((kind, i), functools.partial(pack, term)) for i, term in enumerate(terms)]
 

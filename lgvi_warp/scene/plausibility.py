@@ -21,6 +21,7 @@ from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins
 from lgvi_warp.physics.terms.quadratic_form import QuadraticForm, drives
 from lgvi_warp.physics.terms.strips import StripTerm
+from lgvi_warp.physics.terms.surface_level import rise_at_start
 from lgvi_warp.physics.terms.waves import WaveTerm
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
@@ -278,7 +279,8 @@ def of_start(scene: SceneLike, members: Members, first: int = 0) -> Oddities:
 
 
 def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
-    speed, depth = _speed(members.velocity), members.position[:, 2]
+    speed = _speed(members.velocity)
+    depth = members.position[:, 2] + rise_at_start(scene.terms, members.parameters)
     limit = LIMITS["speed"].value
     yield "start.velocity", speed > limit, lambda i: f"a speed of {speed[i]:.4g} m/s is beyond {limit:g} m/s: a unit?"
     if not ends_at_the_surface(scene) and not floats(scene):
@@ -309,7 +311,7 @@ def beyond(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
                 b[:, 2] + left <= LIMITS["depth"].value, np.inf, left
             )  # `depths` tells of a floor above the sea
         elif event.type == "surface":
-            left = b[:, 2] - numbers["depth"]
+            left = b[:, 2] + rise_at_start(scene.terms, members.parameters) - numbers["depth"]
         elif event.type == "box":
             left = np.minimum(b - numbers["lower"], numbers["upper"] - b).min(axis=1)
         else:

@@ -23,6 +23,7 @@ from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events
+from lgvi_warp.physics.terms.surface_level import below
 from lgvi_warp.physics.vehicle import UNITS, Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
 from lgvi_warp.scene.ensemble import Ensemble
@@ -164,7 +165,8 @@ class Scene(Summarized):
         wired = tuple(term.driven_by(bus if term.key in driven else None) for term in terms)
         nominal = self._nominal()
         every = (*wired, *self.events)
-        object.__setattr__(self, "terms", tuple(term.beside(every).of_vehicle(nominal) for term in wired))
+        object.__setattr__(self, "terms", tuple(below(term.beside(every), wired).of_vehicle(nominal) for term in wired))
+        object.__setattr__(self, "events", tuple(below(event.beside(every), wired) for event in self.events))
 
     def _nominal(self) -> dict[str, np.ndarray]:
         """The numbers of the vehicle and its environment by name."""

@@ -13,7 +13,7 @@ from tests.house.graph import ROOMS, Import, arrows_up, circle, circles_of_folde
 OPTIONAL = {
     "SALib", "matplotlib", "rerun", "rerun_cli", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow",
     "PIL", "gymnasium", "tqdm", "control", "tomlkit", "h5netcdf", "h5py", "dask", "pyproj", "rasterio", "mcap", "mcap_ros2",
-    "stable_baselines3", "shtab", "pandas", "contourpy",
+    "stable_baselines3", "shtab", "pandas", "contourpy", "gsw",
 }  # fmt: skip
 DEVICE_OF_EXTENSIONS, TWIN_OF_EXTENSIONS = (
     re.compile(rf"lgvi_warp\.extensions\.\w+\.{folder}\b") for folder in ("device", "twin")
@@ -104,7 +104,7 @@ def test_only_these_files_of_the_engine_know_the_kernels():
 
 def test_the_engine_knows_no_law_by_name():
     # Base classes, and what all laws share: a law says of itself what a kernel must know (`Term.exact_flow`, `carries` ...).
-    general = {f"physics.terms.{name}" for name in ("base", "noisy", "events")}
+    general = {f"physics.terms.{name}" for name in ("base", "noisy", "events", "surface_level")}
     general |= {f"control.{name}" for name in ("base", "controller", "signals")}
     single = {
         (module, found.name)

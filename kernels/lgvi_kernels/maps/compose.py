@@ -124,7 +124,7 @@ def superpose(laws, role):
 
 def _sees(law, role):
     """Whether a law looks at the water in this role."""
-    return getattr(law, "SEES", False) and hasattr(law, role.removeprefix(SETTLED))
+    return role.removeprefix(SETTLED) in getattr(law, "SEES", ())
 
 
 def _handing_on(nested):

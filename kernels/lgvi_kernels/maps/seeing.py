@@ -20,10 +20,8 @@ from lgvi_kernels.maps.compose import superpose
 class SeeingLaw:
     """A law with the functions that it makes for the water of a scene; all else is the law's own."""
 
-    SEES = True
-
     def __init__(self, law, roles):
-        self.device = law
+        self.device, self.SEES = law, frozenset(roles)
         vars(self).update(roles)
 
     def __getattr__(self, name):

@@ -7,6 +7,8 @@ import warp as wp
 
 from lgvi_kernels.law import *
 
+params = make_params("numbers_surface", lanes="depth")
+
 
 @wp.func
 def distance(view: Any, p: Any):

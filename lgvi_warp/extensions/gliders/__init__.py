@@ -7,6 +7,7 @@ HOLDS = {
     "terms": {
         "ballast": ".terms.ballast",
         "buoyancy_engine": ".terms.buoyancy_engine",
+        "density_profile": ".terms.density_profile",
         "moving_mass": ".terms.moving_mass",
         "polar": ".terms.polar",
         "stratification": ".terms.stratification",

@@ -249,6 +249,9 @@ class Term(Documented):
     usual: ClassVar[Mapping[str, str | tuple[float, str]]] = {}
     depth_field: ClassVar[str] = ""
     floats: ClassVar[bool] = False
+    # Whether it looks at the depth below the surface, and the term that moves that; set for a term of a scene.
+    looks_at_surface: ClassVar[bool] = False
+    level: ClassVar[Any] = None
     # Numbers in (0, 1) that each member of an ensemble draws by itself, unless they vary otherwise.
     drawn: ClassVar[tuple[str, ...]] = ()
 

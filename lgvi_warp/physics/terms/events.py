@@ -70,6 +70,7 @@ class Surface(Event):
 
     type: ClassVar[str] = "surface"
     status: ClassVar[Status] = Status.SURFACE
+    looks_at_surface: ClassVar[bool] = True
 
     depth: Any = number((), "m", 0.0)
 

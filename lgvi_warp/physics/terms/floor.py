@@ -10,14 +10,18 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, own
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number, own
 from lgvi_warp.physics.terms.events import Box, Event
 from lgvi_warp.physics.terms.in_files import InFile, numbers_in
 
 # Depths between which the box of a grid lies [m]: beyond any sea.
 ABOVE, BELOW = -1e5, 1e5
+# Ways of contact; how far above where a member is the event is kept of one on which it may rest [m].
+STOP, REST = "stop", "rest"
+FAR_BELOW = 1e6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,6 +36,7 @@ class Floor(InFile, Event):
         origin: Place of the grid's first node, (2,) [m]: north and east; zeros by default.
         spacing: Distance of the nodes along north and east, (2,) [m]; needed with a grid.
         clearance: How far above the floor members stop [m]; 0 where it is left out. Give it where it is to vary.
+        contact: "stop", the default, or "rest": members land there by a term `lw.terms.BottomContact`.
 
     Methods:
         from_file: Floor of a chart, in a raster or a data set.
@@ -55,7 +60,7 @@ class Floor(InFile, Event):
     type: ClassVar[str] = "floor"
     depth_field: ClassVar[str] = "depth"
     status: ClassVar[Status] = Status.FLOOR
-    of_file_besides: ClassVar[tuple[str, ...]] = ("file", "clearance", "name")
+    of_file_besides: ClassVar[tuple[str, ...]] = ("file", "clearance", "contact", "name")
     of_file_by: ClassVar[str] = "from_file"
 
     depth: Any = number(("x", "y"), "m")
@@ -63,6 +68,7 @@ class Floor(InFile, Event):
     spacing: Any = number((2,), "m", None, above=0.0, optional=True)
     # Absent where it is not given, so that a scene without it has no such parameter.
     clearance: Any = number((), "m", None, optional=True)
+    contact: str = word(STOP, known=(STOP, REST))
 
     @classmethod
     def from_file(
@@ -77,6 +83,7 @@ class Floor(InFile, Event):
         fill: str = "refuse",
         attributes: Mapping[str, Any] | None = None,
         clearance: Any = None,
+        contact: str = STOP,
         name: str = "",
     ) -> Self:
         """Read a floor on a grid from a file: NetCDF in the CF conventions, such as GEBCO's, or a GeoTIFF.
@@ -92,6 +99,7 @@ class Floor(InFile, Event):
             fill: What stands where depths are missing: "refuse", the default, nothing; "nearest"; or "zero", land.
             attributes: Attributes that a NetCDF file lacks or has wrong, for instance {"z.grid_mapping": "EPSG:3996"}.
             clearance: How far above the floor members stop [m]; 0 where it is left out.
+            contact: "stop", the default, or "rest", as of the class.
             name: As of `Event`.
 
         Returns:
@@ -117,7 +125,7 @@ class Floor(InFile, Event):
                   "fill": fill, "attributes": attributes}  # fmt: skip
         numbers = numbers_in(file, cls, wanted)
         at = {"depth": numbers.depth, "origin": numbers.origin, "spacing": numbers.spacing}
-        return cls(**at, clearance=clearance, name=name)
+        return cls(**at, clearance=clearance, contact=contact, name=name)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -148,11 +156,19 @@ class Floor(InFile, Event):
             if value is not None and not self.on_grid:
                 faults.add(name, value, "is given for a floor of one depth", "leave it out, or give a grid of depths")
 
+    def beside(self, terms: Sequence[Term]) -> Any:
+        # Nothing would hold a vehicle on a floor that neither stops it nor pushes.
+        if self.contact == REST and not any(getattr(term, "floor", None) in ("", self.key) for term in terms):
+            problem = "has no term by which the vehicle rests on the floor"
+            remedy = 'give [[terms]] type = "bottom_contact" and its points, or contact = "stop"'
+            raise refusal(f"{self.key}.contact", self.contact, problem, remedy)
+        return self
+
     def device_in(self, aligned: bool) -> str:
         return "floor:grid" if self.on_grid else "floor"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        clearance = numbers.get("clearance", np.zeros(1))
+        clearance = numbers.get("clearance", np.zeros(1)) - FAR_BELOW * (self.contact == REST)
         if not self.on_grid:
             return Packed({"depth": numbers["depth"] - clearance})
         return self.packed_grid(numbers, {"clearance": clearance})

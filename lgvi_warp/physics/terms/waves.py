@@ -14,6 +14,7 @@ from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.physics.terms.base import Array, Numbers, Packed, PackingContext, Term, number, own
 from lgvi_warp.physics.terms.current_harmonics import Harmonics
+from lgvi_warp.physics.terms.surface_level import rise_above
 
 # Decay to the floor, e^(-k h), of deep water: its square is 0 in float32.
 DEEP = 1e-30
@@ -76,6 +77,7 @@ class WaveTerm(Term):
     # Uniform currents, and the flat floor whose depth is the sea's; set for a term of a scene.
     currents: ClassVar[tuple[Term, ...]] = ()
     floor: ClassVar[Any] = None
+    looks_at_surface: ClassVar[bool] = True
 
     depth: Any = number((), "m", None, above=0.0, optional=True, infinite=True)
     periods_of: str = word("ground", known=("ground", "water"))
@@ -167,6 +169,8 @@ class WaveTerm(Term):
         if not self.finite:
             return np.inf
         depth = parameters[f"{self.floor.key}.depth"] if self.floor is not None else numbers["depth"]
+        if self.floor is not None and self.level is not None:
+            depth = depth + self.level.mean_height(own(self.level, parameters))
         return depth[:, None]
 
     def device_in(self, aligned: bool) -> str:
@@ -188,6 +192,7 @@ class WaveTerm(Term):
         # Orbital velocity (k, n, 3) [m/s] at positions and times; above the surface as there, below the floor as there.
         total = np.zeros(position.shape)
         x, y, depth = np.moveaxis(position, -1, 0)
+        depth = depth + rise_above(self, time, parameters)
         for j in range((components := self.wave_table(numbers, parameters)).k.shape[1]):
             north, east, k, omega, phase, ahead, aside, down, f, *_ = (table[:, j] for table in components)
             theta = north * x + east * y + (phase - omega * time[:, None])

@@ -130,6 +130,8 @@ OTHERS = {
     "SurfaceBuoyancy": lambda: lw.terms.SurfaceBuoyancy(heights=0.3),
     "OpenLoops": lambda: lw.linear.OpenLoops("N", (None,), ("N",), 0.1, np.array(["is lost"])),
     "SeaState": lambda: lw.terms.SeaState(significant_height=1.0, peak_period=6.0, heading_deg=30.0),
+    "Tide": lambda: lw.terms.Tide(mean=1.0), "BottomContact": lambda: lw.terms.BottomContact(points=[V]),
+    "DensityProfile": lambda: lw.terms.DensityProfile(depths=[0.0, 1.0], densities=[1000.0, 1010.0]),
     "RotationNormal": lambda: lw.distributions.RotationNormal(std=0.1),
     "Histogram": lambda: lw.statistics.Histogram("depth", edges=[0.0, 1.0]),
     "Derived": lambda: lw.distributions.Derived({"vehicle.mass": scaled}, k=lw.distributions.Normal(std=0.1)),

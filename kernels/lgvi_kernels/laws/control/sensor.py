@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels import device
+from lgvi_kernels import device, tide
 from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.readings import make_reading, remember3, remembered3
@@ -158,6 +158,7 @@ def made(features):
     """
     of, *others = features
     handed, deep, placed = (name in others for name in ("handed", "deepest", "place"))
+    tidal = "tide" in others
     by_pressure = [name for name in others if name in PRESSURE]
     in_waves = by_pressure not in ([], ["still"])
     head_of = PRESSURE[by_pressure[0]] if in_waves else head
@@ -191,6 +192,7 @@ def made(features):
         words = {"memory": wp.int32, "sets": wp.int32} | ({"handed": wp.int32} if handed else {})
         vectors |= {"place": Lane3} if placed else {}
         words |= {"first": wp.int32, "waves": wp.int32} if in_waves else {}
+        words |= dict.fromkeys(("first", *tide.FIELDS), wp.int32) if tidal else {}
         return vectors | lanes | key | words
 
     def params(width, real):
@@ -226,6 +228,10 @@ def made(features):
             y.position = y.position + arm
         if wp.static(len(by_pressure) > 0):
             depth = y.position.z
+            if wp.static(tidal):
+                height = tide.rise(y, p)
+                depth = depth + height
+                at = vec3(at.x, at.y, at.z + height)
             if wp.static(in_waves):
                 depth = depth + head_of(y, p.first, p.waves, at)
             y.position = vec3(y.position.x, y.position.y, greatest(depth, zero))

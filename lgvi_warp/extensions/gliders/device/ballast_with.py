@@ -11,6 +11,7 @@ from lgvi_kernels.lanes.sums import carried
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.driven import make_driven
 from lgvi_kernels.laws.scheduled import make_scheduled
+from lgvi_warp.extensions.gliders.device.density import column, relative_density
 
 # Rows of one volume: buoyancy of 1 m3 [N] and the same times the point (3); then limit, 1 / lag, limit of the rate.
 ROWS = 7
@@ -19,7 +20,7 @@ ROWS = 7
 POWERED_ROWS, INVERSE, TALLY = 8, 4, 2
 
 
-def make_work(following):
+def make_work(following, profiled):
     """The roles evolve and follow, which also account p dV / efficiency where a volume rises."""
     evolve, follow, place, commanded = following.evolve, following.follow, following.place, following.commanded
     look_up = following.look_up
@@ -31,7 +32,10 @@ def make_work(following):
         at = p.first + wp.static(POWERED_ROWS) * i
         tally = p.memory + p.tally + wp.static(TALLY) * i
         zero = volume - volume
-        pressure = greatest(row1(view, at) * view.b.z + dot(row3(view, at + 1), view.down), zero)
+        weight = row1(view, at) * view.b.z + dot(row3(view, at + 1), view.down)
+        if wp.static(profiled):
+            weight = row1(view, at) * column(view, p.first + p.shared, p.size, weight / row1(view, at))
+        pressure = greatest(weight, zero)
         last = remembered(view, tally + 1)
         before = positive(last + ones(last), positive(middle, pressure, last), pressure)
         risen = greatest(volume - remembered(view, tally), zero)
@@ -75,8 +79,9 @@ def make_work(following):
 
 @functools.cache
 def made(features):
-    """The law of ballast with these features: "scheduled" or "driven", "lag", "rate", "power"."""
+    """The law of ballast with these features: "scheduled" or "driven", "lag", "rate", "power", "profile"."""
     make, powered = make_driven if "driven" in features else make_scheduled, "power" in features
+    profiled = "profile" in features
     words, rows = (("account_row", "tally"), POWERED_ROWS) if powered else ((), ROWS)
     following = make(f"Ballast_{'_'.join(features)}", rows, rows - 3, rows - 2, rows - 1, features, words)
     place, look_up = following.place, following.look_up
@@ -91,6 +96,9 @@ def made(features):
         for i in range(p.count):
             at = p.first + wp.static(rows) * i
             volume = place(view, p, i)
+            if wp.static(profiled):
+                depth = view.b.z + dot(row3(view, at + 1), view.down) / row1(view, at)
+                volume = volume * relative_density(view, p.first + p.shared, p.size, depth)
             lift = lift + volume * row1(view, at)
             lever = lever + volume * row3(view, at + 1)
         w.force = w.force - lift * view.down
@@ -99,5 +107,5 @@ def made(features):
 
     roles = {"evolve": following.evolve, "follow": following.follow, "report": following.report}
     if powered:
-        roles |= make_work(following) | {"FOLLOWS_PLACE": True}
+        roles |= make_work(following, profiled) | {"FOLLOWS_PLACE": True}
     return device(__name__, features, params=following.params, law=ballast_law, **roles)

@@ -13,6 +13,7 @@ import warp as wp
 from lgvi_kernels import device
 from lgvi_kernels.lanes.sums import carried
 from lgvi_kernels.law import *
+from lgvi_warp.extensions.gliders.device.density import column, relative_density
 
 # follow() looks at the depth of each stage.
 FOLLOWS_PLACE = True
@@ -44,6 +45,16 @@ def law(w: Any, view: Any, p: Any):
     """f = -rho g (1 + gradient (d - d0)) V R^T e3 at the point, d its depth."""
     deviation = view.b.z + dot(view.down, p.point) - p.reference_depth
     f = -(p.weight * (fused(p.gradient, deviation, ones(deviation)) * volume_now(view, p))) * view.down
+    w.force = w.force + f
+    w.torque = w.torque + cross(p.point, f)
+    return w
+
+
+@wp.func
+def law_in_profile(w: Any, view: Any, p: Any):
+    """The same by a table of the density."""
+    share = relative_density(view, p.first, p.density_knots, view.b.z + dot(view.down, p.point))
+    f = -(p.weight * (share * volume_now(view, p))) * view.down
     w.force = w.force + f
     w.torque = w.torque + cross(p.point, f)
     return w
@@ -124,12 +135,22 @@ def follow(state: Any, view: Any, p: Any):
 # The pump's work ------------------------------------------------------------------------------------------------------
 
 
-@functools.cache
-def powered_params(width, real):
-    """Params: also the pump's efficiency, and the row of the account of the energy used, below 0 where there is none."""
-    Lane, Lane3 = lane(width, real), lane3(width, real)
-    lanes = dict.fromkeys((*NUMBERS, "weight", "efficiency"), Lane)
-    return struct("BuoyancyEnginePowered", point=Lane3, origin=Lane3, memory=wp.int32, account_row=wp.int32, **lanes)
+def make_params_of(features):
+    """Params: with "power" the pump's efficiency, and the row of the account of the energy used, below 0 where there is none.
+
+    With "profile": rows of the table of the density.
+    """
+    powered, profiled = "power" in features, "profile" in features
+    names = (*NUMBERS, "weight", *("efficiency",) * powered)
+    words = ("memory", *("account_row",) * powered, *("first", "density_knots") * profiled)
+
+    @functools.cache
+    def params(width, real):
+        lanes, Lane3 = dict.fromkeys(names, lane(width, real)), lane3(width, real)
+        name = f"BuoyancyEngine{'Powered' * powered}{'InProfile' * profiled}"
+        return struct(name, point=Lane3, origin=Lane3, **dict.fromkeys(words, wp.int32), **lanes)
+
+    return params
 
 
 @wp.func
@@ -159,36 +180,52 @@ def risen_since(view: Any, p: Any, volume: Any):
 
 
 @wp.func
-def powered_evolve(state: Any, view: Any, p: Any):
-    """As evolve; the work p dV of a step, with the pressure of its middle."""
-    if view.second > 0:
-        half = view.h.dtype(0.5) * view.h * ones(view.b.x)
+def pressure_in_profile(view: Any, p: Any):
+    """The same by a table of the density."""
+    depth = view.b.z + dot(view.down, p.point)
+    return greatest(p.weight * column(view, p.first, p.density_knots, depth), depth - depth)
+
+
+def make_powered(pressure_at):
+    """The roles evolve and follow of a pump whose work is accounted."""
+
+    @wp.func
+    def powered_evolve(state: Any, view: Any, p: Any):
+        """As evolve; the work p dV of a step, with the pressure of its middle."""
+        if view.second > 0:
+            half = view.h.dtype(0.5) * view.h * ones(view.b.x)
+            depth = view.b.z + dot(view.down, p.origin)
+            volume, side = pumped_and_turned(view, p, depth, looked_since(view, p) + half)
+            ahead = greatest(pumped(p, volume, side, half) - volume, half - half)
+            pay(view, p, pressure_at(view, p) * (risen_since(view, p, volume) + ahead))
+        return evolve(state, view, p)
+
+    @wp.func
+    def powered_follow(state: Any, view: Any, p: Any):
+        """As follow; the work p dV since the last look, with the pressure in the middle of the time of the pump."""
         depth = view.b.z + dot(view.down, p.origin)
-        volume, side = pumped_and_turned(view, p, depth, looked_since(view, p) + half)
-        ahead = greatest(pumped(p, volume, side, half) - volume, half - half)
-        pay(view, p, pressure_at(view, p) * (risen_since(view, p, volume) + ahead))
-    return evolve(state, view, p)
+        time = view.h * ones(depth)
+        volume, side = pumped_and_turned(view, p, depth, time)
+        beyond, until = met(view, p, remembered(view, p.memory + wp.static(SIDE)), depth, time)
+        risen = risen_since(view, p, volume)
+        pressure = pressure_at(view, p)
+        looked = remembered(view, p.memory + wp.static(SINCE)) + ones(depth)
+        before = positive(looked, remembered(view, p.memory + wp.static(PRESSURE)), pressure)
+        middle = positive(beyond, until, time - time) + depth.dtype(0.5) * (risen / p.pump_rate)
+        pay(view, p, risen * (before + (middle / time) * (pressure - before)))
+        remember(view, p.memory + wp.static(PRESSURE), pressure)
+        return follow(state, view, p)
 
-
-@wp.func
-def powered_follow(state: Any, view: Any, p: Any):
-    """As follow; the work p dV since the last look, with the pressure in the middle of the time in which the pump worked."""
-    depth = view.b.z + dot(view.down, p.origin)
-    time = view.h * ones(depth)
-    volume, side = pumped_and_turned(view, p, depth, time)
-    beyond, until = met(view, p, remembered(view, p.memory + wp.static(SIDE)), depth, time)
-    risen = risen_since(view, p, volume)
-    pressure = pressure_at(view, p)
-    looked = remembered(view, p.memory + wp.static(SINCE)) + ones(depth)
-    before = positive(looked, remembered(view, p.memory + wp.static(PRESSURE)), pressure)
-    middle = positive(beyond, until, time - time) + depth.dtype(0.5) * (risen / p.pump_rate)
-    pay(view, p, risen * (before + (middle / time) * (pressure - before)))
-    remember(view, p.memory + wp.static(PRESSURE), pressure)
-    return follow(state, view, p)
+    return {"evolve": powered_evolve, "follow": powered_follow}
 
 
 @functools.cache
 def made(features):
-    """The same engine with "power"."""
-    roles = {"law": law, "evolve": powered_evolve, "follow": powered_follow}
-    return device(__name__, features, params=powered_params, FOLLOWS_PLACE=True, **roles)
+    """The same engine with "power" or "profile"."""
+    roles = {"law": law, "evolve": evolve, "follow": follow}
+    profiled = "profile" in features
+    if profiled:
+        roles["law"] = law_in_profile
+    if "power" in features:
+        roles |= make_powered(pressure_in_profile if profiled else pressure_at)
+    return device(__name__, features, params=make_params_of(features), FOLLOWS_PLACE=True, **roles)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.extensions.gliders import DEVICE
+from lgvi_warp.extensions.gliders.terms.density_profile import in_profile, profile_rows
 from lgvi_warp.physics.terms.actuators import Commanded, motion, packed_following, refuse_idle, refuse_unread
 from lgvi_warp.physics.terms.base import (
     CONSERVED,
@@ -17,7 +19,9 @@ from lgvi_warp.physics.terms.base import (
     Numbers,
     Packed,
     PackingContext,
+    Term,
     number,
+    own,
     rows_of,
     side_by_side,
 )
@@ -58,6 +62,8 @@ class Ballast(Commanded):
 
     type: ClassVar[str] = "ballast"
     device: ClassVar[str] = f"{DEVICE}.ballast"
+    # The density of the water by depth, where the scene has a profile; set for a term of a scene.
+    profile: ClassVar[Any] = None
 
     position: Any = number(("n", 3), "m", ((0.0, 0.0, 0.0),))
     limit: Any = number(("n",), "m3", None, least=0.0)
@@ -78,6 +84,15 @@ class Ballast(Commanded):
                 object.__setattr__(self, name, value)
         self.repeat(n, "limit", "time_constant", "rate_limit", "efficiency")
         super().__post_init__()
+
+    def beside(self, terms: Sequence[Term]) -> Any:
+        # Knows the density of the water by depth.
+        return in_profile(super().beside(terms), terms)
+
+    @property
+    def looks_at_surface(self) -> bool:  # type: ignore[override]
+        # Where density or pressure at its depth act.
+        return self.profile is not None or self.powered
 
     @property
     def channels(self) -> int:
@@ -112,7 +127,7 @@ class Ballast(Commanded):
 
     def device_in(self, aligned: bool) -> str:
         if self.steady:
-            return self.device
+            return self.device if self.profile is None else f"{self.device}_in_profile"
         driven = self.driver is not None
         # Members may bring in a lag where the scene has a limited rate.
         motions = motion(self) if driven else {"lag": self.slow, "rate": self.rate_limit is not None}
@@ -120,7 +135,8 @@ class Ballast(Commanded):
         features = [
             "driven" if driven else "scheduled",
             *(name for name, acts in motions.items() if acts and moves),
-            *(["power"] if self.powered else []),
+            *["power"] * self.powered,
+            *["profile"] * (self.profile is not None),
         ]
         return f"{DEVICE}.ballast_with:{','.join(features)}"
 
@@ -154,16 +170,25 @@ class Ballast(Commanded):
         # The device rows of each volume, and of its schedule; or the sum of what is held.
         weight = specific_weight(context.parameters)
         points = context.frame.point(numbers["position"])
+        table, count = (None, 0) if self.profile is None else profile_rows(self, context.parameters)
         if self.steady:
+            if table is not None:
+                forces = -weight[:, None] * np.clip(numbers["command"], -numbers["limit"], numbers["limit"])
+                rows = side_by_side(forces[..., None], points).reshape(max(len(forces), len(points)), -1)
+                words = {"count": points.shape[1], "density": rows.shape[1], "density_knots": count}
+                return Packed(words, side_by_side(rows, table))
             net, lever = _held(numbers, weight, points)
             return Packed({"net": net, "lever": lever})
         each = np.broadcast_arrays(weight[:, None, None], points[..., :1])[0]
         blocks = side_by_side(each, each * points)
         if self.powered:
-            return self._with_work(numbers, side_by_side(blocks, 1.0 / numbers["efficiency"][..., None]), context)
-        return packed_following(self, numbers, blocks, start=context.time)
+            blocks = side_by_side(blocks, 1.0 / numbers["efficiency"][..., None])
+            return self._with_work(numbers, blocks, context, table, count)
+        return packed_following(self, numbers, blocks, table, count, start=context.time)
 
-    def _with_work(self, numbers: Numbers, blocks: Array, context: PackingContext) -> Packed:
+    def _with_work(
+        self, numbers: Numbers, blocks: Array, context: PackingContext, table: Array | None, size: int
+    ) -> Packed:
         """The same with a memory of the volumes at the last look, and of pressures: -1 before the first."""
         plain, start = self.beside_account(False), np.zeros((1, self.channels))
         if self.driver is None:
@@ -171,7 +196,7 @@ class Ballast(Commanded):
             start = np.clip(start, -numbers["limit"], numbers["limit"])
         # Where the account lies is filled in with the rows of the memory.
         words = {"account_row": -1, "tally": self.channels if plain.memory else 0}
-        packed = packed_following(plain, numbers, blocks, words=words, start=context.time)
+        packed = packed_following(plain, numbers, blocks, table, size, words=words, start=context.time)
         tally = np.stack(np.broadcast_arrays(start, -1.0), axis=-1).reshape(len(start), -1)
         return packed._replace(memory=tally if packed.memory is None else side_by_side(packed.memory, tally))
 
@@ -179,8 +204,20 @@ class Ballast(Commanded):
         # U = -(net b3 + lever.R^T e3), (k, n) [J], of volumes that are held: else the pump does work.
         if not self.steady:
             return 0.0
+        if self.profile is not None:
+            return self._in_profile(numbers, position, attitude, parameters)
         net, lever = _held(numbers, specific_weight(parameters), numbers["position"])
         return -(net * position[..., 2] + np.sum(lever * attitude[..., 2, :], axis=-1))
+
+    def _in_profile(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
+        """The same in water of a density by depth: volumes times the weight of the columns above them."""
+        profile, density = own(self.profile, parameters), parameters["environment.water_density"]
+        volumes = np.clip(numbers["command"], -numbers["limit"], numbers["limit"])
+        total = np.zeros(position.shape[:-1])
+        for i in range(self.channels):
+            depth = position[..., 2] + np.sum(numbers["position"][:, i] * attitude[..., 2, :], axis=-1)
+            total = total + volumes[:, i] * self.profile.column(profile, density, depth)
+        return np.asarray(specific_weight(parameters) * total)
 
 
 # Buoyancy of 1 m3 of sea water [N]: for sizes of which a choice depends, no result.

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -13,6 +13,7 @@ from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.extensions.gliders import DEVICE
 from lgvi_warp.extensions.gliders.terms.ballast import SEA_WATER, specific_weight
+from lgvi_warp.extensions.gliders.terms.density_profile import in_profile, profile_rows
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
@@ -62,6 +63,9 @@ class BuoyancyEngine(Term):
 
     type: ClassVar[str] = "buoyancy_engine"
     device: ClassVar[str] = f"{DEVICE}.buoyancy_engine"
+    looks_at_surface: ClassVar[bool] = True
+    # The density of the water by depth, where the scene has a profile; set for a term of a scene.
+    profile: ClassVar[Any] = None
     usual: ClassVar[Mapping[str, str]] = dict.fromkeys(
         ("depth_top", "depth_bottom", "reference_depth"), "a place in the sea may be anywhere"
     )
@@ -77,6 +81,10 @@ class BuoyancyEngine(Term):
     reference_depth: Any = number((), "m", 0.0)
     efficiency: Any = number((), "1", None, above=0.0, most=1.0, optional=True)
     first: str = word("down", known=SIDES)
+
+    def beside(self, terms: Sequence[Term]) -> Any:
+        # Knows the density of the water by depth.
+        return in_profile(self, terms)
 
     def __post_init__(self) -> None:
         if self.volume_start is None:
@@ -97,7 +105,8 @@ class BuoyancyEngine(Term):
         return self.accounted and self.efficiency is not None
 
     def device_in(self, aligned: bool) -> str:
-        return f"{self.device}:power" if self.powered else self.device
+        features = [*["power"] * self.powered, *["profile"] * (self.profile is not None)]
+        return f"{self.device}:{','.join(features)}" if features else self.device
 
     def check(self, faults: Faults) -> None:
         for low, high in (("volume_down", "volume_up"), ("depth_top", "depth_bottom")):
@@ -134,4 +143,8 @@ class BuoyancyEngine(Term):
             # Where the account lies is filled in with the rows of the memory.
             values |= {"efficiency": numbers["efficiency"], "account_row": -1}
             rows.append(np.zeros(1))
-        return Packed(values, memory=np.stack(repeated(*rows), axis=-1))
+        memory = np.stack(repeated(*rows), axis=-1)
+        if self.profile is None:
+            return Packed(values, memory=memory)
+        table, count = profile_rows(self, context.parameters)
+        return Packed(values | {"density_knots": count}, table, memory)

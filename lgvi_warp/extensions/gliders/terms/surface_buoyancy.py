@@ -57,6 +57,7 @@ class SurfaceBuoyancy(Term):
     type: ClassVar[str] = "surface_buoyancy"
     device: ClassVar[str] = f"{DEVICE}.surface_buoyancy"
     floats: ClassVar[bool] = True
+    looks_at_surface: ClassVar[bool] = True
     unique: ClassVar[bool] = True
 
     heights: Any = number(("k",), "m", least=0.0)
@@ -88,7 +89,7 @@ class SurfaceBuoyancy(Term):
 
     @property
     def timed(self) -> bool:  # type: ignore[override]
-        return bool(vars(self)["waves"])
+        return bool(vars(self)["waves"]) or self.level is not None
 
     @property
     def conserves(self) -> frozenset[str]:
@@ -96,7 +97,7 @@ class SurfaceBuoyancy(Term):
         return frozenset() if self.timed else CONSERVED
 
     def device_in(self, aligned: bool) -> str:
-        return f"{self.device}:{self.section}" + (f",{water_of(vars(self)['waves'])}" if self.timed else "")
+        return f"{self.device}:{self.section}" + (f",{water_of(vars(self)['waves'])}" if vars(self)["waves"] else "")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Rows of the parts, and of the waves above them.

@@ -3,12 +3,13 @@
 
 import numpy as np
 
+from lgvi_warp.extensions.gliders.twin.density_profile import DensityProfile
 from lgvi_warp.reference.rotation import Array, cross
 from lgvi_warp.reference.terms import Law, View
 
 
 class BuoyancyEngine(Law):
-    """Numbers as those of `lw.terms.BuoyancyEngine`; density [kg/m3], gravity [m/s2].
+    """Numbers as those of `lw.terms.BuoyancyEngine`; density [kg/m3], gravity [m/s2]; profile as of `Ballast`.
 
     Memory: the volume now; 1 up, -1 down; volume and depth at the last look; the time since then, -1 before the first; with
     an efficiency the pressure at the last look [N/m2].
@@ -18,11 +19,15 @@ class BuoyancyEngine(Law):
     gradient = 0.0
     reference_depth = 0.0
     efficiency: float | None = None
+    profile: DensityProfile | None = None
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """-rho (1 + gradient (d - reference_depth)) g V R^T e3 at the position, d its depth."""
-        x = view.b[2] + view.down @ self.position - self.reference_depth
-        f = -self.density * (1.0 + self.gradient * x) * self.gravity * view.memory[0] * view.down
+        depth = view.b[2] + view.down @ self.position
+        density = self.density * (1.0 + self.gradient * (depth - self.reference_depth))
+        if self.profile is not None:
+            density = self.profile.density_at(float(depth))
+        f = -density * self.gravity * view.memory[0] * view.down
         return f, cross(self.position, f)
 
     def start(self) -> Array:
@@ -70,6 +75,8 @@ class BuoyancyEngine(Law):
     def pressure(self, view: View) -> float:
         """The weight of the water above the position per area [N/m2], 0 above the surface."""
         d = view.b[2] + view.down @ self.position
+        if self.profile is not None:
+            return max(self.gravity * self.profile.column(float(d)), 0.0)
         return float(
             max(self.density * self.gravity * (d + self.gradient * (d**2 / 2.0 - self.reference_depth * d)), 0.0)
         )

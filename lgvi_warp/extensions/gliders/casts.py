@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""CTD casts: columns of depth and density, or of temperature and salinity, from arrays, CSV or NetCDF."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, MissingExtra, SceneError, refusal
+from lgvi_warp.common.reading import file_text
+
+# Columns, by the words with which their names may begin.
+WORDS = {
+    "depth": ("depth", "dep", "z"),
+    "pressure": ("pressure", "pres", "prdm", "prsm"),
+    "density": ("density", "rho", "sea_water_density"),
+    "temperature": ("temperature", "temp", "t090", "sea_water_temperature"),
+    "salinity": ("salinity", "sal", "psal", "sea_water_practical_salinity"),
+}
+PLACE = ("latitude", "longitude")
+
+
+def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Rising depths (k,) [m] and densities (k,) [kg/m3] of a cast: a file, columns, or columns in place of those of a file."""
+    faults = Faults()
+    faults.keys("", columns, (*WORDS, *PLACE))
+    faults.raise_if_any()
+    found = {} if file is None else _of_file(Path(file))
+    found |= {name: value for name, value in columns.items() if name in WORDS}
+    place = {name: float(columns.get(name, 0.0)) for name in PLACE}
+    arrays = {name: faults.real(name, value) for name, value in found.items()}
+    faults.raise_if_any()
+    numbers = {name: array for name, array in arrays.items() if array is not None}
+    lengths = {array.shape for array in numbers.values()}
+    if len(lengths) > 1 or any(len(shape) != 1 for shape in lengths):
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in numbers.items())
+        raise SceneError([f"cast: columns differ in length ({shapes}). Give one number of each for each depth."])
+    if "depth" not in numbers and "pressure" not in numbers:
+        raise SceneError(["cast: has no depth. Give a column depth [m] or pressure [dbar]."])
+    if "density" not in numbers and not {"temperature", "salinity"} <= numbers.keys():
+        raise SceneError(["cast: has no density. Give a column density [kg/m3], or temperature and salinity."])
+    return _sorted(*_computed(numbers, **place))
+
+
+def _computed(numbers: Mapping[str, np.ndarray], latitude: float, longitude: float) -> tuple[np.ndarray, np.ndarray]:
+    """Depths and densities; TEOS-10 where one of them is not numbers."""
+    if {"depth", "density"} <= numbers.keys():
+        return numbers["depth"], numbers["density"]
+    try:
+        import gsw
+    except ImportError:
+        raise MissingExtra("densities of temperatures and salinities", "gsw", "ocean") from None
+    pressure = numbers.get("pressure")
+    pressure = gsw.p_from_z(-numbers["depth"], latitude) if pressure is None else pressure
+    depth = numbers.get("depth")
+    depth = -gsw.z_from_p(pressure, latitude) if depth is None else depth
+    if "density" in numbers:
+        return depth, numbers["density"]
+    absolute = gsw.SA_from_SP(numbers["salinity"], pressure, longitude, latitude)
+    conservative = gsw.CT_from_t(absolute, numbers["temperature"], pressure)
+    return np.asarray(depth), np.asarray(gsw.rho(absolute, conservative, pressure))
+
+
+def _sorted(depth: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rising depths, without lines that lack a number; of a depth that occurs twice the mean, as of a cast down and up."""
+    good = np.isfinite(depth) & np.isfinite(density)
+    if not good.any():
+        raise SceneError(["cast: has no line with both a depth and a density. Look at its columns."])
+    at, place, count = np.unique(depth[good], return_inverse=True, return_counts=True)
+    return at, np.bincount(place, density[good]) / count
+
+
+def _of_file(path: Path) -> dict[str, Any]:
+    """Columns of a file that have a known name."""
+    if not path.is_file():
+        raise refusal("file", str(path), "is no file", "give the path of a CSV or NetCDF file")
+    return _of_netcdf(path) if path.suffix.lower() in (".nc", ".nc4", ".cdf") else _of_csv(path)
+
+
+def _of_csv(path: Path) -> dict[str, Any]:
+    lines = file_text(path, "cast").lstrip("\ufeff").splitlines()
+    lines = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "*"))]
+    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, _dialect(lines[:1]))]
+    if len(rows) < 2:
+        raise refusal(
+            "file", str(path), "has no lines below its names", "give a line of names, then one for each depth"
+        )
+    names, table = rows[0], [row for row in rows[1:] if any(map(_real, row))]
+    columns = {}
+    for name, word in _named(names).items():
+        i = names.index(word)
+        columns[name] = np.array([_value(row[i]) if i < len(row) else np.nan for row in table])
+    return columns
+
+
+def _dialect(head: list[str]) -> type[csv.Dialect]:
+    """Commas, semicolons, tabs or spaces, by the line of names."""
+    text = head[0] if head else ""
+
+    class Dialect(csv.excel):
+        delimiter = next((mark for mark in (";", "\t", ",") if mark in text), " ")
+        skipinitialspace = True
+
+    return Dialect
+
+
+def _of_netcdf(path: Path) -> dict[str, Any]:
+    try:
+        import xarray as xr
+    except ImportError:
+        raise MissingExtra("casts in NetCDF files", "xarray", "ocean") from None
+    try:
+        with xr.open_dataset(path, decode_times=False) as data:
+            names = {str(data[key].attrs.get("standard_name", key)): key for key in data.variables}
+            return {
+                name: np.asarray(data[names[word]].values, np.float64).ravel() for name, word in _named(names).items()
+            }
+    except (OSError, ValueError) as error:
+        raise refusal("file", str(path), f"cannot be read ({error})", "give a NetCDF file of one cast") from None
+
+
+def _named(names: Any) -> dict[str, str]:
+    """Known columns by the names in a file: the first whose name, without units, is or begins with a known word."""
+    found: dict[str, str] = {}
+    for column, words in WORDS.items():
+        for name in names:
+            bare = str(name).lower().replace("-", "_").strip()
+            head = bare.split("[")[0].split("(")[0].split(" ")[0].strip("_ ")
+            if column not in found and any(head == word or (len(word) > 2 and head.startswith(word)) for word in words):
+                found[column] = name
+    return found
+
+
+def _real(cell: str) -> bool:
+    return bool(np.isfinite(_value(cell)))
+
+
+def _value(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return float("nan")

@@ -40,9 +40,9 @@ def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.nd
         shapes = ", ".join(f"{name} {array.shape}" for name, array in numbers.items())
         raise SceneError([f"cast: columns differ in length ({shapes}). Give one number of each for each depth."])
     if "depth" not in numbers and "pressure" not in numbers:
-        raise SceneError(["cast: has no depth. Give a column depth [m] or pressure [dbar]."])
+        raise SceneError(["cast has no depth. Give a column depth [m] or pressure [dbar]."])
     if "density" not in numbers and not {"temperature", "salinity"} <= numbers.keys():
-        raise SceneError(["cast: has no density. Give a column density [kg/m3], or temperature and salinity."])
+        raise SceneError(["cast has no density. Give a column density [kg/m3], or temperature and salinity."])
     return _sorted(*_computed(numbers, **place))
 
 
@@ -69,7 +69,7 @@ def _sorted(depth: np.ndarray, density: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Rising depths, without lines that lack a number; of a depth that occurs twice the mean, as of a cast down and up."""
     good = np.isfinite(depth) & np.isfinite(density)
     if not good.any():
-        raise SceneError(["cast: has no line with both a depth and a density. Look at its columns."])
+        raise SceneError(["cast has no line with both a depth and a density. Look at its columns."])
     at, place, count = np.unique(depth[good], return_inverse=True, return_counts=True)
     return at, np.bincount(place, density[good]) / count
 

@@ -51,7 +51,8 @@ def errors(depth, members):
     fleet = lw.Ensemble(scene(depth), members, seed=1, vary=VARY)
     result = lw.solve(fleet, h=STEP, t1=END, save=lw.SaveAt(every=0.5, fields=("position",)))
     tide = next(term for term in fleet.scene.terms if term.type == "tide")
-    height = tide.height(lw.Ensemble.own(tide, result.parameters), result.time)
+    numbers = {name: result.parameters[f"tide.{name}"] for name in tide.parameters()}
+    height = tide.height(numbers, result.time)
     settled = result.time >= SETTLED
     return result.time[settled], (result.position[..., 2] + height - depth)[settled]
 

@@ -4,15 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, own, word_of
-
-if TYPE_CHECKING:
-    from lgvi_warp.control.base import ControlLaw
 
 # Measured quantities that a table may be over: the speed ahead through the water, the depth, and the altitude by an altimeter.
 OVER = {"speed": "m/s", "depth": "m", "altitude": "m"}
@@ -30,7 +27,7 @@ class GainTable(NamedTuple):
     at: np.ndarray
 
 
-def taken_tables(law: ControlLaw) -> dict[str, GainTable]:
+def taken_tables(law: Any) -> dict[str, GainTable]:
     """Put the values of a law's tables in place of them; return the nodes by the number's name."""
     faults, tables = Faults(f"{law.key}."), dict[str, GainTable]()
     for item in law.number_fields():

@@ -13,7 +13,7 @@ from tests.house.graph import ROOMS, Import, arrows_up, circle, circles_of_folde
 OPTIONAL = {
     "SALib", "matplotlib", "rerun", "rerun_cli", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow",
     "PIL", "gymnasium", "tqdm", "control", "tomlkit", "h5netcdf", "h5py", "dask", "pyproj", "rasterio", "mcap", "mcap_ros2",
-    "stable_baselines3", "shtab", "pandas", "contourpy", "gsw",
+    "stable_baselines3", "shtab", "pandas", "contourpy", "gsw", "pythonfmu",
 }  # fmt: skip
 DEVICE_OF_EXTENSIONS, TWIN_OF_EXTENSIONS = (
     re.compile(rf"lgvi_warp\.extensions\.\w+\.{folder}\b") for folder in ("device", "twin")
@@ -93,6 +93,7 @@ def test_the_product_imports_what_it_declares():
 def test_only_these_files_of_the_engine_know_the_kernels():
     those = {
         "lgvi_warp.engine.counted_draws", "lgvi_warp.engine.going_on", "lgvi_warp.engine.kernel",
+        "lgvi_warp.engine.kernel_choice",
         "lgvi_warp.engine.kernel_spec", "lgvi_warp.engine.launches",
         "lgvi_warp.engine.packing", "lgvi_warp.engine.plan", "lgvi_warp.engine.plan_checks",
         "lgvi_warp.engine.sample_layout", "lgvi_warp.engine.packets", "lgvi_warp.engine.peak",
@@ -105,7 +106,7 @@ def test_only_these_files_of_the_engine_know_the_kernels():
 def test_the_engine_knows_no_law_by_name():
     # Base classes, and what all laws share: a law says of itself what a kernel must know (`Term.exact_flow`, `carries` ...).
     general = {f"physics.terms.{name}" for name in ("base", "noisy", "events", "surface_level")}
-    general |= {f"control.{name}" for name in ("base", "controller", "signals")}
+    general |= {f"control.{name}" for name in ("base", "controller", "gain_tables", "signals")}
     single = {
         (module, found.name)
         for module, all_of_it in part("lgvi_warp.engine").items()

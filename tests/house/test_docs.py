@@ -53,7 +53,7 @@ laws = [{ type = "heading_pid", kp = 1.0 }]
 # Page -> what stands before each of its snippets in a scene file.
 BEFORE = {
     "docs/controllers/README.md": [REMUS], "docs/controllers/actuators.md": [REMUS],
-    "docs/controllers/allocation.md": [REMUS + LAW, ROV + LAW, ROV + LAW], "docs/guide/events.md": [REMUS],
+    "docs/controllers/allocation.md": [REMUS + LAW, REMUS + LAW, ROV + LAW, ROV + LAW], "docs/guide/events.md": [REMUS],
 }  # fmt: skip
 
 

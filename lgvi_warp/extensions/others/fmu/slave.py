@@ -16,7 +16,7 @@ from lgvi_warp.scene.scene import Scene
 CONTENT = "vehicle.json"
 
 
-class Vehicle:
+class UnitOfVehicle:
     """A vehicle of the file's scene. Value references are places in its list of variables."""
 
     # Of PythonFMU's base class.

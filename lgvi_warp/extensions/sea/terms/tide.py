@@ -44,7 +44,7 @@ class Tide(SurfaceLevel):
         >>> import lgvi_warp as lw
         >>> tide = lw.terms.Tide(amplitudes=[1.5, 0.5], speeds=[28.984, 30.0], mean=2.1)
         >>> tide.at([0.0, 22357.0]).round(2)
-        array([4.1 , 0.1 ])
+        array([4.1, 0.1])
     """
 
     type: ClassVar[str] = "tide"

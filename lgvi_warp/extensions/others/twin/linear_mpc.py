@@ -18,13 +18,15 @@ class LinearMPC(Part):
 
     P = rate_limit = tracked = lower = outputs = output_limit = excess_cost = None
     preview = False
+    # How references of later ticks differ from the present one; None where it goes on at its rates.
+    shifts: Sequence[Array] | None = None
     disturbance_time, horizon, iterations = 5.0, 10, 50
 
     def begin(self) -> None:
         """Nothing is known of the last tick."""
         n, m = np.shape(self.B)
         self.begun, self.x, self.u, self.d = False, np.zeros(n), np.zeros(m), np.zeros(n)
-        self.shifts = [np.zeros(n)] * self.horizon
+        self.shifts = None
 
     @property
     def ahead(self) -> int:  # type: ignore[override]
@@ -68,7 +70,8 @@ class LinearMPC(Part):
             e0, E = A @ e0 - B @ u_s, A @ E + B @ push
             last = k == self.horizon - 1 and self.P is not None
             W = np.asarray(self.P) if last else np.diag(self.Q)
-            H, f = H + E.T @ W @ E, f + E.T @ W @ (e0 + self.shifts[k])
+            e = e0 if self.shifts is None else e0 + self.shifts[k]
+            H, f = H + E.T @ W @ E, f + E.T @ W @ e
         return H, f
 
     def solved(self, H: Array, f: Array, before: Array, change: Array | None) -> Array:

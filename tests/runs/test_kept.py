@@ -154,7 +154,7 @@ def test_a_resume_counts_what_ran(copy, complete, harm, output):
 
 def test_a_lost_group_is_not_silently_none(copy):
     shutil.rmtree(copy / "kept")
-    with pytest.raises(lw.SceneError, match=r"kept is missing; `lgvi-warp resume"):
+    with pytest.raises(lw.SceneError, match=r"kept is missing. `lgvi-warp resume"):
         lw.open_run(copy)
 
 

@@ -68,7 +68,7 @@ def test_statistics_of_damaged_parts_are_refused(complete, tmp_path):
     path = shutil.copytree(complete, tmp_path / "run.zarr")
     part = path / "parts" / "000000256.npy"
     hostile.flipped(part, None)
-    with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
+    with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed. `lgvi-warp resume .*` mends it"):
         lw.open_run(path)
     (path / "blocks" / "000000256.json").unlink()
     with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing; repair it with `lgvi-warp resume"):

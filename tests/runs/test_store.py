@@ -333,11 +333,11 @@ def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
     """Missing blocks would be exported as NaN."""
     out = tmp_path / "run.out"
     (copy / "blocks" / "000000256.json").unlink()
-    with pytest.raises(lw.SceneError, match=r"1 blocks are not marked as finished; `lgvi-warp resume .*` mends it"):
+    with pytest.raises(lw.SceneError, match=r"1 blocks are not marked as finished. `lgvi-warp resume .*` mends it"):
         lw.export(copy, to, out)
     lw.resume(copy)
     (copy / "velocity" / "c.0.2.0").unlink()
-    with pytest.raises(lw.SceneError, match=r"velocity/c.0.2.0 is missing; `lgvi-warp resume"):
+    with pytest.raises(lw.SceneError, match=r"velocity/c.0.2.0 is missing. `lgvi-warp resume"):
         lw.export(copy, to, out)
     with pytest.raises(lw.SceneError, match=r"is a folder, which is not replaced. Give the name of a file"):
         lw.export(copy, to, tmp_path)

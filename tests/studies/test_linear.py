@@ -260,7 +260,7 @@ def test_what_has_no_regulator(regulator):
 
 
 @pytest.mark.parametrize(("words", "message"), [
-    ({"inputs": "thrust"}, "Did you mean|known: commands"), ({"closed": True, "period": 0.2}, "is that of a plant"),
+    ({"inputs": "thrust"}, "Did you mean|Known: commands"), ({"closed": True, "period": 0.2}, "is that of a plant"),
     ({"about": 3.0}, "is not a motion"), ({"step": 0.0}, "step"),
 ])  # fmt: skip
 def test_what_cannot_be_linearised(words, message):

@@ -110,7 +110,10 @@ class EffortAllocation(Allocation):
 
     def at_speed(self, numbers: Numbers) -> dict[str, np.ndarray]:
         """The numbers of the device code of an allocation at the measured speed; none of another."""
-        return {"least_speed": numbers["least_speed"]} if self.measured else {}
+        if not self.measured:
+            return {}
+        astern = 1.0 if np.allclose(self._effect(-1.0), self._effect(1.0)) else -1.0
+        return {"least_speed": numbers["least_speed"], "astern": np.array([astern])}
 
     def channel_rows(self, B: np.ndarray, context: PackingContext, *more: np.ndarray) -> np.ndarray:
         """The rows of each channel (1 or n, channels, rows), as of lgvi_kernels.laws.control.efforts; more: columns behind."""

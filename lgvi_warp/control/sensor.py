@@ -190,7 +190,7 @@ class Sensor(MeasuringPart):
         acting = tuple(name for name in acting if IDLE_WITHOUT.get(name, name) in acting)
         placed: tuple[str, ...] = (PLACED,) if np.any(numbers.get(PLACED, 0.0)) else ()
         if self.reads == "pressure":
-            placed += (water_of(self.waves) if self.waves else "still",) + (TIDE,) * (self.level is not None)
+            placed += (water_of(self.waves) if self.waves else "still",) + (TIDE,) * (self.surface_level is not None)
         return (
             (*(name for name in acting if name != "latency"), *placed, HANDED) if self.is_handed else (*acting, *placed)
         )

@@ -143,7 +143,7 @@ def choose_kernel(
         user_axes=user_axes,
         parts=tuple(name for name, wanted in contents.items() if wanted),
         coupling=tuple(i in facts.couplings for i in range(len(COUPLINGS))),
-        timed=any(term.timed or term.level for term, _ in (*acting, *events)) or facts.delayed,
+        timed=any(term.timed or term.surface_level for term, _ in (*acting, *events)) or facts.delayed,
         memory=memory or method.gauss > 0,
         program=maps,
         lead=lead,
@@ -299,9 +299,9 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
 
 def _below(term: Term, module: Any, built_in: Callable[[str, str], Any]) -> Any:
     """The device code of a term below the surface of its scene; a sensor reads its height itself."""
-    if term.level is None or isinstance(term, Part):
+    if term.surface_level is None or isinstance(term, Part):
         return module
-    return built_in("laws", term.level.device).in_tide(module)
+    return built_in("laws", term.surface_level.device).in_tide(module)
 
 
 def with_tables(part: Any, module: Any) -> Any:

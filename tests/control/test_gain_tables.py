@@ -176,10 +176,12 @@ def test_fins_at_the_measured_speed_make_what_their_lift_at_it_can(kind):
     lift = 500.0 * (np.array(FINS["area"]) * FINS["lift_slope"])[:, None] * normal
     effect = np.concatenate([lift, np.cross(FINS["position"], lift)], axis=1).T
     if kind is PseudoInverse:
-        wanted = np.stack([np.linalg.pinv(effect * u[i] ** 2, rcond=1e-10) @ demand[i] for i in range(8)])
+        # Astern the lift of a deflection turns round.
+        square = np.sign(speeds) * u**2
+        wanted = np.stack([np.linalg.pinv(effect * square[i], rcond=1e-10) @ demand[i] for i in range(8)])
         np.testing.assert_allclose(command, np.clip(wanted, -0.4, 0.4), atol=1e-13)
     assert np.any(np.abs(command) >= 0.4 - 1e-12)
-    left = demand - np.einsum("ij,nj->ni", effect, command) * u[:, None] ** 2
+    left = demand - np.einsum("ij,nj->ni", effect, command) * (np.sign(speeds) * u**2)[:, None]
     np.testing.assert_allclose(unmet, left, atol=1e-7 * np.abs(demands).max())
     # The twin, of which the allocation knows no speed.
     if kind is PseudoInverse:
@@ -190,7 +192,27 @@ def test_fins_at_the_measured_speed_make_what_their_lift_at_it_can(kind):
 
         fins, at_one = Fins(), PseudoInverseTwin(to="control_fins", effect=effect)
         for i in range(8):
-            twin = MeasuredSpeed(allocation=at_one, least_speed=LEAST, square=u[i] ** 2)
+            twin = MeasuredSpeed(allocation=at_one, least_speed=LEAST, square=np.sign(speeds[i]) * u[i] ** 2)
             rest = twin.allocate(demand[i], {"control_fins": fins})
             np.testing.assert_allclose(command[i], fins.command, atol=1e-13)
             np.testing.assert_allclose(unmet[i], rest, atol=1e-10 * np.abs(demands).max())
+
+
+@pytest.mark.parametrize("flow_angle", [True, False])
+def test_fins_make_the_demanded_moment_ahead_and_astern(flow_angle):
+    """The moment that acts on the vehicle, as the run accounts it, is the demanded one at either sign of the speed."""
+    fins = lw.terms.ControlFins(position=[[-0.6, 0.0, 0.0]], chord=[[1.0, 0.0, 0.0]], normal=[[0.0, 1.0, 0.0]], area=0.02,
+                                lift_slope=3.0, drag=0.0, limit=0.3, flow_angle=flow_angle)  # fmt: skip
+    controller = lw.Controller(
+        period=0.1, guidance=[SetPoint(heading=1.0)], laws=[HeadingPID(kp=0.2)],
+        allocation=[PseudoInverse(to="control_fins", speed="measured", least_speed=LEAST)],
+    )  # fmt: skip
+    vehicle = lw.Vehicle(MASS, inertia=[4.0, 5.0, YAW], buoyancy=MASS * 9.8)
+    here = lw.Scene(vehicle, lw.Environment(9.8, water_density=1000.0), [fins], controller=controller)
+    ahead = np.array([[2.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [0.7, 0.0, 0.0], [-0.7, 0.0, 0.0]])
+    fleet = lw.Ensemble.from_states(here, np.zeros((4, 3)), np.tile(np.eye(3), (4, 1, 1)), ahead, np.zeros((4, 3)))
+    result = lw.solve(fleet, "rk4", h=0.1, t1=0.1, save=lw.SaveAt(every=0.1, fields=("demand", "exerted")))
+    np.testing.assert_allclose(result.demand[0, :, 5], 0.2, rtol=1e-12)
+    # The lift of a fin that is turned by d, with the angle of the flow, is that of a small angle to a part of d^2.
+    deflection = 0.2 / (0.6 * 500.0 * 0.02 * 3.0 * ahead[:, 0] ** 2)
+    assert np.all(np.abs(result.exerted[0, :, 5] / 0.2 - 1.0) <= deflection**2 * flow_angle + 1e-12)

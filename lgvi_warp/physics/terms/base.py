@@ -251,7 +251,7 @@ class Term(Documented):
     floats: ClassVar[bool] = False
     # Whether it looks at the depth below the surface, and the term that moves that; set for a term of a scene.
     looks_at_surface: ClassVar[bool] = False
-    level: ClassVar[Any] = None
+    surface_level: ClassVar[Any] = None
     # Numbers in (0, 1) that each member of an ensemble draws by itself, unless they vary otherwise.
     drawn: ClassVar[tuple[str, ...]] = ()
 

@@ -112,7 +112,9 @@ class ControlFins(Commanded, Fins):
         position, chord, normal = repeated(numbers["position"], numbers["chord"], numbers["normal"])
         chord, normal = unit_directions({"chord": chord, "normal": normal})
         density = parameters["environment.water_density"]
-        size = 0.5 * (density * speed**2)[:, None] * numbers["area"] * numbers["lift_slope"]
+        # Astern the flow meets the other edge: lift by the angle of the flow turns round, other lift keeps its side.
+        square = speed * np.abs(speed) if self.flow_angle else speed**2
+        size = 0.5 * (density * square)[:, None] * numbers["area"] * numbers["lift_slope"]
         if self.lift_angles is not None:
             size = size * (numbers["lift_coefficients"][:, 1] / numbers["lift_angles"][:, 1])[:, None]
         # The flow along the chord is that of the speed ahead.

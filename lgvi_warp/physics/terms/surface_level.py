@@ -81,18 +81,18 @@ def level_of(terms: Sequence[Any]) -> SurfaceLevel | None:
 def below(thing: Any, terms: Sequence[Any]) -> Any:
     """A term, an event or a sensor that knows the height of the surface, if it looks at the depth below it."""
     level = level_of(terms) if thing.looks_at_surface else None
-    if level is thing.level:
+    if level is thing.surface_level:
         return thing
     thing = copy.copy(thing)
-    object.__setattr__(thing, "level", level)
+    object.__setattr__(thing, "surface_level", level)
     return thing
 
 
 def with_level(thing: Any, packed: Packed, parameters: Numbers) -> Packed:
     """The packed numbers of a term, with rows of the height of the surface behind its own."""
-    if thing.level is None:
+    if thing.surface_level is None:
         return packed
-    rows, counts = thing.level.level_rows(own(thing.level, parameters))
+    rows, counts = thing.surface_level.level_rows(own(thing.surface_level, parameters))
     before = packed.rows if isinstance(packed.rows, tuple) else () if packed.rows is None else (packed.rows,)
     first = sum(part.shape[1] for part in before)
     return packed._replace(values=packed.values | {"tide_row": first} | counts, rows=(*before, rows))
@@ -100,7 +100,11 @@ def with_level(thing: Any, packed: Packed, parameters: Numbers) -> Packed:
 
 def rise_above(thing: Any, time: Array, parameters: Numbers) -> Any:
     """Height (k, n) [m] of the surface at times (k,) [s] for a thing that may know it; 0 where it does not."""
-    return 0.0 if thing.level is None else thing.level.height(own(thing.level, parameters), np.asarray(time))
+    return (
+        0.0
+        if thing.surface_level is None
+        else thing.surface_level.height(own(thing.surface_level, parameters), np.asarray(time))
+    )
 
 
 def rise_at_start(terms: Sequence[Any], parameters: Numbers) -> Any:

@@ -169,8 +169,8 @@ class WaveTerm(Term):
         if not self.finite:
             return np.inf
         depth = parameters[f"{self.floor.key}.depth"] if self.floor is not None else numbers["depth"]
-        if self.floor is not None and self.level is not None:
-            depth = depth + self.level.mean_height(own(self.level, parameters))
+        if self.floor is not None and self.surface_level is not None:
+            depth = depth + self.surface_level.mean_height(own(self.surface_level, parameters))
         return depth[:, None]
 
     def device_in(self, aligned: bool) -> str:

@@ -36,7 +36,12 @@ class GainTables(Part):
 
 
 class MeasuredSpeed(Part):
-    """allocation: one whose effect is that at 1 m/s; least_speed [m/s]. Efforts make that effect times the speed squared."""
+    """allocation: one whose effect is that at 1 m/s; least_speed [m/s]. Efforts make that effect times the speed squared.
+
+    astern: Sign of the effect where the speed ahead is negative.
+    """
+
+    astern = 1.0
 
     def begin(self) -> None:
         """Let the allocation forget everything."""
@@ -44,7 +49,8 @@ class MeasuredSpeed(Part):
 
     def measure(self, y: Measurement) -> Measurement:
         """Keep the speed ahead through the water."""
-        self.square = max(abs(y.water_velocity[0]), self.least_speed) ** 2
+        u = y.water_velocity[0]
+        self.square = (self.astern if u < 0.0 else 1.0) * max(abs(u), self.least_speed) ** 2
         measured: Measurement = self.allocation.measure(y)
         return measured
 

@@ -188,3 +188,18 @@ def test_bad_numbers_are_told(name):
     with pytest.raises(lw.SceneError) as found:
         make()
     assert re.search(text, str(found.value))
+
+
+@pytest.mark.parametrize("more", [(), ("measured_position",)], ids=["alone", "beside what is measured"])
+def test_each_reading_is_taken_or_rejected_once(more):
+    """Beams at every second tick and depths at each, of a run; what is saved beside changes no count."""
+    sensors = [lw.control.IMU(**UNIT), lw.control.DVL(noise=0.01, every=2),
+               lw.control.Sensor(of="depth", noise=0.02, name="depth_cell"),
+               lw.control.ErrorStateFilter(dvl="dvl", depth="depth_cell", gate=0.5, most_rejected=np.inf)]  # fmt: skip
+    fleet = lw.Ensemble(scene(sensors, period=0.1), 8, 0)
+    save = lw.SaveAt(every=0.1, fields=("nis_count", "rejected", *more))
+    run = lw.solve(fleet, "rk4", h=0.1, t1=1.0, save=save)
+    taken, rejected = run.nis_count.sum(), run.rejected[-1].sum()
+    # Ticks at 0, 0.1 ... 1 s; four beams at each second one.
+    assert taken + rejected == 8 * (11 + 4 * 6)
+    assert rejected > taken

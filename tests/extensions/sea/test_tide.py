@@ -70,9 +70,9 @@ def test_who_knows_it():
         lw.terms.SurfaceBuoyancy(heights=0.3),
     ]
     scene = neutral([*terms, lw.terms.Tide(mean=1.0)], events=[lw.events.Surface()])
-    assert all(thing.level is scene.terms[2] for thing in (*scene.terms[:2], *scene.events))
+    assert all(thing.surface_level is scene.terms[2] for thing in (*scene.terms[:2], *scene.events))
     plain = neutral(list(scene.terms[:2]), events=list(scene.events))
-    assert all(thing.level is None for thing in (*plain.terms, *plain.events))
+    assert all(thing.surface_level is None for thing in (*plain.terms, *plain.events))
 
 
 @pytest.mark.kernel

@@ -101,15 +101,15 @@ def at_speed(params, allocate, features):
 
     @functools.cache
     def params_at_speed(width, real):
-        """Params: those of the allocation, and the least speed."""
+        """Params: those of the allocation, the least speed, and the sign of the effect astern."""
         own = {name: var.type for name, var in params(width, real).vars.items()}
-        return struct("AtSpeed", **own, least_speed=lane(width, real))
+        return struct("AtSpeed", **own, least_speed=lane(width, real), astern=lane(width, real))
 
     @wp.func
     def allocate_at_speed(w: Any, y: Any, p: Any):
         """The demand over the square of the measured speed ahead, at least `least_speed`; what is left, times it."""
         size = greatest(absolute(y.water_velocity.x), p.least_speed)
-        square = size * size
+        square = positive(-y.water_velocity.x, p.astern, ones(size)) * size * size
         inverse = ones(square) / square
         w.force = inverse * w.force
         w.torque = inverse * w.torque

@@ -138,7 +138,7 @@ class DensityProfile(Term):
     @property
     def conserves(self) -> frozenset[str]:
         # All three: its potential depends on the depth of the centre of buoyancy alone.
-        return CONSERVED if self.compressibility is None and self.level is None else frozenset()
+        return CONSERVED if self.compressibility is None and self.surface_level is None else frozenset()
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Only the deviation from B, since B itself is part of `Weight`.

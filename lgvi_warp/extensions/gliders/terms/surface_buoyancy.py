@@ -89,7 +89,7 @@ class SurfaceBuoyancy(Term):
 
     @property
     def timed(self) -> bool:  # type: ignore[override]
-        return bool(vars(self)["waves"]) or self.level is not None
+        return bool(vars(self)["waves"]) or self.surface_level is not None
 
     @property
     def conserves(self) -> frozenset[str]:

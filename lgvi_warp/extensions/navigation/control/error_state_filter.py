@@ -224,10 +224,11 @@ class ErrorStateFilter(MeasuringPart):
         rows |= {"error": error, "work": error + wide, "covariance": error + 2 * wide}
         rows |= {"watched": self.bus.done.get(self.key, 0), "diverged": self.bus.diverged}
         size, first = states * (states + 1) // 2, error + 2 * wide
-        last = first + size + (size if self.report else 0)
+        rows["tally"] = first + size + (size if self.report else 0)
+        last = rows["tally"] + (DIVERGED_ROWS if self.report else 0)
         if self.gate is not None:
             rows |= {"runs": last, "rejected": self.bus.rejected}
-        memory = np.zeros((len(context.members), last + (RUN_ROWS if self.gate is not None else 0)))
+        memory = np.zeros((len(context.members), last + (RUN_ROWS + len(AIDS) if self.gate is not None else 0)))
         memory[:, error - copies : error] = -1.0
         sigmas = [numbers[f"{name}_sigma"] for name in ("position", "velocity", "attitude")]
         for i, (name, sigma) in enumerate(zip(("position", "velocity", "attitude"), sigmas, strict=True)):

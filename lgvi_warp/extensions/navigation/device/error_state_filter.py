@@ -57,14 +57,14 @@ def make_struct(gated, width, real):
 
     lever: place of the unit; arm: that of the log less it; fix_lever and so on: lever less the places of these.
     size: rows of the covariance, count: those of the estimate; copies: fixes that may be on their way. error, work,
-    covariance: rows of the memory from its first on; watched: those at which an event looks; diverged: rows of the bus.
+    covariance, tally: rows of the memory from its first on; watched: those at which an event looks; diverged: rows of the bus.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
     names = ("lever", "arm", "gained_q", "turned_q", "bias_a_q", "bias_w_q", "fix_r", "delayed_fix_r")
     names += ("fix_lever", "delayed_fix_lever", "depth_lever")
     lanes = ("gravity", "ahead", "down", "dvl_r", "depth_r", "heading_r", "latency")
     words = ("memory", "size", "count", "imu", "dvl", "fix", "delayed_fix", "depth", "heading", "belief")
-    words += ("copies", "error", "work", "covariance", "watched", "diverged")
+    words += ("copies", "error", "work", "covariance", "tally", "watched", "diverged")
     kinds = dict.fromkeys(names, Lane3) | dict.fromkeys(lanes, Lane) | dict.fromkeys(words, wp.int32)
     return struct("ErrorStateFilter", **kinds, **(gate_fields(width, real) if gated else {}))
 
@@ -430,7 +430,11 @@ def note_belief(y: Any, z: Any, p: Any):
     P = at + p.covariance
     nees = squared_size(y.memory, y.packet, P, p.count, e, P + p.size * (p.size + 1) // 2)
     remember(y, p.belief + wp.static(BELIEF_NEES), nees)
-    count_unconverged(y, p.diverged, nees - y.h.dtype(wp.static(DIVERGED)) * ones(nees))
+    # Counted in the filter's memory, which a tick that measures for the notes alone puts back.
+    tally = at + p.tally
+    count_unconverged(y, tally, nees - y.h.dtype(wp.static(DIVERGED)) * ones(nees))
+    remember(y, p.diverged, remembered(y, tally))
+    remember(y, p.diverged + 1, remembered(y, tally + 1))
 
 
 @wp.func

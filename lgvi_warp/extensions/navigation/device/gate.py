@@ -11,13 +11,14 @@ from lgvi_warp.extensions.navigation.device.covariance import widened
 
 # Sensors that a filter may have, in the order of the counts. Places of the first innovation of each but the first.
 AIDS = ("dvl", "fix", "delayed_fix", "depth", "heading")
-FIX, DELAYED_FIX, DEPTH, HEADING = 4, 7, 10, 11
+FIX, DELAYED_FIX, DEPTH, HEADING, SLOTS = 4, 7, 10, 11, 12
 
 
 def gate_fields(width, real):
     """Fields of the filter's struct: gates of the sensors [sigma] and their mean squares; rows.
 
-    most: rejections in a row. runs: first of twelve rows of the memory, from its first on; rejected: first of five of the bus.
+    most: rejections in a row. runs: first of twelve rows of the memory, from its first on, and of five counts behind them;
+    rejected: first of five of the bus, which has these counts.
     """
     names = (f"{role}_{word}" for role in AIDS for word in ("gate", "share"))
     return dict.fromkeys((*names, "most_rejected"), lane(width, real)) | dict.fromkeys(("runs", "rejected"), wp.int32)
@@ -75,7 +76,11 @@ def make_gate(reports):
         kept = positive(lost, zero, new)
         remember(y, row, positive(lost, run + unity, positive(new, zero, run)))
         if wp.static(reports):
-            remember(y, p.rejected + kind, remembered(y, p.rejected + kind) + lost)
+            # Counted in the filter's memory, which a tick that measures for the notes alone puts back.
+            own = p.memory + p.runs + wp.static(SLOTS) + kind
+            count = remembered(y, own) + lost
+            remember(y, own, count)
+            remember(y, p.rejected + kind, count)
         return kept, factor * seen, share
 
     return gate

@@ -9,6 +9,7 @@ import lgvi_warp as lw
 from tests.conftest import ROOT
 
 PAGES = {"laws": lw.laws.ControlLaw, "guidance": lw.laws.Guidance}
+FURTHER = {"laws": "other_laws", "guidance": "circles_and_docks"}
 
 
 def text(page):
@@ -17,7 +18,7 @@ def text(page):
 
 @pytest.mark.parametrize("page", PAGES)
 def test_each_part_has_a_section_with_all_its_keys(page):
-    sections = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", text(page), re.S | re.M))
+    sections = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", f"{text(page)}\n{text(FURTHER[page])}", re.S | re.M))
     for name, kind in PAGES[page].kinds.items():
         if kind.__module__.startswith("lgvi_warp."):
             fields = {item.name.removesuffix("_") for item in kind.number_fields()}

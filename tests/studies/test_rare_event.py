@@ -245,7 +245,7 @@ def test_a_cheaper_scene_that_tells_nothing_is_left_out(answer):
     limit = f"position[0] - {bound_of(1e-5):.12g}"
     # Ten times the drag: where members end is where they began.
     told = lw.rare_event(fleet_of(), limit, cheaper=[{"drag.linear[0]": 4000.0}], **RUN)
-    assert any("name a setting nearer to the scene's own" in message for message in told.messages)
+    assert any("Name a setting nearer to the scene's own" in message for message in told.messages)
     assert told.probability == answer.probability
 
 
@@ -304,7 +304,7 @@ def test_what_moved_is_the_number_that_decides():
 
 def test_more_draws_than_memory_holds_are_refused_before_anything_runs():
     settings = RUN | {"t1": 600.0, "save": lw.SaveAt(at=[600.0])}
-    with pytest.raises(lw.SceneError, match=r'draws of noise a member: chains keep some 16,000 .* give by="splitting"'):
+    with pytest.raises(lw.SceneError, match=r'draws of noise a member: chains keep some 16,000 .* Give by="splitting"'):
         lw.rare_event(scene_of(NOISE), "position[0] - 99.0", **settings)
 
 

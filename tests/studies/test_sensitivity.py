@@ -404,7 +404,7 @@ def test_all_bad_arguments_come_at_once(scene):
     assert "neither an Ensemble nor a Scene" in refused(uq.sobol, 3, "energy", **RUN)
     short = dataclasses.replace(scene, run=RunSettings(step=0.01, duration=1.0))
     assert "is taken over the whole path" in refused(uq.sobol, short, "max(energy)", samples=8, vary=BOX)
-    assert "return an array" in refused(uq.sobol, scene, lambda result: np.zeros(3), samples=8, vary=BOX, **RUN)
+    assert "Return an array" in refused(uq.sobol, scene, lambda result: np.zeros(3), samples=8, vary=BOX, **RUN)
 
 
 # The command --------------------------------------------------------------------------------------------------------------

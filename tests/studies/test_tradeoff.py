@@ -395,7 +395,7 @@ def test_suggestions_for_twenty_scenes():
     ({"error": -1.0}, ["error = -1.0", "above 0 [m]"]), ({"of": "spead"}, ["of = 'spead'", "Did you mean 'speed'"]),
     ({"of": "max(depth)"}, ["of = 'max(depth)'", "Give 'depth'"]),
     ({"of": ["depth", "speed"]}, ["of = ['depth', 'speed']", "one of them"]),
-    ({"methods": ["psi_z"]}, ["methods = 'psi_z'", "psi_x"]), ({"methods": []}, ["methods = []", "name one"]),
+    ({"methods": ["psi_z"]}, ["methods = 'psi_z'", "psi_x"]), ({"methods": []}, ["methods = []", "Name one"]),
     ({"t1": 0.0}, ["t1 = 0.0"]),
 ])  # fmt: skip
 def test_bad_arguments_are_refused_with_the_remedy(scene, arguments, words):

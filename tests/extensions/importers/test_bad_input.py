@@ -17,7 +17,7 @@ SDF = [
     (LINK.replace("<mass>10</mass>", ""), {}, "<mass>", "is missing", "[kg]"),
     (LINK.replace(">10<", ">ten<"), {}, "<mass> = 'ten'", "does not hold 1 finite numbers"),
     (LINK.replace("<xU>-1</xU>", "<xU>-1</xU><yV>1</yV>"), {}, "plugin's linear drag", "both signs", "Fossen's signs"),
-    (LINK.replace("xU", "xUabsV"), {}, "<xUabsV> = -1.0", "product of velocities", "Leave it out"),
+    (LINK.replace("xU", "xUabsV"), {}, "<xUabsV> = -1.0", "product of velocities", "leave it out"),
     ("<sdf><link></sdf>", {}, "not XML", "Correct that line"),
     (LINK, {"link": "c"}, "SDF link = 'c'", "not in the file", "Known: b"),
     (LINK, {"volume": -1.0}, "volume = -1.0", "not positive", "[m3]"),
@@ -33,7 +33,7 @@ def test_sdf(text, more, words):
 
 YAML = [
     ("inertia: [1, 2, 2.5]\n", "mass = ''", "is missing", "Add mass to the file, or pass mass="),
-    ("mass: 10\ninertia:\n", "inertia = ''", "is missing", "Pass inertia="),
+    ("mass: 10\ninertia:\n", "inertia = ''", "is missing", "pass inertia="),
     ("mass: ten\ninertia: [1, 2, 2.5]\n", "mass = 'ten'", "not numeric", "[kg]"),
     ("mass: 10\ninertia: [1, 2, 2.5]\nvolume: 0.1\n", "density = 'not given'", "[kg/m3 (with volume)]"),
     ("mass: 10\ninertia: [1, 2, 2.5]\ncolour: red\n", "colour = 'red'", "unknown key", "ignore="),

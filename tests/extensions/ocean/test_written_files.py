@@ -243,7 +243,7 @@ def mask_beside(file):
 
 
 REFUSALS = {
-    "no units": ("roms", {"u": {"units": None}}, r"u.units = '' is missing; .* give attributes = {'u.units': 'm/s'}"),
+    "no units": ("roms", {"u": {"units": None}}, r"u.units = '' is missing.* give attributes = {'u.units': 'm/s'}"),
     "no formula": (
         "roms",
         [without("Vtransform"), {"s_rho": {"standard_name": "s"}}],

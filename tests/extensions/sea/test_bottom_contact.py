@@ -137,7 +137,7 @@ def test_refusals():
     with pytest.raises(lw.SceneError, match=r"floor.contact.*has no term by which the vehicle rests"):
         lw.Scene(LANDER, events=[rest])
     other = lw.events.Floor(depth=12.0, contact="rest", name="mud")
-    with pytest.raises(lw.SceneError, match=r"does not say which of 2 floors.*name one: floor, mud"):
+    with pytest.raises(lw.SceneError, match=r"does not say which of 2 floors.*Name one: floor, mud"):
         lw.Scene(LANDER, terms=[lw.terms.BottomContact(points=FEET)], events=[rest, other])
     with pytest.raises(lw.SceneError, match=r"bottom_contact.floor = 'mid'"):
         lw.Scene(LANDER, terms=[lw.terms.BottomContact(points=FEET, floor="mid")], events=[rest])

@@ -121,7 +121,7 @@ class Taker:
 def test_an_error_names_the_argument_and_those_of_the_code_stay_as_they_are():
     assert Taker().longer(np.ones(1)) == 2.0
     with pytest.raises(
-        lw.SceneError, match=r"^values = None is not an array of numbers. Give what Taker.longer takes$"
+        lw.SceneError, match=r"^values = None is not an array of numbers. Give what Taker.longer takes\.$"
     ):
         Taker().longer(None)
     with pytest.raises(lw.SceneError, match="by = None is not a whole number"):

@@ -137,7 +137,7 @@ def test_every_member_failing_is_an_exit_code_and_a_reason(tmp_path, capsys):
     assert cli.main(["run", PAPER, "--out", str(tmp_path), *SMALL, *fast]) == 1
     out = capsys.readouterr()
     assert "step_too_large 20" in out.out
-    assert "shorten the step" in out.out
+    assert "Shorten the step" in out.out
     assert "fleet.png was not written" in out.err
     assert (tmp_path / "result.npz").exists()
 
@@ -238,7 +238,7 @@ def test_warnings_are_counted_and_explained(tmp_path, capsys):
     assert result.provenance["checks"] == "all"
     assert result.warnings.counts()["munk_coarse"] == 20
     assert "warnings    munk_coarse 20, restoring_coarse 20" in said
-    assert "shorten the step" in said
+    assert "Shorten the step" in said
     assert f"(first: member 0 at 0 s, h sqrt(B|r|/J) = {result.warning_value[0]:.4g})" in said
 
 

@@ -229,7 +229,7 @@ def test_a_run_is_exported_and_reported(tmp_path, capsys):
     write, page, opened = Study(tmp_path / "a.nc"), Study([tmp_path / "report.html", tmp_path / "b.html"]), []
     assert main(["export", "a", "--to", "netcdf", "--out", "b"], write=write) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.nc (0.1 MB)\n"
-    settings = {"members": None, "origin": None, "start": None, "overwrite": False, "progress": ANY}
+    settings = {"members": None, "origin": None, "start": None, "inputs": None, "overwrite": False, "progress": ANY}
     assert write.calls == [((Path("a"), "netcdf", Path("b")), settings)]
     assert main(["report", "a"], write=page, browse=opened.append) == 0
     assert opened == []

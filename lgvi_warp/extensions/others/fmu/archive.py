@@ -35,7 +35,7 @@ import sys
 from pythonfmu import Fmi2Slave
 
 try:
-    from lgvi_warp.extensions.others.fmu.slave import Vehicle as Base
+    from lgvi_warp.extensions.others.fmu.slave import UnitOfVehicle as Base
 except ImportError as error:
     raise ImportError(
         f"lgvi_warp is not installed in {sys.prefix}, the Python that runs this unit: install it there ({error})"

@@ -249,39 +249,3 @@ def test_two_learners_keep_the_depth_better_than_the_law(tmp_path):
     assert errors["ppo.py"] < errors["depth_pid"]
     assert last == str(picture)
     assert picture.stat().st_size > 10_000
-
-
-@pytest.mark.slow
-def test_ppo_learns(monkeypatch):
-    """Returns of whole episodes from the same seeds: trained, as it begins, and with planes amidships."""
-    pytest.importorskip("stable_baselines3")
-    pytest.importorskip("torch")
-    folder = ROOT / "examples" / "controllers"
-    monkeypatch.syspath_prepend(folder)
-    learn = runpy.run_path(str(folder / "learn_depth_keeping.py"))
-    vehicles, length = learn["VEHICLES"], round(learn["EPISODE"] / learn["PERIOD"])
-
-    def returns(layers):
-        """Return of each vehicle's first episode by seed 7, under a perceptron or planes amidships."""
-        env, total = learn["environment"](), np.zeros(vehicles)
-        seen, _ = env.reset(seed=7)
-        for _ in range(length):
-            seen, rewards, _, ended, _ = env.step(acted(layers, seen))
-            total += rewards
-        assert ended.all()
-        return total
-
-    def acted(layers, x):
-        for W, b in layers[:-1]:
-            x = np.tanh(x @ W.T + b)
-        return np.clip(x @ layers[-1][0].T + layers[-1][1], -1.0, 1.0) if layers else np.zeros((len(x), 1))
-
-    before, _ = learn["by_stable_baselines"](0)
-    after, history = learn["by_stable_baselines"](100_000)
-    trained, fresh, still = returns(after), returns(before), returns([])
-    for other in (fresh, still):
-        # Each vehicle has the same ballast, speed and depth under both: the mean of the gains has this standard error.
-        gains = trained - other
-        assert gains.mean() > 5.0 * gains.std(ddof=1) / np.sqrt(vehicles)
-        assert trained.mean() > 0.5 * other.mean()
-    assert np.mean(history[-length:]) > np.mean(history[:length])

@@ -236,7 +236,7 @@ def test_files_functions_and_ensembles_are_refused(tmp_path):
         lw.export(lw.Ensemble(scene(), 3), target)
     with pytest.raises(lw.SceneError, match=r"is a scene, of which no .csv file can be made. Run it first"):
         lw.export(scene(), tmp_path / "none.csv")
-    with pytest.raises(lw.SceneError, match="is given for a run. Leave it out"):
+    with pytest.raises(lw.SceneError, match=r"is given for a run. Leave it out"):
         lw.export(tmp_path, tmp_path / "none.csv", inputs="commands")
     law = lw.control.Callback(lambda t, y, r, members: np.zeros((len(members), 6)))
     with pytest.raises(lw.SceneError, match="is a function of Python, which a unit does not carry"):

@@ -301,7 +301,7 @@ def judged(load, text):
     try:
         scene = load()
     except lw.SceneError as error:
-        nameless = [fault for fault in error.faults if not named_key(fault, text) or not re.search(r"[;:]", fault)]
+        nameless = [fault for fault in error.faults if not named_key(fault, text) or not re.search(r"[.:;] ", fault)]
         if nameless or not error.faults:
             return "no key", "; ".join(nameless), None
         return "refused", "", None

@@ -55,7 +55,7 @@ class Vehicle(Base, Fmi2Slave):
         super().__init__(**kwargs)
 '''
 NEEDS = (
-    f"Runs in a Python that has lgvi_warp {__version__} (pip install lgvi-warp): that of the program which loads it. "
+    f"Runs in a Python that has lgvi_warp {__version__}: that of the program which loads it. "
     "The first start compiles a kernel, which takes about a minute. Communication steps are whole numbers of the step."
 )
 # The date of all files in the archive: the first that ZIP knows.

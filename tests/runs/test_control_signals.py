@@ -24,7 +24,7 @@ from tests.unit.views.test_recording import rows
 
 # Those of a scene without a filter, without parts that iterate, and without an estimate of the position.
 OTHERS = [name for name, signal in signals.SIGNALS.items() if signal.group == signals.ESTIMATE]
-OTHERS += [signals.ENERGY_USED, signals.UNCONVERGED, signals.NAVIGATION_ERROR]
+OTHERS += [signals.ENERGY_USED, signals.UNCONVERGED, signals.NAVIGATION_ERROR, signals.REJECTED]
 SIGNALS, SAVED = (tuple(name for name in names if name not in OTHERS) for names in (signals.SIGNALS, signals.SAVED))
 H, EVERY, STEPS, MEMBERS = 0.01, 5, 60, 600
 LIMIT, LAG, DELAY = 0.4, 0.1, 2

@@ -296,7 +296,7 @@ def test_files_and_axes(solved, tmp_path, ending_of_name):
 
 
 def test_refusals_name_the_remedy(solved):
-    with pytest.raises(lw.SceneError, match=r"name one: position\[0\]"):
+    with pytest.raises(lw.SceneError, match=r"Name one: position\[0\]"):
         lw.plots.fan(solved, "position")
     with pytest.raises(NothingToDraw, match="SaveAt"):
         lw.plots.fan(dataclasses.replace(solved, samples={"position": solved.position}), "speed")
@@ -323,7 +323,7 @@ def margins_of(steady):
 
 
 def test_margins_of_nobody_are_no_picture(tmp_path):
-    with pytest.raises(NothingToDraw, match=r"none of the 5 members has margins \(5 does not settle\)"):
+    with pytest.raises(NothingToDraw, match=r"none of the 5 members has margins \(5: does not settle\)"):
         lw.plots.margins(margins_of([False] * 5), path=tmp_path / "margins.png")
     assert not list(tmp_path.iterdir())
 

@@ -476,7 +476,7 @@ def test_a_model_describes_its_columns(monkeypatch):
     bare = adaptor.model(BARE, ["vehicle.mass"], "depth", **settings)
     with pytest.raises(lw.SceneError, match=r"vary\.names = .* have no distributions. Map names to distributions"):
         _ = bare.problem
-    with pytest.raises(lw.SceneError, match=r"vary names alone have no distributions. Map names to distributions"):
+    with pytest.raises(lw.SceneError, match=r"vary: names alone have no distributions. Map names to distributions"):
         _ = bare.distributions
     odd = adaptor.model(BARE, {"vehicle.mass": Choice([1.0, 2.0])}, "depth", **settings)
     with pytest.raises(lw.SceneError, match=r"is unknown to SALib. Use levels=True"):

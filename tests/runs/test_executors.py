@@ -332,7 +332,7 @@ def test_unknown_executors_are_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(dask, "TIMEOUT", 0.3)
     for arguments, word in (
         ({"executor": "thread"}, "Did you mean 'threads'"),
-        ({"executor": object()}, "Give an object with run"),
+        ({"executor": object()}, "give an object with run"),
         ({"executor": "processes", "scheduler": "tcp://x"}, "is for the executor dask alone"),
         ({"executor": "processes", "threads": 0}, "threads = 0"),
     ):

@@ -388,7 +388,7 @@ def test_nobody_elses_folder_beside_a_run_is_removed(complete, tmp_path):
     assert (tmp_path / "run.zarr.old" / "notes.txt").read_text() == "mine"
 
 
-ROOM, WRITE = "Make room, then `lgvi-warp resume", "Choose a folder that can be written"
+ROOM, WRITE = "Make room, then `lgvi-warp resume", "choose a folder that can be written"
 # What the system says, of which file, and what a user reads.
 FAULTS = [
     (errno.ENOSPC, "zarr.json", ROOM), (errno.ENOSPC, "created.json", ROOM), (errno.ENOSPC, "c.0.0.0", ROOM),

@@ -352,7 +352,7 @@ def test_w_refuses_a_step_without_solution():
     for spin, refused in ((0.95, False), (1.05, True)):
         x = body.to_reduced(np.zeros(3), np.eye(3), np.zeros(3), np.array([0.0, 0.0, spin]))
         if refused:
-            with pytest.raises(ValueError, match="shorten the step"):
+            with pytest.raises(ValueError, match="Shorten the step"):
                 coupled.W(x, body, 1.0)
         else:
             np.testing.assert_allclose(

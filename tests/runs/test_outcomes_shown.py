@@ -176,7 +176,7 @@ def test_outcomes_look_different():
     seen = [(look.color, look.marker) for look in looks.OUTCOME_STYLES.values()]
     assert set(looks.OUTCOME_STYLES) == set(Status)
     assert len(set(seen)) == len(seen)
-    assert len({look.color for code, look in looks.OUTCOME_STYLES.items() if code == Status.OK or code.stopped}) == 9
+    assert len({look.color for code, look in looks.OUTCOME_STYLES.items() if code == Status.OK or code.stopped}) == 10
 
 
 def test_nothing_to_draw_says_why(mixed, tmp_path):
@@ -428,9 +428,9 @@ def test_the_summary_says_work_where_forces_do_some(mixed):
 
 
 @pytest.mark.parametrize(("absent", "files", "words"), [
-    (["matplotlib"], ["fleet.rrd", "result.npz"], "fleet.png: not made without matplotlib; "),
-    (["rerun"], ["fleet.png", "result.npz"], "fleet.rrd: not made without rerun-sdk; "),
-    (["matplotlib", "rerun"], ["result.npz"], "fleet.png, fleet.rrd: not made without matplotlib and rerun-sdk; "),
+    (["matplotlib"], ["fleet.rrd", "result.npz"], "fleet.png: not made without matplotlib. "),
+    (["rerun"], ["fleet.png", "result.npz"], "fleet.rrd: not made without rerun-sdk. "),
+    (["matplotlib", "rerun"], ["result.npz"], "fleet.png, fleet.rrd: not made without matplotlib and rerun-sdk. "),
 ])  # fmt: skip
 def test_a_plain_installation_runs(scene_file, capsys, monkeypatch, absent, files, words):
     for name in absent:
@@ -439,7 +439,7 @@ def test_a_plain_installation_runs(scene_file, capsys, monkeypatch, absent, file
     code, said, errors = run(scene_file, capsys)
     assert code == 0
     assert "not written" not in errors
-    assert f"note        {words}to have pictures: {install('viz')}\n" in said
+    assert f"note        {words}To have pictures: {install('viz')}\n" in said
     assert sorted(path.name for path in (scene_file.parent / "out").iterdir()) == files
 
 

@@ -203,7 +203,7 @@ def test_statistics_of_functions_are_asked_for_again(tmp_path):
     statistics = [lw.statistics.Mean(shallow)]
     first = lw.solve(fleet(), **SETTINGS, statistics=statistics, keep="none", store=tmp_path / "run.zarr")
     (tmp_path / "run.zarr/blocks/000000256.json").unlink()
-    with pytest.raises(lw.SceneError, match=r"mean shallow are of functions .* give statistics="):
+    with pytest.raises(lw.SceneError, match=r"mean shallow are of functions .* Give statistics="):
         lw.resume(tmp_path)
     with pytest.raises(lw.SceneError, match="are not the run's"):
         lw.resume(tmp_path, statistics=[lw.statistics.Mean("depth")])

@@ -26,7 +26,7 @@ def fast(n=5, spin=30.0):
 
 def test_raise_keeps_the_result(scene):
     with pytest.raises(
-        lw.MembersFailed, match=r"step_too_large, 2 of 5 members \(first: member 1 at 0 s.*shorten"
+        lw.MembersFailed, match=r"step_too_large, 2 of 5 members \(first: member 1 at 0 s.*Shorten"
     ) as caught:
         lw.solve(one(scene, *fast()), "psi_s", h=0.1, t1=1.0, on_failure="raise")
     frozen = lw.solve(one(scene, *fast()), "psi_s", h=0.1, t1=1.0)

@@ -296,7 +296,7 @@ def test_whole_groups_are_used_alone(scene):
     assert 30 < found.samples < 64
     assert found.failed > 0
     assert found.members == 384
-    assert f"the {64 - found.samples} of 64 groups" in found.messages[0]
+    assert f"The {64 - found.samples} of 64 groups" in found.messages[0]
     assert np.isfinite(found.first).all()
     message = refused(uq.sobol, scene, "position[2]", samples=8, failed="drop", **RUN,
                     vary=FAST | {"start.angular_velocity[2]": Uniform(low=300.0, high=400.0)})  # fmt: skip

@@ -35,9 +35,8 @@ class DVL(MeasuringPart):
 
     A beam has no echo where it is lost by chance, where it looks upward, where the way along it to the floor, flat or on a
     grid, is not within its range, and where the body is tilted too far. An `error_state_filter` takes each beam by itself, so
-    one is of use too; without a filter
-    the measured velocity becomes that of the log's place by least squares of three beams or four, else it stays the last one,
-    and is 0 before the first: a log without bottom lock tells no velocity.
+    one is of use too. Without a filter the measured velocity becomes that of the log's place by least squares of three beams
+    or four, else it stays the last one, and is 0 before the first: a log without bottom lock tells no velocity.
 
     Args:
         place: Place of the log (3,) [m], body axes; 0 by default.

@@ -6,10 +6,11 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.law import *
+from lgvi_kernels.laws.waves import add_sums, theta_of
 
 FLOW = "varying"
 
-# Rows of one component: those of deep water, of which the speeds are over 1 - f^2, and f = e^(-k h).
+# Rows of one component: those of deep water, of which the speed is over 1 - f^2, and f = e^(-k h).
 ROWS = 9
 
 # First row of its table, ROWS for each component, and count of components.
@@ -18,41 +19,34 @@ params = make_params("WavesFinite", words="first count")
 
 @wp.func
 def flow(f: Any, view: Any, p: Any):
-    """u = a sigma (C cos theta along the heading, -S sin theta down), theta = k.x - omega t + phase; its slopes.
+    """u = a sigma (C cos theta along the heading, -S sin theta down); its slopes.
 
     C = cosh k(h - depth) / sinh k h = (e + f^2 / e) / (1 - f^2), S = sinh ... = (e - f^2 / e) / (1 - f^2), e = e^(-k depth).
     Above the still surface both are held at those of the surface, below the floor at those of the floor.
     """
     depth = view.b.z
     zero = ones(depth) - ones(depth)
-    below = greatest(depth, zero)
-    sunk = positive(depth, ones(depth), zero)
+    above = -greatest(depth, zero)
+    inside = zero
+    u, rate = vec3(zero, zero, zero), vec3(zero, zero, zero)
+    level, steep = vec3(zero, zero, zero), vec3(zero, zero, zero)
     for j in range(p.count):
         at = p.first + wp.static(ROWS) * j
-        north = row1(view, at)
-        east = row1(view, at + 1)
-        k = row1(view, at + 2)
-        omega = row1(view, at + 3)
-        speed = row3(view, at + 5)
+        north, east, k = row1(view, at), row1(view, at + 1), row1(view, at + 2)
+        ahead, aside = row1(view, at + 5), row1(view, at + 6)
         floor = row1(view, at + 8)
-        theta = north * view.b.x + east * view.b.y + fused(-(view.t * ones(omega)), omega, row1(view, at + 4))
-        free = exponential(-(k * below))
-        inside = positive(free - floor, sunk, zero)
+        theta = theta_of(view, at)
+        free = exponential(k * above)
+        inside = greatest(inside, positive(free - floor, positive(depth, ones(depth), zero), zero))
         e = greatest(free, floor)
         z = floor * (floor / e)
-        cosh = e + z
-        sinh = e - z
-        cos = cosine(theta)
-        sin = sine(theta)
-        c = cosh * cos
-        s = sinh * sin
-        u = vec3(c * speed.x, c * speed.y, -(s * speed.z))
-        # -du/dtheta
-        slope = vec3((cosh * sin) * speed.x, (cosh * sin) * speed.y, (sinh * cos) * speed.z)
-        f.velocity = f.velocity + u
-        f.rate = f.rate + omega * slope
-        f.by_north = f.by_north - north * slope
-        f.by_east = f.by_east - east * slope
-        sc = sinh * cos
-        f.by_depth = f.by_depth - (inside * k) * vec3(sc * speed.x, sc * speed.y, -((cosh * sin) * speed.z))
-    return f
+        cos = row1(view, at + 7) * cosine(theta)
+        sin = row1(view, at + 7) * sine(theta)
+        cc = (e + z) * cos
+        cs = (e + z) * sin
+        sc = (e - z) * cos
+        u = u + vec3(cc * ahead, cc * aside, -((e - z) * sin))
+        rate = rate + row1(view, at + 3) * vec3(cs * ahead, cs * aside, sc)
+        level = level + vec3((north * cs) * ahead, (east * cs) * aside, (north * cs) * aside)
+        steep = steep + vec3(north * sc, east * sc, k * cs)
+    return add_sums(f, u, rate, level, steep, inside)

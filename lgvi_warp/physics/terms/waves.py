@@ -29,7 +29,7 @@ class Components(NamedTuple):
     """Components of a sea, (n, k) each; the first are the rows of lgvi_kernels/laws/waves.py.
 
     north, east, k: wavenumber along the axes and in all [1/m]. omega: frequency at a fixed place [rad/s]. phase [rad].
-    ahead, aside, down: a sigma, sigma the frequency in the water, north, east and in all [m/s]; over 1 - decay^2.
+    ahead, aside: heading, north and east. speed: a sigma, sigma the frequency in the water [m/s]; over 1 - decay^2.
     decay: e^(-k h), h the depth of the sea; 0 in deep water. amplitude: of the surface [m], 0 where the current blocks a wave.
     blocked: where an opposing current lets no wave of this frequency travel.
     """
@@ -41,7 +41,7 @@ class Components(NamedTuple):
     phase: Array
     ahead: Array
     aside: Array
-    down: Array
+    speed: Array
     decay: Array
     amplitude: Array
     blocked: Array
@@ -151,7 +151,7 @@ class WaveTerm(Term):
         k, amplitude = np.where(blocked, 0.0, k), np.where(blocked, 0.0, amplitude)
         decay = np.maximum(np.exp(-k * h), DEEP) if self.finite else np.zeros_like(k)
         speed = amplitude * sigma / (1.0 - np.where(blocked, 0.0, decay) ** 2)
-        rows = (k * along, k * across, k, omega, phase, speed * along, speed * across, speed, decay, amplitude, blocked)
+        rows = (k * along, k * across, k, omega, phase, along, across, speed, decay, amplitude, blocked)
         return Components(*np.broadcast_arrays(*rows))
 
     def _current(self, parameters: Numbers) -> Array | None:
@@ -194,12 +194,12 @@ class WaveTerm(Term):
         x, y, depth = np.moveaxis(position, -1, 0)
         depth = depth + rise_above(self, time, parameters)
         for j in range((components := self.wave_table(numbers, parameters)).k.shape[1]):
-            north, east, k, omega, phase, ahead, aside, down, f, *_ = (table[:, j] for table in components)
+            north, east, k, omega, phase, ahead, aside, speed, f, *_ = (table[:, j] for table in components)
             theta = north * x + east * y + (phase - omega * time[:, None])
             e = np.exp(-k * np.maximum(depth, 0.0))
             e, z = (np.maximum(e, f), f**2 / np.maximum(e, f)) if self.finite else (e, 0.0)
-            cosine, sine = (e + z) * np.cos(theta), (e - z) * np.sin(theta)
-            total = total + np.stack([cosine * ahead, cosine * aside, -sine * down], axis=-1)
+            cosine, sine = speed * (e + z) * np.cos(theta), speed * (e - z) * np.sin(theta)
+            total = total + np.stack([cosine * ahead, cosine * aside, -sine], axis=-1)
         return total
 
     def elevation(self, numbers: Numbers, position: Array, time: Array, parameters: Numbers) -> Array:

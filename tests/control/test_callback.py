@@ -71,15 +71,12 @@ def test_commands_of_two_terms():
         wrench = np.clip(heading(t, y, r, members), -2.0, 2.0)
         return np.concatenate([0.25 * wrench, 0.75 * wrench], axis=1)
 
-    def split(law):
-        plain = scene([law]).scene
-        two = [lw.terms.ControlWrench(name=name, limit=2.0) for name in ("one", "two")]
-        terms = [*two, plain.terms[1]]
-        loop = lw.Controller(period=5 * H, guidance=[lw.control.SetPoint(heading=0.8)], laws=[law])
-        return lw.Ensemble(lw.Scene(plain.vehicle, terms=terms, controller=loop), 20, 3, scene([law]).vary)
-
+    fleet = scene([lw.control.Callback(heading)])
+    terms = [*(lw.terms.ControlWrench(name=name, limit=2.0) for name in ("one", "two")), fleet.scene.terms[1]]
     law = lw.control.Callback(halves, to=["two", "one"])
-    both = lw.solve(split(law), "psi_s", h=H, t1=5.0, save=lw.SaveAt(every=0.5))
+    loop = lw.Controller(period=5 * H, guidance=[lw.control.SetPoint(heading=0.8)], laws=[law])
+    split = lw.Ensemble(lw.Scene(fleet.scene.vehicle, terms=terms, controller=loop), 20, 3, fleet.vary)
+    both = lw.solve(split, "psi_s", h=H, t1=5.0, save=lw.SaveAt(every=0.5))
     one = run([lw.control.Callback(heading)])
     assert np.abs(both.attitude - one.attitude).max() < 1e-12
 

@@ -50,3 +50,22 @@ def test_every_example_is_understood():
         old = {new: old for old, new in OLD.items()}.get(verb, verb)
         known = verb if verb in VERBS else old
         assert parser().parse_args([known, *words]).verb == known
+
+
+# A command in the text of a page, in a block of it, or for a container.
+COMMAND = re.compile(
+    r"`(?:docker run lgvi_warp|(?:uvx --from \. )?lgvi-warp) ([^`]*)`|^ *lgvi-warp ([^`\n]*)|run lgvi_warp (.*)$", re.M
+)
+PAGES = [*sorted((ROOT / "docs").rglob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / ".ci/Dockerfile"]
+
+
+def test_commands_of_all_pages_have_known_verbs_and_options():
+    found = [(page, "".join(match)) for page in PAGES for match in COMMAND.findall(page.read_text())]
+    assert len(found) > 130
+    for page, command in found:
+        verb, *words = re.split(r"[|>#\\]", command)[0].split()
+        if verb != "VERB" and not verb.startswith("-"):
+            assert verb in VERBS, f"{page.name}: {command}"
+            known = {name for action in VERBS[verb]._actions for name in action.option_strings}
+            options = {word.partition("=")[0] for word in words if re.match(r"--\w", word)}
+            assert options <= known, f"{page.name}: {command}"

@@ -6,8 +6,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.arguments import explained
-from tests.support import odd_calls
 from tests.studies.test_saved_answers import tuned
+from tests.support import odd_calls
 from tests.unit.calls.test_odd_calls import raw_of
 from tests.unit.cli.test_study_verbs import loops, slopes, steady, worst
 from tests.unit.cli.test_terminal import region, sobol

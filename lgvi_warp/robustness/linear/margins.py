@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.common.arguments import listed, whole_number
+from lgvi_warp.common.arguments import listed, names_of, whole_number
 from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.summaries import few_digits, plural
@@ -340,7 +340,7 @@ def margins(
     """
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene
-    of, by = tuple(listed("of", of, "names")), tuple(listed("by", by, "names"))
+    of, by = tuple(names_of("of", of)), tuple(names_of("by", by))
     faults = Faults()
     for word in of:
         faults.choice("of", word, OF)

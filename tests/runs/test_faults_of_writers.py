@@ -16,6 +16,7 @@ from lgvi_warp.common import files, tables
 pytest.importorskip("matplotlib")
 ENDINGS = (".csv", ".parquet", ".nc", ".geojson", ".kml", ".mcap")
 PICTURES = ("png", "pdf", "svg", "jpg")
+MOVIES = ("webp", "gif", "png")
 
 
 @pytest.fixture(scope="module")
@@ -37,6 +38,16 @@ def picture(path):
     return lambda: save_figure(figure, path)
 
 
+def moving(path):
+    from PIL import Image
+
+    from lgvi_warp.views.recording.movie import _save
+
+    rng = np.random.default_rng(2)
+    pictures = [Image.fromarray(rng.integers(0, 255, (40, 60, 3), np.uint8)) for _ in range(3)]
+    return lambda: _save(iter(pictures), path, 1.0)
+
+
 def writers(run, folder):
     """Writers of files, by the name of the file."""
     rows = [{"a": i, "b": f"text {i}"} for i in range(500)]
@@ -44,6 +55,7 @@ def writers(run, folder):
         f"run{ending}": (lambda to=folder / f"run{ending}": lw.export(run, to=to, overwrite=True)) for ending in ENDINGS
     }
     made |= {f"picture.{ending}": picture(folder / f"picture.{ending}") for ending in PICTURES}
+    made |= {f"movie.{ending}": moving(folder / f"movie.{ending}") for ending in MOVIES}
     made |= {
         "run.rrd": lambda: lw.record(run, folder / "run.rrd"),
         "result.npz": lambda: run.save(folder / "result.npz"),
@@ -55,6 +67,7 @@ def writers(run, folder):
 
 
 NAMES = [f"run{ending}" for ending in (*ENDINGS, ".rrd")] + [f"picture.{ending}" for ending in PICTURES]
+NAMES += [f"movie.{ending}" for ending in MOVIES]
 NAMES += ["result.npz", "report.html", "table.csv", "text.md"]
 
 

@@ -292,7 +292,15 @@ def test_what_is_no_recipe_is_refused():
     fleet = resting(north=NORMAL(std=1.0))
     found = lw.estimate(fleet, "position[0]", 0.2, **STILL)
     says(refused(lw.estimate, fleet, "position[1]", recipe=found.recipe), "is of another question")
-    for odd in ({}, 3, [], {**found.recipe, "rounds": [[0.0, [-1]]]}, {**found.recipe, "levels": [{}]}):
+    for odd in (
+        {},
+        3,
+        [],
+        np.zeros(3),
+        np.datetime64("2020-01-01"),
+        {**found.recipe, "rounds": [[0.0, [-1]]]},
+        {**found.recipe, "levels": [{}]},
+    ):
         says(refused(lw.estimate, fleet, "position[0]", recipe=odd), "recipe", "is not a recipe of an answer")
 
 

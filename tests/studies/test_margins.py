@@ -188,6 +188,7 @@ def test_edges_beside_known_ones():
 
 @pytest.mark.parametrize(("words", "message"), [
     ({"loop": "heding_pid"}, "Did you mean 'heading_pid'"), ({"of": "frequency"}, "of = 'frequency'"),
+    ({"of": [["gain"]]}, r"of = \['gain'\] is not a name"),
     ({"by": "guess"}, "by = 'guess'"), ({"seconds": 0.0}, "seconds"), ({"seconds": 1.0}, "is less than 30 ticks"),
 ])  # fmt: skip
 def test_bad_arguments(words, message):

@@ -368,7 +368,7 @@ def test_faulty_arguments_are_told_at_once():
     says(str(error.value), "failed = 'drop'", "relative_error = 2.0", "levels = True")
     for more, words in (({"cheaper": {"h": 1.0}}, "is not a list"), ({"cheaper": [{}]}, "names nothing that differs"),
                         ({"cheaper": [{"start.position[0]": 1.0}]}, "is of a number that varies"),
-                        ({"most": 10}, "most = 10")):  # fmt: skip
+                        ({"most": 10}, "most = 10"), ({"by": np.zeros(2)}, r"by = \[0.0, 0.0\] is not known")):  # fmt: skip
         with pytest.raises(lw.SceneError, match=words):
             lw.rare_event(fleet_of(), "position[0] - 9.0", **more, **RUN)
     with pytest.raises(lw.SceneError, match="nothing that varies, and no noise"):

@@ -29,7 +29,7 @@ from lgvi_warp.accuracy.stability.runs import (
 from lgvi_warp.accuracy.tradeoff import chosen_methods
 from lgvi_warp.common import machine, summaries
 from lgvi_warp.common.arguments import listed, whole_number
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
@@ -41,7 +41,7 @@ from lgvi_warp.measuring.distance import QUANTITIES, Distance, compared_in
 from lgvi_warp.measuring.speed import void
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.request import scene_of
+from lgvi_warp.runs.request import MOST_STEPS, scene_of
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.scene import Scene
 
@@ -364,6 +364,12 @@ def stability_map(
     assert grid is not None
     assert compared is not None
     error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
+    least = float(grid.h.min())
+    for name, value in (("t1", t1), ("error_time", error_time)):
+        if value is not None and value > MOST_STEPS * least:
+            raise refusal(
+                name, value, f"is more than {MOST_STEPS:,} steps of {least:g} s", "give less, or longer steps"
+            )
     return map_of(grid, names, compared, dtype, error=error, error_time=error_time, t1=t1, energy_bound=energy_bound,
                   seed=seed, threads=threads, report=report)  # fmt: skip
 

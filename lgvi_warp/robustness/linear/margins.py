@@ -10,8 +10,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.common.arguments import listed
-from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.arguments import listed, names_of, whole_number
+from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.common.near import near_names
 from lgvi_warp.common.summaries import few_digits, plural
 from lgvi_warp.control.delay import MOST_PERIODS
@@ -61,6 +61,21 @@ WORD_OF = {name: word for word, each in NAMES.items() for name in each} | {
 def unit_of(name: str) -> str:
     """The unit of a margin; "" for a number."""
     return UNITS.get(name, UNITS.get(name.rsplit("_", 1)[-1], ""))
+
+
+def _known(key: str, name: str, columns: Mapping[str, Any]) -> Any:
+    """What stands under a name that the user gave."""
+    if not among(name, columns):
+        raise refusal(key, name, "is not known", closest(name, columns))
+    return columns[name]
+
+
+def _percentages(of: Any) -> np.ndarray:
+    """Read percentages (k,)."""
+    faults = Faults()
+    found = [faults.number(f"of[{i}]", each, "%", 0.0, 100.0) for i, each in enumerate(listed("of", of, "percentages"))]
+    faults.raise_if_any()
+    return np.array(found, float)
 
 
 @dataclass(frozen=True)
@@ -154,7 +169,7 @@ class Margins(Saved):
         Returns:
             By name, (k,): each the margin of a member; NaN where no member has one.
         """
-        quantiles = np.asarray(of) / 100.0
+        quantiles = _percentages(of) / 100.0
         known = {name: v[~np.isnan(v)] for name, v in self._columns().items()}
         return {
             name: np.quantile(v, quantiles, method="inverted_cdf") if len(v) else np.full(len(quantiles), np.nan)
@@ -171,8 +186,9 @@ class Margins(Saved):
         Returns:
             (margins of the members that settle as they are, rising; the part of them with at most that much).
         """
-        columns = self._columns() if by is None else {"eigenvalues": self.values, "runs": self.by_runs}[by]
-        values = np.sort(columns[name][self.steady])
+        ways = dict(zip(WAYS, (self.values, self.by_runs), strict=True))
+        columns = self._columns() if by is None else _known("by", by, ways)
+        values = np.sort(_known("name", name, columns)[self.steady])
         return values, np.arange(1, len(values) + 1) / max(1, len(values))
 
     def worst(self, count: int = 10, name: str | None = None) -> np.ndarray:
@@ -188,8 +204,8 @@ class Margins(Saved):
         """
         columns = self._columns()
         chosen = name or next(word for word in ("gain_upper", *NAMED, "sensitivity_peak") if word in columns)
-        values = columns[chosen] * (-1.0 if chosen.endswith(("lower", "peak")) else 1.0)
-        return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[:count]
+        values = _known("name", chosen, columns) * (-1.0 if chosen.endswith(("lower", "peak")) else 1.0)
+        return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[: whole_number("count", count, 0)]
 
     @property
     def reasons_text(self) -> str:
@@ -324,7 +340,7 @@ def margins(
     """
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene
-    of, by = tuple(listed("of", of, "names")), tuple(listed("by", by, "names"))
+    of, by = tuple(names_of("of", of)), tuple(names_of("by", by))
     faults = Faults()
     for word in of:
         faults.choice("of", word, OF)

@@ -105,7 +105,9 @@ def cases_of(tables: Any) -> tuple[Case, ...]:
         arguments = set(Case.__dataclass_fields__) - {"name"}
         entries = [{"name": name, **(table if isinstance(table, Mapping) and table.keys() <= arguments else {"set": table})}
                    for name, table in tables.items()]  # fmt: skip
-    elif not (entries := items_of(tables) or []):
+    else:
+        entries = items_of(tables) or []
+    if not entries:
         example = 'give [{"name": "pid"}, {"name": "stiff", "set": {"heading_pid.kp": 2.0}}]'
         raise refusal("cases", tables, "is not a list of cases", example)
     for i, entry in enumerate(entries):

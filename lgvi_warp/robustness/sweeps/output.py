@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import of_kind, path_of, whole_number
 from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.files import write_text
 from lgvi_warp.common.status import failed
@@ -115,7 +116,8 @@ class Sweep(SweepTable):
         Returns:
             The same with `p` corrected, and `real` by that and the sweep's confidence.
         """
-        return corrected(rows, self.confidence)
+        kind = "difference p real", "a comparison", "give those of Sweep.compare"
+        return corrected([of_kind(f"rows[{i}]", row, *kind) for i, row in enumerate(rows)], self.confidence)
 
     def rare(self, case: str, at: Mapping[str, Any] | None = None) -> RareEvent:
         """Return the rare failure of a case that asks for it: the probability that a member does not pass.
@@ -194,6 +196,7 @@ class Sweep(SweepTable):
         Raises:
             SceneError: there is no such metric or case.
         """
+        count = whole_number("count", count, 0)
         limited = [name for name, (_, below) in self.conditions.limits.items() if np.isfinite(below)]
         by = by or next(iter([*limited, *self.metrics]))
         if by not in self.metrics:
@@ -286,7 +289,7 @@ class Sweep(SweepTable):
         Raises:
             OSError: they cannot be written.
         """
-        target = Path(folder)
+        target = path_of("folder", folder)
         target.mkdir(parents=True, exist_ok=True)
         tables = {"table": self.rows(), "comparison": [row.row() for row in against_baseline(self)],
                   "ranking": self.ranking(), "worst": self.worst(LISTED)}  # fmt: skip

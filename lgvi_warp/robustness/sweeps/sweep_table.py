@@ -45,6 +45,10 @@ class SweepTable:
     rares: RareFailures | None = None
     matters: Mapping[str, float] = field(default_factory=dict)
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        explained(cls)
+
     def __repr__(self) -> str:
         points = len(self.cells) // len(self.cases)
         return f"{type(self).__name__}({len(self.cases)} cases, {points} points, {self.members_count:,} members)"
@@ -72,7 +76,12 @@ class SweepTable:
 
         Returns:
             The unit as text, such as "rad s"; "1" for none.
+
+        Raises:
+            SceneError: there is no such metric.
         """
+        if metric not in self.metrics:
+            raise refusal("metric", metric, "is not a metric of this sweep", closest(metric, self.metrics))
         statistic = self.setup.metrics[metric]
         return str(getattr(statistic, "unit", statistic.quantity.unit))
 

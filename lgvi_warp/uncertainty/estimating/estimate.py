@@ -196,7 +196,7 @@ def recipe_of(recipe: Mapping[str, Any], question: Question, scenes: int) -> tup
         if len(counts) != len(levels) * len(recipe["rounds"]) or sum(counts) > answering.MOST:
             raise ValueError("rounds")
         most = max(each.scene for each in settings)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, SceneError):
             raise
         raise refusal("recipe", recipe, "is not a recipe of an answer", remedy) from None

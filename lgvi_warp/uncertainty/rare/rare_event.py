@@ -119,8 +119,8 @@ def rare_event(
     members = ensemble_of(fleet)
     faults = Faults()
     faults.choice("failed", failed, ("event", "refuse"))
-    faults.choice("by", by, WAYS)
-    if by == "splitting" and cheaper:
+    known = faults.choice("by", by, WAYS)
+    if known and by == "splitting" and cheaper:
         faults.add("cheaper", cheaper, "is of chains", 'leave it out, or give by="chains"')
     check_asked(faults, relative_error, most)
     for name in ("of", "levels", "statistics", "draws", "common_noise"):

@@ -421,6 +421,7 @@ def test_weights_of_a_table_are_those_of_particles():
         ("gate = 0 is not positive", {"gate": 0}),
         ("inflation = 0.5 is below 1", {"inflation": 0.5}),
         ("inflation = 'adaptiv' is not known", {"inflation": "adaptiv"}),
+        ("filter = [0.0, 0.0] is not known", {"filter": np.zeros(2)}),
         ("inflation = 1.1 is of Kalman filters", {"inflation": 1.1, "filter": "particles"}),
     ],
 )

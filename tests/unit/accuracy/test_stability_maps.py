@@ -153,6 +153,12 @@ def test_all_faults_at_once(scene):
         lw.stability_map(scene, points=0, directions=0)
 
 
+@pytest.mark.parametrize("name", ["t1", "error_time"])
+def test_a_time_of_too_many_steps_is_refused(name, scene):
+    with pytest.raises(lw.SceneError, match=f"^{name} = 9.22.* is more than 2,147,483,646 steps of 0.01 s"):
+        lw.stability_map(scene, ("h", 0.01, 1.0), ("angular_velocity", 0.1, 10.0), ["psi_s"], points=4, **{name: 2**63})
+
+
 @pytest.mark.parametrize(("x", "y", "words"), [
     ("h", "h", "both axes"), ("speed", "angular_velocity", "missing, and is on no axis"),
     ("h=a:b", "speed", "NAME=LOW:HIGH"), ("h=1:2:cubic", "speed", "NAME=LOW:HIGH"), ("h=-1:2", "speed", "above 0"),

@@ -6,8 +6,10 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.arguments import explained
+from tests.studies.test_saved_answers import tuned
 from tests.support import odd_calls
 from tests.unit.calls.test_odd_calls import raw_of
+from tests.unit.cli.test_study_verbs import loops, slopes, steady, worst
 from tests.unit.cli.test_terminal import region, sobol
 from tests.unit.measuring.test_cost import found as tradeoff_of
 
@@ -36,6 +38,8 @@ def built(tmp_path_factory):
         "Floor": lw.events.Floor(depth=10.0), "Mean": lw.statistics.Mean("depth"), "SaveAt": lw.SaveAt(every=1.0),
         "Field": lw.terms.CurrentField(velocities=grid, origin=[0.0] * 3, spacing=[1.0] * 3), "Store": lw.Store("a.zarr"),
         "Series": lw.studies.Series("depth", [0.1], [0.0], 0.1), "Axis": lw.studies.Axis("start.velocity[0]", 1.0, 2.0),
+        "Margins": loops("", "", "failed"), "Trim": steady(), "WorstCase": worst(), "Derivatives": slopes(), "Tuned": tuned(),
+        "Sweep": lw.sweep(fleet, cases=[lw.studies.Case("a")], metrics=["max(depth)"], **arguments),
         "Tradeoff": tradeoff_of(4.0), "SobolIndices": sobol(), "StabilityMap": region(), "Until": lw.Until("mean depth", 1.0),
     }  # fmt: skip
     return scene, fleet, result, folder, things

@@ -482,6 +482,7 @@ def test_cases_are_read_from_lists_and_tables():
 
 @pytest.mark.parametrize(("supplied", "faults"), [
     ("pid", ["cases = 'pid' is not a list of cases"]), ([], ["cases = [] is not a list of cases"]),
+    ({}, ["cases = {} is not a list of cases"]),
     (3, ["cases = 3 is not a list of cases"]),
     ([{"set": {}}, "b"], ["cases[0] = {'set': {}} has no name", "cases[1] = 'b' has no name"]),
     ([{"name": "a", "sets": {}}, {"name": "b", "set": 3}],

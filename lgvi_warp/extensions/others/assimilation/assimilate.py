@@ -122,7 +122,7 @@ def assimilate(
     labels = [one.label for one in instruments if isinstance(one, Series)]
     for label in sorted({label for label in labels if labels.count(label) > 1}):
         faults.add("series", label, "is measured by two of them", "give one of them a name: Series(..., name=...)")
-    faults.choice("filter", filter, METHODS)
+    known = faults.choice("filter", filter, METHODS)
     kept = None if discount is None else faults.number("discount", discount)
     if kept is not None and not 1.0 / 3.0 < kept <= 1.0:
         faults.add("discount", discount, "is not between 1/3 and 1", "give 0.99, or None")
@@ -130,7 +130,7 @@ def assimilate(
     factor = 1.0 if isinstance(inflation, str) else faults.number("inflation", inflation, least=1.0)
     if isinstance(inflation, str):
         faults.choice("inflation", inflation, ["adaptive"])
-    if filter == "particles" and (factor != 1.0 or isinstance(inflation, str)):
+    if known and filter == "particles" and (factor != 1.0 or isinstance(inflation, str)):
         faults.add("inflation", inflation, "is of Kalman filters, and particles have weights", "leave it out")
     targets = _targets(faults, members, learn)
     faults.raise_if_any()

@@ -63,7 +63,7 @@ class LinearMPC(ControlLaw):
     algorithm 16.4), whose demand is right to 1e-6 of the limit, in float32 to 1e-2; a run says in its messages where a tick
     had not converged.
 
-    d is what the model lacks: x less what it predicted, filtered over `disturbance_time`. x_s and u_s are the steady state
+    d is what the model lacks: x, against the last reference as it goes on, less what it predicted, over `disturbance_time`. x_s and u_s are the steady state
     under d in which the `tracked` errors are 0: so steady disturbances leave no error of these. What the actuators did not
     deliver did not act. `lw.linear.mpc` makes the law from a linear model.
 
@@ -90,7 +90,7 @@ class LinearMPC(ControlLaw):
             this is above what it saves; where inputs cannot keep it, it is exceeded.
         preview: Whether it looks ahead at what guidance will want over the horizon, which must be set-points and trajectories;
             False by default: the reference goes on at its present velocity.
-        horizon: Number of periods, 1 to 100; 10 by default.
+        horizon: Number of periods, 1 to 100, over which the model grows at most 1e4 times; 10 by default.
         iterations: Largest number of iterations at a tick, of which most take about ten; 50 by default.
         period: Period of the model [s]; a controller of another period is refused. By default whatever it has.
 

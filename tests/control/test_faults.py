@@ -384,6 +384,7 @@ REFUSED = {
     "kinds": (dict(kind=["gain", "lost"]), "fault.kind = 'lost'"),
     "no kind": (dict(kind=[]), "is no kind of fault"),
     "choice": (dict(kind=["gain", "slow"], choice=2.0), "Give 0 to 1"),
+    "part of a choice": (dict(kind=["gain", "slow"], choice=0.5), "choice = 0.5 is not a whole number. Give 0 or 1"),
     "value": (dict(kind="freeze", value=1.0), "is of a fault of the kind stuck"),
     "duty": (dict(duty=1.5), "fault.duty = 1.5"),
     "period": (dict(period=0.0), "fault.period = 0.0"),

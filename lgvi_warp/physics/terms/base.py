@@ -123,6 +123,7 @@ def number(
     axes: str | None = None,
     optional: bool = False,
     infinite: bool = False,
+    whole: bool = False,
 ) -> Any:
     """Declare a numeric field of a term.
 
@@ -140,6 +141,7 @@ def number(
             inertial ones.
         optional: Whether the field may be None after construction, and then is no parameter; False by default.
         infinite: Whether the values may be infinite; False by default.
+        whole: Whether the values must be whole numbers, as counts are; False by default.
 
     Returns:
         A dataclass field with shape, unit, bounds and axes in its metadata.
@@ -150,7 +152,7 @@ def number(
     if axes not in ("vector", "point", None):
         raise ValueError(f"axes = {axes!r} is not known. Give 'vector', 'point' or None")
     meta = dict(shape=shape, unit=unit, least=least, most=most, above=above, rising=rising, axes=axes)
-    return field(default=default, metadata=meta | dict(optional=optional, infinite=infinite))
+    return field(default=default, metadata=meta | dict(optional=optional, infinite=infinite, whole=whole))
 
 
 def word_of(item: dataclasses.Field[Any]) -> str:
@@ -448,7 +450,11 @@ class Term(Documented):
             A mask (n,) for each numeric field, True where the member's number is refused.
         """
         fields = {word_of(item): item for item in self.number_fields()}
-        return {name: _outside(fields[name], value) | _falling(fields[name], value) for name, value in numbers.items()}
+        checks = (_outside, _falling, _fractional)
+        return {
+            name: np.logical_or.reduce([check(fields[name], value) for check in checks])
+            for name, value in numbers.items()
+        }
 
     def odd_at(self, numbers: Numbers, position: Array) -> Mapping[str, tuple[Array, str]]:
         """Oddities of members where they start; none by default.
@@ -729,6 +735,8 @@ def _checked(
         faults.add(name, value, problem, f"give numbers {bounds} [{unit}]")
     elif _falling(field, array[None]).any():
         faults.add(name, value, "is not rising", "sort the table and drop repetitions")
+    elif _fractional(field, array[None]).any():
+        faults.add(name, value, "is not a whole number", f"give {_whole_near(array, meta)}")
     else:
         return array
     return None
@@ -757,6 +765,21 @@ def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     if not field.metadata["rising"]:
         return np.zeros(len(values), bool)
     return np.any(np.diff(np.nan_to_num(values)) <= 0.0, axis=1)
+
+
+def _fractional(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
+    """Mask (n,) of the members whose values (n, ...) of a field are not whole, though they must."""
+    if not field.metadata["whole"]:
+        return np.zeros(len(values), bool)
+    return np.any(values.reshape(len(values), -1) != np.rint(values.reshape(len(values), -1)), axis=1)
+
+
+def _whole_near(array: np.ndarray, meta: Mapping[str, Any]) -> str:
+    """The whole numbers nearest to one, within its bounds; of several, words."""
+    if array.ndim:
+        return "whole numbers"
+    near = {float(value) for value in (np.floor(array), np.ceil(array)) if meta["least"] <= value <= meta["most"]}
+    return " or ".join(f"{value:g}" for value in sorted(near))
 
 
 def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray:

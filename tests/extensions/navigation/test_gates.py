@@ -168,6 +168,10 @@ def test_without_a_gate_there_is_no_row_of_memory_for_it():
 
 BAD = {
     "no gate": (lambda: lw.control.ErrorStateFilter(most_rejected=3.0), "has no meaning without a gate"),
+    "count": (
+        lambda: lw.control.ErrorStateFilter(gate=3.0, most_rejected=1.5),
+        "most_rejected = 1.5 is not a whole number. Give 1 or 2",
+    ),
     "gate of 0": (lambda: lw.control.ErrorStateFilter(gate=0.0), "Give numbers above 0"),
     "two gates": (lambda: lw.control.ErrorStateFilter(gate=[3.0, 4.0]), r"\(5,\)"),
     "tilt": (lambda: lw.control.DVL(greatest_tilt=-0.1), "dvl.greatest_tilt"),

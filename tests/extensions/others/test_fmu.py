@@ -266,3 +266,22 @@ def test_the_command_takes_a_scene_file(tmp_path):
     assert float(known["vehicle.buoyancy"].start) == 299.0
     assert {"control_fins.command[0]", "control_fins.command[1]", "measured_depth"} <= set(known)
     assert cli.main(["export", "example:remus_100_autopilot", "--to", str(target)]) == 2
+
+
+def test_inputs_that_are_no_numbers_end_no_vehicle(unit):
+    """The step is refused with the reason; with a number the vehicle goes on as if it had not been asked."""
+    instance, places = opened(unit)
+    wanted, command = [places[name] for name in MOTION], places["control_wrench.command[2]"]
+    begun(instance)
+    for bad in (np.nan, np.inf):
+        instance.setReal([command], [bad])
+        with pytest.raises(Exception, match=r"fmi2DoStep failed with status 2 \(discard\)"):
+            instance.doStep(0.0, H)
+        assert f"control_wrench.command[2] = {bad} is not finite. Give a number" in instance.said[-1]
+    instance.setReal([command], [3.0])
+    instance.doStep(0.0, H)
+    other, _ = opened(unit)
+    begun(other)
+    other.setReal([command], [3.0])
+    other.doStep(0.0, H)
+    assert instance.getReal(wanted) == other.getReal(wanted)

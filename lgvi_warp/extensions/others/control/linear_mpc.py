@@ -31,6 +31,10 @@ COORDINATES = {
     for i, wish in enumerate(wishes)
 }
 LONGEST = 100
+# By how much a model may grow over a horizon: beyond, the round-off of its problem is as large as its inputs.
+LARGEST_GROWTH = 1e4
+# Numbers of a reference that the law keeps for the next tick.
+OF_REFERENCE = 18
 # Numbers that are given together.
 OF_OUTPUTS = ("outputs", "output_limit", "excess_cost")
 
@@ -59,7 +63,7 @@ class LinearMPC(ControlLaw):
     algorithm 16.4), whose demand is right to 1e-6 of the limit, in float32 to 1e-2; a run says in its messages where a tick
     had not converged.
 
-    d is what the model lacks: x less what it predicted, filtered over `disturbance_time`. x_s and u_s are the steady state
+    d is what the model lacks: x, against the last reference as it goes on, less what it predicted, over `disturbance_time`. x_s and u_s are the steady state
     under d in which the `tracked` errors are 0: so steady disturbances leave no error of these. What the actuators did not
     deliver did not act. `lw.linear.mpc` makes the law from a linear model.
 
@@ -86,7 +90,7 @@ class LinearMPC(ControlLaw):
             this is above what it saves; where inputs cannot keep it, it is exceeded.
         preview: Whether it looks ahead at what guidance will want over the horizon, which must be set-points and trajectories;
             False by default: the reference goes on at its present velocity.
-        horizon: Number of periods, 1 to 100; 10 by default.
+        horizon: Number of periods, 1 to 100, over which the model grows at most 1e4 times; 10 by default.
         iterations: Largest number of iterations at a tick, of which most take about ten; 50 by default.
         period: Period of the model [s]; a controller of another period is refused. By default whatever it has.
 
@@ -163,6 +167,11 @@ class LinearMPC(ControlLaw):
         if _steady_state(self.A, self.B, places) is None:
             problem = "has no steady inputs that hold it against any disturbance"
             faults.add("tracked", ", ".join(tracked), problem, "track another state, or give other inputs")
+        rate = float(_growth_rate(self.A))
+        if rate**self.horizon > LARGEST_GROWTH:
+            problem = f"is too long for an unstable model that grows {rate:.3g} times in a period"
+            remedy = f"give at most {int(np.log(LARGEST_GROWTH) / np.log(rate))}, or a model of a shorter period"
+            faults.add("horizon", self.horizon, problem, remedy)
         wishes = dict.fromkeys(COORDINATES[name] for name in states)
         known = {
             "states": tuple(states), "inputs": tuple(inputs), "needs": tuple(wish for wish in wishes if wish),
@@ -170,6 +179,23 @@ class LinearMPC(ControlLaw):
         }  # fmt: skip
         for name, value in known.items():
             object.__setattr__(self, name, value)
+
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        # The conditions of `check`, member by member.
+        bad = super().unphysical(numbers)
+        if any(bad[name].any() for name in ("A", "B", "limit", *(name for name in ("P", "lower") if name in bad))):
+            return bad
+        bad["A"] = bad["A"] | (_growth_rate(numbers["A"]) ** self.horizon > LARGEST_GROWTH)
+        places = vars(self)["tracked_places"]
+        A, B = repeated(numbers["A"], numbers["B"])
+        unsteady = [_steady_state(*model, places) is None for model in zip(A, B, strict=True)]
+        for name in ("A", "B"):
+            bad[name] = bad[name] | (np.array(unsteady) if len(numbers[name]) == len(unsteady) else np.all(unsteady))
+        if "lower" in bad:
+            bad["lower"] = bad["lower"] | np.any(numbers["lower"] >= numbers["limit"], axis=1)
+        if "P" in bad:
+            bad["P"] = bad["P"] | ~np.array([_at_least_zero(P) for P in numbers["P"]])
+        return bad
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         # A model of another period would be wrong without a sign of it.
@@ -229,11 +255,11 @@ class LinearMPC(ControlLaw):
             return self.device
         return f"{DEVICE}.limited_mpc:{f'preview{self.horizon}' if self.preview else ''}"
 
-    def output_rows(self, own: Numbers) -> np.ndarray:
-        """Rows of the limits of outputs of a member, tick by tick (horizon p, 2 + 2 n + k).
+    def output_rows(self, own: Numbers) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the limits of outputs of a member, tick by tick (horizon p, 2 + 2 n + k), and the outputs' lines (p, n).
 
-        Each is the limit, the cost of a unit beyond it, what state and disturbance make of the output, and what inputs do, in
-        units of the largest effect of an input as a part of its limit.
+        Each row is the limit, the cost of a unit beyond it, what state and disturbance make of the output, and what inputs do;
+        all are in units of the largest effect of an input as a part of its limit.
         """
         A, B, N, p = own["A"], own["B"] * own["limit"], self.horizon, len(own.get("outputs", ()))
         n, m = B.shape
@@ -243,14 +269,15 @@ class LinearMPC(ControlLaw):
             made[:, j * m : (j + 1) * m] += B
             answers.append(own["outputs"] @ np.hstack([still, made]))
         if not p:
-            return np.zeros((0, 2 + 2 * n + N * m))
+            return np.zeros((0, 2 + 2 * n + N * m)), np.zeros((0, n))
         rows = np.stack(answers)
         unit = np.abs(rows[:, :, 2 * n :]).max(axis=(0, 2))
         unit = np.where(unit > 0.0, unit, 1.0)
         # The problem is half of the sums that are made least.
         ends = np.stack([own["output_limit"] / unit, 0.5 * own["excess_cost"] * unit], axis=-1)
         ends = np.broadcast_to(ends, (N, p, 2))
-        return np.concatenate([ends, rows / unit[:, None]], axis=-1).reshape(N * p, -1)
+        rows = np.concatenate([ends, rows / unit[:, None]], axis=-1)
+        return rows.reshape(N * p, -1), own["outputs"] / unit[:, None]
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Places, A, B, limits, and the matrices of the problem; memory of state, inputs and disturbance.
@@ -269,8 +296,8 @@ class LinearMPC(ControlLaw):
             half = found.cost[np.tril_indices(k)]
             member = {name: value[i] for name, value in own.items()}
             lower = (member.get("lower", -limit) / limit,) if self.limits_more else ()
-            outputs: tuple[np.ndarray, ...] = (self.output_rows(member),) if self.limits_more else ()
-            outputs += (-np.linalg.solve(found.cost, found.ahead), found.ahead) if self.preview else ()
+            ends, lines = self.output_rows(member) if self.limits_more else (np.zeros(0), np.zeros(0))
+            outputs = (ends, -np.linalg.solve(found.cost, found.ahead), found.ahead, lines) if self.preview else (ends,)
             parts = (places, own["A"][i], own["B"][i], limit, *lower, change, found.best, found.slope, half, *outputs)
             rows.append(np.concatenate([np.ravel(part) for part in parts]))
         words = {"states": n, "inputs": m, "horizon": self.horizon, "iterations": self.iterations}
@@ -280,16 +307,21 @@ class LinearMPC(ControlLaw):
         if self.limits_more:
             p = 0 if self.outputs is None else len(self.outputs)
             words["outputs"] = p
-            work += 8 * ((1 + rated) * k + self.horizon * p) - m
+            work += 9 * (2 * (1 + rated) * k + self.horizon * p) - 8 * (1 + rated) * k - m
             words["shifts"] = work
             work += self.horizon * n if self.preview else 0
-        return Packed(words | {"gain": gain}, np.array(rows), np.zeros((1, 1 + 2 * n + m)), work=work)
+        return Packed(words | {"gain": gain}, np.array(rows), np.zeros((1, 1 + 2 * n + m + OF_REFERENCE)), work=work)
 
 
 def _at_least_zero(matrix: np.ndarray) -> bool:
     """Whether a matrix is symmetric and has no negative eigenvalue, but for round-off."""
     size = np.abs(matrix).max()
     return bool(np.allclose(matrix, matrix.T) and np.linalg.eigvalsh(matrix).min() >= -1e-9 * size)
+
+
+def _growth_rate(A: np.ndarray) -> np.ndarray:
+    """By how much states of models (..., n, n) grow in a period at most in the long run, at least 1."""
+    return np.asarray(np.maximum(np.abs(np.linalg.eigvals(A)).max(axis=-1), 1.0))
 
 
 def _steady_state(A: np.ndarray, B: np.ndarray, tracked: Sequence[int]) -> np.ndarray | None:

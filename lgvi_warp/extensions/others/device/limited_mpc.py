@@ -13,20 +13,32 @@ from lgvi_kernels import device
 from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
-from lgvi_kernels.laws.control.integral import remember3, remembered3
-from lgvi_warp.extensions.others.device.linear_mpc import DEMAND, SEEN, advance, entry, estimate, place, see, times
+from lgvi_kernels.laws.control.integral import remembered3
+from lgvi_warp.extensions.others.device.linear_mpc import (
+    DEMAND,
+    SEEN,
+    advance,
+    entry,
+    estimate,
+    place,
+    see,
+    see_later,
+    times,
+)
 
 # Rows of the table, with n states, m inputs, k = horizon m and q outputs: places of the states, of the inputs; A, B; largest
 # inputs, and as parts of these the least ones and the limits of changes, m each; best inputs without limits and slope of the
 # cost, (k, 2 n) each; the cost's matrix, line by line up to the diagonal. Then of each output at each tick: its limit, the
 # cost of a unit beyond it, what state and disturbance make of it (2 n), what the inputs make of it (k). With preview, what
-# shifts of the reference make of the best inputs without limits and of the slope of the cost, (k, horizon n) each.
+# shifts of the reference make of the best inputs without limits and of the slope of the cost, (k, horizon n) each, and the
+# lines of the outputs (q, n).
 # Rows of the memory as in linear_mpc.py.
 # Sides C v <= room are k inputs from above and from below, where `rated` their changes too, and the outputs, which may exceed
-# theirs. Scratch rows of a side: slack, multiplier, excess, room; what a step is to make of slack times multiplier, and of
-# excess times the rest of its cost; its weight in Newton's matrix, and how far slack and excess are from its inputs.
-OF_SIDE = 8
-SLACK, MULTIPLIER, EXCESS, ROOM, TARGET, TARGET_OF_EXCESS, WEIGHT, MISSED = range(8)
+# theirs. Scratch rows of a side: slack, multiplier, excess, the rest of its cost (a unit's cost less the multiplier), room;
+# what a step is to make of slack times multiplier, and of excess times the rest; its weight in Newton's matrix, and how far
+# slack and excess are from its inputs. The rest is kept, not computed: near a solution it is far below the cost's round-off.
+OF_SIDE = 9
+SLACK, MULTIPLIER, EXCESS, REST, ROOM, TARGET, TARGET_OF_EXCESS, WEIGHT, MISSED = range(9)
 
 params = make_params(
     "LimitedMPC",
@@ -90,12 +102,6 @@ def spread(y: Any, p: Any, outputs: int, to: int, t: int, value: Any):
             remember(y, to + i, remembered(y, to + i) + row1(y, at + i) * value)
 
 
-@wp.func
-def rest_of_cost(y: Any, p: Any, outputs: int, at: int, t: int):
-    """The cost of a unit of excess less the multiplier, of a side that may be exceeded."""
-    return row1(y, row_of_output(p, outputs, t) + 1) - remembered(y, at + wp.static(MULTIPLIER))
-
-
 @wp.func(inline=False)
 def factor(y: Any, p: Any, outputs: int, cost: int, each: int, L: int, zero: Any):
     """The Cholesky factor of H + C^T diag(weights) C, with inverses on its diagonal."""
@@ -139,7 +145,7 @@ def gap_of(y: Any, p: Any, outputs: int, at: int, t: int):
         y, at + wp.static(MULTIPLIER)
     )
     if t >= hard_sides(p):
-        gap = gap + remembered(y, at + wp.static(TARGET_OF_EXCESS)) / rest_of_cost(y, p, outputs, at, t)
+        gap = gap + remembered(y, at + wp.static(TARGET_OF_EXCESS)) / remembered(y, at + wp.static(REST))
     return gap
 
 
@@ -152,7 +158,7 @@ def moves(y: Any, p: Any, outputs: int, at: int, t: int, change: Any):
     excess = more - more
     if t >= hard_sides(p):
         target = remembered(y, at + wp.static(TARGET_OF_EXCESS)) - remembered(y, at + wp.static(EXCESS)) * more
-        excess = -target / rest_of_cost(y, p, outputs, at, t)
+        excess = -target / remembered(y, at + wp.static(REST))
     return slack, more, excess
 
 
@@ -186,15 +192,17 @@ def step(y: Any, p: Any, outputs: int, slope: int, to: int, each: int, L: int, z
         most = greatest(most, -more / remembered(y, at + wp.static(MULTIPLIER)))
         if t >= hard:
             most = greatest(most, -excess / remembered(y, at + wp.static(EXCESS)))
-            most = greatest(most, more / rest_of_cost(y, p, outputs, at, t))
+            most = greatest(most, more / remembered(y, at + wp.static(REST)))
     return most
 
 
 @wp.func(inline=False)
-def begin(
-    y: Any, p: Any, outputs: int, limits: int, x: int, before: int, v: int, f: int, cost: int, each: int, zero: Any
-):
-    """Inputs of 0, slacks of the room or 1, and multipliers of one size, which is returned."""
+def begin(y: Any, p: Any, outputs: int, limits: int, lines: int, x: int, before: int, v: int, f: int, cost: int, each: int,
+          zero: Any):  # fmt: skip
+    """Inputs of 0, slacks of the room or 1, and multipliers of one size, which is returned.
+
+    lines: first row of the lines of outputs, which shifts of the reference change; 0 without preview.
+    """
     unity = ones(zero)
     k = p.horizon * p.inputs
     m = p.inputs
@@ -207,10 +215,17 @@ def begin(
         at = each + wp.static(OF_SIDE) * t
         room = unity
         start = size
+        rest = zero
         if t >= hard:
             row = row_of_output(p, outputs, t)
             room = row1(y, row) - times(y, row + 2, x, 2 * p.states, zero)
-            start = least(size, y.h.dtype(0.5) * (row1(y, row + 1) * unity))
+            if lines > 0:
+                tick = (t - hard) // p.outputs
+                line = lines + (t - hard) % p.outputs * p.states
+                room = room - times(y, line, p.work + p.shifts + tick * p.states, p.states, zero)
+            price = row1(y, row + 1) * unity
+            start = least(size, y.h.dtype(0.5) * price)
+            rest = price - start
         elif t >= 2 * k:
             i = t % k
             room = row1(y, limits + 2 * m + i % m) * unity
@@ -225,6 +240,7 @@ def begin(
         remember(y, at + wp.static(SLACK), greatest(room, unity))
         remember(y, at + wp.static(MULTIPLIER), start)
         remember(y, at + wp.static(EXCESS), greatest(-room, unity))
+        remember(y, at + wp.static(REST), rest)
     return size
 
 
@@ -257,12 +273,13 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, 
         remember(y, at + wp.static(TARGET), slack * multiplier)
         if t >= hard:
             excess = remembered(y, at + wp.static(EXCESS))
-            left = rest_of_cost(y, p, outputs, at, t)
+            left = remembered(y, at + wp.static(REST))
             missed = missed - excess
             softness = softness + excess / left
             gap = gap + excess * left
             remember(y, at + wp.static(TARGET_OF_EXCESS), excess * left)
-        off = greatest(off, absolute(missed))
+        # Relative to the room, which is far above 1 where inputs hardly move an output.
+        off = greatest(off, absolute(missed) / greatest(unity, absolute(remembered(y, at + wp.static(ROOM)))))
         remember(y, at + wp.static(MISSED), missed)
         remember(y, at + wp.static(WEIGHT), unity / softness)
     share_of = y.h.dtype(1.0) / y.h.dtype(count + soft)
@@ -270,7 +287,7 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, 
     steep = zero
     for i in range(k):
         steep = greatest(steep, absolute(remembered(y, slope + i)))
-    rest = greatest(gap - by_digits(y, y.h.dtype(1e-12), y.h.dtype(2e-6)) * size, zero)
+    rest = greatest(gap - by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * size, zero)
     close = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
     rest = greatest(rest, greatest(off - close * unity, steep - close * size))
     busy = positive(rest, busy, zero)
@@ -284,7 +301,7 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, 
             multiplier = remembered(y, at + wp.static(MULTIPLIER)) + length * more
             ahead = ahead + (remembered(y, at + wp.static(SLACK)) + length * slack) * multiplier
             if t >= hard:
-                left = rest_of_cost(y, p, outputs, at, t) - length * more
+                left = remembered(y, at + wp.static(REST)) - length * more
                 ahead = ahead + (remembered(y, at + wp.static(EXCESS)) + length * excess) * left
                 target = remembered(y, at + wp.static(TARGET_OF_EXCESS)) - excess * more
                 remember(y, at + wp.static(TARGET_OF_EXCESS), target)
@@ -305,6 +322,7 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, 
             advance(y, at + wp.static(MULTIPLIER), length, more)
             if t >= hard:
                 advance(y, at + wp.static(EXCESS), length, excess)
+                advance(y, at + wp.static(REST), length, -more)
         for i in range(k):
             advance(y, v + i, length, remembered(y, to + i))
     return busy
@@ -321,10 +339,7 @@ def foresee(s: Any, r: Any, y: Any, p: Any):
         see(s, y, p.work)
         for i in range(n):
             remember(y, row + i, remembered(y, p.work + place(y, p.first + i)))
-        see(r, y, p.work)
-        remember3(y, p.work, remembered3(y, p.work) - time * r.velocity)
-        turn = to_body(y, to_inertial(r, r.angular_velocity))
-        remember3(y, p.work + 3, remembered3(y, p.work + 3) - time * turn)
+        see_later(r, y, p.work, time)
         for i in range(n):
             remember(y, row + i, remembered(y, row + i) - remembered(y, p.work + place(y, p.first + i)))
     return s
@@ -374,7 +389,7 @@ def made(features):
                 reach = y.h.dtype(0.999) * row1(y, limits + 2 * m + i) * unity
                 u = clamp(u, row1(y, limits + m + i) * unity - reach, unity + reach)
             remember(y, before + i, u)
-        estimate(y, p, x, matrices)
+        estimate(r, y, p, matrices)
         for i in range(n):
             remember(y, x + n + i, remembered(y, last + n + m + i))
             remember(y, last + i, remembered(y, x + i))
@@ -389,7 +404,10 @@ def made(features):
                 remember(y, best_of + i, times(y, of_shifts, shifts, p.horizon * n, remembered(y, best_of + i)))
                 of_shifts += k * p.horizon * n
                 remember(y, f + i, times(y, of_shifts, shifts, p.horizon * n, remembered(y, f + i)))
-        size = begin(y, p, outputs, limits, x, before, v, f, cost, each, zero)
+        lines = wp.static(0)
+        if wp.static(ahead > 0):
+            lines = outputs + p.horizon * p.outputs * (2 + 2 * n + k) + 2 * k * p.horizon * n
+        size = begin(y, p, outputs, limits, lines, x, before, v, f, cost, each, zero)
         for t in range(count):
             room = remembered(y, each + wp.static(OF_SIDE) * t + wp.static(ROOM))
             over = greatest(over, side(y, p, outputs, best_of, t, zero) - room)

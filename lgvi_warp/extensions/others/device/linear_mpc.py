@@ -11,14 +11,15 @@ from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
 from lgvi_kernels.laws.control.integral import remember3, remembered3
 from lgvi_kernels.laws.control.pose_error import attitude_error, rate_error, velocity_error
 
-# Errors that may be states, in the order in which `see` writes them; components of a demand.
+# Errors that may be states, in the order in which `see` writes them; components of a demand; numbers of a reference.
 SEEN = 12
 DEMAND = 6
+WANTED = 18
 
 # Rows of the table, with n states, m inputs and k = horizon m: places of the states, of the inputs; A, B; limits of inputs and
 # of their changes (as parts of these), m each; the best inputs without limits (k, 2 n) of state and disturbance; the slope of
 # the cost, (k, 2 n); and its matrix, line by line up to the diagonal.
-# Rows of the memory: whether it has begun; the state (n), the inputs (m) and the disturbance (n).
+# Rows of the memory: whether it has begun; the state (n), the inputs (m) and the disturbance (n); the reference (WANTED).
 # Constraints |C v - middle| <= half are the k inputs, then where `rated` their k changes. Each has eight scratch rows: the
 # slacks above and below, their multipliers, 1 / the slacks, and what a step is to make of slack times multiplier.
 OF_EACH = 8
@@ -43,6 +44,38 @@ def see(r: Any, y: Any, row: int):
 
 
 @wp.func
+def see_later(r: Any, y: Any, row: int, time: Any):
+    """Write all errors against a reference that went on at its rates for a time."""
+    see(r, y, row)
+    remember3(y, row, remembered3(y, row) - time * r.velocity)
+    turn = to_body(y, to_inertial(r, r.angular_velocity))
+    remember3(y, row + 3, remembered3(y, row + 3) - time * turn)
+
+
+@wp.func
+def keep_wanted(r: Any, y: Any, row: int):
+    """Keep a reference for the next tick."""
+    remember3(y, row, r.position)
+    remember3(y, row + 3, r.velocity)
+    remember3(y, row + 6, r.north)
+    remember3(y, row + 9, r.east)
+    remember3(y, row + 12, r.down)
+    remember3(y, row + 15, r.angular_velocity)
+
+
+@wp.func
+def kept_wanted(r: Any, y: Any, row: int):
+    """The reference of the last tick."""
+    r.position = remembered3(y, row)
+    r.velocity = remembered3(y, row + 3)
+    r.north = remembered3(y, row + 6)
+    r.east = remembered3(y, row + 9)
+    r.down = remembered3(y, row + 12)
+    r.angular_velocity = remembered3(y, row + 15)
+    return r
+
+
+@wp.func
 def place(y: Any, row: int):
     """A whole number of the table, the same in all lanes."""
     return int(row1(y, row)[0])
@@ -57,15 +90,21 @@ def times(y: Any, row: int, at: int, count: int, total: Any):
 
 
 @wp.func
-def estimate(y: Any, p: Any, x: int, matrices: int):
-    """The disturbance d: what the model of a period lacks, by a filter of first order."""
+def estimate(r: Any, y: Any, p: Any, matrices: int):
+    """The disturbance d: what the model of a period lacks, by a filter of first order.
+
+    The model predicts errors against the last reference, which goes on at its rates: what guidance changed is no disturbance.
+    """
     n = p.states
     m = p.inputs
     last = p.memory + 1
+    wanted = last + 2 * n + m
     begun = remembered(y, p.memory)
+    see_later(kept_wanted(r, y, wanted), y, p.work, y.period)
+    keep_wanted(r, y, wanted)
     for i in range(n):
         d = remembered(y, last + n + m + i)
-        lacking = remembered(y, x + i) - d
+        lacking = remembered(y, p.work + place(y, p.first + i)) - d
         lacking = lacking - times(y, matrices + i * n, last, n, d - d)
         lacking = lacking - times(y, matrices + n * n + i * m, last + n, m, d - d)
         remember(y, last + n + m + i, d + begun * (p.gain * lacking))
@@ -262,7 +301,7 @@ def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, L
     steep = zero
     for i in range(k):
         steep = greatest(steep, absolute(remembered(y, slope + i)))
-    rest = greatest(gap - by_digits(y, y.h.dtype(1e-12), y.h.dtype(2e-6)) * size, zero)
+    rest = greatest(gap - by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * size, zero)
     close = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
     rest = greatest(rest, greatest(off - close * unity, steep - close * size))
     busy = positive(rest, busy, zero)
@@ -337,7 +376,7 @@ def control(w: Any, r: Any, y: Any, p: Any):
             most = unity + y.h.dtype(0.999) * row1(y, limits + m + i) * unity
             u = clamp(u, -most, most)
         remember(y, before + i, u)
-    estimate(y, p, x, matrices)
+    estimate(r, y, p, matrices)
     for i in range(n):
         remember(y, x + n + i, remembered(y, last + n + m + i))
         remember(y, last + i, remembered(y, x + i))

@@ -189,6 +189,8 @@ class VehicleUnit:
         if steps < 1 or abs(last - round(last)) > SAME_STEP:
             problem = f"communication step {length:.9g} s is not a whole number of steps of {vehicle.h:.9g} s"
             raise ValueError(f"{problem}. Give a multiple, or export a scene with another [run] step")
+        for name in (name for name in self._inputs if not math.isfinite(self._values[name])):
+            raise ValueError(f"{name} = {self._values[name]} is not finite. Give a number")
         if not self.of_commands and vehicle.steps:
             vehicle.change(self._set_points())
         vehicle.advance(steps, np.array([self._values[name] for name in self._inputs]))

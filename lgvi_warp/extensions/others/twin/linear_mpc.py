@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.reference.control import Measurement, Part, Reference, pose_errors
+from lgvi_warp.reference.control import NO_WISH, Measurement, Part, Reference, pose_errors
 from lgvi_warp.reference.rotation import Array
 
 COORDINATES = [f"{name}[{i}]" for name in ("position", "rotation", "velocity", "angular_velocity") for i in range(3)]
@@ -26,7 +26,7 @@ class LinearMPC(Part):
         """Nothing is known of the last tick."""
         n, m = np.shape(self.B)
         self.begun, self.x, self.u, self.d = False, np.zeros(n), np.zeros(m), np.zeros(n)
-        self.shifts = None
+        self.shifts, self.wanted = None, NO_WISH
 
     @property
     def ahead(self) -> int:  # type: ignore[override]
@@ -39,12 +39,14 @@ class LinearMPC(Part):
         errors = np.concatenate([-position, rotation, -velocity, -rate])
         return errors[[COORDINATES.index(name) for name in self.states]]
 
+    def errors_later(self, r: Reference, y: Measurement, time: float) -> Array:
+        """The same where the reference went on at its rates for a time."""
+        going = np.concatenate([r.velocity, y.R.T @ r.R @ r.angular_velocity, np.zeros(6)])
+        return self.errors(r, y) - time * going[[COORDINATES.index(name) for name in self.states]]
+
     def foresee(self, later: Sequence[Reference], r: Reference, y: Measurement) -> None:
         """Keep how the errors of later references differ from those of r as it goes on at its rates."""
-        going = np.concatenate([r.velocity, y.R.T @ r.R @ r.angular_velocity, np.zeros(6)])
-        going = going[[COORDINATES.index(name) for name in self.states]]
-        now, T = self.errors(r, y), y.period
-        self.shifts = [self.errors(s, y) - now + (j + 1) * T * going for j, s in enumerate(later)]
+        self.shifts = [self.errors(s, y) - self.errors_later(r, y, (j + 1) * y.period) for j, s in enumerate(later)]
 
     def steady_state(self, d: Array) -> tuple[Array, Array]:
         """x_s and u_s with x_s = A x_s + B u_s + d and no error of what is tracked."""
@@ -110,8 +112,12 @@ class LinearMPC(Part):
                 made[:, j * m : (j + 1) * m] += B
                 answers.append((self.outputs @ at, self.outputs @ made))
             units = np.max([np.abs(gains).max(axis=1) for _, gains in answers], axis=0)
-            for still, gains in answers:
-                C, room = [*C, gains / units[:, None]], [*room, (self.output_limit - still) / units]
+            shifts = np.zeros((N, len(x))) if self.shifts is None else self.shifts
+            for (still, gains), shift in zip(answers, shifts, strict=True):
+                C, room = (
+                    [*C, gains / units[:, None]],
+                    [*room, (self.output_limit - still - self.outputs @ shift) / units],
+                )
                 cost.append(0.5 * self.excess_cost * units)
         return np.concatenate(C), np.concatenate(room), np.concatenate(cost)
 
@@ -122,7 +128,7 @@ class LinearMPC(Part):
         places = [COMPONENTS.index(name) for name in self.inputs]
         u = self.u - unmet[places]
         if self.begun:
-            lacking = x - (self.A @ self.x + self.B @ u + self.d)
+            lacking = self.errors_later(self.wanted, y, y.period) - (self.A @ self.x + self.B @ u + self.d)
             self.d = self.d + (1.0 - np.exp(-y.period / self.disturbance_time)) * lacking
         H, f = self.problem(x, self.d)
         before = u / limit
@@ -138,7 +144,7 @@ class LinearMPC(Part):
         if change is not None:
             before = np.clip(before, lower - 0.999 * change, 1.0 + 0.999 * change)
             first = np.clip(first, before - change, before + change)
-        self.begun, self.x, self.u = True, x, limit * np.clip(first, lower, 1.0)
+        self.begun, self.x, self.u, self.wanted = True, x, limit * np.clip(first, lower, 1.0), r
         made: Any = np.zeros(6)
         made[places] = self.u
         return np.asarray(w + made)
@@ -150,7 +156,7 @@ def interior(H: Array, f: Array, C: Array, d: Array, slacks: Array, iterations: 
     multipliers = np.full(len(d), size)
     for _ in range(iterations):
         off, slope, gap = C @ v + s - d, H @ v + f + C.T @ multipliers, s @ multipliers / len(d)
-        if gap <= 1e-12 * size and np.abs(off).max() <= 1e-9 and np.abs(slope).max() <= 1e-9 * size:
+        if gap <= 1e-15 * size and np.abs(off).max() <= 1e-9 and np.abs(slope).max() <= 1e-9 * size:
             break
         K, c = H + C.T @ ((multipliers / s)[:, None] * C), s * multipliers
         for corrects in (False, True):
@@ -176,13 +182,14 @@ def softened(H: Array, f: Array, C: Array, room: Array, cost: Array, iterations:
         return np.asarray(v)
     v, size, soft = np.zeros(len(f)), max(H[0, 0], np.abs(f).max()), np.isfinite(cost)
     s, e = np.maximum(room, 1.0), np.where(soft, np.maximum(-room, 1.0), 0.0)
-    multipliers, count = np.minimum(size, 0.5 * cost), len(room) + soft.sum()
+    multipliers, count, large = np.minimum(size, 0.5 * cost), len(room) + soft.sum(), np.maximum(1.0, np.abs(room))
+    # What multipliers leave of the cost is kept, not computed: near a solution it is far below the cost's round-off.
+    left = np.where(soft, cost - multipliers, 1.0)
     for _ in range(iterations):
-        left = np.where(soft, cost - multipliers, 1.0)
         off, slope = C @ v + s - e - room, H @ v + f + C.T @ multipliers
         target, of_excess = s * multipliers, e * left
         gap = (target.sum() + of_excess.sum()) / count
-        if gap <= 1e-12 * size and np.abs(off).max() <= 1e-9 and np.abs(slope).max() <= 1e-9 * size:
+        if gap <= 1e-15 * size and np.abs(off / large).max() <= 1e-9 and np.abs(slope).max() <= 1e-9 * size:
             break
         weight = 1.0 / (s / multipliers + e / left)
         K = H + C.T @ (weight[:, None] * C)
@@ -201,4 +208,5 @@ def softened(H: Array, f: Array, C: Array, room: Array, cost: Array, iterations:
                 target, of_excess = target + ds * dm - aim, np.where(soft, of_excess - de * dm - aim, 0.0)
         length = min(1.0, 0.99 / most)
         v, s, e, multipliers = v + length * move, s + length * ds, e + length * de, multipliers + length * dm
+        left = np.where(soft, left - length * dm, 1.0)
     return np.asarray(v)

@@ -12,7 +12,8 @@ import numpy as np
 
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.engine.states import into
-from lgvi_warp.physics.terms.surface_level import level_of
+from lgvi_warp.physics.terms.base import Numbers, own
+from lgvi_warp.physics.terms.surface_level import level_of, rise_at_start
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.plausibility import LIMITS, ends_at_the_surface, floats, wave_periods
 
@@ -31,17 +32,18 @@ def time_between_looks(scene: SceneLike) -> float | None:
 class Heights:
     """The greatest height of each member above the surface so far [m], and the steps made when it first was too high."""
 
-    def __init__(self, scene: SceneLike, depth: np.ndarray):
+    def __init__(self, scene: SceneLike, depth: np.ndarray, parameters: Numbers):
         self._open = not (ends_at_the_surface(scene) or floats(scene))
         level = level_of(scene.terms)
-        self._limit = LIMITS["height"].value + (level.highest() if level else 0.0)
+        highest = level.highest(own(level, parameters)) if level else 0.0
+        self._limit = LIMITS["height"].value + np.zeros(len(depth)) + highest
         # Of a start above the surface a message of its own tells.
-        self._above = depth < 0.0
+        self._above = depth + rise_at_start(scene.terms, parameters) < 0.0
         self._height, self._step = np.full(len(depth), -np.inf), np.zeros(len(depth), np.int64)
 
     def look(self, depth: np.ndarray, steps: np.ndarray) -> None:
         """Look at depths (k, m) [m] after so many steps (k,); most often a comparison of the least suffices."""
-        if not self._open or depth.size == 0 or depth.min() >= -self._limit:
+        if not self._open or depth.size == 0 or depth.min() >= -self._limit.min():
             return
         high = (depth < -self._limit) & ~self._above
         first = high.any(axis=0) & (self._height <= self._limit)

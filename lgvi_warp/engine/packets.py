@@ -224,7 +224,9 @@ class Packets:
     def heights(self) -> of_surface.Heights:
         """The heights of the members above the surface so far."""
         if self._heights is None:
-            self._heights = of_surface.Heights(self.plan.ensemble.scene, self.members.position[:, 2])
+            self._heights = of_surface.Heights(
+                self.plan.ensemble.scene, self.members.position[:, 2], self.members.parameters
+            )
         return self._heights
 
     def look_at_depth(self, k: int, when: slice, position: np.ndarray | None) -> None:

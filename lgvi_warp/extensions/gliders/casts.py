@@ -16,12 +16,24 @@ from lgvi_warp.common.reading import file_text
 # Columns, by the words with which their names may begin.
 WORDS = {
     "depth": ("depth", "dep", "z"),
-    "pressure": ("pressure", "pres", "prdm", "prsm"),
+    "pressure": ("pressure", "pres", "prdm", "prsm", "sea_water_pressure"),
     "density": ("density", "rho", "sea_water_density"),
     "temperature": ("temperature", "temp", "t090", "sea_water_temperature"),
-    "salinity": ("salinity", "sal", "psal", "sea_water_practical_salinity"),
+    "salinity": ("salinity", "sal", "psal", "sea_water_practical_salinity", "sea_water_salinity"),
 }
 PLACE = ("latitude", "longitude")
+# Numbers that such a column may have in the sea, and its unit: beyond them it has another unit, or marks what is missing.
+BOUNDS = {
+    "depth": (-10.0, 12_000.0, "m, down"),
+    "pressure": (-10.0, 12_500.0, "dbar"),
+    "density": (900.0, 1500.0, "kg/m3; to an anomaly add 1,000"),
+    "temperature": (-3.0, 45.0, "deg C"),
+    "salinity": (0.0, 60.0, "practical salinity"),
+}
+# Below this a number is a mark of Sea-Bird's files for none (-9.99e-29), but for 0.
+MARK = 1e-20
+# Words with which names of what is no measurement end.
+NOT_MEASURED = ("qc", "flag", "flags", "std", "sd", "error", "err", "anomaly")
 
 
 def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -34,7 +46,8 @@ def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.nd
     place = {name: float(columns.get(name, 0.0)) for name in PLACE}
     arrays = {name: faults.real(name, value) for name, value in found.items()}
     faults.raise_if_any()
-    numbers = {name: array for name, array in arrays.items() if array is not None}
+    numbers = {name: _measured(name, array, faults) for name, array in arrays.items() if array is not None}
+    faults.raise_if_any()
     lengths = {array.shape for array in numbers.values()}
     if len(lengths) > 1 or any(len(shape) != 1 for shape in lengths):
         shapes = ", ".join(f"{name} {array.shape}" for name, array in numbers.items())
@@ -44,6 +57,19 @@ def profile_of(file: Any, columns: Mapping[str, Any]) -> tuple[np.ndarray, np.nd
     if "density" not in numbers and not {"temperature", "salinity"} <= numbers.keys():
         raise SceneError(["cast has no density. Give a column density [kg/m3], or temperature and salinity."])
     return _sorted(*_computed(numbers, **place))
+
+
+def _measured(name: str, array: np.ndarray, faults: Faults) -> np.ndarray:
+    """The numbers of a column, nan for marks of what is missing; a fault where one cannot be of the sea, in this unit."""
+    array = np.where((np.abs(array) < MARK) & (array != 0.0), np.nan, array)
+    least, most, unit = BOUNDS[name]
+    odd = array[np.isfinite(array) & ((array < least) | (array > most))]
+    if odd.size:
+        problem = f"is beyond {least:g} to {most:g}, between which the sea is"
+        faults.add(name, float(odd[0]), problem, f"give {unit}, and nan or nothing where a number is missing")
+    elif name in ("depth", "pressure") and np.any(array < 0.0) and not np.any(array > 0.0):
+        faults.add(name, float(np.nanmin(array)), "is above the surface, as all are", f"give {unit}, positive downward")
+    return array
 
 
 def _computed(numbers: Mapping[str, np.ndarray], latitude: float, longitude: float) -> tuple[np.ndarray, np.ndarray]:
@@ -115,23 +141,28 @@ def _of_netcdf(path: Path) -> dict[str, Any]:
         raise MissingExtra("casts in NetCDF files", "xarray", "ocean") from None
     try:
         with xr.open_dataset(path, decode_times=False) as data:
+            # By their own names, or else by their standard names.
             names = {str(data[key].attrs.get("standard_name", key)): key for key in data.variables}
-            return {
-                name: np.asarray(data[names[word]].values, np.float64).ravel() for name, word in _named(names).items()
-            }
+            found = {name: names[word] for name, word in _named(names).items()} | _named(data.variables)
+            return {name: np.asarray(data[key].values, np.float64).ravel() for name, key in found.items()}
     except (OSError, ValueError) as error:
         raise refusal("file", str(path), f"cannot be read ({error})", "give a NetCDF file of one cast") from None
 
 
 def _named(names: Any) -> dict[str, str]:
-    """Known columns by the names in a file: the first whose name, without units, is or begins with a known word."""
+    """Known columns by the names in a file: those whose name, without units, is a known word; else begins with one."""
+    heads = {}
+    for name in names:
+        bare = str(name).lower().replace("-", "_").strip()
+        head = bare.split("[")[0].split("(")[0].split(" ")[0].strip("_ ")
+        if head.split("_")[-1] not in NOT_MEASURED:
+            heads[name] = head
     found: dict[str, str] = {}
     for column, words in WORDS.items():
-        for name in names:
-            bare = str(name).lower().replace("-", "_").strip()
-            head = bare.split("[")[0].split("(")[0].split(" ")[0].strip("_ ")
-            if column not in found and any(head == word or (len(word) > 2 and head.startswith(word)) for word in words):
-                found[column] = name
+        same = [name for name, head in heads.items() if head in words]
+        alike = [name for name, head in heads.items() if any(len(w) > 2 and head.startswith(w) for w in words)]
+        if same or alike:
+            found[column] = (same + alike)[0]
     return found
 
 

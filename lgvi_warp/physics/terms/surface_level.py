@@ -53,11 +53,14 @@ class SurfaceLevel(Term):
         """
         raise NotImplementedError
 
-    def highest(self) -> float:
-        """The largest height that it may reach, by the scene's numbers.
+    def highest(self, numbers: Numbers) -> Array:
+        """The largest height that it may reach.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
 
         Returns:
-            Height [m].
+            (n,) [m].
         """
         raise NotImplementedError
 

@@ -183,6 +183,15 @@ class WaveTerm(Term):
             fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"
             remedy = f"give gravity above 0, or leave {self.key} out"
             raise refusal("environment.gravity", float(g.min()), fault, remedy)
+        shallowest = np.min(self._depth(numbers, context.parameters))
+        if shallowest <= 0.0:
+            over = context.parameters[f"{self.floor.key}.depth"]
+            fault = (
+                f"leaves no water for {self.key}: {-float(shallowest):.4g} m of the floor lie above the mean surface"
+            )
+            raise refusal(
+                f"{self.floor.key}.depth", float(np.min(over)), fault, f"give a deeper floor, or {self.key} a depth"
+            )
         c = self.wave_table(numbers, context.parameters)
         columns = c[: 8 + self.finite]
         rows = np.stack(columns, axis=-1)

@@ -160,3 +160,49 @@ def test_two_densities_are_refused():
     assert scene_of(Case((lw.terms.Ballast(),), ())).terms[0].profile is None
     assert VEHICLE.buoyancy == BUOYANCY
     assert STATE["b"][2] == 8.0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("depth,density\n0,23.1\n20,25.2\n", "density = 23.1 is beyond 900 to 1500.*add 1,000"),
+        ("depth,density [g/cm3]\n0,1.0231\n20,1.0252\n", "density = 1.0231 is beyond"),
+        ("z,density\n-9,1025\n-1,1024\n0,1023\n", "depth = -9.0 is above the surface.*positive downward"),
+        ("depth,density\n-999,1024\n10,1025\n", "depth = -999.0 is beyond"),
+        ("depth,temp,sal\n0,10,35\n10,-999,35\n", "temperature = -999.0 is beyond -3 to 45.*deg C, and nan"),
+        ("depth,temp,sal\n0,283.1,35\n10,282.1,35\n", "temperature = 283.1 is beyond"),
+        ("depth,temp,sal\n0,10,0.035\n10,9,-9\n", "salinity = -9.0 is beyond"),
+        ("pressure [Pa],temp,sal\n101325,10,35\n201325,9,35\n", "pressure = 101325.0 is beyond.*dbar"),
+    ],
+)
+def test_casts_in_other_units_are_refused(tmp_path, text, words):
+    file = tmp_path / "cast.csv"
+    file.write_text(text)
+    with pytest.raises(lw.SceneError, match=words):
+        lw.terms.DensityProfile.from_cast(file)
+
+
+def test_flags_and_marks_of_a_cast_are_no_numbers(tmp_path):
+    # Flags before their columns, and Sea-Bird's mark for none.
+    file = tmp_path / "cast.csv"
+    file.write_text("depth_qc,depth,density_qc,rho_sd,density\n1,0,1,0.1,1023\n1,-9.990e-29,4,0,1030\n1,20,1,0,1025\n")
+    water = lw.terms.DensityProfile.from_cast(file)
+    np.testing.assert_array_equal(water.depths, [0.0, 20.0])
+    np.testing.assert_array_equal(water.densities, [1023.0, 1025.0])
+
+
+def test_a_cast_by_standard_names_or_its_own(tmp_path):
+    # Floats of Argo have PRES as sea_water_pressure and PSAL as sea_water_salinity.
+    xr, gsw = pytest.importorskip("xarray"), pytest.importorskip("gsw")
+    columns = {
+        "PRES": ("sea_water_pressure", [5.0, 50.0]),
+        "PRES_QC": ("status_flag", [1.0, 1.0]),
+        "TEMP": ("sea_water_temperature", [12.0, 8.0]),
+        "PSAL": ("sea_water_salinity", [34.0, 35.0]),
+    }
+    data = xr.Dataset({name: ("n", value, {"standard_name": word}) for name, (word, value) in columns.items()})
+    data.to_netcdf(tmp_path / "float.nc")
+    water = lw.terms.DensityProfile.from_cast(tmp_path / "float.nc")
+    np.testing.assert_allclose(water.depths, -gsw.z_from_p([5.0, 50.0], 0.0))
+    # UNESCO's equation of state at 5 dbar, 34, 12 deg C: 1025.8; at 50 dbar, 35, 8 deg C: 1027.5.
+    np.testing.assert_allclose(water.densities, [1025.8, 1027.5], atol=0.1)

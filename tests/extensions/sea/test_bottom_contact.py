@@ -50,7 +50,9 @@ def test_rest_below_the_angle_of_friction_and_slide_above_it(method):
     assert result.status.counts() == {"ok": 4}
     ground = np.einsum("knij,knj->kni", result.attitude, result.velocity)
     # At rest after the fall of a millimetre: the oscillations of 8 s, 400 steps, are gone.
-    assert np.abs(ground[-1, ::2]).max() < 1e-9
+    # rk4 leaves the rotations a little, and the water's velocity is turned into the body and back.
+    R = result.attitude[-1, ::2]
+    assert np.abs(ground[-1, ::2]).max() < 1e-9 + np.abs(R @ R.swapaxes(1, 2) - np.eye(3)).max()
     assert np.abs(result.position[-1, ::2] - result.position[-2, ::2]).max() < 1e-9
     # g (sin a - mu cos a) apparent weight / (mass + added mass), to what is left of the oscillations.
     wanted = NET * (np.sin(SLOPE) - 0.2 * np.cos(SLOPE)) / (MASS + ADDED)
@@ -122,6 +124,11 @@ def test_the_floor_is_as_hard_as_the_step_allows():
     q = {name: value[None] for name, value in alone.parameters().items()}
     k, c = alone.terms[0].stiffest(lw.Ensemble.own(alone.terms[0], q), q, 0.1)
     np.testing.assert_allclose([k, c], [[(MASS + ADDED) / 0.01], [(MASS + ADDED) / 0.1]], rtol=1e-12)
+    # As little damping as asked for, as long as a bounce gains nothing by the step: 0.08 (h w)^2 of what is critical.
+    for stiffness, wanted in ((30.0, 0.08 * 0.01 * 60.0), (1e9, 0.08 * 600.0)):
+        lively = lander(points=((0.0, 0.0, 0.0),), stiffness=stiffness, damping=0.0)
+        q = {name: value[None] for name, value in lively.parameters().items()}
+        assert lively.terms[0].stiffest(lw.Ensemble.own(lively.terms[0], q), q, 0.1)[1] == pytest.approx(wanted)
     # Softer where asked for, never harder.
     for stiffness, wanted in ((10.0, 10.0), (1e9, 3000.0)):
         softer = lander(points=((0.0, 0.0, 0.0),), stiffness=stiffness)

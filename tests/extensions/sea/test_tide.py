@@ -11,6 +11,7 @@ from lgvi_warp.extensions.sea.twin.tide import InTide
 from lgvi_warp.extensions.sea.twin.tide import Tide as TideTwin
 from lgvi_warp.physics.terms.base import own
 from lgvi_warp.reference.terms.waves import Waves
+from tests.control.test_altitude import FREE
 from tests.extensions.gliders.cases import BALL, BUOYANCY, CENTER_OF_BUOYANCY, ENGINE, WATER
 from tests.laws.case import Case
 from tests.laws.cases_water import GRAVITY, WAVES, arrays
@@ -30,7 +31,10 @@ def test_heights():
     # M2 by its speed: 360 deg in 44,714 s.
     by_speed = lw.terms.Tide(amplitudes=[1.0], speeds=[28.984104])
     assert by_speed.at([0.0, 0.5 * 44714.16])[1] == pytest.approx(-1.0, abs=1e-9)
-    assert tide.highest() == pytest.approx(1.4)
+    numbers = {name: value[None] for name, value in tide.parameters().items()}
+    assert tide.highest(numbers)[0] == pytest.approx(1.4)
+    # Of the table by hand: 10 to 100 s, 10 to 300 s, over 300 s.
+    assert tide.mean_height(numbers)[0] == pytest.approx(0.7 + 20.0 / 300.0)
 
 
 def test_numbers_vary_by_member():
@@ -45,6 +49,48 @@ def test_numbers_vary_by_member():
     for i in range(5):
         alone = lw.terms.Tide(**CONSTITUENTS | {"amplitudes": p["tide.amplitudes"][i]}, mean=p["tide.mean"][i])
         np.testing.assert_array_equal(alone.at([0.0, 10.0]), height[:, i])
+
+
+def test_waves_over_a_floor_know_the_mean_of_a_table():
+    # Three ways to say that the water is 6 m deep: sqrt(g k tanh(6 k)) = omega.
+    waves = lw.terms.SeaState(significant_height=0.5, peak_period=6.0, heading_deg=0.0, seed=1)
+    tides = (
+        {"mean": 4.0},
+        {"times": [0.0], "heights": [4.0]},
+        {"times": [0.0, 50.0, 100.0], "heights": [1.0, 3.0, 5.0], "mean": 1.0},
+    )
+    for numbers in tides:
+        scene = neutral([waves, lw.terms.Tide(**numbers)], events=[lw.events.Floor(depth=2.0)])
+        p = lw.Ensemble(scene, 1).parameters(0, 1)
+        c = scene.terms[0].wave_table(own(scene.terms[0], p), p)
+        np.testing.assert_allclose(np.sqrt(scene.environment.gravity * c.k * np.tanh(6.0 * c.k)), c.omega, rtol=1e-9)
+
+
+@pytest.mark.kernel
+def test_a_floor_above_the_surface_leaves_no_waves():
+    waves = lw.terms.SeaState(significant_height=0.5, peak_period=6.0, heading_deg=0.0)
+    scene = neutral([waves, lw.terms.Tide(mean=-3.0)], events=[lw.events.Floor(depth=2.0)])
+    with pytest.raises(lw.SceneError, match=r"floor.depth.*leaves no water for sea_state: 1 m.*Give a deeper floor"):
+        lw.solve(scene, "psi_s", h=0.1, t1=1.0)
+
+
+@pytest.mark.kernel
+def test_heights_above_the_tide_of_each_member():
+    # Free bodies that rise by 1 m: from 2 m under their surfaces, and from 0.5 m under them.
+    mean = np.array([3.0, 3.0, -2.0, -2.0])
+    place = np.zeros((4, 3))
+    place[:, 2] = np.array([2.0, 0.5, 2.0, 0.5]) - mean
+    rising = np.tile([0.0, 0.0, -0.5], (4, 1))
+    fleet = lw.Ensemble.from_states(
+        neutral([lw.terms.Tide(mean=0.0)]),
+        place,
+        np.tile(np.eye(3), (4, 1, 1)),
+        rising,
+        np.zeros((4, 3)),
+        {"tide.mean": mean},
+    )
+    result = lw.solve(fleet, "psi_s", h=0.1, t1=2.0)
+    assert result.warnings.has(lw.Warnings.ABOVE_SURFACE).tolist() == [False, True, False, True]
 
 
 def test_numbers_that_are_no_tide_are_refused():
@@ -186,3 +232,45 @@ def test_kernel_and_twin():
     ]
     kernel, reference = both(Case(tuple(terms), laws), "psi_s", 0.02, 20)
     assert difference(kernel, reference) < 1e-12
+
+
+@pytest.mark.slow
+@pytest.mark.kernel
+def test_an_altimeter_and_the_clearance_know_no_tide():
+    # Floor and axes stay: a body that sinks by 0.5 m/s from 8 m is D - z above the floor and ends at D - clearance, whatever
+    # its tide, while a pressure cell reads z + eta. The guidance adds to that what is too high.
+    n, tilt, T = 3, np.radians(40.0), 60.0
+    numbers = {
+        "tide.mean": np.array([0.0, 2.0, -1.5]),
+        "tide.amplitudes": np.array([[0.5], [1.5], [0.0]]),
+        "tide.phases": np.array([[0.0], [1.0], [2.0]]),
+        "floor.depth": np.array([20.0, 23.0, 18.0]),
+    }
+    tide = lw.terms.Tide(amplitudes=[1.0], periods=[T], mean=0.0)
+    sensors = [
+        lw.control.Altimeter(direction=[np.sin(tilt), 0.0, np.cos(tilt)]),
+        lw.control.Sensor(name="depth_cell", of="depth", reads="pressure"),
+    ]
+    controller = lw.Controller(
+        period=0.1,
+        sensors=sensors,
+        guidance=[lw.control.Altitude(**FREE)],
+        laws=[lw.control.HeavePID(kp=0.0)],
+    )
+    floor = lw.events.Floor(depth=20.0, clearance=1.0)
+    scene = neutral([tide, lw.terms.ControlWrench()], controller=controller, events=[floor])
+    place, sinking = np.tile([0.0, 0.0, 8.0], (n, 1)), np.tile([0.0, 0.0, 0.5], (n, 1))
+    fleet = lw.Ensemble.from_states(scene, place, np.tile(np.eye(3), (n, 1, 1)), sinking, np.zeros((n, 3)), numbers)
+    save = lw.SaveAt(every=2.0, fields=("position", "measured_depth", "reference_depth"))
+    result = lw.solve(fleet, "rk4", h=0.1, t1=40.0, save=save)
+    D = numbers["floor.depth"]
+    assert result.status.counts() == {"floor": n}
+    np.testing.assert_allclose(result.failure_time, (D - 1.0 - 8.0) / 0.5, atol=1e-9)
+    before = result.time[:, None] < result.failure_time
+    z = 8.0 + 0.5 * result.time[:, None] + np.zeros(n)
+    angle = 2.0 * np.pi * result.time[:, None] / T + numbers["tide.phases"][:, 0]
+    eta = numbers["tide.mean"] + numbers["tide.amplitudes"][:, 0] * np.cos(angle)
+    np.testing.assert_allclose(result.altitude[before], (D - z)[before], atol=1e-9)
+    np.testing.assert_allclose(result.measured_depth[before], (z + eta)[before], atol=1e-9)
+    reading = result.samples["reference_depth"] - result.measured_depth + FREE["altitude"]
+    np.testing.assert_allclose(reading[before], (D - z)[before], atol=1e-9)

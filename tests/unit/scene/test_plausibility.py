@@ -216,7 +216,7 @@ def test_what_becomes_odd_on_the_way_is_said():
 def test_heights_above_the_surface_count_from_a_limit_on():
     """A start above the surface has a message of its own; a depth that is no number counts for nothing."""
     limit = LIMITS["height"].value
-    looked = Heights(scene(), np.array([1.0, 0.0, -2.0, 5.0, 5.0]))
+    looked = Heights(scene(), np.array([1.0, 0.0, -2.0, 5.0, 5.0]), {})
     looked.look(
         np.array([[1.0, 0.0, -2.0, 5.0, 5.0], [-limit, -3.0, -3.0, np.nan, -0.5], [2.0, -1.0, 2.0, 5.0, -9.0]]),
         np.array([0, 7, 9]),
@@ -230,7 +230,7 @@ def test_heights_above_the_surface_count_from_a_limit_on():
     assert value[[1, 4]].tolist() == [4.0, 9.0]
     (text,) = above_surface(bits, value)
     says(text, "2 of 5 members rise above the surface", "member 4, by 9 m", "lw.events.Surface()")
-    known = Heights(scene(events=[{"type": "surface"}]), np.zeros(5))
+    known = Heights(scene(events=[{"type": "surface"}]), np.zeros(5), {})
     known.look(np.full((1, 5), -9.0), np.array([1]))
     assert known.added(*none) is not None
     assert not known.added(*none)[0].any()

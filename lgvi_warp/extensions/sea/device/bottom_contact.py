@@ -17,6 +17,9 @@ from lgvi_kernels.law import *
 FOLLOWS_PLACE = True
 # Rows of the memory of a point: its anchor [m], inertial axes, and 1 once there is one.
 MEMORY = 4
+# How far the spring along the floor may be stretched, over what friction holds at rest. In the middle of an explicit kick the
+# dampers of a vehicle at rest have a force of their own: without this part points just within the cone would creep.
+SLACK = 1.25
 
 
 @functools.cache
@@ -40,12 +43,12 @@ def touched(view: Any, p: Any, i: int):
 
 @wp.func
 def stretch(view: Any, p: Any, i: int, place: Any, n: Any, sunk: Any):
-    """Distance of the point from its anchor along the floor, as far as friction lets the spring be stretched."""
+    """Distance of the point from its anchor along the floor, as far as the spring may be stretched."""
     at = p.memory + wp.static(MEMORY) * i
     anchor = vec3(remembered(view, at), remembered(view, at + 1), remembered(view, at + 2))
     s = remembered(view, at + 3) * (place - anchor)
     s = s - dot(s, n) * n
-    return held_within(s, p.friction * greatest(sunk, sunk - sunk))
+    return held_within(s, sunk.dtype(wp.static(SLACK)) * (p.friction * greatest(sunk, sunk - sunk)))
 
 
 @wp.func

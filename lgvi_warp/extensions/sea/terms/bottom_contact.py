@@ -19,6 +19,9 @@ from lgvi_warp.physics.terms.floor import REST, Floor
 
 # Largest angle [rad] by which the stiffest contact turns in a step, and largest part of a velocity that its dampers take.
 ANGLE, PART = 1.0, 1.0
+# Least part of critical damping, over the square of that angle. By when in a step a point touches, an explicit step returns
+# up to 1 + angle^2 / 4 of the energy of a bounce; a damper takes 2 pi times its part: 1 / 8 pi to first order, and a margin.
+LEAST = 0.08
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,7 +40,7 @@ class BottomContact(Term):
         points: Points of the hull that may touch the floor, (k, 3) [m] from the body's origin.
         friction: Friction over push, the tangent of the angle of the cone; 0.5 by default.
         stiffness: Stiffness of the floor at each point [N/m]; by default as the step allows.
-        damping: Damping at each point [N s/m]; by default as the step allows.
+        damping: Damping at each point [N s/m]; by default as the step allows, at least so much that no bounce gains energy.
         floor: Name of the floor; "" by default, for the only one whose `contact` is "rest".
 
     Raises:
@@ -117,9 +120,9 @@ class BottomContact(Term):
         total = np.abs(np.linalg.eigvals(np.linalg.solve(inertia, springs))).max(axis=1)
         k, c = (ANGLE / h) ** 2 / total, PART / h / total
         k = np.minimum(numbers["stiffness"], k) if "stiffness" in numbers else k
-        # Aperiodic, where nothing else is asked for.
-        c = np.minimum(numbers.get("damping", 2.0 * np.sqrt(k / total)), c)
-        return k, c
+        # Aperiodic, where nothing else is asked for; at least what a bounce may gain by the step.
+        critical = 2.0 * np.sqrt(k / total)
+        return k, np.clip(numbers.get("damping", critical), LEAST * h**2 * total * k * critical, c)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         k, c = self.stiffest(numbers, context.parameters, context.h)

@@ -130,16 +130,26 @@ class Tide(SurfaceLevel):
         return total
 
     def mean_height(self, numbers: Numbers) -> Array:
-        return np.asarray(numbers.get("mean", np.zeros(1)))
+        # A table's mean is that between its first and its last time.
+        mean = numbers.get("mean", np.zeros(1))
+        if "heights" in numbers:
+            times, heights, mean = repeated(numbers["times"], numbers["heights"], mean)
+            span = np.diff(times)
+            within = (span * 0.5 * (heights[:, 1:] + heights[:, :-1])).sum(axis=1) / np.maximum(
+                span.sum(axis=1), 1e-300
+            )
+            mean = mean + (within if span.size else heights[:, 0])
+        return np.asarray(mean)
 
-    def highest(self) -> float:
-        parts = (self.mean, None if self.amplitudes is None else np.abs(self.amplitudes).sum())
-        table = 0.0 if self.heights is None else float(np.max(self.heights))
-        return table + float(sum(part for part in parts if part is not None))
+    def highest(self, numbers: Numbers) -> Array:
+        parts = [numbers["mean"]] if "mean" in numbers else []
+        parts += [np.abs(numbers["amplitudes"]).sum(axis=1)] if "amplitudes" in numbers else []
+        parts += [numbers["heights"].max(axis=1)] if "heights" in numbers else []
+        return np.asarray(sum(parts[1:], parts[0]))
 
     def level_rows(self, numbers: Numbers) -> tuple[Array, dict[str, int]]:
         waves = self.constituents(numbers)
-        mean, count = self.mean_height(numbers), 0
+        mean, count = numbers.get("mean", np.zeros(1)), 0
         table = mean[:, None]
         if "heights" in numbers:
             times, heights, mean = repeated(numbers["times"], numbers["heights"], mean)

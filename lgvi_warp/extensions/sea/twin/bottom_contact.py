@@ -29,9 +29,9 @@ class BottomContact(Law):
         return float((self.depth + self.slope @ place[:2] - place[2]) * self.normal[2])
 
     def stretch(self, memory: Array, place: Array) -> Array:
-        """From the anchor to a point along the floor, within the cone."""
+        """From the anchor to a point along the floor, within 1.25 times the cone of a point at rest."""
         s = memory[3] * (place - memory[:3])
-        return within(s - (s @ self.normal) * self.normal, self.friction * max(self.sunk(place), 0.0))
+        return within(s - (s @ self.normal) * self.normal, 1.25 * self.friction * max(self.sunk(place), 0.0))
 
     def anchored(self, view: View) -> Array:
         """Memory after the anchors were dragged along."""

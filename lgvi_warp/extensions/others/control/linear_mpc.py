@@ -63,9 +63,9 @@ class LinearMPC(ControlLaw):
     algorithm 16.4), whose demand is right to 1e-6 of the limit, in float32 to 1e-2; a run says in its messages where a tick
     had not converged.
 
-    d is what the model lacks: x, against the last reference as it goes on, less what it predicted, over `disturbance_time`. x_s and u_s are the steady state
-    under d in which the `tracked` errors are 0: so steady disturbances leave no error of these. What the actuators did not
-    deliver did not act. `lw.linear.mpc` makes the law from a linear model.
+    d is what the model lacks: x, against the last reference as it goes on, less what it predicted, over `disturbance_time`.
+    x_s and u_s are the steady state under d in which the `tracked` errors are 0: so steady disturbances leave no error of
+    these. What the actuators did not deliver did not act. `lw.linear.mpc` makes the law from a linear model.
 
     Args:
         states: Names of the states (n,), errors of what is measured less what is wanted: "position[0]" to "position[2]" [m,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import inspect
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -98,7 +99,7 @@ def _fields(kind: Any) -> list[dataclasses.Field[Any]]:
 
 def _table(kind: Any, known: Mapping[str, Schema] | None = None, required: Iterable[str] = ()) -> Schema:
     """A table with the fields of a class, some of which are known."""
-    texts, known = _meanings(kind), known or {}
+    texts, known = meanings(kind), known or {}
     content: dict[str, Schema] = {name: dict(item) for name, item in known.items()}
     for item in _fields(kind):
         name = word_of(item)
@@ -152,8 +153,9 @@ def _numbers(shape: tuple[Any, ...], number: Schema | None = None) -> Schema:
     return {"anyOf": [number, items | {"minItems": 1}]}
 
 
-def _meanings(kind: Any) -> dict[str, str]:
+def meanings(kind: Any) -> dict[str, str]:
     """Meanings of a class's fields by name, from its docstring."""
-    _, _, arguments = (kind.__doc__ or "").partition("Args:\n")
-    documented = re.findall(r"^        (\w+): (.*(?:\n {12}.*)*)", arguments.partition("\n\n")[0], re.MULTILINE)
+    # Python 3.13 takes the indentation away itself.
+    _, _, arguments = inspect.cleandoc(kind.__doc__ or "").partition("Args:\n")
+    documented = re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", arguments.partition("\n\n")[0], re.MULTILINE)
     return {name: " ".join(text.split()) for name, text in documented}

@@ -43,6 +43,10 @@ class Response:
         """L (k, r, r) of states in Schur's axes."""
         return np.asarray(-self._C @ x)
 
+    def closed(self, turn: float) -> np.ndarray:
+        """Poles of the loop that is closed with this turn [rad] in each of its commands."""
+        return np.linalg.eigvals(self._T + np.exp(1j * turn) * (self._B @ self._C))
+
     def rows(self, outputs: np.ndarray) -> np.ndarray:
         """Rows (p, n) of the states in Schur's axes."""
         return np.asarray(outputs @ self._Z)

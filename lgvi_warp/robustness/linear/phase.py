@@ -14,6 +14,8 @@ from lgvi_warp.robustness.linear.disk import NARROWINGS, Response, grid_of
 
 # Halvings of an interval of the grid in which a gain crosses 1: to round-off.
 HALVINGS = 50
+# Distance of a pole of the turned loop from where its gain crosses 1; of a double pole round-off is the root of eps.
+MISS = 1e-6
 
 
 def loci(L: np.ndarray) -> np.ndarray:
@@ -58,8 +60,16 @@ def phase(response: Response) -> tuple[float, float]:
         between = 0.5 * (low + high)
         same = (np.take_along_axis(sizes(between), which[:, None], axis=1)[:, 0] > 0.0) == begin
         low, high = np.where(same, between, low), np.where(same, high, between)
-    crossing = np.take_along_axis(loci(response(high)), which[:, None], axis=1)[:, 0]
-    apart = np.abs(np.angle(-crossing))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        L = response(high)
+    seen = np.isfinite(L).all(axis=(1, 2))
+    crossing = np.take_along_axis(loci(L[seen]), which[seen, None], axis=1)[:, 0]
+    turns, high = -np.angle(-crossing), high[seen]
+    # Next to a pole on the circle round-off crosses 1, too: there no pole of the turned loop lies.
+    miss = [np.abs(response.closed(turn) - np.exp(1j * at)).min() for turn, at in zip(turns, high, strict=True)]
+    apart = np.where(np.array(miss) < MISS, np.abs(turns), np.inf)
+    if not np.isfinite(apart).any():
+        return np.inf, np.nan
     return float(apart.min()), float(high[np.argmin(apart)])
 
 

@@ -2,13 +2,14 @@
 """The JSON schema of scene files: what the loader takes fits it, what the loader refuses as unknown does not."""
 
 import copy
+import inspect
 import tomllib
 
 import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.cli.lists import NEW_SCENE
-from lgvi_warp.scene.schema import schema
+from lgvi_warp.scene.schema import meanings, schema
 from lgvi_warp.vehicles.fossen import vehicle_file, vehicle_names
 from tests.conftest import ROOT
 from tests.support.json_schema import faults
@@ -77,6 +78,13 @@ def test_what_the_loader_refuses_does_not_fit(key, value, place):
     with pytest.raises(lw.SceneError):
         lw.Scene.from_dict(content)
     assert place in faults(content, SCHEMA)
+
+
+def test_meanings_are_found_without_indentation():
+    # As Python 3.13 keeps docstrings.
+    dedented = type("Vehicle", (), {"__doc__": inspect.cleandoc(lw.Vehicle.__doc__)})
+    assert meanings(dedented) == meanings(lw.Vehicle)
+    assert meanings(dedented)["mass"] == "Dry mass [kg]. Simple form."
 
 
 def test_keys_are_described():

@@ -95,7 +95,7 @@ class Fault(Sending):
         _is_channel, "is not a whole number", 'give the number of a channel, from 0, or "all"', 0
     )
     kind: Any = declared(_kinds, "gain")
-    choice: Any = number((), "1", 0.0, least=0.0, whole=True)
+    choice: Any = number((), "1", 0.0, least=0.0, integer=True)
     time: Any = number((), "s", 0.0, least=0.0, infinite=True)
     until: Any = number((), "s", np.inf, above=0.0, infinite=True)
     gain: Any = number((), "1", 0.0)

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import inspect
+import math
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any

@@ -41,11 +41,11 @@ def picture(path):
 def moving(path):
     from PIL import Image
 
-    from lgvi_warp.views.recording.movie import _save
+    from lgvi_warp.views.recording.movie import save
 
     rng = np.random.default_rng(2)
     pictures = [Image.fromarray(rng.integers(0, 255, (40, 60, 3), np.uint8)) for _ in range(3)]
-    return lambda: _save(iter(pictures), path, 1.0)
+    return lambda: save(iter(pictures), path, 1.0)
 
 
 def writers(run, folder):

@@ -123,7 +123,7 @@ def number(
     axes: str | None = None,
     optional: bool = False,
     infinite: bool = False,
-    whole: bool = False,
+    integer: bool = False,
 ) -> Any:
     """Declare a numeric field of a term.
 
@@ -141,7 +141,7 @@ def number(
             inertial ones.
         optional: Whether the field may be None after construction, and then is no parameter; False by default.
         infinite: Whether the values may be infinite; False by default.
-        whole: Whether the values must be whole numbers, as counts are; False by default.
+        integer: Whether the values must be whole numbers, as counts are; False by default.
 
     Returns:
         A dataclass field with shape, unit, bounds and axes in its metadata.
@@ -152,7 +152,7 @@ def number(
     if axes not in ("vector", "point", None):
         raise ValueError(f"axes = {axes!r} is not known. Give 'vector', 'point' or None")
     meta = dict(shape=shape, unit=unit, least=least, most=most, above=above, rising=rising, axes=axes)
-    return field(default=default, metadata=meta | dict(optional=optional, infinite=infinite, whole=whole))
+    return field(default=default, metadata=meta | dict(optional=optional, infinite=infinite, integer=integer))
 
 
 def word_of(item: dataclasses.Field[Any]) -> str:
@@ -769,7 +769,7 @@ def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
 
 def _fractional(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     """Mask (n,) of the members whose values (n, ...) of a field are not whole, though they must."""
-    if not field.metadata["whole"]:
+    if not field.metadata["integer"]:
         return np.zeros(len(values), bool)
     return np.any(values.reshape(len(values), -1) != np.rint(values.reshape(len(values), -1)), axis=1)
 

@@ -63,8 +63,8 @@ def unit_of(name: str) -> str:
     return UNITS.get(name, UNITS.get(name.rsplit("_", 1)[-1], ""))
 
 
-def _known(key: str, name: str, columns: Mapping[str, Any]) -> Any:
-    """What stands under a name that the user gave."""
+def _named(key: str, name: str, columns: Mapping[str, Any]) -> Any:
+    """Column of a name that the user gave."""
     if not among(name, columns):
         raise refusal(key, name, "is not known", closest(name, columns))
     return columns[name]
@@ -187,8 +187,8 @@ class Margins(Saved):
             (margins of the members that settle as they are, rising; the part of them with at most that much).
         """
         ways = dict(zip(WAYS, (self.values, self.by_runs), strict=True))
-        columns = self._columns() if by is None else _known("by", by, ways)
-        values = np.sort(_known("name", name, columns)[self.steady])
+        columns = self._columns() if by is None else _named("by", by, ways)
+        values = np.sort(_named("name", name, columns)[self.steady])
         return values, np.arange(1, len(values) + 1) / max(1, len(values))
 
     def worst(self, count: int = 10, name: str | None = None) -> np.ndarray:
@@ -204,7 +204,7 @@ class Margins(Saved):
         """
         columns = self._columns()
         chosen = name or next(word for word in ("gain_upper", *NAMED, "sensitivity_peak") if word in columns)
-        values = _known("name", chosen, columns) * (-1.0 if chosen.endswith(("lower", "peak")) else 1.0)
+        values = _named("name", chosen, columns) * (-1.0 if chosen.endswith(("lower", "peak")) else 1.0)
         return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[: whole_number("count", count, 0)]
 
     @property

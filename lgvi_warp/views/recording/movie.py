@@ -93,7 +93,7 @@ def write(result: Result, path: str | os.PathLike[str], *, members: Any = None, 
     durable.place_of(target)  # before anything is drawn
     if by != "plot":
         try:
-            _save(_shot(result, members, int(count)), target, length)
+            save(_shot(result, members, int(count)), target, length)
             return "viewer"
         except headless.DriverMissingError as error:
             if by == "viewer":
@@ -103,11 +103,11 @@ def write(result: Result, path: str | os.PathLike[str], *, members: Any = None, 
         except MissingExtra:
             if by == "viewer":
                 raise
-    _save(plainly(result, members, int(count)), target, length)
+    save(plainly(result, members, int(count)), target, length)
     return "plot"
 
 
-def _save(pictures: Iterator[Any], target: Path, seconds: float) -> None:
+def save(pictures: Iterator[Any], target: Path, seconds: float) -> None:
     """Write pictures one after the other; the file is there whole or not at all."""
     every = list(pictures)
     look = {"duration": max(1, round(1000.0 * seconds / len(every))), "loop": 0, "save_all": True,

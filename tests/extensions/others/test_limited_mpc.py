@@ -206,7 +206,7 @@ def test_a_jump_of_the_reference_is_no_disturbance(lower):
 @pytest.mark.parametrize("cost", [1e3, 1e7, 1e9])
 @pytest.mark.kernel
 def test_a_limit_that_is_broken_at_the_start_is_met_again_whatever_it_costs(cost):
-    """It sinks at 1 m/s, 0.2 m/s being allowed: the largest force brings it back, at its rate and then at its limit."""
+    """A body sinks at 1 m/s, 0.2 m/s being allowed: the largest force brings it back, at its rate and then at its limit."""
     part = heave_law(horizon=20, outputs=[[0.0, 1.0]], output_limit=[0.2], excess_cost=[cost])
     scene = diving(part, guidance=lw.control.SetPoint(depth=8.0))
     scene = scene.with_numbers({"start.velocity": [0.0, 0.0, 1.0]})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What lands gains no energy, in the kernel: bounces, tumbles, an edge that lands first, and the cone of friction."""
+"""Landers gain no energy in the kernel: bounces, tumbles, an edge that lands first, and the cone of friction."""
 
 import numpy as np
 import pytest

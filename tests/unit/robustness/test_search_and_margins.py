@@ -414,13 +414,13 @@ def test_margins_in_words_and_by_member():
 
 
 @pytest.mark.parametrize(("call", "words"), [
-    (lambda found: found.curve("gain_uper"), "name = 'gain_uper' is not known. Did you mean 'gain_upper'?"),
-    (lambda found: found.curve("gain_upper", by="run"), "by = 'run' is not known. Did you mean 'runs'?"),
-    (lambda found: found.curve("gain_upper", by="runs"), "name = 'gain_upper' is not known. Known: delay."),
-    (lambda found: found.worst(name="delays"), "name = 'delays' is not known. Did you mean 'delay'?"),
-    (lambda found: found.worst(-1), "count = -1 is not a whole number from 0"),
-    (lambda found: found.percentiles([50.0, 101.0]), "of[1] = 101.0 is above 100. Give a number [%] from 0 to 100."),
-    (lambda found: found.percentiles([[50.0]]), "of[0] = [50.0] has shape (1,). Give a number [%]."),
+    (lambda margins: margins.curve("gain_uper"), "name = 'gain_uper' is not known. Did you mean 'gain_upper'?"),
+    (lambda margins: margins.curve("gain_upper", by="run"), "by = 'run' is not known. Did you mean 'runs'?"),
+    (lambda margins: margins.curve("gain_upper", by="runs"), "name = 'gain_upper' is not known. Known: delay."),
+    (lambda margins: margins.worst(name="delays"), "name = 'delays' is not known. Did you mean 'delay'?"),
+    (lambda margins: margins.worst(-1), "count = -1 is not a whole number from 0"),
+    (lambda margins: margins.percentiles([50.0, 101.0]), "of[1] = 101.0 is above 100. Give a number [%] from 0 to 100."),
+    (lambda margins: margins.percentiles([[50.0]]), "of[0] = [50.0] has shape (1,). Give a number [%]."),
 ])  # fmt: skip
 def test_what_margins_do_not_have_is_refused(call, words):
     upper, delay = {"gain_upper": np.array([2.0, 8.0])}, {"delay": np.array([0.3, 0.1])}

@@ -116,7 +116,7 @@ class ErrorStateFilter(MeasuringPart):
     process_scale: Any = number((), "1", 1.0, above=0.0)
     measurement_scale: Any = number((), "1", 1.0, above=0.0)
     gate: Any = number((len(AIDS),), "1", None, above=0.0, infinite=True, optional=True)
-    most_rejected: Any = number((), "1", None, least=1.0, infinite=True, optional=True, whole=True)
+    most_rejected: Any = number((), "1", None, least=1.0, infinite=True, optional=True, integer=True)
     report: bool = flag(True)
 
     def __post_init__(self) -> None:

@@ -190,6 +190,16 @@ def test_limits_of_errors_are_of_the_reference_that_it_sees_ahead():
     np.testing.assert_allclose(result.position[:, 0, 2], depths, atol=1e-6)
 
 
+@pytest.mark.kernel
+def test_a_loop_in_single_precision_is_that_of_exact_programs():
+    result = lw.solve(diving(heave_law(preview=True)), "rk4", h=T / 5.0, t1=TICKS * T, save=SAVE, dtype="float32")
+    depths, forces = by_hand(at_most=50.0)
+    # Promised to 1e-2 of the limit, of 40 N.
+    np.testing.assert_allclose(result.samples["demand"][:, 0, 2], forces, atol=0.4)
+    np.testing.assert_allclose(result.position[:, 0, 2], depths, atol=1e-2)
+    assert result.samples["unconverged"][-1, 0] == 0.0
+
+
 @pytest.mark.parametrize("lower", [None, [-25.0]], ids=["", "lower"])
 @pytest.mark.kernel
 def test_a_jump_of_the_reference_is_no_disturbance(lower):

@@ -285,3 +285,13 @@ def test_inputs_that_are_no_numbers_end_no_vehicle(unit):
     other.setReal([command], [3.0])
     other.doStep(0.0, H)
     assert instance.getReal(wanted) == other.getReal(wanted)
+
+
+def test_a_parameter_of_a_vehicle_that_has_moved_lets_the_next_step_fail(unit):
+    instance, places = opened(unit)
+    begun(instance)
+    instance.doStep(0.0, H)
+    instance.setReal([places["vehicle.buoyancy"]], [250.0])
+    with pytest.raises(Exception, match=r"fmi2DoStep failed with status 2 \(discard\)"):
+        instance.doStep(H, H)
+    assert "vehicle.buoyancy = 250.0 is a parameter, and the vehicle has moved. Reset the unit" in instance.said[-1]

@@ -79,6 +79,7 @@ class VehicleUnit:
         self._changed: set[str] = set()
         self._vehicle: SteppedVehicle | None = None
         self._shown: dict[str, float | int] | None = None
+        self._late: str | None = None
 
     def _acted(self, scene: Scene) -> Scene:
         """The scene on which the inputs act."""
@@ -143,12 +144,14 @@ class VehicleUnit:
         return self._shown[name]
 
     def set(self, name: str, value: float | int) -> None:
-        """Give a parameter, before the first step, or an input."""
+        """Give a parameter, before the first step, or an input. A later parameter lets the next step fail."""
         if value == self._values[name]:
             return
         fixed = name not in self._inputs
         if fixed and self.time > 0.0:
-            raise ValueError(f"{name} = {value} is a parameter, and the vehicle has moved. Reset the unit first")
+            # Told by the next step: what is raised here ends the process that imports the unit.
+            self._late = f"{name} = {value} is a parameter, and the vehicle has moved. Reset the unit first"
+            return
         self._values[name] = value
         if fixed:
             self._changed.add(name)
@@ -181,6 +184,8 @@ class VehicleUnit:
         Raises:
             ValueError: Where time and length do not fit, or the vehicle fails.
         """
+        if self._late is not None:
+            raise ValueError(self._late)
         vehicle = self.begin()
         last = (time + length) / vehicle.h
         if abs(time / vehicle.h - vehicle.steps) > SAME_STEP:

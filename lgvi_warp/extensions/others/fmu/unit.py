@@ -227,6 +227,7 @@ class VehicleUnit:
         if {n: state["values"][n] for n in state["changed"]} != {n: self._values[n] for n in self._changed}:
             self._vehicle = None
         self._values, self._changed, self._shown = dict(state["values"]), set(state["changed"]), None
+        self._late = None
         self.begin().recall(state["vehicle"])
 
 

@@ -264,6 +264,9 @@ def test_a_horizon_over_which_an_unstable_model_outgrows_its_digits_is_refused()
     np.testing.assert_allclose(-40.0 * best[0, :2], K, rtol=1e-6)
     text = refused(heave_law, **(model | {"horizon": 50}))
     says(text, "linear_mpc.horizon = 50", "grows 1.36 times in a period", "Give at most ")
+    # Also where the growth over the horizon is beyond all numbers.
+    text = refused(heave_law, A=np.array([[1.0, T], [0.0, 1e9]]), horizon=50)
+    says(text, "linear_mpc.horizon = 50", "grows 1e+09 times in a period")
 
 
 def test_only_guidance_that_follows_from_the_time_can_be_foreseen():

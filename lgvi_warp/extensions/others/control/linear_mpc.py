@@ -168,7 +168,7 @@ class LinearMPC(ControlLaw):
             problem = "has no steady inputs that hold it against any disturbance"
             faults.add("tracked", ", ".join(tracked), problem, "track another state, or give other inputs")
         rate = float(_growth_rate(self.A))
-        if rate**self.horizon > LARGEST_GROWTH:
+        if self.horizon * np.log(rate) > np.log(LARGEST_GROWTH):
             problem = f"is too long for an unstable model that grows {rate:.3g} times in a period"
             remedy = f"give at most {int(np.log(LARGEST_GROWTH) / np.log(rate))}, or a model of a shorter period"
             faults.add("horizon", self.horizon, problem, remedy)
@@ -185,7 +185,7 @@ class LinearMPC(ControlLaw):
         bad = super().unphysical(numbers)
         if any(bad[name].any() for name in ("A", "B", "limit", *(name for name in ("P", "lower") if name in bad))):
             return bad
-        bad["A"] = bad["A"] | (_growth_rate(numbers["A"]) ** self.horizon > LARGEST_GROWTH)
+        bad["A"] = bad["A"] | (self.horizon * np.log(_growth_rate(numbers["A"])) > np.log(LARGEST_GROWTH))
         places = vars(self)["tracked_places"]
         A, B = repeated(numbers["A"], numbers["B"])
         unsteady = [_steady_state(*model, places) is None for model in zip(A, B, strict=True)]

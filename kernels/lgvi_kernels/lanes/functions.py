@@ -56,7 +56,7 @@ def _declare_functions(width, real):
     @overloads.func_native(code("AB", "A > B ? A : B"))
     def greatest(a: L, b: L) -> L: ...
 
-    @overloads.func_native(code("ABC", "A < B ? B : (A > C ? C : A)"))
+    @overloads.func_native(code("ABC", "B > (C < A ? C : A) ? B : (C < A ? C : A)"))
     def clamp(a: L, b: L, c: L) -> L: ...
 
     @overloads.func_native(code("ABC", "A * B + C" if width == 1 else "__builtin_elementwise_fma(A, B, C)"))

@@ -36,13 +36,13 @@ def any_positive(width, real):
 def element(width, real, statement):
     """C++ that reads or writes a lane r at its place in a two-dimensional array."""
     kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
-    place = f"{kind}* place = ({kind}*)rows.data + ((wp::int64)(entry * rows.shape[1] + row) + offset);"
+    place = f"{kind}* place = ({kind}*)rows.data + ((wp::int64)entry * rows.shape[1] + row + offset);"
     return f"{kind} r; {place} {statement}"
 
 
 def shared(width, real):
     """C++ that reads one number of a two-dimensional array into all lanes."""
-    place = "((S*)rows.data)[(wp::int64)(entry * rows.shape[1] + row) + offset]"
+    place = "((S*)rows.data)[(wp::int64)entry * rows.shape[1] + row + offset]"
     return f"{head(width, real, '')} V R = V() + {place}; wp::vec_t<{width}, S> r; memcpy(&r, &R, sizeof(V)); return r;"
 
 

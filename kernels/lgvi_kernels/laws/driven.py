@@ -88,8 +88,8 @@ def make_driven(name, rows, limit, lag, rate, features, words=(), count=0):
         return n
 
     @wp.func
-    def step_to(view: Any, p: Any, i: int, time: Any, remaining: Any):
-        """Let channel i follow its command over a time; remaining: the part of a gap that is left, where all are alike."""
+    def step_to(view: Any, p: Any, i: int, time: Any):
+        """Let channel i follow its command over a time."""
         at = p.first + wp.static(rows) * i
         n = remembered(view, p.memory + i)
         u = wanted(view, p, i)
@@ -99,20 +99,22 @@ def make_driven(name, rows, limit, lag, rate, features, words=(), count=0):
             most = time * row1(view, at + wp.static(rate))
             n = n + clamp(u - n, -most, most)
         else:
-            if p.alike == 0:
-                remaining = left_after(time, row1(view, at + wp.static(lag)))
-            n = u + remaining * (n - u)
+            n = fused(left_after(time, row1(view, at + wp.static(lag))), n - u, u)
         remember(view, p.memory + i, n)
 
     @wp.func
     def move(state: Any, view: Any, p: Any, length: Any):
         if wp.static(moves):
             time = length * ones(view.b.x)
-            remaining = time
-            if wp.static(not limited):
+            # A loop of its own: an exponential within a condition would be computed for each channel, and dropped.
+            if wp.static(not limited) and p.alike > 0:
                 remaining = left_after(time, row1(view, p.first + wp.static(lag)))
-            for i in range(wp.static(count) if wp.static(count > 0) else p.count):
-                step_to(view, p, i, time, remaining)
+                for i in range(wp.static(count) if wp.static(count > 0) else p.count):
+                    u = wanted(view, p, i)
+                    remember(view, p.memory + i, fused(remaining, remembered(view, p.memory + i) - u, u))
+            else:
+                for i in range(p.count):
+                    step_to(view, p, i, time)
         return state
 
     @wp.func

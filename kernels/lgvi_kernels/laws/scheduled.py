@@ -57,6 +57,20 @@ def left_along(length: Any, lag: Any):
 
 
 @wp.func
+def lagged(n: Any, start: Any, end: Any, mean: Any, left: Any):
+    """Behind a straight command by a lag: n less the command decays, and falls behind its slope; see left_along."""
+    return fused(left, n - start, fused(-mean, end - start, end))
+
+
+@wp.func
+def command_ends(memory: Any, packet: int, at: int, i: int, first_part: Any, last_part: Any):
+    """The commands of channel i at these two parts of the piece in use, whose rows are at `at`."""
+    value = element(memory, packet, at + 2 * i, 0)
+    change = element(memory, packet, at + 2 * i + 1, 0)
+    return fused(first_part, change, value), fused(last_part, change, value)
+
+
+@wp.func
 def turned_towards(n: Any, start: Any, end: Any, length: Any, rate: Any):
     """Along a straight command: at the rate until n meets it, then with it, or after it where it is faster."""
     unity = ones(n)
@@ -158,9 +172,8 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
         return n
 
     @wp.func
-    def follow_piece(table: Any, entry: int, memory: Any, packet: int, p: Any, i: int, start: Any, stop: Any, length: Any,
-                     mean: Any, left: Any):  # fmt: skip
-        """Let channel i follow a straight command over a time; mean, left: see left_along, where all are alike."""
+    def follow_piece(table: Any, entry: int, memory: Any, packet: int, p: Any, i: int, start: Any, stop: Any, length: Any):
+        """Let channel i follow a straight command over a time."""
         at = p.first + wp.static(rows) * i
         lag_here = entry_of(length, table, entry, at, wp.static(lag))
         n = element(memory, packet, p.memory + i, 0)
@@ -171,10 +184,8 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
             pace = vec3(lag_here, entry_of(length, table, entry, at, wp.static(rate)), lag_here)
             after = chased(n, start, stop, length, pace)
         else:
-            # n less the command decays, and falls behind its slope.
-            if p.alike == 0:
-                mean, left = left_along(length, lag_here)
-            after = fused(left, n - start, fused(-mean, stop - start, stop))
+            mean, left = left_along(length, lag_here)
+            after = lagged(n, start, stop, mean, left)
         # Lanes without this piece keep their bits, whatever their neighbours have.
         set_element(memory, packet, p.memory + i, 0, positive(length, after, n))
 
@@ -195,16 +206,12 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
                 steepness = entry_of(time, table, entry, row, 1)
                 first_part = clamp((since - time_left) * steepness, zero, unity)
                 last_part = clamp((since - end) * steepness, zero, unity)
-                mean = length
-                left = length
-                if wp.static(not limited):
-                    mean, left = left_along(length, entry_of(time, table, entry, p.first + wp.static(lag), 0))
                 for i in range(p.count):
                     value = entry_of(time, table, entry, row + wp.static(PIECE) + 2 * i, 0)
                     change = entry_of(time, table, entry, row + wp.static(PIECE) + 2 * i, 1)
                     start = fused(first_part, change, value)
                     stop = fused(last_part, change, value)
-                    follow_piece(table, entry, memory, packet, p, i, start, stop, length, mean, left)
+                    follow_piece(table, entry, memory, packet, p, i, start, stop, length)
             since = ended
             time_left = end
             row += wp.static(PIECE) + 2 * p.count
@@ -222,17 +229,19 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
             steepness = element(memory, packet, p.work + 2, 0)
             first_part = clamp((since - time) * steepness, unity - unity, unity)
             last_part = clamp(since * steepness, unity - unity, unity)
-            mean = time
-            left = time
-            if wp.static(not limited):
+            at = p.work + wp.static(IN_USE)
+            # A loop of its own: an exponential within a condition would be computed for each channel, and dropped.
+            if wp.static(not limited) and p.alike > 0:
                 mean, left = left_along(time, entry_of(time, table, entry, p.first + wp.static(lag), 0))
-            for i in range(wp.static(count) if wp.static(count > 0) else p.count):
-                at = p.work + wp.static(IN_USE) + 2 * i
-                value = element(memory, packet, at, 0)
-                change = element(memory, packet, at + 1, 0)
-                start = fused(first_part, change, value)
-                stop = fused(last_part, change, value)
-                follow_piece(table, entry, memory, packet, p, i, start, stop, time, mean, left)
+                for i in range(wp.static(count) if wp.static(count > 0) else p.count):
+                    start, stop = command_ends(memory, packet, at, i, first_part, last_part)
+                    n = element(memory, packet, p.memory + i, 0)
+                    after = lagged(n, start, stop, mean, left)
+                    set_element(memory, packet, p.memory + i, 0, positive(time, after, n))
+            else:
+                for i in range(p.count):
+                    start, stop = command_ends(memory, packet, at, i, first_part, last_part)
+                    follow_piece(table, entry, memory, packet, p, i, start, stop, time)
 
     @wp.func
     def evolve(state: Any, view: Any, p: Any):

@@ -95,6 +95,7 @@ entry_of = overloads.family(
     "entry_of", "`element`; `like` says which type, since the overload whose lanes share a number cannot know it."
 )
 set_element = overloads.family("set_element", "rows[entry, row + offset] = value.")
+copy_rows = overloads.family("copy_rows", "rows[entry, target + i] = rows[entry, source + i] for i from first to last.")
 gathered = overloads.family("gathered", "The row + offset + index of each lane.")
 gathered3 = overloads.family("gathered3", "`gathered` of three rows from row + index on, as a vector.")
 thirds = overloads.family(
@@ -206,6 +207,9 @@ def _declare_rows(width, real):
 
     @overloads.func_native(native.shared(width, real))
     def entry_of(like: L, rows: Numbers, entry: int, row: int, offset: int) -> L: ...
+
+    @overloads.func_native(native.copied(width, real))
+    def copy_rows(rows: Rows, entry: int, source: int, target: int, first: int, last: int): ...
 
     @overloads.func_native(native.element(width, real, write))
     def set_element(rows: Rows, entry: int, row: int, offset: int, value: L): ...

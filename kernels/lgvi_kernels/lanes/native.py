@@ -40,6 +40,13 @@ def element(width, real, statement):
     return f"{kind} r; {place} {statement}"
 
 
+def copied(width, real):
+    """C++ that copies rows of one entry, as the place `source` has them, to those of the place `target`."""
+    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
+    begin = f"{kind}* row = ({kind}*)rows.data + (wp::int64)entry * rows.shape[1];"
+    return f"{begin} for (wp::int64 i = first; i < last; ++i) row[target + i] = row[source + i];"
+
+
 def shared(width, real):
     """C++ that reads one number of a two-dimensional array into all lanes."""
     place = "((S*)rows.data)[(wp::int64)entry * rows.shape[1] + row + offset]"

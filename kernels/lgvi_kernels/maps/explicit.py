@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, element, mul, ones, set_element, sub  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, copy_rows, cross, mul, ones, sub  # noqa: F401
 from lgvi_kernels.lanes.matrix3 import factor_struct
 from lgvi_kernels.lanes.rotations import rotation_struct
 from lgvi_kernels.lanes.state import damping_struct, struct, view_struct, wrench_struct
@@ -158,8 +158,7 @@ def copy_memory(c: Any, source: int, target: int):
     """Copy the laws' memory: place 0 is in use, place 1 keeps that of the step's start."""
     # Half of the array is a backup, and half of the rest is what is kept.
     rows = c.memory.shape[1] // 4
-    for j in range(c.first_memory, c.last_memory):
-        set_element(c.memory, c.packet, target * rows, j, element(c.memory, c.packet, source * rows, j))
+    copy_rows(c.memory, c.packet, source * rows, target * rows, c.first_memory, c.last_memory)
 
 
 def make_recall(View, follow, settle, before, node):

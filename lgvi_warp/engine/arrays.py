@@ -185,6 +185,8 @@ class LawArrays:
         self._bounded = [_bounded(dtype) for _, dtype in kinds]
         self.places: list[Any] = []
         self._sizes: Any = None
+        # Rows of the memory, and what laws remember in them at the start.
+        self._remembering: list[tuple[slice, np.ndarray]] = []
         # Rows that all members share, as they were written, by their place in the table; None for those that members own.
         self._written: dict[int, np.ndarray | None] = {}
 
@@ -205,7 +207,14 @@ class LawArrays:
                 self._packets, _nested(group, bounded, list(itertools.islice(next_places, len(group.packed))))
             )
         self._write_table(laws, [known for group in groups for known in group.shared], moved)
-        self._write_memory(laws, bus, scratch, moved)
+        if moved:
+            self.memory = Lanes(self._packets, 2 * (self.scratch + scratch), self._Lane)
+        self._remembering, first = [], bus
+        for law in laws:
+            if law.memory is not None:
+                self._remembering.append((slice(first, first + law.memory.shape[1]), law.memory))
+            first += memory_rows(law)
+        self.write_memory()
 
     def _place(self, laws: Sequence[Packed], bus: int, account: int | None) -> None:
         """Give each law its rows of table and memory."""
@@ -252,18 +261,15 @@ class LawArrays:
                 self._put_rows(self.table.view[:, at:first], part)
                 self._written[at] = part.copy() if len(part) == 1 else None
 
-    def _write_memory(self, laws: Sequence[Packed], first: int, scratch: int, moved: bool) -> None:
-        half = self.scratch + scratch
-        if moved:
-            self.memory = Lanes(self._packets, 2 * half, self._Lane)
-        if not half:
-            return
+    def write_memory(self) -> None:
+        """Write anew what laws remember at the start, and zeros into all other rows of the memory."""
         view = self.memory.view
+        if not view.size:
+            return
         view[...] = 0.0
-        for law in laws:
-            if law.memory is not None:
-                self._put_rows(view[:, first : first + law.memory.shape[1]], law.memory)
-            first += memory_rows(law)
+        for rows, memory in self._remembering:
+            self._put_rows(view[:, rows], memory)
+        half = view.shape[1] // 2
         view[:, half:] = view[:, :half]
 
 

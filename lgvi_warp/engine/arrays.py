@@ -187,13 +187,16 @@ class LawArrays:
         self._sizes: Any = None
         # Rows of the memory, and what laws remember in them at the start.
         self._remembering: list[tuple[slice, np.ndarray]] = []
-        # Rows that all members share, as they were written, by their place in the table; None for those that members own.
-        self._written: dict[int, np.ndarray | None] = {}
+        # Bits of rows that one number fills, as they were written, by their place in the table: b"" of those that all members
+        # share, None of those that members own.
+        self._written: dict[int, bytes | None] = {}
 
     def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0, account: int | None = None) -> None:
         """Write what the terms packed, and the parts of a controller; account: the number of the law that keeps it."""
         laws = [law for group in groups for law in group.packed]
-        sizes = tuple((row_count(law), memory_count(law), law.work) for law in laws), scratch, bus
+        rows = [row_parts(law) for law in laws]
+        widths = [[part.shape[1] for part in parts] for parts in rows]
+        sizes = widths, [(memory_count(law), law.work) for law in laws], scratch, bus
         moved = self._sizes != sizes
         if moved:
             # A law may have as many rows as its members need: those after it, though shared, then lie elsewhere.
@@ -206,7 +209,7 @@ class LawArrays:
             structs.write(
                 self._packets, _nested(group, bounded, list(itertools.islice(next_places, len(group.packed))))
             )
-        self._write_table(laws, [known for group in groups for known in group.shared], moved)
+        self._write_table(rows, [known for group in groups for known in group.shared], moved)
         if moved:
             self.memory = Lanes(self._packets, 2 * (self.scratch + scratch), self._Lane)
         self._remembering, first = [], bus
@@ -243,9 +246,8 @@ class LawArrays:
             row, memory = row + size, end
         self._rows, self.scratch = row, memory
 
-    def _write_table(self, laws: Sequence[Packed], shared: Sequence[bool], moved: bool) -> None:
+    def _write_table(self, parts_of_laws: Sequence[Sequence[np.ndarray]], shared: Sequence[bool], moved: bool) -> None:
         """Write the laws' rows; the first row of the table is none's. Rows that members share are written when they change."""
-        parts_of_laws = [row_parts(law) for law in laws]
         count = self._packets if any(len(part) > 1 for parts in parts_of_laws for part in parts) else 1
         if moved or len(self.table.view) != count:
             # A vector of rows that members share is one load of four: one row more than there are.
@@ -255,11 +257,10 @@ class LawArrays:
         for parts, known in zip(parts_of_laws, shared, strict=True):
             for part in parts:
                 at, first = first, first + part.shape[1]
-                before = self._written.get(at) if len(part) == 1 else None
-                if before is not None and (known or np.array_equal(before, part)):
-                    continue
-                self._put_rows(self.table.view[:, at:first], part)
-                self._written[at] = part.copy() if len(part) == 1 else None
+                bits = None if len(part) > 1 else b"" if known else part.tobytes()
+                if bits is None or bits != self._written.get(at):
+                    self._put_rows(self.table.view[:, at:first], part)
+                    self._written[at] = bits
 
     def write_memory(self) -> None:
         """Write anew what laws remember at the start, and zeros into all other rows of the memory."""

@@ -122,7 +122,7 @@ class Packets:
 
     def _place_account(self) -> None:
         """Tell the kernel where in the memory the energy used is, and which rows it saves with a sample."""
-        if self.plan.spec.accounted and self.monitor.account != self.laws.account:
+        if self.laws.account >= 0 and self.plan.spec.accounted and self.monitor.account != self.laws.account:
             self.monitor.account = self.laws.account
             self.monitor.signals = self._signal_rows(self.laws.account)
             self._launch = None

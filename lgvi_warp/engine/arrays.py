@@ -104,7 +104,7 @@ class Structs:
     def write(self, packets: int, parts: list[tuple[tuple[str, ...], Any, bool]]) -> None:
         """Write numbers of members."""
         varying = [(path, fields) for path, fields, shared in parts if not shared]
-        count = packets if max((longest(fields) for _, fields in varying), default=1) > 1 else 1
+        count = packets if packets > 1 and max((longest(fields) for _, fields in varying), default=1) > 1 else 1
         names = [tuple(fields) for _, fields, _ in parts]
         if names != self._written:
             # A field that is not written any more would keep the number of other members.

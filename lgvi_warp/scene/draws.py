@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -129,10 +129,16 @@ class Draws:
 
     def with_columns(self, columns: Columns) -> Draws:
         """The draws of other members, of which a table's columns have other values; the targets are the same."""
-        draws = replace(self, columns=columns, total=len(columns[0][1]), places=None, weights=None)
-        names = ("drawn_names", "varied_names", "_start_names", "varied_starts")
-        vars(draws).update({name: getattr(self, name) for name in names}, _before=self._latest)
+        draws = object.__new__(Draws)  # in a third of the time of `replace`
+        vars(draws).update(self._of_tables, columns=columns, total=len(columns[0][1]), _before=self._latest)
         return draws
+
+    @functools.cached_property
+    def _of_tables(self) -> dict[str, Any]:
+        """What draws have in common, whatever the values of a table's columns."""
+        names = ("drawn_names", "varied_names", "_start_names", "varied_starts")
+        known = self.__getstate__() | {name: getattr(self, name) for name in names}
+        return known | {"places": None, "weights": None}
 
     def note_sound(self, draws: Draws) -> None:
         """Note that the members of another table are physical."""

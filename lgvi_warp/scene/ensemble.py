@@ -479,6 +479,11 @@ class Ensemble(Summarized, Documented):
         ensemble.checked = len(chosen) if self.checked == self.members else 0
         return ensemble
 
+    def __copy__(self) -> Ensemble:
+        ensemble = object.__new__(type(self))  # in a fraction of the time that `copy` takes by itself
+        vars(ensemble).update(vars(self))
+        return ensemble
+
     def _drawing(self, **changes: Any) -> Ensemble:
         """Return a copy whose numbers are drawn in another way."""
         ensemble = copy.copy(self)

@@ -280,9 +280,9 @@ def test_a_call_computes_nothing_again_that_follows_from_the_same_numbers(monkey
     for kind, name in ((DragMatrix, "packed"), (DragMatrix, "unphysical"), (LawArrays, "write")):
         monkeypatch.setattr(kind, name, counted(counts, getattr(kind, name)))
     run(X)
-    run(X + [[0.1, 0.0]])
+    run(X + np.array([[0.1, 0.0]]))
     assert not counts
-    run(X + [[0.0, 1.0]])
+    run(X + np.array([[0.0, 1.0]]))
     assert counts == {"packed": 1, "unphysical": 1, "write": 1}
 
 

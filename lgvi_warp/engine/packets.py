@@ -163,19 +163,21 @@ class Packets:
                 self._warned = going_on.start_warnings(members.final, members.count)
                 self.heights.take(members.final.lanes.get(going_on.HEIGHTS))
 
-    def _write_packed(self, packing: Packing, each: Mapping[str, list[Packed]]) -> None:
+    def _write_packed(self, packing: Packing, by_kind: Mapping[str, list[Packed]]) -> None:
         """Write the numbers of laws, parts and events, by kind, the inertia and the limits that are watched."""
         plan, shared, before = self.plan, self.plan.shared.keeps, [] if self._launch is None else self._arrays()
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
-        groups = [Group(packed, [shared((kind, i)) for i in range(len(packed))]) for kind, packed in each.items()]
+        groups = [Group(packed, [shared((kind, i)) for i in range(len(packed))]) for kind, packed in by_kind.items()]
         bus, _ = self._bus()
-        spare = sum(map(memory_rows, each["part"])) if self._controlled and plan.layout.noted_bits & SEEN_NOTES else 0
+        spare = (
+            sum(map(memory_rows, by_kind["part"])) if self._controlled and plan.layout.noted_bits & SEEN_NOTES else 0
+        )
         scratch = packing.scratch([law for group in groups for law in group.packed], bus + spare)
         self.laws.write(groups, scratch, bus + spare, plan.kernel_choice.account)
         self._place_account()
         if self._controlled:
             self.monitor.loop = self.laws.structs[1].array
-            of_parts = self.laws.places[len(each["law"]) :]
+            of_parts = self.laws.places[len(by_kind["law"]) :]
             self.monitor.spare, self.monitor.part_rows = bus, spare
             self.monitor.parts = of_parts[0][1][2] if of_parts else 0
         if plan.spec.warning_rows:

@@ -135,7 +135,7 @@ class Draws:
 
     @functools.cached_property
     def _of_tables(self) -> dict[str, Any]:
-        """What draws have in common, whatever the values of a table's columns."""
+        """Entries that draws of one table share, whatever the values of its columns."""
         names = ("drawn_names", "varied_names", "_start_names", "varied_starts")
         known = self.__getstate__() | {name: getattr(self, name) for name in names}
         return known | {"places": None, "weights": None}

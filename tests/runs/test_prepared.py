@@ -290,9 +290,9 @@ def counted(counts, function):
     """The function, whose calls are counted."""
 
     @functools.wraps(function)
-    def call(*given, **named):
+    def call(*values, **named):
         counts[function.__name__] += 1
-        return function(*given, **named)
+        return function(*values, **named)
 
     return call
 

@@ -41,7 +41,7 @@ def real_numbers(value: Any) -> np.ndarray:
         if array.dtype.kind == "O" and all(isinstance(item, Real) and not _is_word(item) for item in array.flat):
             return array.astype(np.float64)
         if array.dtype.kind in "iuf":
-            return array.astype(np.float64)
+            return array.astype(np.float64, copy=False)
     except (ValueError, TypeError, OverflowError, RuntimeError):
         pass
     raise NotReal("is not numeric")

@@ -104,7 +104,7 @@ class Structs:
     def write(self, packets: int, parts: list[tuple[tuple[str, ...], Any, bool]]) -> None:
         """Write numbers of members."""
         varying = [(path, fields) for path, fields, shared in parts if not shared]
-        count = packets if max((longest(fields) for _, fields in varying), default=1) > 1 else 1
+        count = packets if packets > 1 and max((longest(fields) for _, fields in varying), default=1) > 1 else 1
         names = [tuple(fields) for _, fields, _ in parts]
         if names != self._written:
             # A field that is not written any more would keep the number of other members.
@@ -185,13 +185,18 @@ class LawArrays:
         self._bounded = [_bounded(dtype) for _, dtype in kinds]
         self.places: list[Any] = []
         self._sizes: Any = None
-        # Rows that all members share, as they were written, by their place in the table; None for those that members own.
-        self._written: dict[int, np.ndarray | None] = {}
+        # Rows of the memory, and what laws remember in them at the start.
+        self._remembering: list[tuple[slice, np.ndarray]] = []
+        # Bits of rows that one number fills, as they were written, by their place in the table: b"" of those that all members
+        # share, None of those that members own.
+        self._written: dict[int, bytes | None] = {}
 
     def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0, account: int | None = None) -> None:
         """Write what the terms packed, and the parts of a controller; account: the number of the law that keeps it."""
         laws = [law for group in groups for law in group.packed]
-        sizes = tuple((row_count(law), memory_count(law), law.work) for law in laws), scratch, bus
+        rows = [row_parts(law) for law in laws]
+        widths = [[part.shape[1] for part in parts] for parts in rows]
+        sizes = widths, [(memory_count(law), law.work) for law in laws], scratch, bus
         moved = self._sizes != sizes
         if moved:
             # A law may have as many rows as its members need: those after it, though shared, then lie elsewhere.
@@ -204,8 +209,15 @@ class LawArrays:
             structs.write(
                 self._packets, _nested(group, bounded, list(itertools.islice(next_places, len(group.packed))))
             )
-        self._write_table(laws, [known for group in groups for known in group.shared], moved)
-        self._write_memory(laws, bus, scratch, moved)
+        self._write_table(rows, [known for group in groups for known in group.shared], moved)
+        if moved:
+            self.memory = Lanes(self._packets, 2 * (self.scratch + scratch), self._Lane)
+        self._remembering, first = [], bus
+        for law in laws:
+            if law.memory is not None:
+                self._remembering.append((slice(first, first + law.memory.shape[1]), law.memory))
+            first += memory_rows(law)
+        self.write_memory()
 
     def _place(self, laws: Sequence[Packed], bus: int, account: int | None) -> None:
         """Give each law its rows of table and memory."""
@@ -234,9 +246,8 @@ class LawArrays:
             row, memory = row + size, end
         self._rows, self.scratch = row, memory
 
-    def _write_table(self, laws: Sequence[Packed], shared: Sequence[bool], moved: bool) -> None:
+    def _write_table(self, parts_of_laws: Sequence[Sequence[np.ndarray]], shared: Sequence[bool], moved: bool) -> None:
         """Write the laws' rows; the first row of the table is none's. Rows that members share are written when they change."""
-        parts_of_laws = [row_parts(law) for law in laws]
         count = self._packets if any(len(part) > 1 for parts in parts_of_laws for part in parts) else 1
         if moved or len(self.table.view) != count:
             # A vector of rows that members share is one load of four: one row more than there are.
@@ -246,24 +257,20 @@ class LawArrays:
         for parts, known in zip(parts_of_laws, shared, strict=True):
             for part in parts:
                 at, first = first, first + part.shape[1]
-                before = self._written.get(at) if len(part) == 1 else None
-                if before is not None and (known or np.array_equal(before, part)):
-                    continue
-                self._put_rows(self.table.view[:, at:first], part)
-                self._written[at] = part.copy() if len(part) == 1 else None
+                bits = None if len(part) > 1 else b"" if known else part.tobytes()
+                if bits is None or bits != self._written.get(at):
+                    self._put_rows(self.table.view[:, at:first], part)
+                    self._written[at] = bits
 
-    def _write_memory(self, laws: Sequence[Packed], first: int, scratch: int, moved: bool) -> None:
-        half = self.scratch + scratch
-        if moved:
-            self.memory = Lanes(self._packets, 2 * half, self._Lane)
-        if not half:
-            return
+    def write_memory(self) -> None:
+        """Write anew what laws remember at the start, and zeros into all other rows of the memory."""
         view = self.memory.view
+        if not view.size:
+            return
         view[...] = 0.0
-        for law in laws:
-            if law.memory is not None:
-                self._put_rows(view[:, first : first + law.memory.shape[1]], law.memory)
-            first += memory_rows(law)
+        for rows, memory in self._remembering:
+            self._put_rows(view[:, rows], memory)
+        half = view.shape[1] // 2
         view[:, half:] = view[:, :half]
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from typing import Any
@@ -36,7 +37,9 @@ from lgvi_warp.engine.step_warnings import (
     row_limits,
 )
 from lgvi_warp.engine.tangents import CopiesPacking, Slopes, slopes_of_frame
+from lgvi_warp.physics.terms.base import Packed
 from lgvi_warp.sampling.members import Members
+from lgvi_warp.scene.draws import KEPT
 
 # What the kernel notes of members that end.
 ENDS = ("status", "failed_step", "failed_size")
@@ -70,7 +73,7 @@ class Packets:
         self._place_ticks(plan)
         self.noted = {name: array.numpy() for name, array in self._written_by_the_kernel().items()}
         self._launch: Any = None
-        self._launched, self._written = (0, 0, 0), False
+        self._launched, self._packed_before = (0, 0, 0), list[Any]()
         self.refill(members)
 
     @classmethod
@@ -119,7 +122,7 @@ class Packets:
 
     def _place_account(self) -> None:
         """Tell the kernel where in the memory the energy used is, and which rows it saves with a sample."""
-        if self.plan.spec.accounted and self.monitor.account != self.laws.account:
+        if self.laws.account >= 0 and self.plan.spec.accounted and self.monitor.account != self.laws.account:
             self.monitor.account = self.laws.account
             self.monitor.signals = self._signal_rows(self.laws.account)
             self._launch = None
@@ -137,41 +140,51 @@ class Packets:
         """Take other members in place of these, from their starts on."""
         plan, self.members = self.plan, members
         packing = self._packed(members)
-        shared, before = plan.shared.keeps, self._arrays() if self._written else []
-        self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
         each = {"law": packing.laws(), "part": packing.control(), "event": packing.events()}
         if not self._controlled:
             del each["part"]
-        groups = [Group(packed, [shared((kind, i)) for i in range(len(packed))]) for kind, packed in each.items()]
-        bus, _ = self._bus()
-        spare = sum(map(memory_rows, each["part"])) if self._controlled and plan.layout.noted_bits & SEEN_NOTES else 0
-        scratch = packing.scratch([law for group in groups for law in group.packed], bus + spare)
-        self.laws.write(groups, scratch, bus + spare, plan.kernel_choice.account)
-        self._place_account()
-        if self._controlled:
-            self.monitor.loop = self.laws.structs[1].array
-            of_parts = self.laws.places[len(each["law"]) :]
-            self.monitor.spare, self.monitor.part_rows = bus, spare
-            self.monitor.parts = of_parts[0][1][2] if of_parts else 0
-        if plan.spec.warning_rows:
-            self._limits.write(self.count, [((), self._watched_limits(), False)])
-            self.monitor.limits = self._limits.array
+        packed = [packing.numbers, packing.inertia(), *(law for laws in each.values() for law in laws)]
+        # What a run keeps, or knows to follow from the same numbers, it gives as the same object.
+        if self._packed_before and all(map(operator.is_, packed, self._packed_before)):
+            self.laws.write_memory()
+        else:
+            self._write_packed(packing, each)
+        self._packed_before = packed if members.count <= KEPT and self.slopes is None else []
         self.state_lanes.write(packing.starts(), packing.members.count)
         if self.slopes is not None:
             self.slopes.check_moved()
         self._warned: tuple[np.ndarray, np.ndarray] | None = None
         self._heights: of_surface.Heights | None = None
-        if self._written:
-            for view in self.noted.values():
-                view.fill(0)
-            if any(new is not old for new, old in zip(self._arrays(), before, strict=True)):
-                self._launch = None
-        self._written = True
+        for view in self.noted.values():
+            view.fill(0)
         if members.final is not None:
             going_on.take(self, members.final)
             if plan.launches.goes_on_exactly:
                 self._warned = going_on.start_warnings(members.final, members.count)
                 self.heights.take(members.final.lanes.get(going_on.HEIGHTS))
+
+    def _write_packed(self, packing: Packing, by_kind: Mapping[str, list[Packed]]) -> None:
+        """Write the numbers of laws, parts and events, by kind, the inertia and the limits that are watched."""
+        plan, shared, before = self.plan, self.plan.shared.keeps, [] if self._launch is None else self._arrays()
+        self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
+        groups = [Group(packed, [shared((kind, i)) for i in range(len(packed))]) for kind, packed in by_kind.items()]
+        bus, _ = self._bus()
+        spare = (
+            sum(map(memory_rows, by_kind["part"])) if self._controlled and plan.layout.noted_bits & SEEN_NOTES else 0
+        )
+        scratch = packing.scratch([law for group in groups for law in group.packed], bus + spare)
+        self.laws.write(groups, scratch, bus + spare, plan.kernel_choice.account)
+        self._place_account()
+        if self._controlled:
+            self.monitor.loop = self.laws.structs[1].array
+            of_parts = self.laws.places[len(by_kind["law"]) :]
+            self.monitor.spare, self.monitor.part_rows = bus, spare
+            self.monitor.parts = of_parts[0][1][2] if of_parts else 0
+        if plan.spec.warning_rows:
+            self._limits.write(self.count, [((), self._watched_limits(), False)])
+            self.monitor.limits = self._limits.array
+        if not all(map(operator.is_, self._arrays(), before)):
+            self._launch = None
 
     def _packed(self, members: Members) -> Packing:
         """The packing of members, of their copies too where numbers carry slopes; frame, scale and water are the members'."""

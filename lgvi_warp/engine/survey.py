@@ -184,7 +184,7 @@ def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -
         if not shared.keeps(AXES):
             shared.varied.add(AXES)
         mass = shared("mass", p, _mass_in_axes)
-        frame = replace(p[AXES][0], M=mass)
+        frame = p[AXES][0].with_mass(mass)
         if user_axes:
             frame = inertia.user_frame_with_mass(p[AXES][0], mass, p["vehicle.inertia"])
         p[FRAME] = frame, *p[AXES][1:]

@@ -116,6 +116,12 @@ class Frame:
         """Whether some member's origin of the state is not the user's."""
         return bool(self.origin.any())
 
+    def with_mass(self, M: np.ndarray) -> Frame:
+        """The same axes and origins with other mass matrices (n, 3, 3) [kg]."""
+        frame = replace(self, M=M)
+        vars(frame).update(turned=self.turned, shifted=self.shifted)
+        return frame
+
     @functools.cached_property
     def mass_diagonal(self) -> np.ndarray | None:
         """Diagonals (., 3) of the mass matrices, where none has another entry; else None."""

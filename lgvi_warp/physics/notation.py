@@ -141,8 +141,9 @@ def only_diagonal(matrices: np.ndarray) -> np.ndarray | None:
     if len(matrices) > FOLD:
         # All bits of an entry that some matrix has, but that of the sign: a third of the time.
         entries = reduced(np.bitwise_or, np.ascontiguousarray(matrices, np.float64).view(np.int64))[None] << 1
-    none_beside = np.count_nonzero(entries) == np.count_nonzero(np.einsum("nii->ni", entries))
-    return np.einsum("nii->ni", matrices) if none_beside else None
+    diagonals = np.einsum("nii->ni", matrices)
+    own = diagonals if entries is matrices else np.einsum("nii->ni", entries)
+    return diagonals if np.count_nonzero(entries) == np.count_nonzero(own) else None
 
 
 def rotations(R: np.ndarray, limit: float = ORTHOGONAL) -> np.ndarray:

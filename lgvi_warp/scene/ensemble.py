@@ -268,7 +268,7 @@ class Ensemble(Summarized, Documented):
         return np.arange(first, stop) if self._indices is self._draws.places is None else self.indices[first:stop]
 
     def _checks(self) -> PhysicalChecks:
-        varied = self.varied_names & self._draws.scene.parameters.keys()
+        varied = self.varied_names & self._draws.scene.parameters.keys() - self._draws.known_sound
         return PhysicalChecks(self.scene, varied, self._draws.drawn_names, self.members)
 
     def _check_physical(self, before: bool = False) -> None:
@@ -479,6 +479,11 @@ class Ensemble(Summarized, Documented):
         ensemble.checked = len(chosen) if self.checked == self.members else 0
         return ensemble
 
+    def __copy__(self) -> Ensemble:
+        ensemble = object.__new__(type(self))  # in a fraction of the time that `copy` takes by itself
+        vars(ensemble).update(vars(self))
+        return ensemble
+
     def _drawing(self, **changes: Any) -> Ensemble:
         """Return a copy whose numbers are drawn in another way."""
         ensemble = copy.copy(self)
@@ -535,6 +540,7 @@ class Ensemble(Summarized, Documented):
         ensemble._draws, ensemble._indices = self._draws.with_columns(pairs), None
         ensemble.final, ensemble.start_time = None, 0.0
         ensemble._check_physical()
+        self._draws.note_sound(ensemble._draws)
         return ensemble
 
     def in_scene(self, scene: SceneLike, by_member: Sequence[str] = ()) -> Ensemble:

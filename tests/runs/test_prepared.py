@@ -2,10 +2,12 @@
 """A prepared run has the bits of solve, whatever varies, however often and from however many threads it is called."""
 
 import dataclasses
+import functools
 import gc
 import pickle
 import re
 import tracemalloc
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -17,12 +19,13 @@ from lgvi_warp.calls.prepared import FailedMembers
 from lgvi_warp.designs import Grid, Table, UnitCubePoints
 from lgvi_warp.distributions import Normal, RotationNormal, Uniform
 from lgvi_warp.engine import plan as plans
+from lgvi_warp.engine.arrays import LawArrays
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.shared import SharedResultsCache
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import ensemble as ensembles
-from lgvi_warp.terms import Current, DragMatrix, Thrusters
+from lgvi_warp.terms import Current, DragMatrix, Thrusters, WrenchNoise
 
 pytestmark = pytest.mark.kernel
 
@@ -221,6 +224,79 @@ def test_paths_are_kept_of_some_members_at_a_time(paper, monkeypatch):
         lw.prepare(paper, NAMES, of="max(depth)", save=lw.SaveAt(every=0.1), **SETTINGS)(X)
 
 
+# Calls one after the other, each of which changes one kind of number, or none: (columns that change, by how much).
+CHANGES = [([], 0.0), ([1], 0.1), ([0], 0.5), ([2], -0.5), ([0, 1, 2], 0.2), ([1], 1e-16), ([], 0.0), ([1], -0.3)]
+
+
+@pytest.mark.parametrize("members", [1, 5])
+def test_nothing_of_the_call_before_is_left(paper, members):
+    run, X = lw.prepare(paper, NAMES, of="position", **SETTINGS), numbers(members)
+    sound = X.copy()
+    for columns, change in CHANGES:
+        X[-1, columns] += change  # in the caller's array, which an earlier call has read
+        np.testing.assert_array_equal(run(X), solved(paper, NAMES, X, **SETTINGS).position[-1])
+        with pytest.raises(lw.SceneError) as first:
+            run(np.where(np.arange(3) == 2, -1.0, X))
+        with pytest.raises(lw.SceneError) as alone:
+            solved(paper, NAMES, np.where(np.arange(3) == 2, -1.0, X), **SETTINGS)
+        assert str(first.value) == str(alone.value)
+    np.testing.assert_array_equal(run(sound[:1]), solved(paper, NAMES, sound[:1], **SETTINGS).position[-1])
+    np.testing.assert_array_equal(run(sound), solved(paper, NAMES, sound, **SETTINGS).position[-1])
+
+
+def test_a_zero_of_another_sign_is_another_number():
+    scene = lw.Scene.named("sphere", terms=[Current(velocity=[0.0, 0.0, 0.0])])
+    run = lw.prepare(scene, ["current.velocity[0]"], of=lambda end: end.parameters["current.velocity"][:, 0], **SHORT)
+    for zero in (0.0, -0.0, 0.0):
+        assert run([[zero]]).tobytes() == np.array([zero]).tobytes()
+
+
+def test_columns_that_their_owner_changes_are_others(paper):
+    fleet = lw.Ensemble(paper, None, 0, None, Table(values={"vehicle.mass": [123.8]}))
+    column = np.array([124.0])
+    before = fleet.with_columns({"vehicle.mass": column}).parameters(0, 1)["vehicle.mass"]
+    column += 1.0
+    assert fleet.with_columns({"vehicle.mass": column}).parameters(0, 1)["vehicle.mass"] == 125.0
+    assert before == 124.0
+
+
+def test_noise_of_a_call_is_its_own():
+    noise = WrenchNoise(force=(1.0, 0.0, 0.0))
+    scene = lw.Scene(lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0]), terms=[noise])
+    names, X = ["vehicle.mass"], np.full((2, 1), 10.0)
+    run = lw.prepare(scene, names, of="position", **SHORT)
+    for seed, indices in ((0, [0, 1]), (3, [0, 1]), (3, [1, 0]), (0, [7, 7]), (0, [0, 1])):
+        fleet = lw.Ensemble(scene, None, seed, None, Table(values={"vehicle.mass": X[:, 0]}))
+        fleet.indices = np.array(indices)
+        np.testing.assert_array_equal(run(X, seed=seed, indices=indices), lw.solve(fleet, **SHORT).position[-1])
+
+
+def test_a_call_computes_nothing_again_that_follows_from_the_same_numbers(monkeypatch):
+    scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+    names, X = ["start.velocity[0]", "drag_matrix.quadratic[1,1]"], np.array([[1.5, 150.0]])
+    run = lw.prepare(scene, names, of="position", **SHORT)
+    run(X)
+    counts = Counter()
+    for kind, name in ((DragMatrix, "packed"), (DragMatrix, "unphysical"), (LawArrays, "write")):
+        monkeypatch.setattr(kind, name, counted(counts, getattr(kind, name)))
+    run(X)
+    run(X + np.array([[0.1, 0.0]]))
+    assert not counts
+    run(X + np.array([[0.0, 1.0]]))
+    assert counts == {"packed": 1, "unphysical": 1, "write": 1}
+
+
+def counted(counts, function):
+    """The function, whose calls are counted."""
+
+    @functools.wraps(function)
+    def call(*values, **named):
+        counts[function.__name__] += 1
+        return function(*values, **named)
+
+    return call
+
+
 def test_threads_may_call_at_once(paper):
     run = lw.prepare(paper, NAMES, of="position", threads=1, **SETTINGS)
     inputs = [numbers(17 + i % 3, i) for i in range(40)]
@@ -312,6 +388,14 @@ PUSHING = {
     "position": [[-0.5, 0.2, 0.0]], "direction": [[1.0, 0.0, 0.0]], "coefficient": [20.0], "limit": [1.0],
     "time_constant": [0.3], "times": [0.0, 0.3, 0.6], "command_schedule": [[0.2], [0.9], [0.1]],
 }  # fmt: skip
+
+
+def test_laws_remember_nothing_of_the_call_before():
+    scene = lw.Scene.named("sphere", terms=[Thrusters(**PUSHING)])
+    names = ["start.velocity[0]", "thrusters.coefficient[0]"]
+    run = lw.prepare(scene, names, of="position", **SHORT)
+    for X in ([[0.0, 20.0]], [[0.0, 20.0]], [[1.0, 20.0]], [[1.0, 25.0]], [[1.0, 25.0]]):
+        np.testing.assert_array_equal(run(X), solved(scene, names, X, **SHORT).position[-1])
 
 
 @pytest.mark.parametrize("columns", [(5,), (2, 5)])

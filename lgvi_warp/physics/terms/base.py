@@ -450,9 +450,8 @@ class Term(Documented):
             A mask (n,) for each numeric field, True where the member's number is refused.
         """
         fields = {word_of(item): item for item in self.number_fields()}
-        checks = (_outside, _falling, _fractional)
         return {
-            name: np.logical_or.reduce([check(fields[name], value) for check in checks])
+            name: _outside(fields[name], value) | _falling(fields[name], value) | _fractional(fields[name], value)
             for name, value in numbers.items()
         }
 
@@ -733,9 +732,9 @@ def _checked(
         bounds = " ".join(f"{word} {bound:g}" for bound, word in words if np.isfinite(bound))
         problem = "is not positive" if meta["above"] == 0.0 and np.any(array <= 0.0) else "is out of bounds"
         faults.add(name, value, problem, f"give numbers {bounds} [{unit}]")
-    elif _falling(field, array[None]).any():
+    elif np.any(_falling(field, array[None])):
         faults.add(name, value, "is not rising", "sort the table and drop repetitions")
-    elif _fractional(field, array[None]).any():
+    elif np.any(_fractional(field, array[None])):
         faults.add(name, value, "is not a whole number", f"give {_whole_near(array, meta)}")
     else:
         return array
@@ -760,17 +759,17 @@ def _outside(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     return ~np.all((np.isfinite(flat) | meta["infinite"]) & inside, axis=1)
 
 
-def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
-    """Mask (n,) of the members whose values (n, k) of a field do not rise, though they must."""
+def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> Any:
+    """Mask (n,) of the members whose values (n, k) of a field do not rise, though they must; False where they need not."""
     if not field.metadata["rising"]:
-        return np.zeros(len(values), bool)
+        return False
     return np.any(np.diff(np.nan_to_num(values)) <= 0.0, axis=1)
 
 
-def _fractional(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
-    """Mask (n,) of the members whose values (n, ...) of a field are not whole, though they must."""
+def _fractional(field: dataclasses.Field[Any], values: np.ndarray) -> Any:
+    """Mask (n,) of the members whose values (n, ...) of a field are not whole; False where they need not be."""
     if not field.metadata["integer"]:
-        return np.zeros(len(values), bool)
+        return False
     return np.any(values.reshape(len(values), -1) != np.rint(values.reshape(len(values), -1)), axis=1)
 
 

@@ -238,11 +238,9 @@ def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         size, entries = 1.0 / np.cbrt(diagonal), matrices[:, i, j]
         scaled = np.abs(entries) * size[:, i] * size[:, j] ** 2
-        others = np.zeros((6, len(matrices)))
-        for k in range(len(i)):
-            others[i[k]] += scaled[:, k]
-            others[j[k]] += 2.0 * scaled[:, k]
-        return np.asarray(brakes & (~entries.any(axis=1) | (others <= 3.0).all(axis=0)))
+        shares = np.zeros((6, len(i)))
+        shares[i, range(len(i))], shares[j, range(len(i))] = 1.0, 2.0
+        return np.asarray(brakes & (~entries.any(axis=1) | (shares @ scaled.T <= 3.0).all(axis=0)))
 
 
 def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -324,16 +322,17 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingCon
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = context.frame.from_forces
     XT = np.swapaxes(X, 1, 2)
-    entries = reduced(np.logical_or, quadratic)
-    columns = np.flatnonzero(entries.any(axis=0)).tolist()
+    columns: dict[int, list[int]] = {}
+    for j, i in np.argwhere(reduced(np.logical_or, quadratic).T).tolist():
+        columns.setdefault(j, []).append(i)
     constant = (XT @ linear @ X).reshape(-1, 36)
     values = {"constant": int(linear.any())}
     if context.aligned:
         rows = (constant, (XT @ quadratic @ X).reshape(-1, 36))
         return Packed(values | {"quadratic": int(bool(columns))}, rows)
     parts = [constant]
-    for j in columns:
+    for j, entries in columns.items():
         # X^T q of a column q, whose entries are mostly zero; members side by side, which is twice as fast.
-        wrench = sum(X[:, i, :].T * quadratic[:, i, j] for i in np.flatnonzero(entries[:, j]).tolist())
+        wrench = sum(X[:, i, :].T * quadratic[:, i, j] for i in entries)
         parts += [X[:, j, :], np.asarray(wrench).T]
     return Packed(values | {"count": len(columns)}, tuple(parts))

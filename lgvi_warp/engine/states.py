@@ -50,7 +50,7 @@ def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     np.multiply(columns[:, 0], vectors[:, 0], out=total)
     for i in range(1, d):
         total += np.multiply(columns[:, i], vectors[:, i], out=product)
-    return total.T
+    return np.ascontiguousarray(total.T)
 
 
 def into(axes: np.ndarray, vectors: np.ndarray) -> np.ndarray:

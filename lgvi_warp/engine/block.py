@@ -62,8 +62,7 @@ def blocks(members: int, size: int | None = None) -> list[Block]:
 def parts(members: int, steps: int, threads: int, apart: bool, gathered: bool = False) -> list[Block]:
     """The blocks of a run.
 
-    apart: whether something depends on each block: where a run may end after any, in a store, and where others than threads
-        of this process run them.
+    apart: whether each block matters: where a run may end after any, in a store, and where others than threads run them.
     gathered: whether statistics are gathered, of each block apart: then several blocks may run as one.
     """
     if apart:

@@ -46,7 +46,7 @@ def times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     # One number of all members after another: rows of a few numbers would take several times as long.
     (_, k, d), n = matrices.shape, max(len(matrices), len(vectors))
     columns = np.moveaxis(matrices, 0, -1)
-    total, product = np.empty((k, n)), np.empty((k, n))
+    total, product = np.empty((2, k, n))
     np.multiply(columns[:, 0], vectors[:, 0], out=total)
     for i in range(1, d):
         total += np.multiply(columns[:, i], vectors[:, i], out=product)

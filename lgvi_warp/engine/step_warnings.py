@@ -101,6 +101,7 @@ def _split(plan: Watched) -> bool:
     return plan.method.tableau is None and plan.kernel_choice.averages is None
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _drag_number(plan: Watched, members: Members, water: np.ndarray | None) -> np.ndarray:
     """h (l + 2 q|v|) / I, (m,), the largest of all axes, where the members start; of the terms that tell how they brake."""
     p, velocity = members.parameters, members.velocity if water is None else members.velocity - water
@@ -163,11 +164,8 @@ def munk_factor(frame: Frame) -> np.ndarray:
     return np.asarray((1.0 / M.min(axis=1) - 1.0 / M.max(axis=1)) / frame.J.min(axis=1))
 
 
-# Those that follow from the members' numbers and starts.
-AT_START = frozenset((
-    Warnings.INERTIA, Warnings.PRECISION_LOSS, Warnings.MUNK_COARSE, Warnings.RESTORING_COARSE, Warnings.ROTATION,
-    Warnings.DRAG_STIFF, Warnings.MUNK_UNSTABLE, Warnings.RESTORING_UNSTABLE,
-))  # fmt: skip
+# All warnings: nothing rules any of them out.
+AT_START = frozenset(Warnings)
 
 
 def at_start(
@@ -196,10 +194,6 @@ def at_start(
             bits[over] |= np.uint16(warning)
             value[over] = np.broadcast_to(size(), m)[over]
 
-    def departed() -> np.ndarray:
-        small, middle, large = np.sort(frame.J, axis=1).T
-        return np.asarray(large / (small + middle))
-
     def lost() -> np.ndarray:
         way, place = h * _size(members.velocity), np.finfo(plan.dtype).eps * _size(members.position)
         return np.divide(place, way, out=np.zeros(m), where=way > 0.0)
@@ -213,11 +207,7 @@ def at_start(
         arm = hydrostatics.moment(members.parameters) + hydrostatics.net(members.parameters)[:, None] * frame.balance
         return np.asarray(h * np.sqrt(_size(arm) / frame.J.min(axis=1)))
 
-    def braked() -> np.ndarray:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return _drag_number(plan, members, water)
-
-    note(Warnings.INERTIA, departed, 1.0 + 1e-9)
+    note(Warnings.INERTIA, lambda: (J := np.sort(frame.J, axis=1))[:, 2] / (J[:, 0] + J[:, 1]), 1.0 + 1e-9)
     if plan.dtype != "float32_compensated":
         note(Warnings.PRECISION_LOSS, lost, PRECISION)
     if method.adaptive:
@@ -227,7 +217,7 @@ def at_start(
     note(Warnings.RESTORING_COARSE, swing, coarse)
     note(Warnings.ROTATION, lambda: h * _size(members.angular_velocity), rotation_limit(method))
     if _split(plan) and _dragged(plan.kernel_choice):
-        note(Warnings.DRAG_STIFF, braked, SPLIT_DRAG_NUMBER)
+        note(Warnings.DRAG_STIFF, lambda: _drag_number(plan, members, water), SPLIT_DRAG_NUMBER)
     note(Warnings.MUNK_UNSTABLE, munk, oscillation_limit(method, MUNK))
     note(Warnings.RESTORING_UNSTABLE, swing, oscillation_limit(method, RESTORING))
     return bits, value

@@ -155,8 +155,8 @@ def predict(
     observed, plan = request.observed, request.plan(survey_all=False)
     count = request.count(plan)
     into, fields = (None, request.saved) if store is None else with_saved_fields(store, request)
-    joined = into is not None or bool(observed.watch(plan.grid.times)[0])
-    blocks_of_run = parts(plan.ensemble.members, plan.grid.steps, count, joined)
+    apart, statistics = into is not None or observed.apart, bool(observed.statistics)
+    blocks_of_run = parts(plan.ensemble.members, plan.grid.steps, count, apart, statistics)
     compile_seconds = plan.compile()
     try:
         set_up, step = costs(plan, blocks_of_run, count, observed)
@@ -292,8 +292,8 @@ class Sized:
     def working(self, threads: int) -> int:
         """Compute the memory of the blocks at work [bytes]."""
         plan = self.plan
-        joined = self.store is not None or self.statistics.part > 0
-        runs = parts(plan.ensemble.members, plan.grid.steps, threads, joined)
+        apart, statistics = self.store is not None or plan.launches.gathered is not None, self.statistics.part > 0
+        runs = parts(plan.ensemble.members, plan.grid.steps, threads, apart, statistics)
         count = min(len(runs), threads)
         row = sum(plan.layout.sizes.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
@@ -301,7 +301,8 @@ class Sized:
         ticks = plan.launches.ticks_held(runs[0].count) * plan.launches.tick_bytes(runs[0].count)
         # A segment's samples are held three times: as the kernel wrote them, in order of members, and as rotated or moved
         # copies. Parts are held twice: their rows, and all joined.
-        each = 3 * segment + ticks + 2 * self.statistics.part + self.statistics.taking
+        gathered = -(-runs[0].count // blocks(plan.ensemble.members)[0].count)
+        each = 3 * segment + ticks + 2 * gathered * self.statistics.part + self.statistics.taking
         if self.store:
             each += self.statistics.file + sum(column.bytes for column in columns(plan, self.store))
         return count * each

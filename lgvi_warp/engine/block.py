@@ -59,10 +59,14 @@ def blocks(members: int, size: int | None = None) -> list[Block]:
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]
 
 
-def parts(members: int, steps: int, threads: int, joined: bool) -> list[Block]:
+def parts(members: int, steps: int, threads: int, apart: bool, gathered: bool = False) -> list[Block]:
     """The blocks of a run.
 
-    joined: whether bits or files depend on blocks: with statistics, which are joined block by block, in a store, and where
-        others than threads of this process run them.
+    apart: whether each block matters: where a run may end after any, in a store, and where others than threads run them.
+    gathered: whether statistics are gathered, of each block apart: then several blocks may run as one.
     """
-    return blocks(members, None if joined else shares(members, threads, steps))
+    if apart:
+        return blocks(members)
+    size = shares(members, threads, steps)
+    own = block_size(members) if gathered else size
+    return blocks(members, max(own, size // own * own))

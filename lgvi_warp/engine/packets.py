@@ -28,12 +28,13 @@ from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.sample_layout import ACCOUNT_ROW
 from lgvi_warp.engine.state_lanes import StateLanes, kernel_for
 from lgvi_warp.engine.step_warnings import (
+    AT_START,
     at_start,
-    calm,
     departure,
     leaves_rotations,
     munk_factor,
     orthogonality_limit,
+    possible,
     row_limits,
 )
 from lgvi_warp.engine.tangents import CopiesPacking, Slopes, slopes_of_frame
@@ -475,16 +476,18 @@ class Packets:
     def _warned_at_start(self) -> tuple[np.ndarray, np.ndarray]:
         """(bits, value) of the warnings at the start; no value where there are none."""
         plan, members, peaks = self.plan, self.members, self.state_lanes.peaks
-        # Along packets first: lanes beside each other in memory are compared at once.
-        if plan.checks == "none" or (
-            peaks is not None and calm(plan, members, self.frame, peaks.max(axis=0).max(axis=1))
-        ):
+        among = frozenset[Warnings]()
+        if plan.checks != "none":
+            # Along packets first: lanes beside each other in memory are compared at once.
+            most = None if peaks is None else peaks.max(axis=0).max(axis=1)
+            among = AT_START if most is None else possible(plan, members, self.frame, most)
+        if not among:
             return np.zeros(members.count, np.uint16), np.zeros(0)
-        rows, water = self.state_lanes.rows(), self._packing.water
+        momenta, water = self.state_lanes.momenta(), self._packing.water
         if isinstance(self._packing, CopiesPacking):
-            rows = self._packing.of_members(rows)
+            momenta = self._packing.of_members(momenta)
             water = None if water is None else self._packing.of_members(water)
-        return at_start(plan, members, self.frame, rows[:, 12:15] * self.scale[:, None], water)
+        return at_start(plan, members, self.frame, momenta * self.scale[:, None], water, among)
 
     def _with_departed(
         self, bits: np.ndarray, step: np.ndarray, value: np.ndarray

@@ -17,7 +17,7 @@ from lgvi_kernels.packing.states import PEAKS, PLACES, make_pack_states
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.arrays import PLAIN, Lanes, Writing
-from lgvi_warp.engine.states import Starts, write_rows
+from lgvi_warp.engine.states import Starts, momenta, write_rows
 
 # Members of a run for which it pays to load the kernel, which takes some tens of milliseconds once it is compiled.
 MANY = 50_000
@@ -73,6 +73,10 @@ class StateLanes(Lanes):
         rows = np.empty((self._members, self._spec.state_fields))
         write_rows(self._starts, rows, self._spec.compensated)
         return rows
+
+    def momenta(self) -> np.ndarray:
+        """The momenta p of the states that were written last, (1 or members, 3)."""
+        return momenta(self._starts)[1]
 
 
 _loaded: set[tuple[int, Any]] = set()

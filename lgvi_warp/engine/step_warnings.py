@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -99,6 +101,7 @@ def _split(plan: Watched) -> bool:
     return plan.method.tableau is None and plan.kernel_choice.averages is None
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _drag_number(plan: Watched, members: Members, water: np.ndarray | None) -> np.ndarray:
     """h (l + 2 q|v|) / I, (m,), the largest of all axes, where the members start; of the terms that tell how they brake."""
     p, velocity = members.parameters, members.velocity if water is None else members.velocity - water
@@ -120,10 +123,17 @@ def leaves_rotations(method: Method) -> bool:
 
 def departure(rows: np.ndarray) -> np.ndarray:
     """Distance of matrices, rows (packets, 9, width), from rotations: the largest entry of |R R^T - I|, (packets * width,)."""
-    R = rows.reshape(len(rows), 3, 3, -1)
-    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-    entries = [np.abs((R[:, i] * R[:, j]).sum(axis=1, dtype=np.float64) - (i == j)) for i, j in pairs]
-    return np.asarray(np.max(entries, axis=0).reshape(-1))
+    # Members side by side: a sum over three numbers of each would take many times as long.
+    R = rows.transpose(1, 0, 2).reshape(3, 3, -1)
+    largest = np.zeros(R.shape[2])
+    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)):
+        products = R[i] * R[j]
+        size = products[0].astype(np.float64)
+        size += products[1]
+        size += products[2]
+        size -= i == j
+        np.maximum(largest, np.abs(size, out=size), out=largest)
+    return largest
 
 
 def orthogonality_limit(plan: Watched) -> float:
@@ -154,41 +164,60 @@ def munk_factor(frame: Frame) -> np.ndarray:
     return np.asarray((1.0 / M.min(axis=1) - 1.0 / M.max(axis=1)) / frame.J.min(axis=1))
 
 
+# All warnings: nothing rules any of them out.
+AT_START = frozenset(Warnings)
+
+
 def at_start(
-    plan: Watched, members: Members, frame: Frame, momentum: np.ndarray, water: np.ndarray | None
+    plan: Watched,
+    members: Members,
+    frame: Frame,
+    momentum: np.ndarray,
+    water: np.ndarray | None,
+    among: Collection[Warnings] = AT_START,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The warnings that follow from the members' numbers and starts.
 
     momentum: (m, 3) [N s], relative to the water. water: (m, 3) [m/s], its velocity in body axes; None where it rests.
+    among: the warnings that are possible.
     Returns: (bits, value), both (m,): bits of `Warnings`, and the value of the most serious one; NaN for none.
     """
     m, h, method = members.count, plan.grid.h, plan.method
     bits, value = np.zeros(m, np.uint16), np.full(m, np.nan)
 
-    def note(warning: Warnings, size: Any, limit: float) -> None:
-        above = np.asarray(size) > limit
+    def note(warning: Warnings, size: Callable[[], Any], limit: float) -> None:
+        if warning not in among:
+            return
+        above = np.asarray(size()) > limit
         if above.any():
             over = np.broadcast_to(above, m)
             bits[over] |= np.uint16(warning)
-            value[over] = np.broadcast_to(size, m)[over]
+            value[over] = np.broadcast_to(size(), m)[over]
 
-    small, middle, large = np.sort(frame.J, axis=1).T
-    note(Warnings.INERTIA, large / (small + middle), 1.0 + 1e-9)
-    if plan.dtype != "float32_compensated":
+    def lost() -> np.ndarray:
         way, place = h * _size(members.velocity), np.finfo(plan.dtype).eps * _size(members.position)
-        note(Warnings.PRECISION_LOSS, np.divide(place, way, out=np.zeros(m), where=way > 0.0), PRECISION)
+        return np.divide(place, way, out=np.zeros(m), where=way > 0.0)
+
+    @functools.cache
+    def munk() -> np.ndarray:
+        return np.asarray(h * np.sqrt(munk_factor(frame)) * _size(momentum))
+
+    @functools.cache
+    def swing() -> np.ndarray:
+        arm = hydrostatics.moment(members.parameters) + hydrostatics.net(members.parameters)[:, None] * frame.balance
+        return np.asarray(h * np.sqrt(_size(arm) / frame.J.min(axis=1)))
+
+    note(Warnings.INERTIA, lambda: (J := np.sort(frame.J, axis=1))[:, 2] / (J[:, 0] + J[:, 1]), 1.0 + 1e-9)
+    if plan.dtype != "float32_compensated":
+        note(Warnings.PRECISION_LOSS, lost, PRECISION)
     if method.adaptive:
         return bits, value
     coarse = COARSE / longest_stage(method)
-    munk = h * np.sqrt(munk_factor(frame)) * _size(momentum)
-    arm = hydrostatics.moment(members.parameters) + hydrostatics.net(members.parameters)[:, None] * frame.balance
-    swing = h * np.sqrt(_size(arm) / frame.J.min(axis=1))
     note(Warnings.MUNK_COARSE, munk, coarse)
     note(Warnings.RESTORING_COARSE, swing, coarse)
-    note(Warnings.ROTATION, h * _size(members.angular_velocity), rotation_limit(method))
+    note(Warnings.ROTATION, lambda: h * _size(members.angular_velocity), rotation_limit(method))
     if _split(plan) and _dragged(plan.kernel_choice):
-        with np.errstate(over="ignore", invalid="ignore"):
-            note(Warnings.DRAG_STIFF, _drag_number(plan, members, water), SPLIT_DRAG_NUMBER)
+        note(Warnings.DRAG_STIFF, lambda: _drag_number(plan, members, water), SPLIT_DRAG_NUMBER)
     note(Warnings.MUNK_UNSTABLE, munk, oscillation_limit(method, MUNK))
     note(Warnings.RESTORING_UNSTABLE, swing, oscillation_limit(method, RESTORING))
     return bits, value
@@ -198,32 +227,28 @@ def at_start(
 BELOW = 1.0 - 1e-9
 
 
-def calm(plan: Watched, members: Members, frame: Frame, peaks: np.ndarray) -> bool:
-    """Whether bounds on all members together show that the start of none gives a warning; `at_start` decides where not.
+def possible(plan: Watched, members: Members, frame: Frame, peaks: np.ndarray) -> frozenset[Warnings]:
+    """The warnings at the start that bounds on all members together do not rule out; `at_start` decides which are given.
 
     peaks: (4,), the largest of what the kernel notes when it packs the starts (see lgvi_kernels.packing.states.PEAKS).
     """
     h, method, p = plan.grid.h, plan.method, members.parameters
     momentum, rate, time, speed = np.sqrt(peaks)
     total = frame.J.sum(axis=1)
-    if ((1.0 + 0.5e-9) * (total[:, None] - frame.J) < frame.J).any():
-        return False
-    if plan.dtype != "float32_compensated" and not np.finfo(plan.dtype).eps * time / h < BELOW * PRECISION:
-        return False
-    if method.adaptive:
-        return True
-    coarse, least = BELOW * COARSE / longest_stage(method), frame.J.min()
-    munk = h * momentum * np.sqrt(_most_munk(frame))
-    swing = h * np.sqrt(_longest_arm(p, frame) / least)
-    if not munk < min(coarse, BELOW * oscillation_limit(method, MUNK)):
-        return False
-    if not swing < min(coarse, BELOW * oscillation_limit(method, RESTORING)):
-        return False
-    if not h * rate < BELOW * rotation_limit(method):
-        return False
-    if not (_split(plan) and _dragged(plan.kernel_choice)):
-        return True
-    return bool(_most_drag(plan, p, speed, rate) < BELOW * SPLIT_DRAG_NUMBER)
+    sizes = [(Warnings.INERTIA, ((1.0 + 0.5e-9) * (total[:, None] - frame.J) < frame.J).max(), BELOW)]
+    if plan.dtype != "float32_compensated":
+        sizes += [(Warnings.PRECISION_LOSS, np.finfo(plan.dtype).eps * time / h, PRECISION)]
+    if not method.adaptive:
+        coarse = COARSE / longest_stage(method)
+        munk = h * momentum * np.sqrt(_most_munk(frame))
+        swing = h * np.sqrt(_longest_arm(p, frame) / frame.J.min())
+        sizes += [(Warnings.MUNK_COARSE, munk, coarse), (Warnings.RESTORING_COARSE, swing, coarse)]
+        sizes += [(Warnings.MUNK_UNSTABLE, munk, oscillation_limit(method, MUNK))]
+        sizes += [(Warnings.RESTORING_UNSTABLE, swing, oscillation_limit(method, RESTORING))]
+        sizes += [(Warnings.ROTATION, h * rate, rotation_limit(method))]
+        if _split(plan) and _dragged(plan.kernel_choice):
+            sizes += [(Warnings.DRAG_STIFF, _most_drag(plan, p, speed, rate), SPLIT_DRAG_NUMBER)]
+    return frozenset(warning for warning, size, limit in sizes if not size < BELOW * limit)
 
 
 def _most_munk(frame: Frame) -> float:

@@ -80,9 +80,9 @@ def run_plan(
         assert on_block is not None
         on_block(gathered.of_block(block))
 
-    joined = bool(gathered.observing.keepers) or not isinstance(runner, Threads)
-    runs = parts(total, plan.grid.steps, threads, joined)
-    if not joined and on_block is None and single_block.fits(plan, runs):
+    apart, statistics = gathered.observed.apart or not isinstance(runner, Threads), bool(gathered.observing.keepers)
+    runs = parts(total, plan.grid.steps, threads, apart, statistics)
+    if not (apart or statistics) and on_block is None and single_block.fits(plan, runs):
         gathered.take_all(*single_block.run_single_block(plan, gathered.names, warned, overall.at, final))
         return ended(total)
     work = Work(plan, gathered.keepers if slopes is None else (*gathered.keepers, slopes), warned=warned)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,3 +54,20 @@ class Members:
     def count(self) -> int:
         """The number of members, m."""
         return len(self.position)
+
+    def at(self, some: slice) -> Members:
+        """Some of the members, views."""
+        of_each = {
+            name: getattr(self, name)[some]
+            for name in ("position", "attitude", "velocity", "angular_velocity", "indices")
+        }
+        return replace(
+            self,
+            **of_each,
+            parameters={name: values[some] if len(values) > 1 else values for name, values in self.parameters.items()},
+            starts={name: values[some] for name, values in self.starts.items()},
+            weight=None if self.weight is None else self.weight[some],
+            final=None if self.final is None else self.final.part(np.arange(self.count)[some]),
+            given=None if self.given is None else self.given.of_members(some),
+            shifted=None,
+        )

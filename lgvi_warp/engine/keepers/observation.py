@@ -56,6 +56,11 @@ class Observation:
         """Whether some statistic takes the samples at all ticks of a controller."""
         return any(statistic.ticks for statistic in self.statistics)
 
+    @property
+    def apart(self) -> bool:
+        """Whether each block runs apart: the run may end after any, and what all ticks give should stay in the caches."""
+        return self.until is not None or self.ticks
+
     def read_at_ticks(self) -> dict[str, tuple[int, ...]]:
         """Fields of the motion that statistics read at the ticks of a controller."""
         entries: dict[str, tuple[int, ...]] = {}

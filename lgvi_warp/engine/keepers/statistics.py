@@ -38,23 +38,24 @@ class Gathered:
         self._size = blocks(members)[0].count
         self.trees = [Tree(statistic.join_any) for statistic in self.statistics]
 
-    def open(self, plan: Plan, block: Block, members: Members) -> _BlockOfRun:
-        """The keeper of a block's statistics."""
-        return _BlockOfRun(self, plan, block, members)
+    def open(self, plan: Plan, block: Block, members: Members) -> _BlocksOfRun:
+        """The keeper of the statistics of a block, or of several that run as one."""
+        return _BlocksOfRun(self, plan, block, members)
 
     def place(self, block: Block) -> tuple[int, int, int]:
         """The first member of a block, the block's number, and the size of all blocks but the last."""
         return block.first, block.first // self._size, self._size
 
     def merge(self, block: Block, part: list[Part]) -> None:
-        """Add a block's parts to the trees."""
-        for statistic, statistic_part in zip(self.statistics, part, strict=True):
+        """Add the parts of a block, or those of several in their order, to the trees."""
+        for statistic, statistic_part in zip(self.statistics, part, strict=False):
             if statistic.since - statistic_part.keys():
                 raise ValueError(f"{statistic.key!r} is of an earlier version, which took other events for censoring")
         # Squares of a failing member may overflow: the statistic reports it, so no warning from NumPy.
         with np.errstate(invalid="ignore", over="ignore"):
-            for tree, statistic_part in zip(self.trees, part, strict=True):
-                tree.add(block.first // self._size, statistic_part)
+            for i, statistic_part in enumerate(part):
+                later, of = divmod(i, len(self.trees))
+                self.trees[of].add(block.first // self._size + later, statistic_part)
 
     def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
         """Estimates from the blocks so far, of one statistic or (None, the default) of all."""
@@ -167,14 +168,29 @@ class BlockStatistics:
         return [gathers.close() for gathers in self._open]
 
 
-class _BlockOfRun(BlockStatistics):
-    """The statistics of a block that is advanced."""
+class _BlocksOfRun:
+    """The statistics of a block that is advanced, or of several that are advanced as one: of each those that it has alone."""
 
     def __init__(self, run: Gathered, plan: Plan, block: Block, members: Members):
-        ticks = plan.launches.gathered
-        super().__init__(run, block, members, None if ticks is None else ticks.times, members.weight)
-        self._plan = plan
+        self._plan, ticks = plan, plan.launches.gathered
+        self._each = list[tuple[slice, BlockStatistics]]()
+        for one in blocks(block.count, run.place(block)[2]):
+            some = slice(one.first, one.stop)
+            own = members if one.count == block.count else members.at(some)
+            place = Block(block.first + one.first, block.first + one.stop)
+            gathers = BlockStatistics(run, place, own, None if ticks is None else ticks.times, own.weight)
+            self._each.append((some, gathers))
+
+    def take(self, when: slice, samples: Fields) -> None:
+        """Pass the samples on."""
+        for some, gathers in self._each:
+            gathers.take(when, samples.of_members(some))
+
+    def take_ticks(self, when: slice, samples: Fields) -> None:
+        """Pass the samples at ticks on."""
+        for some, gathers in self._each:
+            gathers.take_ticks(when, samples.of_members(some))
 
     def close(self, outcome: MemberStatus) -> list[Part]:
-        """Return, for each statistic, arrays by name."""
-        return self.ended(outcome.ends(self._plan))
+        """Return, for each block and statistic, arrays by name."""
+        return [part for some, gathers in self._each for part in gathers.ended(outcome.at(some).ends(self._plan))]

@@ -47,10 +47,25 @@ class Fields(dict[str, np.ndarray]):
         others = self.time[places], self._steps[places], self.terms, self._when_ended, self.controller, self.events
         return type(self)(values, *others)
 
+    def of_members(self, some: slice) -> Fields:
+        """Return the samples of some of the members, views."""
+        values = {name: values[:, some] for name, values in self.items()}
+
+        def ends() -> tuple[np.ndarray, np.ndarray]:
+            # Asked once of all members, whatever number of parts they come in.
+            status, step = self._all_ends
+            return status[some], step[some]
+
+        return type(self)(values, self.time, self._steps, self.terms, ends, self.controller, self.events)
+
+    @functools.cached_property
+    def _all_ends(self) -> tuple[np.ndarray, np.ndarray]:
+        return self._when_ended()
+
     @functools.cached_property
     def _ends(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Status (n,) of each member and the last step (n,) after which it still ran; None if all run on."""
-        status, step = self._when_ended()
+        status, step = self._all_ends
         return (status, step) if np.any(status) else None
 
     def good(self, held: bool = True) -> np.ndarray | None:

@@ -3,7 +3,7 @@
 
 import pytest
 
-from lgvi_warp.engine.block import Block, block_size, blocks, default_threads
+from lgvi_warp.engine.block import Block, block_size, blocks, default_threads, parts
 
 
 @pytest.mark.parametrize(("members", "size"), [
@@ -29,3 +29,16 @@ def test_each_member_is_in_one_block(members):
 def test_few_members_of_a_short_run_take_one_thread(members, steps, threads):
     """Several cost more than they save there; a long run of few members is worth them."""
     assert default_threads(members, steps, 8) == threads
+
+
+@pytest.mark.parametrize(
+    ("members", "steps", "threads"), [(400_000, 240, 2), (20_000, 100, 2), (5_000, 10_000, 4), (70_001, 9, 1)]
+)
+def test_blocks_whose_statistics_are_gathered_run_several_as_one(members, steps, threads):
+    """Whole ones, as many as a run without statistics takes: a block costs a millisecond beside its kernel."""
+    own, found = block_size(members), parts(members, steps, threads, apart=False, gathered=True)
+    assert [block.first for block in found[1:]] == [block.stop for block in found[:-1]]
+    assert (found[0].first, found[-1].stop) == (0, members)
+    assert all(block.first % own == 0 for block in found)
+    most = parts(members, steps, threads, apart=False)[0].count
+    assert most - own < found[0].count <= max(own, most)

@@ -4,6 +4,7 @@
 import pickle
 
 import numpy as np
+import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.engine.block import blocks
@@ -29,3 +30,31 @@ def test_members_beyond_those_that_ran_are_not_run_again():
     assert Observation(keep=(2, 5, 7)).again(status).tolist() == [2]
     assert Observation(keep="failed").again(np.array([0, 3, 0])).tolist() == [1]
     assert Observation(keep="none").again(status).tolist() == []
+
+
+@pytest.mark.kernel
+def test_statistics_are_the_same_whether_blocks_run_as_one_or_apart(tmp_path):
+    """Also of members that ended, of weighted ones, and of a function that sees members; a store runs each block apart."""
+    scene = lw.Scene.named("nordkvist_sanyal", start={"velocity": [0.2, 0.0, 0.1]}, events=[lw.events.Floor(depth=0.1)])
+    vary = {
+        "start.velocity": lw.distributions.Normal(std=0.1),
+        "vehicle.buoyancy": lw.distributions.Normal(relative=0.01),
+    }
+    fleet = lw.Ensemble(scene, 700, 1, vary)
+    own = lw.statistics.Quantity("own", lambda samples, members: samples["position"][..., 2] * members.indices)
+    kinds = lw.statistics.Mean, lw.statistics.Covariance, lw.statistics.Extremes
+    asked = [kind(of) for kind in kinds for of in ("position", own)]
+    asked += [
+        lw.statistics.Quantiles("speed", size=64),
+        lw.statistics.Mean("depth", at="floor"),
+        lw.statistics.Outcome("floor"),
+    ]
+    seen = []
+    settings = dict(method="psi_s", h=0.05, t1=1.0, keep="none", statistics=asked, threads=1)
+    as_one = lw.solve(fleet, **settings, on_block=lambda result: seen.append(result.members))
+    apart = lw.solve(fleet, **settings, store=tmp_path / "apart.zarr")
+    assert seen == [700]
+    assert set(as_one.status.counts()) == {"ok", "floor"}
+    for name, estimate in as_one.statistics.items():
+        for array, values in estimate.arrays.items():
+            np.testing.assert_array_equal(values, apart.statistics[name][array], err_msg=f"{name} {array}")

@@ -172,7 +172,9 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
         return n
 
     @wp.func
-    def follow_piece(table: Any, entry: int, memory: Any, packet: int, p: Any, i: int, start: Any, stop: Any, length: Any):
+    def follow_piece(
+        table: Any, entry: int, memory: Any, packet: int, p: Any, i: int, start: Any, stop: Any, length: Any
+    ):
         """Let channel i follow a straight command over a time."""
         at = p.first + wp.static(rows) * i
         lag_here = entry_of(length, table, entry, at, wp.static(lag))

@@ -34,7 +34,7 @@ def test_members_beyond_those_that_ran_are_not_run_again():
 
 @pytest.mark.kernel
 def test_statistics_are_the_same_whether_blocks_run_as_one_or_apart(tmp_path):
-    """Also of members that ended, of weighted ones, and of a function that sees members; a store runs each block apart."""
+    """Also of members that ended, and of a function that sees members; a store runs each block apart."""
     scene = lw.Scene.named("nordkvist_sanyal", start={"velocity": [0.2, 0.0, 0.1]}, events=[lw.events.Floor(depth=0.1)])
     vary = {
         "start.velocity": lw.distributions.Normal(std=0.1),

@@ -17,7 +17,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 class AllocationMatrix(Allocation):
     """Commands u = A w of the demand w = (X, Y, Z, K, M, N), each within its limit.
 
-    The part that the commands do not deliver is fed back to the laws: (I - A^+ A) w and A^+ of what the limits cut off,
+    The part that the commands do not deliver is fed back to the laws: (I - A^+ A) w, and A^+ times what the limits cut off,
     with the pseudo-inverse A^+.
 
     Args:

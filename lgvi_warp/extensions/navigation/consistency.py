@@ -128,9 +128,9 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
     noise is normal; members are independent, so sums over them have as many times these. Bar-Shalom, Li & Kirubarajan (2001),
     *Estimation with Applications to Tracking and Navigation*, section 5.4. Errors of one member at two times are not
     independent: one ensemble may be outside its NEES band for long, by chance, so that the share of the times in the band
-        is no test. The mean over all times is a test: its effective sample size is the number of values over 1 + 2 times
-        the sum of their autocorrelations, and the sum of that many values of a consistent filter has a chi-square
-        distribution.
+    is no test. The mean over all times is a test: its effective sample size is the number of values over 1 + 2 times
+    the sum of their autocorrelations, and the sum of that many values of a consistent filter has a chi-square
+    distribution.
 
     Args:
         result: Result of a run with an `lw.control.ErrorStateFilter` that saved "nees", "nis" and "nis_count".

@@ -149,7 +149,7 @@ def linearize(
         period: Period of a plant [s]; default that of the controller, else the step.
         method: As in `lw.solve`; default that of the trim, else of the scene.
         h: Step [s]; default that of the trim, else of the scene.
-        step: Half a difference of numbers up to 1, and its ratio to larger ones; default 1e-5.
+        step: Increment of the central differences, relative for numbers above 1; default 1e-5.
 
     Returns:
         The model.

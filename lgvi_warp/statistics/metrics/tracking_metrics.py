@@ -299,7 +299,7 @@ class MaxError(Largest, OfTracking):
 class CrossTrack(MaxError):  # noqa: N818  (no exception)
     """The largest horizontal distance of each member from the line through the wanted place along the wanted velocity [m].
 
-    Where no velocity is wanted, from the wanted place. Then statistics of it.
+    Without a wanted velocity, the distance from the wanted place. Then statistics over members.
 
     Args:
         of: "cross_track", the default.

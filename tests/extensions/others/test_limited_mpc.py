@@ -191,6 +191,16 @@ def test_limits_of_errors_are_of_the_reference_that_it_sees_ahead():
 
 
 @pytest.mark.kernel
+def test_a_short_horizon_looks_ahead_too():
+    """Loops of a few rounds are unrolled. A reference that does not change gives nothing to see."""
+    still = lw.control.SetPoint(position=(0.0, 0.0, 8.0))
+    scenes = [diving(heave_law(preview=ahead, horizon=5, **SINKS), guidance=still) for ahead in (False, True)]
+    plain, ahead = (lw.solve(scene, "rk4", h=T / 5.0, t1=3.0, save=SAVE).samples["demand"] for scene in scenes)
+    assert np.abs(plain).max() > 10.0
+    np.testing.assert_allclose(ahead, plain, atol=1e-9)
+
+
+@pytest.mark.kernel
 def test_a_loop_in_single_precision_is_that_of_exact_programs():
     result = lw.solve(diving(heave_law(preview=True)), "rk4", h=T / 5.0, t1=TICKS * T, save=SAVE, dtype="float32")
     depths, forces = by_hand(at_most=50.0)

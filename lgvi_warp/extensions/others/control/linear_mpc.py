@@ -220,10 +220,10 @@ class LinearMPC(ControlLaw):
         Returns:
             Its matrices.
         """
-        own = {name: value[min(i, len(value) - 1)] for name, value in numbers.items()}
-        A, B, limit, N = own["A"], own["B"] * own["limit"], own["limit"], self.horizon
+        values = {name: value[min(i, len(value) - 1)] for name, value in numbers.items()}
+        A, B, limit, N = values["A"], values["B"] * values["limit"], values["limit"], self.horizon
         n, m = B.shape
-        weights = [np.diag(own["Q"])] * (N - 1) + [own.get("P", np.diag(own["Q"]))]
+        weights = [np.diag(values["Q"])] * (N - 1) + [values.get("P", np.diag(values["Q"]))]
         powers = [np.eye(n)]
         for _ in range(N):
             powers.append(A @ powers[-1])
@@ -233,9 +233,9 @@ class LinearMPC(ControlLaw):
             for column in range(row + 1):
                 Gamma[row * n : (row + 1) * n, column * m : (column + 1) * m] = powers[row - column] @ B
         weighted = np.concatenate([W @ Gamma[j * n : (j + 1) * n] for j, W in enumerate(weights)])
-        cost = weighted.T @ Gamma + np.diag(np.tile(own["R"] * limit**2, N))
+        cost = weighted.T @ Gamma + np.diag(np.tile(values["R"] * limit**2, N))
         # About its steady state under d, x_s = S_x d and u_s = S_u d, the model has no disturbance.
-        steady = _steady_state(A, own["B"], vars(self)["tracked_places"])
+        steady = _steady_state(A, values["B"], vars(self)["tracked_places"])
         S_x, S_u = (np.zeros((n, n)), np.zeros((m, n))) if steady is None else np.split(steady, [n])
         at_once = weighted.T @ Phi
         slope = np.hstack([at_once, -at_once @ S_x - cost @ np.tile(S_u / limit[:, None], (N, 1))])
@@ -256,29 +256,29 @@ class LinearMPC(ControlLaw):
             return self.device
         return f"{DEVICE}.limited_mpc:{f'preview{self.horizon}' if self.preview else ''}"
 
-    def output_rows(self, own: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    def output_rows(self, values: Numbers) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the limits of outputs of a member, tick by tick (horizon p, 2 + 2 n + k), and the outputs' lines (p, n).
 
         Each row is the limit, the cost of a unit beyond it, what state and disturbance make of the output, and what inputs do;
         all are in units of the largest effect of an input as a part of its limit.
         """
-        A, B, N, p = own["A"], own["B"] * own["limit"], self.horizon, len(own.get("outputs", ()))
+        A, B, N, p = values["A"], values["B"] * values["limit"], self.horizon, len(values.get("outputs", ()))
         n, m = B.shape
         still, made, answers = np.hstack([np.eye(n), np.zeros((n, n))]), np.zeros((n, N * m)), []
         for j in range(N if p else 0):
             still, made = A @ still + np.hstack([np.zeros((n, n)), np.eye(n)]), A @ made
             made[:, j * m : (j + 1) * m] += B
-            answers.append(own["outputs"] @ np.hstack([still, made]))
+            answers.append(values["outputs"] @ np.hstack([still, made]))
         if not p:
             return np.zeros((0, 2 + 2 * n + N * m)), np.zeros((0, n))
         rows = np.stack(answers)
         unit = np.abs(rows[:, :, 2 * n :]).max(axis=(0, 2))
         unit = np.where(unit > 0.0, unit, 1.0)
         # The problem is half of the sums that are made least.
-        ends = np.stack([own["output_limit"] / unit, 0.5 * own["excess_cost"] * unit], axis=-1)
+        ends = np.stack([values["output_limit"] / unit, 0.5 * values["excess_cost"] * unit], axis=-1)
         ends = np.broadcast_to(ends, (N, p, 2))
         rows = np.concatenate([ends, rows / unit[:, None]], axis=-1)
-        return rows.reshape(N * p, -1), own["outputs"] / unit[:, None]
+        return rows.reshape(N * p, -1), values["outputs"] / unit[:, None]
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Places, A, B, limits, and the matrices of the problem; memory of state, inputs and disturbance.
@@ -287,19 +287,18 @@ class LinearMPC(ControlLaw):
         places = [*(list(COORDINATES).index(name) for name in self.states), *map(COMPONENTS.index, self.inputs)]
         gain = -np.expm1(-period / numbers["disturbance_time"])
         matrices = {name: value for name, value in numbers.items() if name != "disturbance_time"}
-        names, arrays = list(matrices), repeated(*matrices.values())
+        by_name = dict(zip(matrices, repeated(*matrices.values()), strict=True))
         rows = []
-        for i in range(len(arrays[0])):
-            own = dict(zip(names, arrays, strict=True))
-            found = self.condensed(own, i, period)
-            limit = own["limit"][i]
-            change = period * own["rate_limit"][i] / limit if "rate_limit" in own else np.zeros(m)
+        for i in range(len(by_name["A"])):
+            found = self.condensed(by_name, i, period)
+            member = {name: value[i] for name, value in by_name.items()}
+            A, B, limit = (member[name] for name in ("A", "B", "limit"))
+            lower = member.get("lower", -limit) / limit
+            change = period * member["rate_limit"] / limit if "rate_limit" in member else np.zeros(m)
             half = found.cost[np.tril_indices(k)]
-            member = {name: value[i] for name, value in own.items()}
-            lower = (member.get("lower", -limit) / limit,) if self.limits_more else ()
-            ends, lines = self.output_rows(member) if self.limits_more else (np.zeros(0), np.zeros(0))
+            ends, lines = self.output_rows(member)
             outputs = (ends, -np.linalg.solve(found.cost, found.ahead), found.ahead, lines) if self.preview else (ends,)
-            parts = (places, own["A"][i], own["B"][i], limit, *lower, change, found.best, found.slope, half, *outputs)
+            parts = (places, A, B, limit, lower, change, found.best, found.slope, half, *outputs)
             rows.append(np.concatenate([np.ravel(part) for part in parts]))
         words = {"states": n, "inputs": m, "horizon": self.horizon, "iterations": self.iterations}
         rated = int(self.rate_limit is not None)

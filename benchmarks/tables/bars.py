@@ -152,13 +152,13 @@ def text_of(content: dict[str, Any]) -> str:
         error = "its own model and step" if row["error"] is None else f"{row['error']:.1e}"
         rows.append([NAMES[row["tool"]], row["dtype"], f"`{row['method']}`, {row['setting']}", error,
                      f"{row['measured']:,}", words(row["seconds"]), f"{row['seconds'] / home['seconds']:.2g}"])  # fmt: skip
-    head = ["tool", "dtype", "cheapest setting", "largest error", "vehicles measured", "time", "parts of lgvi_warp's"]
+    head = ["tool", "dtype", "cheapest setting", "largest error", "vehicles measured", "time", "times lgvi_warp's"]
     lines = [
         f"![Seconds for {content['members']:,} vehicles by tool]({picture_of().name})", "",
         f"{content['members']:,} REMUS 100 that sink under thrust for {content['t1']:g} s, one core, compiled before. "
         f"Errors are at the end, the largest of {content['judged']} members, position [m] and attitude; at most "
         f"{content['target']:g} is asked. Where fewer vehicles were measured, the time is scaled; "
-        f"the loop's is processor time (`--simulator DIR`). {content['where']}", "",
+        f"for the loop (`--simulator DIR`) it is processor time. {content['where']}", "",
         *(f"{line}." for line in content["missing"]),
         markdown(head, rows, "lllrrrr"),
     ]  # fmt: skip

@@ -27,7 +27,7 @@ SECTION = r"^(Args|Attributes|Returns|Yields|Raises|Examples):\n((?:    .*(?:\n|
 # A line that begins an item of a list, or any space.
 SPACE = re.compile(r"\n\s*(\* )|\s+")
 # What stands for the text of a base.
-AS_OF = re.compile(r"As of `\w+`")
+AS_OF = re.compile(r"As in `\w+`")
 ENTRY = r"^(\*{0,2}\w[\w, *.]*):\s+(.+(?:\n(?: .*)?)*)"
 
 

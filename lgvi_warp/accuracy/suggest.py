@@ -74,11 +74,11 @@ class Suggestion:
     Attributes:
         settings: arguments for `lw.solve(fleet, **settings)`: method, h and dtype.
         setting: the same as a Candidate.
-        error: error asked for [`unit`].
+        error: requested error [`unit`].
         of: name of the quantity that the error is of.
         unit: unit of that quantity.
-        expected: largest error over members and path: that of the members checked, carried on to the size of the fleet by how
-            the largest ones fall off; one fleet in ten, as large and drawn alike, exceeds it [`unit`].
+        expected: largest error over members and path: that of the checked members, extrapolated to the size of the fleet by
+            the tail of the largest errors; one in ten fleets of this size and distribution exceeds it [`unit`].
         us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
         run_seconds: predicted run time of all members on `threads` threads, without compiling [s].
         threads: threads that `run_seconds` assumes.
@@ -161,9 +161,10 @@ def suggest(
     Args:
         fleet: the ensemble, or a Scene with one.
         error: largest error allowed, over members and path, in the unit of `of`; above 0. Default 1e-3.
-        of: quantity that the error is of: any that statistics know, such as "position" [m], "attitude" [rad], "depth" [m],
-            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity; or the mean of a number, such as
-            "mean position[0]", whose bias at the end is reported with its interval, as by `lw.estimate`. Default "position".
+        of: quantity whose error is limited: any that statistics know, such as "position" [m], "attitude" [rad], "depth"
+            [m], "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity; or the mean of a number,
+            such as "mean position[0]", whose bias at the end is reported with its interval, as by `lw.estimate`. Default
+            "position".
         t1: end time [s]. Default: run.duration of the scene.
         methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
         members: size of the sample that is searched. Default 128.
@@ -176,8 +177,8 @@ def suggest(
         The cheapest setting, its expected error, its predicted time and memory, and the next best settings.
 
     Raises:
-        SceneError: for faulty arguments, all in one message; where noise acts that is no NoisyTerm; and where no reference is
-            ten times better than the error, with the time up to which one is.
+        SceneError: for faulty arguments, all in one message; if noise acts that is no NoisyTerm; and if no reference is ten
+            times better than the error: the message has the time up to which one is.
 
     Examples:
         >>> import lgvi_warp as lw

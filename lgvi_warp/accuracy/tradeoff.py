@@ -155,7 +155,7 @@ class Tradeoff(Saved):
             Measurements in order of rising cost.
 
         Raises:
-            SceneError: where the trade-off has no such quantity or kind.
+            SceneError: if the trade-off has no such quantity or kind.
         """
         of, faults = self.of if of is None else of, Faults()
         faults.choice("of", of, (self.of, *self.units))

@@ -28,21 +28,21 @@ from lgvi_warp.store.open import open_run
 def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], weights: Any = None) -> Estimates:
     """Gather statistics of a finished run from the samples that it kept: in memory, or in a store block by block.
 
-    The estimates are those that the run would have gathered on the way, with the same bits: blocks of members are reduced
-    and joined in the same order. Where a store holds rounded samples (Store(dtype="float32") of a run in float64) they are
-    those of the rounded ones. Times are those of the samples.
+    The estimates equal those gathered during a run, to the bit: blocks of members are reduced and joined in the same order.
+    If a store holds rounded samples (Store(dtype="float32") of a run in float64), the estimates are of the rounded
+    samples. Times are those of the samples.
 
-    Metrics, which look at every tick of a controller, need samples at every tick: save=lw.SaveAt(every=period, fields=...)
-    with the signals that they read; they equal those of the run but for round-off, since a run moves ticks to the user's axes
-    in its kernel. Outcomes and end times need no samples.
+    Metrics need samples at every tick of the controller, with the signals that they read: save=lw.SaveAt(every=period,
+    fields=...). They differ from those of the run by round-off, because a run converts ticks to the user's axes in its
+    kernel. Outcomes and end times need no samples.
 
     Args:
-        result: What `lw.solve`, `lw.open_run` or `lw.Result.load` returned; or the path of a store. Of a store with 10^6
-            members a few blocks' samples are in memory at a time.
-        statistics: Statistics, as of `lw.solve`, or tables of a scene file.
-        weights: What each member counts for, numbers (n,) from 0 in any unit: the members then stand for another distribution
-            than the one that they were drawn from. By default the weights of the run (see lw.designs.Table), else all count
-            alike. Members of a Sobol sequence or another design are weighed as independent ones: their intervals are wide.
+        result: A result of `lw.solve`, `lw.open_run` or `lw.Result.load`, or the path of a store. Of a store with 10^6
+            members only a few blocks' samples are in memory at a time.
+        statistics: Statistics, as in `lw.solve`, or tables of a scene file.
+        weights: Weights of the members (n,), at least 0, in any unit, to represent another distribution than the one that
+            they were drawn from. By default the weights of the run (see lw.designs.Table), else equal weights. Weighted
+            members of a Sobol sequence or another design are treated as independent: their intervals are wide.
 
     Returns:
         The estimates by name, with `messages` on what the user should know.

@@ -100,12 +100,12 @@ def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members:
     """Standard normals of the random number generator: those that a call uses if it is not given its draws.
 
     run(X, lw.uq.draws_of(run, indices)) has the bits of a call with these indices of the same run prepared without
-    draws="given" (but for the last digit with `rkmk4` in float32, and with width=1). So what is to be changed may start from
-    there: one gust, the leading draws, the noise of a chain.
+    draws="given" (but for the last digit with `rkmk4` in float32, and with width=1). So they are a starting point for
+    changes: of one gust, of the leading draws, of the noise of a chain.
 
     Args:
         run: A run made by `lw.prepare`.
-        indices: (n,), whose draws: those of the members with these indices in an ensemble of this seed, whole numbers from 0.
+        indices: (n,), indices of members in an ensemble of this seed, whole numbers from 0: their draws are returned.
             Default None for 0 to members - 1.
         seed: Seed of the noise, a whole number from 0; default that of the ensemble.
         members: How many, where there are no indices; default those of the ensemble.

@@ -124,13 +124,13 @@ def predict(
 ) -> Prediction:
     """Predict what lw.solve(fleet, **settings) will take, from a trial of about a second.
 
-    Statistics count for time, memory and disk, and so do the members of keep=[...], which are run again for their samples.
-    Those of keep="failed" do not count: how many will fail is not known. With `until`, the whole ensemble is predicted. A
-    run whose cost changes on the way (events, adaptive steps) takes another time than predicted.
+    The prediction includes statistics, and the second run of the members of keep=[...]. It excludes that of keep="failed",
+    since the number of failures is not known. With `until`, the whole ensemble is predicted. If the cost of steps changes
+    during the run (events, adaptive steps), its time differs from the prediction.
 
     Args:
         fleet: An Ensemble, or a Scene, which stands for its own ensemble.
-        threads: Number of threads; default as of `lw.solve`.
+        threads: Number of threads; default as in `lw.solve`.
         store: As for solve; the disk is the one that its folder lies on. None: a run in memory.
         **settings: Arguments of solve that decide the plan and what is kept: method, h, t1, save, dtype, width, checks,
             on_failure, statistics, keep, until.

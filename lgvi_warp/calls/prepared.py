@@ -48,17 +48,17 @@ class Prepared:
         table: members whose columns a call with X replaces; or why there are none.
         names: names of the columns of X.
         of: quantities of interest; empty for whole results.
-        runner: what settles and runs.
+        runner: object that prepares and runs the calls.
         levels: columns of the cube, in the order of the names, where X holds levels; None where it holds values.
         refuse: whether a failed member is an error; else its quantities are NaN.
         common_noise: whether noise acts on every member alike.
-        noise: what is drawn, and from where.
+        noise: noise that is drawn, and its source.
         made_of: arguments of `prepare`, by position and by name, for a pickle.
 
     Attributes:
         names: names of the columns of X (d,).
         common_noise: whether noise acts on every member alike.
-        noise: what is drawn, and from where.
+        noise: noise that is drawn, and its source.
         draws: draws of noise and sensors in a call.
 
     Methods:
@@ -148,7 +148,7 @@ class Prepared:
             attitude: (n, 3, 3), body to inertial axes.
             velocity: (n, 3) [m/s], body axes.
             angular_velocity: (n, 3) [rad/s], body axes.
-            parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None, those of the scene, or of
+            parameters: arrays (n, ...) by name, as in `Ensemble.from_states`; default None, those of the scene, or of
                 `result.final`.
             xi: as of a call.
             indices: (n,), whole numbers from 0 that key the noise of each member, such as its index in another ensemble;
@@ -343,11 +343,11 @@ def prepare(
 ) -> Prepared:
     """Prepare a run that is called many times with other numbers; noise is frozen by row: row i always has that of member i.
 
-    Checks, choices, the kernel and whatever no number of `vary` changes are settled once. A call then costs what the kernel
-    takes, and little more; it has the bits of `solve`. The function may be called from several threads, and be pickled.
+    Checks, choices, compilation and everything that does not depend on `vary` are done once. A call then costs little more
+    than the kernel, and equals `solve` to the bit. The function may be called from several threads, and pickled.
 
-    Noise of forces and sensors is frozen by row: row i has the noise of member i of the ensemble's seed in every call. What
-    follows rows from call to call, as a chain does, gives run(X, seed=, indices=).
+    Noise of forces and sensors is frozen by row: row i has the noise of member i of the ensemble's seed in every call. A
+    method that follows rows from call to call, such as a Markov chain, calls run(X, seed=, indices=).
 
         run = lw.prepare(scene, ["vehicle.mass", "start.position[2]"], of="max(depth)", h=0.01, t1=60.0)
         depths = run(X)                                    # X (n, 2), depths (n,)
@@ -356,12 +356,12 @@ def prepare(
         fleet: A Scene or an Ensemble; its [ensemble] is used where `vary` is None.
         vary: Names of what varies, ["vehicle.mass", "start.position[2]"], or a mapping of names to distributions.
         of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result; "outcome
-            floor"; a metric as of `lw.sweep`, "iae depth", lw.metrics.ITAE("depth"). Default None: calls return results.
-        method: As of `lw.solve`, but where it is left out, chosen once, for `fleet`. What else is left out, of h, t1, dtype,
-            width, checks, on_failure, device, threads, executor and scheduler, is taken from the scene's [run].
+            floor"; a metric as in `lw.sweep`, "iae depth", lw.metrics.ITAE("depth"). Default None: calls return results.
+        method: As in `lw.solve`, but if omitted, chosen once, for `fleet`. If h, t1, dtype, width, checks, on_failure,
+            device, threads, executor or scheduler are omitted, they are taken from the scene's [run].
         h: Step [s].
         t1: End of the run [s].
-        save: Samples to keep, as of `lw.solve`; default with `of`: those that the quantities need.
+        save: Samples to keep, as in `lw.solve`; default with `of`: those that the quantities need.
         dtype: "float64", "float32" or "float32_compensated".
         statistics: Statistics gathered over the members of each call, in result.statistics; default none.
         levels: Whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values;

@@ -41,7 +41,7 @@ def resume(
         path: A store, or a folder with one store.
         fleet: The run's Ensemble, or Scene. Needed if a scene file cannot describe it (distributions of your own).
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
-        threads: Number of threads; default as of `lw.solve`.
+        threads: Number of threads; default as in `lw.solve`.
         scheduler: Address of Dask's scheduler.
         progress: As in solve.
         force: Whether to continue on another machine or with other versions, where the bits may differ.

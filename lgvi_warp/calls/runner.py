@@ -187,7 +187,7 @@ def outputs(
 ) -> Outputs:
     """Join the quantities of groups of members, and count how these ended.
 
-    groups: for each, as of `values_of`. ends: the status of each group's members.
+    groups: for each, as in `values_of`. ends: the status of each group's members.
     """
     labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
     values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)

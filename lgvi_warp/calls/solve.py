@@ -54,12 +54,12 @@ def solve(
 ) -> Result:
     """Advance every member of the fleet from t = 0, or from `start`, to t1 and return the samples and statistics asked for.
 
-    What is left out is taken from the scene's [run] section; the defaults below hold where that says nothing. Nothing is
-    printed unless `progress` says so. The same inputs give the same bits for any number of threads, on one type of machine.
+    Omitted arguments are taken from the scene's [run] section; the defaults below apply if that has no value. Only
+    `progress` prints. The same inputs give the same bits for any number of threads, on one type of machine.
 
     Args:
         fleet: An Ensemble, or a Scene, which stands for its own ensemble (one vehicle if it has none).
-        method: A name or a Method. Default: chosen by what acts, "psi_s" where nothing damps the motion.
+        method: A name or a Method. Default: chosen by the scene's forces, "psi_s" without damping.
         h: Step [s].
         t1: End of the run [s], counted from t = 0.
         save: Which samples to save, and when; default every [run] save_every of the scene, else the start and the end.
@@ -69,7 +69,7 @@ def solve(
             million steps of vehicles).
         width: Vehicles per packet; default from the CPU.
         checks: "safe" (default) gives each member a status, freezes it when it fails, and warns if its parameters and its
-            start do not suit the step; "all" also warns of what arises on the way; "none" leaves all that code out.
+            start do not suit the step; "all" also warns of problems during the run; "none" compiles no checks.
         on_failure: "freeze" (default) keeps a member that fails at its last good state. "raise" raises MembersFailed after
             the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone: order and
             the symmetry of each step are kept, symplecticity is not.
@@ -88,14 +88,14 @@ def solve(
             not held in memory; lw.resume continues such a run after it was stopped.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
-        blocks: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may ask for more
-            blocks than there are. The result is of the members of these blocks.
-        on_block: Called with the Result of each block of members as soon as it is finished, a copy, in order, in the thread
-            that called: to look at a run while it goes on. Default: nothing is called.
-        start: `result.final` of another run of these members, from which this one goes on: with the same settings and numbers
-            the two have the bits of one run. Samples, statistics and messages are of this run alone. Default: from t = 0.
-        tangents: Names of numbers, such as "vehicle.mass" or "start.velocity[0]", by which the derivatives of all samples are
-            wanted, or one name; they are in result.jacobian. The kernel carries them beside the motion, two in one run, and
+        blocks: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may name more
+            blocks than exist. The result has the members of these blocks.
+        on_block: Function that is called with a copy of each block's Result as soon as the block is finished, in order and
+            in the calling thread: to monitor a run. Default: none.
+        start: `result.final` of another run of these members, to continue it: with the same settings and numbers the two
+            equal one run, to the bit. Samples, statistics and messages are of this run alone. Default: from t = 0.
+        tangents: Names of numbers, such as "vehicle.mass" or "start.velocity[0]", or one name: the derivatives of all
+            samples with respect to these are in result.jacobian. The kernel integrates them with the motion, two per run;
             each costs one to two runs without them. Default: none.
 
     Returns:

@@ -66,7 +66,7 @@ def of_energy(drawn: Any, members: int) -> dict[str, Any] | None:
 
 
 def of_run(result: Any, drawn: Any, written: Written, faults: Sequence[str], seconds: float) -> dict[str, Any]:
-    """A run, as the verbs run and resume print it, which took so many seconds; drawn: as of `of_energy`."""
+    """A run, as the verbs run and resume print it, which took so many seconds; drawn: as in `of_energy`."""
     rate = result.members * result.provenance["steps"] / result.run_seconds if result.run_seconds else None
     return of_result(result) | {
         "energy": of_energy(drawn, result.members) if result.samples else None,

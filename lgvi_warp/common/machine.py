@@ -31,7 +31,7 @@ def simd() -> str:
 
 
 def register_width(dtype: str, extension: str | None = None) -> int:
-    """Vehicles of which one number each fills a SIMD register; extension: as of `simd`, by default of this machine."""
+    """Vehicles of which one number each fills a SIMD register; extension: as in `simd`, by default of this machine."""
     return REGISTER_BYTES[extension or simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 

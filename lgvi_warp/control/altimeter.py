@@ -19,8 +19,8 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 class Altimeter(Sensor):
     """A sensor of the range to the scene's floor along a beam of the body, with the errors of any `Sensor`.
 
-    It reads from 0, on the floor or below it, to `most`, where no floor is within reach. It looks from the true place and
-    attitude, whatever other sensors say.
+    Readings range from 0, on the floor or below it, to `most`, if no floor is within reach. They follow from the true
+    position and attitude, whatever other sensors read.
 
     Args:
         direction: Direction of the beam in body axes, (3,) of any length; (0, 0, 1) by default, down.
@@ -34,12 +34,12 @@ class Altimeter(Sensor):
         every: Ticks from one new reading to the next, a whole number; 1 by default.
         latency: Ticks until a reading arrives, a whole number; 0 by default.
         dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default.
-        burst: Mean length of a run of lost readings [ticks]; by default each is lost by itself.
+        burst: Mean length of a run of lost readings [ticks]; by default losses are independent.
         outlier: Probability with which a reading is an outlier; by default none is.
         outlier_std: Standard deviation of what an outlier adds to the reading [m].
 
     Raises:
-        SceneError: Where the beam has no direction; and as `Sensor`. A scene refuses it where it has no floor, or several and
+        SceneError: If the beam has no direction; and as `Sensor`. A scene refuses it where it has no floor, or several and
             none is named.
 
     Examples:

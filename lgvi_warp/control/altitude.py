@@ -24,10 +24,10 @@ SOURCES = ("altimeter", "chart")
 class Altitude(Guidance):
     """An altitude above the sea floor: the wanted depth is that of the floor less the altitude, so that depth laws follow it.
 
-    By an altimeter the floor's depth is the measured depth and what the measured attitude makes of the reading: where the beam
-    meets the floor. A beam that looks ahead makes the vehicle climb before a slope. Without an echo the vehicle goes deeper
-    until there is one. By the chart the floor's depth is that of the scene's floor at the measured place, or `look_ahead`
-    ahead of it where that is shallower.
+    By an altimeter the floor's depth is that of the point where the beam meets the floor, from the measured depth, the
+    measured attitude and the reading. A beam that looks ahead makes the vehicle climb before a slope. Without an echo the
+    vehicle goes deeper until there is one. By the chart it is the depth of the scene's floor at the measured position, or
+    at `look_ahead` ahead of it if it is shallower there.
 
     Args:
         altitude: Wanted altitude [m], above 0.
@@ -39,8 +39,8 @@ class Altitude(Guidance):
         deepest: Largest depth that is wanted [m]; 12,000 by default.
 
     Raises:
-        SceneError: Where `shallowest` is below `deepest`, or `look_ahead` is given without the chart; and as `Term`. A scene
-            refuses it where the altimeter or the floor is missing.
+        SceneError: If `shallowest` is below `deepest`, or `look_ahead` is given without the chart; or a number is
+            invalid (see `Term`). A scene refuses it where the altimeter or the floor is missing.
 
     Examples:
         >>> import lgvi_warp as lw

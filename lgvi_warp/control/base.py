@@ -144,7 +144,7 @@ class Part(Term):
 
     Attributes:
         section: List of the controller in which it stands.
-        device: As of `Term`; the module is one of lgvi_kernels.laws.control.
+        device: As in `Term`; the module is one of lgvi_kernels.laws.control.
         needs: What it reads of the wanted motion, among `WISHES`.
         gives: What it wants of the motion, among `WISHES`.
         bus: Where it finds the numbers of other parts.
@@ -226,7 +226,7 @@ class Part(Term):
             By default the part itself.
 
         Raises:
-            SceneError: Where the part has places, and the scene no origin.
+            SceneError: If the part has places, and the scene no origin.
         """
         return self
 

@@ -22,19 +22,19 @@ WORK = 138
 class BoundedLeastSquares(EffortAllocation):
     """Allocation by bounded least squares: efforts within limits, wrench nearest to the demand (Johansen & Fossen 2013, 2.2).
 
-    The error is the sum of (priority times component)^2, moments divided by the mean lever arm of the channels. Where the
-    efforts of least error without limits are within the limits, they are taken; they are those of `PseudoInverse` where the
-    channels make every component by itself. Else an active-set method finds the efforts of least error, to round-off.
-    Channels that are known to be lost make nothing, however many they are.
+    The error is the sum of (priority times component)^2, moments divided by the mean lever arm of the channels. If the
+    unconstrained efforts of least error are within the limits, they are used; they equal those of `PseudoInverse` if the
+    channels can produce every component independently. Otherwise an active-set method finds the efforts of least error, to
+    round-off. Channels that are known to be lost produce nothing, however many they are.
 
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which fins are judged; 1 by default. "measured": at each tick the measured speed ahead,
-            through the water, but at least `least_speed`.
-        least_speed: Least speed [m/s] at which fins are judged where `speed` is "measured".
-        priorities: How much an error in X, Y, Z, K, M, N counts, (6,), above 0; 1 by default. [1, 1, 1, 10, 10, 10] makes
-            moments before forces.
+        speed: Speed ahead [m/s] at which the effect of fins is evaluated; 1 by default. "measured": at each tick the
+            measured speed ahead, through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which it is evaluated if `speed` is "measured".
+        priorities: Weights of errors in X, Y, Z, K, M, N, (6,), above 0; 1 by default. [1, 1, 1, 10, 10, 10] gives moments
+            priority over forces.
         iterations: Largest number of steps of the active-set method at a tick; 100 by default. A run says in its messages
             where a tick had not converged.
 

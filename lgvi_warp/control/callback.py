@@ -31,8 +31,9 @@ class Callback(ControlLaw):
         function: The function; it must be picklable where other processes run it.
         to: Key of a term, or of several: then the function returns the commands of their channels, side by side,
             (m, channels), and no law or allocation acts on them. None, the default, for demands.
-        version: What tells the function from others in sweeps and stores, a text or a number, changed whenever the function
-            does. None, the default: what its code says. Give one where it reads files, or holds what cannot be compared.
+        version: Text or number that identifies the function in sweeps and stores; change it whenever the function changes.
+            None, the default: its code identifies it. Give one if the function reads files, or holds objects that cannot be
+            compared.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -22,7 +22,7 @@ class ComplementaryFilter(MeasuringPart):
         time_constant: Time after which the measured attitude counts more than the rates [s].
 
     Raises:
-        SceneError: As `Term`.
+        SceneError: If a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "complementary_filter"

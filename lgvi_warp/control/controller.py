@@ -46,20 +46,20 @@ class Controller(Documented):
 
     Args:
         period: Time between two ticks [s], a whole number of steps.
-        delay: From a tick until its commands act [s], a whole number of steps; may vary by member. 0 by default.
-        sensors: What changes the truth into what is measured, in this order; by default the truth is measured.
-        guidance: What says which motion is wanted, in this order.
-        laws: What demands a wrench; their demands are added.
-        allocation: What turns the demand into commands, in this order: each takes what those before it did not deliver. By
-            default the pseudo-inverse, where there is one term that takes commands.
-        faults: What happens to commands and to sensors.
+        delay: Time from a tick until its commands act [s], a whole number of steps; may vary by member. 0 by default.
+        sensors: Sensors and estimators, in the order in which they act; by default the true motion is measured.
+        guidance: Parts that set the wanted motion, in the order in which they act.
+        laws: Parts that demand a wrench; their demands are added.
+        allocation: Parts that turn the demand into commands, in this order: each receives what those before it did not
+            deliver. By default the pseudo-inverse, if exactly one term takes commands.
+        faults: Faults of actuators and of sensors.
 
     Methods:
         parameters: The numbers that may vary by member.
         to_dict: The section [controller] of a scene file.
 
     Raises:
-        SceneError: Where anything is wrong; the message lists every fault.
+        SceneError: If anything is wrong; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -174,7 +174,7 @@ class Controller(Documented):
             A copy.
 
         Raises:
-            SceneError: Where a part has places, and the scene no origin.
+            SceneError: If a part has places, and the scene no origin.
         """
         located = copy.copy(self)
         faults = Faults("controller.")
@@ -204,7 +204,7 @@ class Controller(Documented):
             A copy.
 
         Raises:
-            SceneError: Where an allocation or a fault names a term that takes no commands, or a part misses something of the
+            SceneError: If an allocation or a fault names a term that takes no commands, or a part misses something of the
                 scene. The message lists every fault.
         """
         faults = Faults("controller.")

@@ -30,7 +30,7 @@ class DeadReckoning(MeasuringPart):
         start_error: Added to the position of the first tick, (3,) [m], inertial axes; 0 by default.
 
     Raises:
-        SceneError: Where a word is not known; and as `Term`.
+        SceneError: If a word is not known; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "dead_reckoning"

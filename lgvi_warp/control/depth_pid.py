@@ -12,7 +12,7 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DepthPID(IntegralLaw):
-    """PID of the depth by successive loop closure: the depth asks for a pitch angle, the pitch for a moment M.
+    """PID of the depth by successive loop closure: an outer loop from depth to pitch, an inner loop from pitch to a moment M.
 
     theta_d = -(kp e + ki I) within the pitch limit, e the wanted depth less the measured one: pitch up is positive, depth
     grows downward. M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w. For vehicles that move ahead.
@@ -20,14 +20,15 @@ class DepthPID(IntegralLaw):
     Args:
         kp: Gain from depth to pitch [rad/m].
         ki: Gain from the integral of the depth's error to pitch [rad/(m s)]; 0 by default.
-        pitch_limit: Largest pitch that is wanted [rad]; 0.5 by default.
+        pitch_limit: Limit of the wanted pitch [rad]; 0.5 by default.
         kp_pitch: Gain of the pitch [N m/rad].
         ki_pitch: Gain of the integral of the pitch's error [N m/(rad s)]; 0 by default.
         kd_pitch: Gain of the pitch rate q [N m s/rad]; 0 by default.
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
         integral_limit: Largest sizes of both integrals, (2,) [m s, rad s]; 1e6 by default.
-        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
-            would make this worse; or "none". The depth's integral waits while the wanted pitch is at its limit.
+        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
+            error would increase the shortfall; or "none". The depth's integrator also stops while the wanted pitch is at
+            its limit.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -20,30 +20,32 @@ WIDEST = 1.5
 class Docking(Guidance):
     """Approach a dock along its centre line at decreasing speed, and start again if the vehicle is outside the funnel.
 
-    With e the way to starboard off the centre line and D the look-ahead, the wanted heading is the dock's less
-    atan((e + kappa J) / D), where dJ/dt = D e / (D^2 + (e + kappa J)^2), as in `Waypoints` with "ilos". The pace over
-    ground falls from `speed`, `slowing` before the dock, to `contact_speed` at it, evenly with the distance. The funnel has
-    the radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is outside within `judged` of
-    the dock goes round: to the place `offset` to starboard of where the line begins, `approach` before the dock, and from
-    there along the line again. Once in the mouth at the dock's plane it is docked: speed 0, and the dock's place and heading.
+    With e the distance to starboard of the centre line and D the look-ahead, the wanted heading is the dock's minus atan((e
+    + kappa J) / D), where dJ/dt = D e / (D^2 + (e + kappa J)^2), as in `Waypoints` with "ilos". The wanted speed over
+    ground falls linearly with the distance, from `speed` at `slowing` before the dock to `contact_speed` at the dock. The
+    funnel has the radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is nearer than
+    `judged` and outside the funnel starts again. It goes to the beginning of the line, `approach` before the dock,
+    displaced by `offset` to starboard, and from there along the line. Once in the mouth at the dock's plane it is docked:
+    speed 0, and the dock's place and heading.
 
     Args:
         position: The dock, (3,) [m], inertial axes: the middle of its mouth.
         heading: Heading of a vehicle that enters [rad].
-        speed: Pace of the approach [m/s], over ground.
-        contact_speed: Pace at the dock [m/s], above 0.
-        slowing: How far before the dock the pace begins to fall [m].
+        speed: Speed of the approach [m/s], over ground.
+        contact_speed: Speed at the dock [m/s], over ground, above 0.
+        slowing: Distance from the dock at which the speed begins to fall [m].
         look_ahead: D [m].
         mouth: Radius of the mouth [m].
         funnel: Half the opening angle of the funnel [rad], at most 1.5.
-        approach: How far before the dock the line begins [m].
-        judged: How far before the dock the funnel begins to count [m], at most `approach`.
-        offset: How far to starboard of the line's beginning vehicles go round to [m]; twice the radius of a turn lets them
-            come out of it on the line. 0 by default.
+        approach: Distance from the dock at which the line begins [m].
+        judged: Distance from the dock within which a vehicle must be in the funnel [m], at most `approach`.
+        offset: Distance to starboard of the line's beginning to which a vehicle goes to start again [m]; with twice the
+            turning radius it ends its turn on the line. 0 by default.
         kappa: Gain of the integral [1/s]; 0.1 by default.
 
     Raises:
-        SceneError: Where the funnel counts before the line begins, or the contact speed is above the speed; and as `Term`.
+        SceneError: If the funnel counts before the line begins, or the contact speed is above the speed; or a number is
+            invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -27,9 +27,9 @@ class EffortAllocation(Allocation):
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which fins are judged; 1 by default. "measured": at each tick the measured speed ahead,
-            through the water, but at least `least_speed`.
-        least_speed: Least speed [m/s] at which fins are judged where `speed` is "measured".
+        speed: Speed ahead [m/s] at which the effect of fins is evaluated; 1 by default. "measured": at each tick the
+            measured speed ahead, through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which it is evaluated if `speed` is "measured".
     """
 
     words_for: ClassVar[Mapping[str, str]] = {"speed": MEASURED}

@@ -40,7 +40,7 @@ def _is_channel(value: Any) -> bool:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fault(Sending):
-    """A fault of an actuator or of a sensor: from one time to another its command or its reading x is another one.
+    """A fault of an actuator or of a sensor: between two times its command or its reading x is altered.
 
     | kind | |
     | --- | --- |
@@ -49,12 +49,12 @@ class Fault(Sending):
     | stuck | an actuator stays where it is at the onset, a sensor at its last reading; or x <- value |
     | freeze | the last command or reading repeats |
     | slow | x follows with the time constant, from the last one on |
-    | delay | x comes later; until the first one has come the last one repeats |
-    | intermittent | on and off: a command is as of "gain", the last reading stays, an estimator gets none |
+    | delay | x arrives later; until the first delayed one arrives, the last one repeats |
+    | intermittent | on and off: a command acts as with "gain", the last reading repeats, an estimator gets none |
 
-    It begins at the first tick at or after `time`, and is over at the first at or after `until`. A sensor's fault acts right
-    after the sensor, on what has arrived of its reading. Where an estimator takes the readings, it changes what the estimator
-    gets; a kind with memory goes by those that are new. Laws know nothing of it, and their integrals go on.
+    It begins at the first tick at or after `time`, and is over at the first at or after `until`. A sensor's fault acts
+    directly after the sensor, on the reading that has arrived. If an estimator takes the readings, the fault acts on those;
+    kinds with memory count new readings only. Laws are not informed of a fault, and their integrals continue.
 
     Args:
         of: Key of the term or of the sensor.
@@ -68,15 +68,15 @@ class Fault(Sending):
         gain: Factor of the command or reading; 0 by default.
         offset: Added to it, in its unit; 0 by default.
         value: Command or reading of a channel that is stuck; by default where it was.
-        time_constant: Of a slow one [s]; 1 by default.
-        delay: Of a late one [s], to the nearest tick; 1 by default.
-        duty: Part of each period, the first, in which an intermittent one acts; 0.5 by default.
-        period: From one onset to the next of an intermittent one [s], to the nearest tick; 1 by default.
-        known: Of an actuator: whether the allocation leaves the channel out from `time` on; False by default.
+        time_constant: Time constant of kind "slow" [s]; 1 by default.
+        delay: Delay of kind "delay" [s], to the nearest tick; 1 by default.
+        duty: Fraction of each period, from its start, in which kind "intermittent" acts; 0.5 by default.
+        period: Time from one onset to the next of kind "intermittent" [s], to the nearest tick; 1 by default.
+        known: Whether the allocation excludes an actuator's channel from `time` on; False by default.
 
     Raises:
-        SceneError: Where `of` is no text, `channel` no whole number, a kind not known, `until` not after `time`, or `known`
-            neither true nor false; and as `Term`.
+        SceneError: If `of` is no text, `channel` no whole number, a kind not known, `until` not after `time`, or `known`
+            neither true nor false; or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -21,8 +21,8 @@ class HeadingPID(IntegralLaw):
         ki: Integral gain [N m/(rad s)]; 0 by default.
         kd: Gain of the yaw rate [N m s/rad]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
-        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
-            would make this worse; or "none".
+        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
+            error would increase the shortfall; or "none".
 
     Examples:
         >>> import lgvi_warp as lw

@@ -15,8 +15,8 @@ class HeadingSMC(IntegralLaw):
     """Integral sliding mode control of the heading, with Nomoto's model as feedforward (Fossen 2021, eq. 16.479).
 
     psi is the heading, r its rate: sigma = (r - r_d) + 2 lambda (psi - psi_d) + lambda^2 I, r_v = r - sigma, a_v its rate
-    where the errors are as they are, and N = (nomoto_time a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) /
-    nomoto_gain; sat(x) is x within -1 and 1.
+    at the present errors, and N = (nomoto_time a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / nomoto_gain; sat(x)
+    is x within -1 and 1.
 
     Args:
         lambda_: Rate at which errors decay while sigma is 0 [1/s]; `lambda` in a scene file.
@@ -26,8 +26,8 @@ class HeadingSMC(IntegralLaw):
         nomoto_gain: K of Nomoto's model T dr/dt + r = K N [rad/(s N m)].
         nomoto_time: T of Nomoto's model [s]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
-        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
-            would make this worse; or "none".
+        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
+            error would increase the shortfall; or "none".
     """
 
     type: ClassVar[str] = "heading_smc"

@@ -21,8 +21,8 @@ class HeavePID(IntegralLaw):
         ki: Integral gain [N/(m s)]; 0 by default.
         kd: Gain of the depth's rate, which is downward over ground [N s/m]; 0 by default.
         integral_limit: Largest size of I [m s]; 1e6 by default.
-        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
-            would make this worse; or "none".
+        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
+            error would increase the shortfall; or "none".
     """
 
     type: ClassVar[str] = "heave_pid"

@@ -18,8 +18,9 @@ class Loiter(Guidance):
     """Circle a point for as long as the run lasts (Beard & McLain 2012, 10.2).
 
     With d the distance from the centre on the map, the wanted heading is that of the circle's tangent, turned towards the
-    circle by atan((d - radius) / look_ahead); its rate on the circle, speed / radius, is wanted too. Wanted position and
-    velocity are those of the circle abeam, for laws of the pose. A vehicle that cannot turn so tightly goes round outside.
+    circle by atan((d - radius) / look_ahead); the wanted heading rate on the circle is speed / radius. For laws of the
+    pose, the wanted position and velocity are those of the point of the circle abeam. A vehicle that cannot turn so tightly
+    circles outside.
 
     Args:
         center: The place, (3,) [m], inertial axes; its third number is the depth.

@@ -16,14 +16,14 @@ class LowPass(MeasuringPart):
     """First-order low-pass filter of one measured quantity, exact for readings that are held over a period.
 
     x <- x + (1 - exp(-T / time_constant)) (measured - x), T the period; it starts at the first reading. The difference of two
-    headings is within half a turn; an attitude goes the same part of the turn to the measured one.
+    headings is within half a turn; an attitude moves by the same fraction of the rotation to the measured one.
 
     Args:
-        of: What it filters, as of `lw.control.Sensor`.
+        of: Quantity that it filters, as in `lw.control.Sensor`.
         time_constant: Its time constant [s]; 0 for no filter.
 
     Raises:
-        SceneError: Where `of` is not known; and as `Term`.
+        SceneError: If `of` is not known; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "low_pass"

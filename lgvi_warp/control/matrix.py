@@ -17,8 +17,8 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 class AllocationMatrix(Allocation):
     """Commands u = A w of the demand w = (X, Y, Z, K, M, N), each within its limit.
 
-    What the commands do not deliver is told back to the laws: (I - A^+ A) w and A^+ of what the limits cut off, with the
-    pseudo-inverse A^+.
+    The part that the commands do not deliver is fed back to the laws: (I - A^+ A) w, and A^+ times what the limits cut off,
+    with the pseudo-inverse A^+.
 
     Args:
         to: Key of the term that takes the commands.

@@ -54,22 +54,22 @@ class Policy(ControlLaw):
     """A trained perceptron (multilayer network): y = f(W y + b) layer by layer; the demand is `scale` times the last layer.
 
     The file holds weights_0 (n1, n0), biases_0 (n1,), weights_1 (n2, n1), ... as np.savez writes them, uncompressed; nothing
-    in it is executed. Inputs are, of what is wanted less what is measured, "depth_error", "heading_error" [m, rad],
-    "speed_error" [m/s], "position_error" [m, body axes], and "attitude_error", e_R of `PosePID`; of what is measured "depth"
-    [m], "velocity" over ground, "water_velocity" [m/s], "angular_velocity" [rad/s] and "down", the direction downward, all
-    in body axes. A name with [0], [1] or [2] is one number of three.
+    in it is executed. Inputs are wanted minus measured values, "depth_error", "heading_error" [m, rad], "speed_error"
+    [m/s], "position_error" [m, body axes], and "attitude_error", e_R of `PosePID`; and measured values, "depth" [m],
+    "velocity" over ground, "water_velocity" [m/s], "angular_velocity" [rad/s] and "down", the direction downward, all in
+    body axes. A name with [0], [1] or [2] is one number of three.
 
     Args:
         file: Path of the .npz file; in a scene file from the folder of the scene.
         inputs: Names of the inputs in their order; together n0 numbers.
         outputs: Which of "X", "Y", "Z", "K", "M", "N" the last layer's numbers are.
-        scale: What an output of 1 is, as many as outputs [N, N m]; 1 by default.
+        scale: Demand at an output of 1, one for each output [N, N m]; 1 by default.
         activation: Of all layers but the last: "tanh", the default, or "relu".
         output_activation: Of the last layer: "linear", the default, "tanh", or "clip", within -1 and 1.
-        checksum: That of the file's numbers, so that another file is not taken for it; by default whatever is there is read.
+        checksum: Checksum of the file's numbers, so that another file is refused; by default any file is read.
 
     Raises:
-        SceneError: Where the file cannot be read, or does not fit inputs and outputs; and as `Term`.
+        SceneError: If the file cannot be read, or does not fit inputs and outputs; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "policy"

@@ -25,11 +25,11 @@ class PosePID(PoseLaw):
         ki_r: Gains of its integral (3,) [N m/s], body axes; 0 by default.
         kw: Gains of the angular velocity (3,) [N m s], body axes.
         integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
-        feedforward: "restoring": what balances weight, buoyancy and their moment at the measured attitude, by the numbers of
-            the scene, whatever a member's are; or "none", the default.
-        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
-            would make this worse; or "none". The error of the position waits along the body's axes, along which actuators
-            push.
+        feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude, by the scene's numbers
+            for every member; or "none", the default.
+        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
+            error would increase the shortfall; or "none". The position's integrator stops by body axis, since actuators
+            push along these.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -15,8 +15,8 @@ class PoseSMC(PoseLaw):
     """Integral sliding mode control of the pose, each body axis by itself (the form of Fossen 2021, 16.4, on SE(3)).
 
     s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I, and f = k_d s + k_sigma sat(s / boundary); the same of the attitude
-    with s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R; e_b, e_R, I and I_R as of `PosePID`, sat(x) is x
-    within -1 and 1.
+    with s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R; e_b, e_R, I and I_R as in `PosePID`, sat(x) is
+    x within -1 and 1.
 
     Args:
         lambda_: Rates at which errors of position decay while s is 0 (3,) [1/s]; `lambda` in a scene file.
@@ -28,11 +28,11 @@ class PoseSMC(PoseLaw):
         k_sigma_r: The same as k_sigma, of the attitude (3,) [N m].
         k_d_r: The same as k_d, of the attitude (3,) [N m s].
         integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
-        feedforward: "restoring": what balances weight, buoyancy and their moment at the measured attitude, by the numbers of
-            the scene, whatever a member's are; or "none", the default.
-        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
-            would make this worse; or "none". The error of the position waits along the body's axes, along which actuators
-            push.
+        feedforward: "restoring" balances weight, buoyancy and their moment at the measured attitude, by the scene's numbers
+            for every member; or "none", the default.
+        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
+            error would increase the shortfall; or "none". The position's integrator stops by body axis, since actuators
+            push along these.
     """
 
     type: ClassVar[str] = "pose_smc"

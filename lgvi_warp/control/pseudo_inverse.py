@@ -19,17 +19,17 @@ MOST_LOST = 4
 class PseudoInverse(EffortAllocation):
     """Allocation by a weighted pseudo-inverse: least sum of weight t^2, wrench B t nearest to the demand (Fossen 2021, 11.2).
 
-    t = W^-1 B^T (B W^-1 B^T)^+ w. Components for which no law asks do not count. Effort is thrust of thrusters, by the
-    inverse of their curve; angle of fins, whose effect B is that at `speed`; force or moment of a control_wrench. Thrust is
-    that at rest: what it loses by the advance speed is not made up for, and counts as delivered. Thrusters with a polynomial
-    need a `limit`, up to which, or to where the polynomial turns, it is inverted.
+    t = W^-1 B^T (B W^-1 B^T)^+ w. Components that no law demands are ignored. The effort t is the thrust of a thruster,
+    whose curve is inverted; the angle of a fin, whose effect B is that at `speed`; or the force or moment of a
+    control_wrench. Thrust is that at zero advance speed: the loss by advance is not compensated, and counts as delivered.
+    Thrusters with a polynomial need a `limit`: the polynomial is inverted up to it, or up to its turning point.
 
     Args:
         to: Key of the term that takes the commands.
         weights: Cost of each effort, (channels,), above 0; 1 by default.
-        speed: Speed ahead [m/s] at which fins are judged; 1 by default. "measured": at each tick the measured speed ahead,
-            through the water, but at least `least_speed`.
-        least_speed: Least speed [m/s] at which fins are judged where `speed` is "measured".
+        speed: Speed ahead [m/s] at which the effect of fins is evaluated; 1 by default. "measured": at each tick the
+            measured speed ahead, through the water, but at least `least_speed`.
+        least_speed: Least speed [m/s] at which it is evaluated if `speed` is "measured".
     """
 
     type: ClassVar[str] = "pseudo_inverse"

@@ -26,8 +26,8 @@ class ReferenceModel(Guidance):
 
     Each number x follows its target s by x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0. It
     starts at the measured position, heading and rates. Between ticks the target is held and the equation solved exactly;
-    where x' is then beyond its limit, x went at the limit all the time, and x'' is 0. A heading goes the short way to its
-    target, and may pass pi. Roll and pitch that are wanted are kept.
+    if x' is then beyond its limit, x moves at the limit over the whole period, and x'' is 0. A heading goes the short way
+    to its target, and may pass pi. Wanted roll and pitch are not changed.
 
     Args:
         natural_frequency: omega (2,) [rad/s] of depth and heading, or (4,) of north, east, depth and heading.

@@ -64,28 +64,28 @@ class Sensor(MeasuringPart):
         drift: Random walk: its standard deviation after 1 s, in the unit of the reading / s^1/2; 0 by default.
         quantum: Readings are rounded to whole multiples of this; 0 by default, not at all.
         every: Ticks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
-        latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first one is there.
+        latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first reading is used.
         dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default. The first is never lost.
-        burst: Mean length of a run of lost readings [ticks], at least 1 and dropout / (1 - dropout); by default, or where 0,
-            each is lost by itself. The share of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
+        burst: Mean length of a run of lost readings [ticks], at least 1 and dropout / (1 - dropout); by default, or at 0,
+            losses are independent. The share of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
         outlier: Probability with which a reading is an outlier; by default none is.
         outlier_std: Standard deviation of what an outlier adds to the reading.
         deepest: Depth of its place below which readings are lost, as those of GPS are [m]; inf by default.
         place: Place of a sensor of position or depth (3,) [m], body axes, as of an antenna; by default the body's origin. It
             reads the position or the depth of this place.
         reads: How a depth is read: "geometry", the default, the distance from the mean surface; or "pressure", as a pressure
-            cell: p / (rho g), below the scene's tide, which waves change by their linear theory, the less the deeper. It is 0
-            out of the water.
+            cell: p / (rho g) below the scene's tide, with the pressure of waves by linear theory, which decays with depth.
+                It is 0 out of the water.
 
-    The reading of the first tick always arrives, at once and whatever the depth: it stands for what was read before the run,
-    on deck. A `DVL`, which needs the floor, has no such reading: its velocity is 0 before the first lock.
+    The reading of the first tick always arrives, at once and whatever the depth: it stands for a reading on deck, before
+    the run. A `DVL`, which needs the floor, has no such reading: its velocity is 0 before the first lock.
 
-    An estimator that names the sensor (see lw.control.ErrorStateFilter) takes the readings itself: then what is measured stays
-    as it was, no reading is kept, the first may be lost, and the estimator waits for the latency.
+    An estimator that names the sensor (see lw.control.ErrorStateFilter) takes the readings itself: then the measured motion
+    is not changed, no reading is repeated, the first may be lost, and the estimator accounts for the latency.
 
     Raises:
-        SceneError: Where `of` is not known, `every` or `latency` is no whole number, or a place is given for another
-            reading; and as `Term`.
+        SceneError: If `of` is not known, `every` or `latency` is no whole number, or a place is given for another
+            reading; or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -15,16 +15,17 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SetPoint(Guidance):
-    """Constant set-point: a place, a heading, a speed. What is not given is left to the guidance before it.
+    """Constant set-point: position, heading and speed. What is omitted is left to the preceding guidance.
 
     Args:
         position: Wanted position, (3,) [m], inertial axes.
-        depth: Wanted depth [m]; in place of `position`, whose third number it is.
-        heading: Wanted heading [rad], from north to east, of an upright attitude; 0 by default where a position is given.
+        depth: Wanted depth [m], without a position in north and east; give either `depth` or `position`.
+        heading: Wanted heading [rad], from north to east; roll and pitch are wanted as 0. With a position it is 0 by
+            default.
         speed: Wanted speed ahead through the water [m/s].
 
     Raises:
-        SceneError: Where nothing is given, or position and depth both; and as `Term`.
+        SceneError: If nothing is given, or both position and depth; or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

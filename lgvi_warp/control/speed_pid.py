@@ -21,8 +21,8 @@ class SpeedPID(IntegralLaw):
         ki: Integral gain [N/m]; 0 by default.
         drag: Feedforward, the drag over the speed squared [N s^2/m^2]; 0 by default.
         integral_limit: Largest size of I [m]; 1e6 by default.
-        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
-            would make this worse; or "none".
+        anti_windup: "conditional", the default: an integrator stops while the actuators do not deliver the demand and its
+            error would increase the shortfall; or "none".
     """
 
     type: ClassVar[str] = "speed_pid"

@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.base import number
 class StateFeedback(ControlLaw):
     """The demand w = -K x of the error x (12,), such as of a linear quadratic regulator.
 
-    x = (b - b_d, e_R, nu - R^T v_d, Omega - R^T R_d Omega_d): position in inertial axes [m], attitude as of `PosePID` [1],
+    x = (b - b_d, e_R, nu - R^T v_d, Omega - R^T R_d Omega_d): position in inertial axes [m], attitude as in `PosePID` [1],
     velocity over ground [m/s] and angular velocity [rad/s] in body axes.
 
     Args:

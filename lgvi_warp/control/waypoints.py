@@ -30,33 +30,37 @@ OF_POINTS = ("times", *CIRCLES)
 class Waypoints(Guidance):
     """Waypoints joined by straight legs; the heading follows by line of sight (Fossen 2021, 12.3-12.5).
 
-    With y the way to starboard off the leg and D the look-ahead, the wanted heading is the leg's less
+    With y the distance to starboard of the leg and D the look-ahead, the wanted heading is that of the leg minus
     "los": atan(y / D);
     "ilos": atan((y + kappa J) / D), where J gains D y / (D^2 + (y + kappa J)^2) a second (Borhaug, Pavlov & Pettersen 2008);
     "alos": beta + atan(y / D), where the estimate beta of the crab angle gains gamma D y / sqrt(D^2 + y^2) a second (Fossen &
-    Aguiar 2024). Wanted depth and position are those of the leg abeam of the vehicle. A leg is done within the radius of its
-    end, or abeam of it; then the next one is sailed.
+    Aguiar 2024).
+
+    Wanted depth and position are those of the point of the leg abeam of the vehicle. A leg is done when the vehicle is within
+    the radius of its end, or abeam of it.
 
     Args:
-        points: The points, (k, 3) [m], inertial axes: at least two, each at another place of the map than the one before.
+        points: The points, (k, 3) [m], inertial axes: at least two; neighbours must differ in north or east.
         geodetic: The points as latitude, longitude [deg, WGS 84] and depth [m], (k, 3), in place of `points`; the scene's
             environment must have an origin. Legs are straight in the plane of its axes. `points` vary, not `geodetic`.
-        speed: Wanted speed ahead through the water [m/s]; with `times` the largest one.
+        speed: Wanted speed ahead through the water [m/s]; with `times` the largest speed.
         look_ahead: D [m].
         radius: Radius of acceptance [m], horizontal.
         method: "los", "ilos" or "alos"; by default "los".
         kappa: Gain of "ilos" [1/s]; 0.1 by default.
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
-        at_end: At the last point "stop", the default: heading of the last leg, speed 0, the point itself as wanted position;
-            "go_on": along the last leg, beyond its end; or "loiter": round a circle about it.
-        times: When to be at each point, (k,) [s], rising. Before the first of them the speed is 0. By default whenever it is.
+        at_end: Behaviour at the last point: "stop", the default: heading of the last leg, speed 0, the point as wanted
+            position; "go_on": along the last leg beyond its end; or "loiter": on a circle about the point.
+        times: Arrival time at each point, (k,) [s], rising. Before the first time the speed is 0. By default there are no
+            times.
         loiter_radius: Radius [m] of the circles about points.
-        loiter_turns: Turns about each point, (k,), that of the first 0; by default none.
-        loiter_time: Least time on the circle about each point, (k,) [s], that of the first 0; by default none.
+        loiter_turns: Number of turns about each point, (k,), 0 at the first; by default none.
+        loiter_time: Least time on the circle about each point, (k,) [s], 0 at the first; by default none.
         clockwise: Whether circles go clockwise as seen from above; by default True.
 
     Raises:
-        SceneError: Where points are no way, times do not rise, circles have no radius, or a radius no circle; and as `Term`.
+        SceneError: If the points do not form a path, times do not rise, or only one of circles and their radius is given;
+            or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

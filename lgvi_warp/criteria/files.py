@@ -146,7 +146,7 @@ class Saved(ABC):
             Path of the file.
 
         Raises:
-            OSError: where it cannot be written.
+            OSError: if it cannot be written.
         """
         return write_csv(list(self.rows()), path)
 
@@ -161,7 +161,7 @@ class Saved(ABC):
             Paths of the files.
 
         Raises:
-            OSError: where they cannot be written.
+            OSError: if they cannot be written.
         """
         target = path_of("folder", folder)
         name = self.study if among(name, ("",)) else str(path_of("name", name))
@@ -201,8 +201,8 @@ class Saved(ABC):
             What the study found.
 
         Raises:
-            OSError: where the file cannot be read.
-            SceneError: where it is no regular file, is damaged, or of another version.
+            OSError: if the file cannot be read.
+            SceneError: if it is no regular file, is damaged, or of another version.
         """
         own = f"{cls.study}.json" if hasattr(cls, "study") else ""
         if own and (folder := path_of("path", path)).is_dir() and folder.name != own:

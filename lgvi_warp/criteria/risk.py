@@ -18,7 +18,7 @@ class CVaR:
     """The mean of the worst part of the members (Rockafellar & Uryasev 2000).
 
     Args:
-        share: The part, in (0, 1]; 0.05 for the worst 5 %. Where it ends within a member, that member counts in part.
+        share: The part, in (0, 1]; 0.05 for the worst 5 %. If its end falls within a member, that member counts in part.
 
     Raises:
         SceneError: If the share is not in (0, 1].

@@ -310,7 +310,7 @@ def _nested(
 ) -> list[tuple[tuple[str, ...], Any, bool]]:
     """The numbers of a group as parts of the kernel's struct, which holds those of the first law, and the rest.
 
-    bounded: as of `_bounded`. places: for each law where its rows are, as fields of its own, and its bounds.
+    bounded: as in `_bounded`. places: for each law where its rows are, as fields of its own, and its bounds.
     """
     parts: list[tuple[tuple[str, ...], Any, bool]] = []
     each = zip(group.packed, group.shared, bounded, places, strict=True)

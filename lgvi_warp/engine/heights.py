@@ -51,7 +51,7 @@ class Heights:
         self._height = np.fmax(self._height, np.where(self._above, -np.inf, -np.fmin.reduce(depth, axis=0)))
 
     def added(self, bits: np.ndarray, step: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Add the warning of members that rose too high; arrays (m,) each, as of `Warnings`."""
+        """Add the warning of members that rose too high; arrays (m,) each, as in `Warnings`."""
         high = self._height > self._limit
         if not high.any():
             return bits, step, value

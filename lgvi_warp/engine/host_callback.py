@@ -22,10 +22,10 @@ class CallbackInput:
         velocity: Velocities (m, 3) [m/s]: measured over ground in body axes; wanted in inertial axes.
         angular_velocity: Angular velocities (m, 3) [rad/s], body axes.
         heading: Headings (m,) [rad].
-        water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None, the default, of what is wanted.
-        speed: Wanted speed ahead (m,) [m/s]; None, the default, of what is measured.
-        angular_acceleration: Wanted angular accelerations (m, 3) [rad/s^2], axes of the wanted attitude; None, the default, of
-            what is measured.
+        water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None, the default, in wanted values.
+        speed: Wanted speed ahead (m,) [m/s]; None, the default, in measured values.
+        angular_acceleration: Wanted angular accelerations (m, 3) [rad/s^2], axes of the wanted attitude; None, the default,
+            in measured values.
     """
 
     position: np.ndarray

@@ -258,7 +258,7 @@ suitable: set[tuple[type, str]] = set()
 
 
 def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) -> Any:
-    """The module of a term's device code, checked for what a kernel needs of it; built_in: as of `choose_kernel`."""
+    """The module of a term's device code, checked for what a kernel needs of it; built_in: as in `choose_kernel`."""
     folder, roles = _folder_and_roles(term)
     page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
     module = built_in(folder, device) if isinstance(device, str) else device
@@ -316,7 +316,7 @@ def with_tables(part: Any, module: Any) -> Any:
 
 @functools.cache
 def _tabled(module: Any, lanes: Any, fields: tuple[tuple[str, int, str], ...]) -> Any:
-    """As `with_tables`; cached, since the device code of a kernel is its key. lanes: as of `Term.lanes`."""
+    """As `with_tables`; cached, since the device code of a kernel is its key. lanes: as in `Term.lanes`."""
     # Where a scene has tables, here: other runs do without this code.
     from lgvi_kernels.laws.control.gain_table import tabled
     from lgvi_kernels.maps.compose import numbers_struct

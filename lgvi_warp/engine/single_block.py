@@ -56,7 +56,7 @@ def _advanced(
     """Samples of all members, and their packets at the end."""
     n = plan.ensemble.members
     block = Block(0, n)
-    # As of `run_block`.
+    # As in `run_block`.
     with np.errstate(invalid="ignore", over="ignore"):
         members = plan.ensemble.select(0, n)
         plan.check_block(block, members)

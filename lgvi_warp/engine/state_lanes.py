@@ -28,7 +28,7 @@ FEW = 256
 class StateLanes(Lanes):
     """The states of a block's members, (packets, fields of a state) of lanes.
 
-    kernel: as of `kernel_for`. peaks: per packet and lane, what of the starts is looked at for warnings (see PEAKS);
+    kernel: as in `kernel_for`. peaks: per packet and lane, what of the starts is looked at for warnings (see PEAKS);
         None where the twin wrote the states.
     """
 

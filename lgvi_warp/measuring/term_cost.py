@@ -32,8 +32,8 @@ def term_cost(
 ) -> list[dict[str, Any]]:
     """Measure the cost of a step without terms, with each term of a scene alone, and with all of them.
 
-    The scenes take turns. Costs are processor time of the thread that runs the kernel, the least of several readings. What
-    steers the vehicle, and what ends a run, is left out. Each kernel is compiled once, which takes some seconds.
+    The scenes take turns. Costs are processor time of the thread that runs the kernel, the least of several readings.
+    Controllers and events are left out. Each kernel is compiled once, which takes some seconds.
 
     Args:
         scene: The scene.
@@ -76,7 +76,7 @@ def plans_of_terms(
 ) -> dict[str, Plan]:
     """Plan ten steps of a scene without terms, with each alone and with all, by the method that the whole scene runs by.
 
-    What steers the vehicle, and what ends a run, is left out.
+    Controllers and events are left out.
     """
 
     def plan_of(terms: tuple[Term, ...], method: str | Method | None) -> Plan:

@@ -166,8 +166,8 @@ class Method(Summarized, Documented):
         solver: Solver of equation (24): "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or
             "moser_veselov" (explicit).
         iterations: Newton steps, or fixed-point iterations, of every solve, 0 to 100. None (default) iterates each vehicle
-            to the tolerance. "auto" finds out before the run how many serve every member's start at twice the step; a solve
-            that needs more later gives its member the status NOT_CONVERGED.
+            to the tolerance. "auto" determines before the run how many suffice for every member's start at twice the step;
+            a solve that needs more later gives its member the status NOT_CONVERGED.
         tolerance: Relative residual of equation (24) above which a solve has not converged, between 0 and 1. Default:
             1e-14 in float64 and 1e-6 in float32; 1e-12 and 1e-5 for a fixed number of iterations.
         alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; default 0.5.
@@ -175,10 +175,10 @@ class Method(Summarized, Documented):
         beta: The same for nonconservative torques, equation (16).
         rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8; default None, a fixed step. The error estimated
             for each step stays below atol + rtol |y|, in the mean square over y = (b, R, p, pi), momenta divided by the
-            largest J. The worst vehicle of a packet decides. The run's step is then the longest one, and the grid of samples,
-            events and statuses.
+            largest J. The vehicle with the largest error sets the step of its packet. The run's `h` is then the longest
+            step, and the grid of samples, events and statuses.
         atol: Absolute tolerance of the step control; give both or none.
-        reason: Why it was chosen where no one named it; for the summary and the provenance. Default "".
+        reason: Reason of an automatic choice, for the summary and the provenance. Default "".
 
     Attributes:
         order: Order of convergence in the step.

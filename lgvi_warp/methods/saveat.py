@@ -24,14 +24,15 @@ class SaveAt:
 
     Args:
         every: Interval of samples [s], from the start on; default None, the end only.
-        at: Rising times of samples [s], >= 0, in any sequence; default None. Give `every` or `at`, not both. Times are
-            whole numbers of steps within 1e-9 of a step, or within the precision of float32 where they are of float32.
+        at: Rising times of samples [s], >= 0, in any sequence; default None. Give `every` or `at`, not both. Each time must
+            be a whole number of steps, to within 1e-9 of a step, or to the precision of float32 for times in float32.
         fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. A field that is left out
             takes no memory. In a scene with a controller also its signals: "command", "actuator", "demand", "unmet",
             "exerted", "measured_..." and "reference_..." (see lw.Result); in one with a term `lw.terms.EnergyUse` also
             "energy_used".
-        final: Whether `result.final` is kept, from which a run can go on: the states at the end, and what forces, actuators
-            and controllers remember. Default: where the samples of all members are kept, of fewer than 100,000.
+        final: Whether to keep `result.final`, from which a run can be continued: the states at the end, and the memory of
+            forces, actuators and controllers. Default: True if the samples of all members are kept and there are fewer than
+            100,000.
 
     Raises:
         SceneError: A setting is wrong; the message names every fault.

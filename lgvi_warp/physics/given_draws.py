@@ -111,7 +111,7 @@ class DrawLayout:
             Its draws, in the order of their columns.
 
         Raises:
-            SceneError: Where it has none: it draws for some member by numbers that were not said to vary.
+            SceneError: If it has none: it draws for some member by numbers that were not said to vary.
         """
         if key not in self._by_key:
             remedy = "name what varies of it: prepare(scene, vary=[...], draws='given')"

@@ -61,7 +61,7 @@ def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
 def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
     """Mass matrices (n, 6, 6) about another origin and in other axes.
 
-    I6: (n, 6, 6) about the user's origin, in his axes. origin: (n, 3) [m]. Q: (n, 3, 3), as of `motion_from`.
+    I6: (n, 6, 6) about the user's origin, in his axes. origin: (n, 3) [m]. Q: (n, 3, 3), as in `motion_from`.
     """
     X = motion_from(origin, Q)
     return np.swapaxes(X, -1, -2) @ I6 @ X
@@ -270,7 +270,7 @@ def nearest_axes(Q: np.ndarray, like: np.ndarray, ordered: bool) -> np.ndarray:
 
 
 def in_order(frame: Frame, P: np.ndarray) -> Frame:
-    """The same frame with its axes in another order and sense; P: as of `nearest_axes`."""
+    """The same frame with its axes in another order and sense; P: as in `nearest_axes`."""
     order = np.abs(P).argmax(axis=1)
     M, E, E_forces = (in_axes(P, each) if each.any() else each for each in (frame.M, frame.E, frame.E_forces))
     return replace(frame, Q=frame.Q @ P, J=np.take_along_axis(frame.J, order, axis=1), M=M, E=E, E_forces=E_forces)

@@ -23,7 +23,7 @@ class Shape:
             scene file it is relative to the file's folder, and must lie within it.
 
     Raises:
-        SceneError: Where neither or both are given, or a number is not positive. The message lists every fault.
+        SceneError: If neither or both are given, or a number is not positive. The message lists every fault.
     """
 
     length: float | None = positive(None, unit="m")

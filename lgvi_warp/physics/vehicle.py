@@ -47,8 +47,8 @@ class Vehicle(Summarized):
     """A rigid body in water, in body axes (x ahead, y to starboard, z down), described in one of two forms.
 
     The simple form is about the centre of gravity: `mass`, `inertia`, `added_mass`. The 6x6 form is about any origin of the
-    body: `rigid_body_mass_matrix`, `added_mass_matrix`, `weight`, `center_of_gravity`. Matrices are stored in full. All but
-    `mass` are given by name: three numbers of inertia look like three of added mass.
+    body: `rigid_body_mass_matrix`, `added_mass_matrix`, `weight`, `center_of_gravity`. Matrices are stored in full. All
+    arguments but `mass` are keyword-only, since inertia and added mass look alike.
 
     Args:
         mass: Dry mass [kg]. Simple form.
@@ -62,9 +62,9 @@ class Vehicle(Summarized):
         weight: Weight [N]; by default mass times gravity. 6x6 form.
         center_of_gravity: Where the weight acts, (3,) [m] from the origin; by default where the rigid body's matrix has it.
             6x6 form.
-        inertia_tolerance: The fraction of the largest principal inertia by which the other two may sum to less than it, in
-            the 6x6 form. With 0, the default, a matrix that no rigid body has is refused; importers set it for published
-            numbers.
+        inertia_tolerance: Allowed violation of the triangle inequality of the principal inertias, as a fraction of the
+            largest one, in the 6x6 form. With 0, the default, a matrix that no rigid body has is refused; importers set it
+            for published numbers.
         warnings: Texts about what is unusual but allowed, as importers give them. The vehicle adds what it finds itself;
             all are among the messages of a run.
         shape: How the vehicle is drawn, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
@@ -72,7 +72,7 @@ class Vehicle(Summarized):
         title: What the vehicle is called in summaries and reports; by default the name of a vehicle of the package.
 
     Raises:
-        SceneError: Where a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
+        SceneError: If a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
             The message lists every fault.
 
     Examples:

@@ -70,13 +70,13 @@ class Result(Summarized):
         time: Times of the samples [s], shape (k,).
         samples: Arrays of the fields that were kept, by name. Each is also an attribute: position (k, n, 3) [m, inertial],
             attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
-            Signals of a controller, where SaveAt(fields=...) names them, are those after the look at each time: command and
-            actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand, unmet and
-            exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
+            Signals of a controller, if SaveAt(fields=...) names them, are the values after the tick at each time: command
+            and actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand, unmet and exerted
+            (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
             _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed. Of a
-            filter (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k, n, 6), nees, nis, nis_count
-            (k, n), innovation and innovation_sigma (k, n, 12). So are energy_used (k, n) [J], of a scene that accounts it, and
-            navigation_error (k, n, 3) [m, inertial], of one that estimates the position.
+            filter (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k, n, 6), nees, nis,
+            nis_count (k, n), innovation and innovation_sigma (k, n, 12). So are energy_used (k, n) [J], of a scene that
+            accounts it, and navigation_error (k, n, 3) [m, inertial], of one that estimates the position.
         status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
         failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN where there
             was neither.
@@ -90,7 +90,7 @@ class Result(Summarized):
         event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None where `status` tells.
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
         starts: Numbers of the start that varied, by name, (n, ...): "start.position", "start.euler_deg", ...
-        weights: What each member counts for in statistics, (n,), of mean 1 (see lw.designs.Table); None: all alike.
+        weights: Statistical weights of the members, (n,), of mean 1 (see lw.designs.Table); None: equal weights.
         messages: Remarks on how far the result can be relied on.
         provenance: Scene, ensemble with its seed, settings, versions and machine.
         terms: The scene's terms.
@@ -101,7 +101,7 @@ class Result(Summarized):
         jacobian: Derivatives of the samples by the numbers in `tangents`, by name, each of the samples' shape and one
             dimension more: (k, n, ..., tangents); NaN from where a member ended. Empty without `tangents`.
         tangents: Names of these numbers, as `solve(tangents=...)` got them.
-        end: What `final` returns, or a function without arguments that reads it; None where it was not kept.
+        end: Value of `final`, or a function without arguments that reads it; None if it was not kept.
         compile_seconds: Time to load the kernel [s].
         compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
         run_seconds: Time of the run without that [s].

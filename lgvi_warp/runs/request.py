@@ -135,7 +135,7 @@ class Request:
     def plan(self, survey_all: bool = True) -> Plan:
         """Settle the run: its steps, its method and its kernel.
 
-        survey_all: as of `choose_plan`.
+        survey_all: as in `choose_plan`.
         """
         if self.device is not None:
             check_device(self.device)
@@ -160,7 +160,7 @@ class Request:
 
         plan: the plan of this request. Where a member beyond those that were looked at needs another kernel, the run begins
             anew with a kernel for all members, so that they have the bits of one kernel.
-        settings: as of `run_plan`.
+        settings: as in `run_plan`.
         """
         settings = {"observed": self.observed, "fields": self.saved, "executor": self.executor, **settings}
         try:

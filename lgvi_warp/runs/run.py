@@ -33,7 +33,7 @@ from lgvi_warp.sampling.final import Final
 from lgvi_warp.scene import plausibility
 from lgvi_warp.statistics.estimates.estimate import Estimates
 
-# Function from a plan to its provenance, as of `provenance_but_scene`, and messages.
+# Function from a plan to its provenance, as in `provenance_but_scene`, and messages.
 Known = Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]]
 
 

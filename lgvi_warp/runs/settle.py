@@ -11,5 +11,5 @@ from lgvi_warp.scene.ensemble import Ensemble
 
 
 def make_plan(fleet: Ensemble, *arguments: Any, survey_all: bool = True, **settings: Any) -> Plan:
-    """Settle the settings of a run, as of `Request`."""
+    """Settle the settings of a run, as in `Request`."""
     return Request(fleet, *arguments, **settings).plan(survey_all)

@@ -30,9 +30,9 @@ MOST_DRIFT = 0.1
 class Final(Summarized):
     """Final states of n members of a run, and the memory of forces, actuators and controllers.
 
-    A run that goes on from it with the same scene, members and settings has the bits of one run: `lw.solve(..., start=final)`,
-    `lw.prepare(...).states(final)`. With other settings or other numbers of the members it goes on from the states, with what
-    is remembered; so it does after `changed`.
+    A run that continues from it with the same scene, members and settings equals one run, to the bit: `lw.solve(...,
+    start=final)`, `lw.prepare(...).states(final)`. With other settings or other numbers of the members it continues from
+    the states and the memory; the same holds after `changed`.
 
     Attributes:
         time: Time [s], counted from t = 0 of the first run.
@@ -177,7 +177,7 @@ class Final(Summarized):
         """Read an end from arrays.
 
         Args:
-            arrays: Arrays by name, as of `to_arrays`; others are ignored.
+            arrays: Arrays by name, as in `to_arrays`; others are ignored.
             numbers: time, step, steps, seed and settings.
             parameters: Parameters of the members by name.
 

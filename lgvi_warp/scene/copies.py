@@ -37,7 +37,7 @@ STEP, LEAST_PART = 2e-3, 1e-2
 class Copies:
     """The shifted copies of an ensemble's members.
 
-    targets: the numbers, in order. ensemble: each member, then its copies. steps: (members, targets), as of `Shifted`.
+    targets: the numbers, in order. ensemble: each member, then its copies. steps: (members, targets), as in `Shifted`.
     surveyed: the copies by which the kernel is chosen, where it is to serve other numbers too; else those of `ensemble`.
     """
 

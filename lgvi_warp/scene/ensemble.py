@@ -60,7 +60,7 @@ class Ensemble(Summarized, Documented):
 
     Attributes:
         indices: Indices of these members in the whole ensemble, (members,).
-        final: Where they ended in the run that they go on from; None where they start.
+        final: Final states of the run that these members continue; None for members that start at t = 0.
         replicates: Number of independent replicates of the sampling.
 
     Methods:
@@ -68,13 +68,13 @@ class Ensemble(Summarized, Documented):
         numbers: All numbers of some members, those of the start too.
         starts: Numbers of the start that vary, of some members.
         levels: Levels in (0, 1) from which distributions draw.
-        weights: What some members count for in statistics.
+        weights: Statistical weights of some members.
         select: Parameters and initial states of some members.
         varied: Names of the parameters that vary.
         member: One member as an ensemble of its own.
         subset: Some members as an ensemble of their own.
         with_seed: Members drawn from the same distributions by another seed.
-        going_on: These members as they go on from the end of a run.
+        going_on: These members, continued from the end of a run.
         from_scene: The ensemble that a scene file describes.
         from_states: An ensemble of given states and parameters.
         to_dict: The section [ensemble] of a scene file.

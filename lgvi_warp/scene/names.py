@@ -45,7 +45,7 @@ def by_key(scene: Any, name: str) -> str:
 
 
 def all_by_key(argument: str, scene: Any, values: Mapping[str, Value]) -> dict[str, Value]:
-    """The values by names as of `by_key`. Raises SceneError if two names are of the same number."""
+    """The values by names as in `by_key`. Raises SceneError if two names are of the same number."""
     keyed: dict[str, Value] = {}
     for name, value in values.items():
         key = by_key(scene, name)

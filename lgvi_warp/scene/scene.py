@@ -251,7 +251,7 @@ class Scene(Summarized):
 
         Args:
             path: Path of the file; "example:NAME" for one that comes with the package (`lgvi-warp example` lists them).
-            overrides: Values that replace those of the file, by key ("run.step") or by name as of `with_numbers`
+            overrides: Values that replace those of the file, by key ("run.step") or by name as in `with_numbers`
                 ("heading_pid.kp", "current.velocity[0]"); by default none.
 
         Returns:

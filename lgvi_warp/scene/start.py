@@ -105,7 +105,7 @@ class Environment:
             Positions (..., 3) [m], inertial axes (north, east, down).
 
         Raises:
-            SceneError: Where there is no origin, or a latitude is beyond 90 degrees.
+            SceneError: If there is no origin, or a latitude is beyond 90 degrees.
             ImportError: If pyproj is not installed.
         """
         remedy = "give latitude, longitude and depth of each"
@@ -122,7 +122,7 @@ class Environment:
             farther than the other side of the Earth.
 
         Raises:
-            SceneError: Where there is no origin.
+            SceneError: If there is no origin.
             ImportError: If pyproj is not installed.
         """
         plane = self.plane
@@ -283,7 +283,7 @@ class Start:
             The start that knows its position: a copy, or this one where it has no place on the Earth.
 
         Raises:
-            SceneError: Where the environment has no origin, or a latitude is beyond 90 degrees.
+            SceneError: If the environment has no origin, or a latitude is beyond 90 degrees.
         """
         if self.geodetic is None:
             return self

@@ -27,8 +27,8 @@ HATS = notation.hat(np.eye(3)) + 0.0
 class CircularMean(Statistic):
     """Mean direction of angles [rad], with the resultant length.
 
-    Intervals: normal theory (delta method from the covariance of cosine and sine); the whole circle where the resultant
-    is not clear of 0. For the length it is the interval of the logarithm of 1 less the length, as for a variance (see
+    Intervals: normal theory (delta method from the covariance of cosine and sine); the whole circle if the resultant is not
+    significantly above 0. For the length it is the interval of the logarithm of 1 less the length, as for a variance (see
     Covariance); with two members it is 0 to 1.
 
     Arrays of the estimate, beside lower, upper and count (k,):

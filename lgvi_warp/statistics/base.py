@@ -104,9 +104,9 @@ class Statistic(Documented):
             (see lw.statistics.Quantity).
         name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
         confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
-        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
-            By default None: all sample times.
+        stopped: "held" keeps a member that an event stopped in its last state; "left_out" excludes it from then on.
+        at: An outcome, such as "floor": evaluate only the members with this outcome, in their final state. By default None:
+            all members, at each sample time.
 
     Raises:
         SceneError: with every fault.

@@ -150,8 +150,8 @@ class Covariance(Statistic):
 
     Interval: Student's t (n - 2) with the standard error from the members' own fourth moments (delta method), which
     does not assume normal members. For a variance it is the interval of its logarithm, which is nearer to normal.
-    Fourth moments of few members are biased towards small values: the amount that normal members would lack is added, a
-    term of order 1 / n (Bonett 2006 for variances). With two members the interval is infinite.
+    Fourth moments of few members are biased towards small values: the bias of normal members is corrected, a term of order
+    1 / n (Bonett 2006 for variances). With two members the interval is infinite.
 
     Arrays of the estimate, beside lower, upper and count (k,):
 

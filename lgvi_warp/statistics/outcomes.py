@@ -93,18 +93,18 @@ def _endings(values: Values) -> Part:
 class Outcome(OfEnds):
     """Probability that a member has ended by an outcome by each time.
 
-    The probability is Aalen & Johansen's estimate (1978), the cumulative incidence: a member that another event stopped
-    does not end so any more; one that fails counts until then (it is censored), unless the outcome is a failure. If none
-    fails, it is the fraction of all members. The probabilities of all events and of "ok", which comes at the end of the
-    run, have the sum 1. Interval: Wilson's with the number of members whose fraction has the variance of a Dirichlet
+    The probability is Aalen & Johansen's estimate (1978), the cumulative incidence: a member that another event stopped can
+    no longer have this outcome. A member that fails counts until then (it is censored), unless the outcome is a failure. If
+    none fails, it is the fraction of all members. The probabilities of all events and of "ok", which comes at the end of
+    the run, have the sum 1. Interval: Wilson's with the number of members whose fraction has the variance of a Dirichlet
     product: that of all members if none fails. Times are those of the events, not of samples.
 
     Arrays of the estimate, beside lower and upper:
 
     * value (k,): the probability; survival is 1 - value.
-    * alone (k,): Kaplan & Meier's estimate (1958), in which other events censor too: the probability if nothing else
-      stopped members, provided that those that it stopped would have gone on like the others: this no run can show, and
-      rarely holds (what surfaces does not sink); alone_lower, alone_upper.
+    * alone (k,): Kaplan & Meier's estimate (1958), in which other events censor too: the probability if no other event
+        stopped members. It assumes that the stopped members would have continued like the others, which no run can show and
+        which rarely holds (a vehicle that surfaces does not sink); alone_lower, alone_upper.
     * fraction (k,): members that have ended by the outcome, as a fraction of all members, including those that failed;
       fraction_lower, fraction_upper: Wilson's interval.
     * ended, otherwise, failed (k,): number of members that have ended by the outcome, otherwise, and of the latter by a
@@ -283,13 +283,14 @@ def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarra
 class EndTime(OfEnds, MemberStatistic):
     """Statistics of the time [s] at which members ended by an outcome, over the members that did.
 
-    Members that end otherwise, or not before the run does, are left out; Outcome takes them into account.
+    Members that end by another outcome, or reach the end of the run, are left out; Outcome takes them into account.
 
     Args:
         of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
             any).
         name: Key of the estimate in the result; by default the type and the outcome, as in "outcome floor".
-        then: a statistic, or a list, without `of`; by default the mean, quantiles and a histogram of 20 bins over the
+        then: statistic of these times over the members, or a list, each without its `of`; by default the mean, quantiles
+            and a histogram of 20 bins over the
             run: "mean end_time floor", "quantiles end_time floor", "histogram end_time floor".
     """
 

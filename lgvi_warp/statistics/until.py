@@ -33,9 +33,9 @@ def _time_or_all(faults: Faults, key: str, value: Any) -> Any:
 class Until:
     """Run blocks of members until a statistic's interval is narrow enough, at most all members of the ensemble.
 
-    The run stops at the end of a block. Intervals are looked at in the order of the blocks, so that neither the number
-    of members nor any bit depends on threads; with replicates of a design, at powers of two of members.
-    docs/guide/statistics_accuracy.md has the effect of stopping on coverage.
+    The run stops at the end of a block. Intervals are checked in the order of the blocks, so that neither the number of
+    members nor any bit depends on threads; with replicates of a design, at powers of two of members.
+    docs/guide/statistics_accuracy.md gives the effect of stopping on coverage.
 
     Args:
         statistic: the name of one of the run's statistics as the command prints it: "mean position"; one component,

@@ -58,9 +58,8 @@ def export(
 
     ".csv" and ".parquet": a table with a row for each member and time of the samples, else for each member. ".nc": NetCDF-4
     with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and transforms in the
-    axes of ROS. docs/guide/exports.md has their columns, names, units and axes. Of a footprint the regions are
-    written, as ".geojson" or ".kml". Of a scene ".fmu" is its vehicle as a unit of the FMI standard
-    (docs/guide/exports.md).
+    axes of ROS. docs/guide/exports.md has their columns, names, units and axes. A footprint is exported as its regions, to
+    ".geojson" or ".kml". A scene is exported to ".fmu": its vehicle as a unit of the FMI standard (docs/guide/exports.md).
 
     Args:
         run: A result, a result.npz, a store, or a folder with one of the two; or what `lw.studies.footprint` returns. For
@@ -72,8 +71,8 @@ def export(
             1,000 at most.
         origin: Latitude and longitude of the axes' origin [deg]; by default that of the run's environment, if it has one.
         start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; by default that of the run's environment.
-        inputs: Of ".fmu" alone: "commands" (default) of the actuators, in place of the scene's laws; or "set_points" of its
-            controller, which then is a part of the unit.
+        inputs: Inputs of an ".fmu": "commands" (default) of the actuators, in place of the scene's laws; or "set_points" of
+            its controller, which is then part of the unit.
         overwrite: Whether to replace a file that exists; by default it is kept, and the export refused.
         progress: Function of the fraction done, or True to show it; by default nothing.
 

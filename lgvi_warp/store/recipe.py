@@ -157,7 +157,7 @@ UNTOLD = (
 
 
 def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """The user's functions that differ between two provenances, as of `differences`; and those that cannot be compared."""
+    """The user's functions that differ between two provenances, as in `differences`; and those that cannot be compared."""
     before, current = stored.get("functions", {}), now.get("functions", {})
     differ, untold = list[tuple[str, str, str]](), list[str]()
     for name in dict.fromkeys([*before, *current]):

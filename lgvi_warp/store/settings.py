@@ -38,7 +38,8 @@ class Store:
         existing: What to do if the folder holds a run already: "refuse" (default), "resume" (continue it, if it is the same
             run) or "overwrite".
         force: Whether to continue on another machine or with other versions, where the bits may differ; default False.
-        chunk_bytes: Size that a chunk has at most, about [bytes]; default 10 MB. Each block at work holds one chunk per field.
+        chunk_bytes: Approximate largest size of a chunk [bytes]; default 10 MB. Each running block holds one chunk per
+            field in memory.
 
     Raises:
         SceneError: If settings are at fault or a library is missing; the message names every fault.

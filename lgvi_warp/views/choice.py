@@ -65,10 +65,10 @@ def of_members(count: int, total: int) -> str:
 def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
     """Choose the members that pictures and recordings show when they draw only some.
 
-    Drawn are the members that reach farthest along each axis; then of those that did not end ok up to a third of the places,
-    shared among the outcomes; then members in the order of a hash of their index. The hash is as fair for grids, tables and
-    Sobol points as for random draws, and the same run always gives the same choice. Times are even, at most 240.
-    Quantiles are taken of all members up to 20,000, and of that many beyond, by the same hash.
+    First come the members that reach farthest along each axis. Up to a third of the places go to members that did not end
+    "ok", shared among the outcomes. The rest follow in the order of a hash of their index. The hash is as fair for grids,
+    tables and Sobol points as for random draws, and the same run always gives the same choice. Times are evenly spaced, at
+    most 240. Quantiles are those of at most 20,000 members, chosen by the same hash.
 
     Args:
         result: A result with positions, in memory or in a store.

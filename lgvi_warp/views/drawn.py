@@ -174,7 +174,7 @@ def _navigation(few: Result, counted: np.ndarray, text: str) -> Iterator[Fan]:
         title = f"Off the estimated place [m] of {text}; orange: as filters believe"
         yield Fan(OFF, title, "m", at_levels(off, counted, LEVELS), believed_sigma(few, counted))
     if "nees" in few.samples:
-        yield Fan("nees", f"NEES, 15 for a right filter, of {text}", "1", at_levels(few.nees, counted, LEVELS))
+        yield Fan("nees", f"NEES, 15 for a consistent filter, of {text}", "1", at_levels(few.nees, counted, LEVELS))
 
 
 def believed_sigma(few: Result, counted: np.ndarray) -> np.ndarray:

@@ -63,6 +63,6 @@ def test_public_docstrings_send_no_reader_to_what_is_not_public():
     sent = {
         (name, word)
         for name, thing in NAMED.items()
-        for word in re.findall(r"(?:[Ss]ee|As of) `([A-Z]\w+)`", inspect.getdoc(thing) or "")
+        for word in re.findall(r"(?:[Ss]ee|As in) `([A-Z]\w+)`", inspect.getdoc(thing) or "")
     }
     assert [(name, word) for name, word in sent if word not in NAMED] == []

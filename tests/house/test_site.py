@@ -57,7 +57,7 @@ class Heir(Base):
 
     Args:
         a, b: Two [m].
-        told: As of `Base`; and more.
+        told: As in `Base`; and more.
 
     Returns:
         silent: no parameter.

@@ -222,7 +222,9 @@ def make_seen(spec, types, method, truth, at_step, opened, notes):
         """Measure and guide; tell laws that look ahead what guidance will want at the next ticks."""
         y, r = seen(x, c, monitor, k, h, opening)
         later = y
-        for j in range(1, wp.static(ticks + 1)):
+        # A number that is no constant: Warp would unroll a short loop, and mix the types of its number.
+        last = int(wp.static(ticks))
+        for j in range(1, last + 1):
             later.t = y.t + real(j) * y.period
             later.step = y.step + j * monitor.every
             later.tick = y.tick + j

@@ -73,7 +73,7 @@ class Axis:
             The axis; what the text leaves out has its default.
 
         Raises:
-            SceneError: where the text is of another form.
+            SceneError: if the text is of another form.
         """
         name, equals, rest = str(text).partition("=")
         faults, words = Faults(), rest.split(":") if equals else []

@@ -293,13 +293,19 @@ def stability_map(
 ) -> StabilityMap:
     """Run a grid of starts by every method, and classify each cell as accurate, bounded, flagged, failed or silent.
 
-    A cell is accurate where its error stays below the bound up to error_time, against a reference of fine steps that two
-    runs agree on ten times better. It is bounded where only energy and rotation stay bounded up to t1: the energy of a
-    conservative scene changes, that of a damped one grows, by less than energy_bound times what the start's momenta can
-    hold as kinetic energy plus what the potentials gave. It is flagged where that holds and a member got a status or a
-    warning; failed where it does not hold and a member got one, or numbers are not finite; silent where it does not hold
-    and no member got one. What drives a scene (wrenches, thrusters, waves) changes its energy by right: there the energy is
-    compared with the reference's, up to error_time or 16 steps. What the scene's ensemble varies is left out.
+    Classes of a cell:
+
+    * accurate: the error stays below the bound up to error_time, against a reference of fine steps on which two runs agree
+      ten times better;
+    * bounded: not accurate, but energy and rotation stay bounded up to t1;
+    * flagged: bounded, and a member got a status or a warning;
+    * failed: unbounded, and a member got a status or a warning; or numbers are not finite;
+    * silent: unbounded, and no member got a status or a warning.
+
+    Energy is bounded if its change (conservative scene) or its growth (damped scene) is less than energy_bound times the sum
+    of the kinetic energy that the start's momenta can hold and the energy that the potentials gave. Wrenches, thrusters and
+    waves change the energy of a scene: there it is compared with the reference's, up to error_time or 16 steps. The scene's
+    [ensemble] is ignored.
 
     Args:
         scene: the scene.

@@ -52,7 +52,7 @@ class Joint:
 
 @dataclass
 class Lump:
-    """Several links as one rigid body, in the axes of its main link and about its origin; units as of `Link`."""
+    """Several links as one rigid body, in the axes of its main link and about its origin; units as in `Link`."""
 
     mass: float
     center: np.ndarray

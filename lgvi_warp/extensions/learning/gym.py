@@ -39,10 +39,10 @@ OfTicks = Callable[..., Any]
 class Vehicles:
     """Vehicles as a vector environment of Gymnasium; one step is one period of the scene's controller.
 
-    An action is what a law demands, or what an actuator is commanded, until the next tick. An observation is what the
-    controller measures, with its sensors' errors, beside what its guidance wants. Vehicles that fail, or that an event of the
-    scene stops, are terminated. Each episode of each environment is another member of the ensemble: with other draws of all
-    that varies. Laws of the scene go on, and the actions are added to their demands.
+    An action is a demand, or a command of an actuator, held until the next tick. An observation has measured values, with
+    the errors of sensors, and wanted values. Vehicles that fail, or that an event of the scene stops, are terminated. Each
+    episode of each environment is another member of the ensemble: with other draws of all that varies. Laws of the scene
+    stay active, and the actions are added to their demands.
 
     `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since all began [s], what is measured and what
     is wanted (`lw.control.CallbackInput`) of m vehicles at once.
@@ -58,8 +58,8 @@ class Vehicles:
         duration: Length of an episode [s], after which it is truncated; default the scene's [run] duration, else without end.
         num_envs: Number of environments; default the members of the ensemble.
         outputs: Which of the demands "X", "Y", "Z", "K", "M", "N" the actions are; all by default.
-        scale: What an action of 1 is, a number or one for each; actions then lie in [-1, 1]. None (default): actions are in N
-            and N m, without bounds; or in the unit of the commands, within their limits.
+        scale: Demand or command of an action of 1, a number or one for each; actions then lie in [-1, 1]. None (default):
+            actions are in N and N m, without bounds; or in the unit of the commands, within their limits.
         instead_of: Keys of laws that the actions stand in for. A `Callback` always gives way. None by default.
         autoreset_mode: gymnasium.vector.AutoresetMode or its value: "NextStep" (default), "SameStep" or "Disabled".
         method: A name or a Method; default that of the scene.
@@ -72,8 +72,8 @@ class Vehicles:
         time: Time since all began [s].
 
     Raises:
-        SceneError: Where anything is wrong; the message lists every fault.
-        MissingExtra: Where Gymnasium is not installed.
+        SceneError: If anything is wrong; the message lists every fault.
+        MissingExtra: If Gymnasium is not installed.
     """
 
     metadata: dict[str, Any]
@@ -241,8 +241,8 @@ class Vehicles:
             (observations of all environments, {}).
 
         Raises:
-            TypeError: Where the seed or the mask is of another type.
-            ValueError: Where the mask has another shape, or is False throughout.
+            TypeError: If the seed or the mask is of another type.
+            ValueError: If the mask has another shape, or is False throughout.
         """
         if seed is not None and not isinstance(seed, int | np.integer):
             raise TypeError(f"seed = {brief(seed)} is not a whole number. Give one for all environments")
@@ -281,7 +281,7 @@ class Vehicles:
             "_status" where vehicles have ended by themselves, and what Gymnasium asks for with autoreset "SameStep".
 
         Raises:
-            ValueError: Where the actions have another shape, or are no real numbers.
+            ValueError: If the actions have another shape, or are no real numbers.
             ResetNeeded: Before the first `reset`; with autoreset "Disabled" where an episode has ended; and after
                 2^31 integration steps, when all environments must be reset.
         """

@@ -29,7 +29,7 @@ def heading_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
 
 
 def attitude_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
-    """e_R = vee(R_d^T R - R^T R_d) / 2, as of `lw.control.PosePID`: (m, 3) [1], body axes."""
+    """e_R = vee(R_d^T R - R^T R_d) / 2, as in `lw.control.PosePID`: (m, 3) [1], body axes."""
     return 0.5 * np.cross(y.attitude, r.attitude).sum(axis=1)
 
 

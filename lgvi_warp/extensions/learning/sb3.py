@@ -33,8 +33,8 @@ def sb3(env: Vehicles) -> Any:
         `reset()` draw by the seed s, one for all. Rewards are float32 (num_envs,).
 
     Raises:
-        SceneError: Where `env` is something else, or its actions have no bounds.
-        MissingExtra: Where Stable-Baselines3 is not installed.
+        SceneError: If `env` is something else, or its actions have no bounds.
+        MissingExtra: If Stable-Baselines3 is not installed.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -75,7 +75,7 @@ class Baselines:
             Their first observations (num_envs, k).
 
         Raises:
-            ValueError: Where options were set, of which there are none.
+            ValueError: If options were set, of which there are none.
         """
         if any(self._options):
             raise ValueError(f"options = {self._options[0]}: there are none to set. Vary the ensemble")
@@ -153,7 +153,7 @@ class Baselines:
             indices: All environments; None, the default, says so.
 
         Raises:
-            ValueError: Where only some environments are named.
+            ValueError: If only some environments are named.
         """
         if set(self._chosen(indices)) != set(range(self.num_envs)):
             raise ValueError(f"indices = {indices}: all environments share their attributes. Leave it out")

@@ -18,13 +18,13 @@ NEEDED = ("nees", "nis", "nis_count")
 
 
 class TimeAverage(NamedTuple):
-    """The mean over all members and times, beside that of a right filter.
+    """The mean over all members and times, beside that of a consistent filter.
 
     Attributes:
         mean: That mean; NaN where there is nothing to average.
-        degrees: Degrees of freedom of one value, the mean of a right filter times their number.
+        degrees: Degrees of freedom of one value, the mean of a consistent filter times their number.
         effective: How many independent values the mean is worth.
-        p: Probability of a mean as far off, either way, for a right filter; NaN without a mean.
+        p: Probability of a mean as far off, either way, for a consistent filter; NaN without a mean.
     """
 
     mean: float
@@ -40,13 +40,15 @@ class Consistency(Summarized):
     Attributes:
         time: Times of the samples (k,) [s].
         members: Members that were still under way (k,).
-        nees: Mean over the members of e^T P^-1 e, 15 for a right filter (k,); NaN where a filter's covariance lost its digits.
+        nees: Mean over the members of e^T P^-1 e, 15 for a consistent filter (k,); NaN where a filter's covariance lost its
+            digits.
         nees_band: Lower and upper end of its band (k, 2).
-        nis: Sum of squared innovations over their variances, by their number, 1 for a right filter (k,); NaN where none was.
+        nis: Sum of squared innovations over their variances, by their number, 1 for a consistent filter (k,); NaN where
+            none was.
         nis_band: Lower and upper end of its band (k, 2); NaN where none was.
         level: Probability of each band.
         nees_average: Test of the mean of NEES over members and times, with its effective sample size and its p-value.
-        nis_average: The same of NIS, whose innovations are independent of one another for a right filter.
+        nis_average: The same of NIS, whose innovations are independent of one another for a consistent filter.
     """
 
     time: np.ndarray
@@ -125,9 +127,10 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
     degrees of freedom, and the squared innovations over their variances (NIS) have one each, if the model is linear and the
     noise is normal; members are independent, so sums over them have as many times these. Bar-Shalom, Li & Kirubarajan (2001),
     *Estimation with Applications to Tracking and Navigation*, section 5.4. Errors of one member at two times are not
-    independent: one ensemble may be outside its NEES band for long, by chance, so that the share of the times in the band is
-    no verdict. The mean over all times is one: its effective sample size is the number of values over 1 + 2 sum of their
-    correlations from one time to later ones, and that many values of a right filter have the sum of chi-square.
+    independent: one ensemble may be outside its NEES band for long, by chance, so that the share of the times in the band
+    is no test. The mean over all times is a test: its effective sample size is the number of values over 1 + 2 times
+    the sum of their autocorrelations, and the sum of that many values of a consistent filter has a chi-square
+    distribution.
 
     Args:
         result: Result of a run with an `lw.control.ErrorStateFilter` that saved "nees", "nis" and "nis_count".
@@ -137,7 +140,7 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
         The means and their bands, by time, and the tests of the means over all times.
 
     Raises:
-        SceneError: Where the result lacks these samples, or the level is not in (0, 1).
+        SceneError: If the result lacks these samples, or the level is not in (0, 1).
 
     Examples:
         >>> import lgvi_warp as lw

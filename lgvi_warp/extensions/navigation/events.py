@@ -20,14 +20,14 @@ class PositionUncertain(Event):
     """Stop a member at the tick at which its filter knows the position less well than a limit.
 
     The standard deviation of the position is sqrt(s_n^2 + s_e^2 + s_d^2), of the first three numbers of the signal
-    "estimate_sigma". The member needs no such signal: a filter with `report = false` stops it, too.
+    "estimate_sigma". The signal need not be kept: a filter with `report = false` works, too.
 
     Args:
         sigma: Limit of the standard deviation of the position [m].
         filter: Name of the filter, an `lw.control.ErrorStateFilter`; "error_state_filter" by default.
 
     Raises:
-        SceneError: As a scene is built that has no such filter; and as `Term`.
+        SceneError: When a scene is built that has no such filter; or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

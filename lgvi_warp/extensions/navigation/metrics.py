@@ -26,14 +26,15 @@ class OfFilter(Metric):
 
 @dataclass(frozen=True, eq=False)
 class NEES(OfFilter):
-    """The mean over a member's ticks of e^T P^-1 e, its filter's squared error by the truth; then statistics of it.
+    """The mean over a member's ticks of e^T P^-1 e, its filter's squared error by the truth; then statistics over members.
 
-    It is 15 on average for a right filter, which has 15 states. Errors of one member at two ticks are not independent: use
-    `lw.metrics.consistency` for a test over members. It needs a filter that reports.
+    It is 15 on average for a consistent filter, which has 15 states. Errors of one member at two ticks are not independent:
+    use `lw.metrics.consistency` for a test over members. The filter needs report=True.
 
     Args:
         of: "nees", the default.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        then: Statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(), the
+            default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "nees"
@@ -55,14 +56,15 @@ class NEES(OfFilter):
 
 @dataclass(frozen=True, eq=False)
 class NIS(NEES):
-    """The mean over all readings that a member's filter took of innovation^2 over its variance; then statistics of it.
+    """Mean over all readings that a member's filter took of innovation^2 over its variance; then statistics over members.
 
-    It is 1 on average for a right filter, and NaN for one that took none. Unlike `NEES` it needs no truth: a vehicle at sea
-    can tell it. It needs a filter that reports.
+    It is 1 on average for a consistent filter, and NaN for one that took none. Unlike `NEES` it needs no truth: a vehicle
+    at sea can compute it. The filter needs report=True.
 
     Args:
         of: "nis", the default.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        then: Statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(), the
+            default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "nis"
@@ -78,14 +80,15 @@ class NIS(NEES):
 
 @dataclass(frozen=True, eq=False)
 class Rejected(OfFilter):
-    """The number of readings that the gate of a member's filter has rejected until the end; then statistics of it.
+    """The number of readings that the gate of a member's filter has rejected by the end; then statistics over members.
 
-    Each number of a reading counts, a beam or a coordinate of a fix, of all sensors together; the signal "rejected" has the
-    counts by sensor. It needs a filter with a gate that reports.
+    Every number of a reading counts separately, such as a beam or a coordinate of a fix, summed over all sensors. The
+    signal "rejected" has the counts by sensor. The filter needs a gate and report=True.
 
     Args:
         of: "rejected", the default.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        then: Statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(), the
+            default, lw.statistics.Quantiles(), ...
 
     Examples:
         >>> import lgvi_warp as lw

@@ -30,7 +30,7 @@ IMPLIED: tuple[Term, ...] = (Weight(), Restoring())
 def register(kind: type[AnyTerm]) -> type[AnyTerm]:
     """Register a user's term, event or part of a controller under its `type`, for scene files; a decorator of the class.
 
-    A class is known as soon as it is made, if its `type` is not taken; this function says so where it is.
+    A class registers itself when it is defined, unless its `type` is taken; this function raises an error in that case.
 
     Args:
         kind: Subclass of `Term`, of `Event` or of a part, such as `ControlLaw`, with a `type` of its own.
@@ -39,7 +39,7 @@ def register(kind: type[AnyTerm]) -> type[AnyTerm]:
         The same class.
 
     Raises:
-        ValueError: Where `type` is empty or taken by another class.
+        ValueError: If `type` is empty or taken by another class.
     """
     if not isinstance(kind, type) or not hasattr(kind, "kinds"):
         raise refusal("kind", kind, "is not a class of a term", "give a subclass of lw.laws.Term")

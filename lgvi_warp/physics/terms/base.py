@@ -147,7 +147,7 @@ def number(
         A dataclass field with shape, unit, bounds and axes in its metadata.
 
     Raises:
-        ValueError: Where `axes` is none of these.
+        ValueError: If `axes` is none of these.
     """
     if axes not in ("vector", "point", None):
         raise ValueError(f"axes = {axes!r} is not known. Give 'vector', 'point' or None")
@@ -207,7 +207,7 @@ class Term(Documented):
         to_dict: The term as a table of a scene file.
 
     Raises:
-        SceneError: Where a number has the wrong shape, is not finite or is out of bounds. The message lists every fault.
+        SceneError: If a number has the wrong shape, is not finite or is out of bounds. The message lists every fault.
     """
 
     type: ClassVar[str] = ""
@@ -347,7 +347,7 @@ class Term(Documented):
             By default the term itself.
 
         Raises:
-            SceneError: Where it does not go with this vehicle.
+            SceneError: If it does not go with this vehicle.
         """
         return self
 
@@ -414,7 +414,7 @@ class Term(Documented):
             A new term.
 
         Raises:
-            SceneError: Where a value is wrong.
+            SceneError: If a value is wrong.
         """
         faults = Faults()
         faults.keys(self.key, fields, [item.name for item in dataclasses.fields(self) if item.init])
@@ -531,7 +531,7 @@ class Term(Documented):
         """The device code for the axes of this run.
 
         Args:
-            aligned: As of `PackingContext`: whether the kernel's axes and origin are the user's.
+            aligned: As in `PackingContext`: whether the kernel's axes and origin are the user's.
 
         Returns:
             The name of a module of lgvi_kernels.laws, the path of another one, or an object with the same functions.
@@ -551,7 +551,7 @@ class Term(Documented):
             The fields of the device struct, and the rows, memory and scratch rows that the device code needs.
 
         Raises:
-            NotImplementedError: Where the term does not define it, and has a number of another shape than () and (3,).
+            NotImplementedError: If the term does not define it, and has a number of another shape than () and (3,).
         """
         if self.lanes() is None:
             name = type(self).__name__
@@ -611,7 +611,7 @@ class Term(Documented):
             Matrices (n, 6, 6) [N s/m, N s, N m s], user's axes and origin.
 
         Raises:
-            NotImplementedError: Where the term does not define it: its damping then counts as strong.
+            NotImplementedError: If the term does not define it: its damping then counts as strong.
         """
         raise NotImplementedError(f"{type(self).__name__} does not tell how strongly it brakes")
 
@@ -627,7 +627,7 @@ class Term(Documented):
             Wrenches (1 or n, 6, channels) about the body's origin [N, N m per unit of effort].
 
         Raises:
-            NotImplementedError: Where the term does not define it, as an actuator must for `PseudoInverse`.
+            NotImplementedError: If the term does not define it, as an actuator must for `PseudoInverse`.
         """
         raise NotImplementedError(f"{type(self).__name__} does not tell what its channels make")
 

@@ -44,11 +44,11 @@ class ControlFins(Commanded, Fins):
         lift_slope: Slope of the lift coefficient, (n,) [1/rad]; where a table of lift is given, the factor of its
             coefficients, 1 by default.
         lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; none by default.
-        lift_coefficients: Lift coefficients at these angles, (k,) [1]; of negative angles they have the other sign. Between
-            the angles they are linear, beyond the last one constant.
-        flow_angle: Whether the angle of the flow adds to the deflection, the default. If not, lift is
-            rho A/2 lift_slope d u u for a deflection d and a flow u along the chord, and drag
-            rho A/2 (drag + drag_normal d^2) |u| u.
+        lift_coefficients: Lift coefficients at these angles, (k,) [1]; at negative angles they have the opposite sign.
+            Between the angles they are linear, beyond the last one constant.
+        flow_angle: Whether the angle of the flow adds to the deflection, True by default. If not, lift is rho A/2
+            lift_slope d u u for a deflection d and a flow u along the chord, and drag rho A/2 (drag + drag_normal d^2) |u|
+            u.
         limit: Largest deflection either way, (n,) [rad]; 0.35 by default.
         rate_limit: Largest rate of the deflection, (n,) [rad/s]; none by default.
         time_constant: Time constant of the lag of the deflection, (n,) [s]; none by default.

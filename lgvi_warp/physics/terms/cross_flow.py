@@ -24,7 +24,7 @@ class CrossFlow(StripTerm):
         drag_coefficient: Drag coefficient Cd, (k,), or one number for all stations.
 
     Raises:
-        SceneError: Where stations do not rise or are fewer than two, and as `Term`.
+        SceneError: If stations do not rise or are fewer than two; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "cross_flow"

@@ -45,7 +45,7 @@ class CurrentProfile(Term):
         velocities: Velocities of the water at these depths, (k, 3) [m/s], in inertial axes.
 
     Raises:
-        SceneError: Where depths do not rise, and as `Term`.
+        SceneError: If depths do not rise; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "current_profile"

@@ -42,7 +42,7 @@ class CurrentField(InFile, Term):
         from_dataset: Currents of an ocean model.
 
     Raises:
-        SceneError: Where the shape of `velocities` does not fit, and as `Term`.
+        SceneError: If the shape of `velocities` does not fit; or a number is invalid (see `Term`).
 
     Examples:
         An eddy that turns once in 1,000 s about the middle of a square of 200 m.
@@ -118,15 +118,15 @@ class CurrentField(InFile, Term):
                 the file itself.
             outside: As of the class, but "stop" by default.
             scenario: As of the class. Scenarios are the dimension `realization`, `member`, `ensemble` or `number`.
-            name: As of `Term`.
+            name: As in `Term`.
 
         Returns:
             The field. Its `data` says how many values were missing, and what the regular grid changed [m/s].
 
         Raises:
-            SceneError: Where the data set has no velocities that are known, axes that are not understood, or neither the
+            SceneError: If the data set has no velocities that are known, axes that are not understood, or neither the
                 region nor the times; with the remedy.
-            MissingExtra: Where xarray, a reader of NetCDF or pyproj is not installed.
+            MissingExtra: If xarray, a reader of NetCDF or pyproj is not installed.
 
         Examples:
             A shear of 1 m/s in 0.1 degrees to the north, and where it is 5 km north of the origin.

@@ -44,7 +44,7 @@ class CurrentHarmonics(Harmonics):
         phases: Phases at t = 0, (k,) [rad]; 0 by default.
 
     Raises:
-        SceneError: Where a period is not above 0, and as `Term`.
+        SceneError: If a period is not above 0; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "current_harmonics"

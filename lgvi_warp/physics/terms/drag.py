@@ -156,8 +156,9 @@ class DragMatrix(Term):
         quadratic: Quadratic coefficients, (6, 6) [N s2/m2, N s2, N m s2]; 0 by default.
 
     Raises:
-        SceneError: Where a matrix creates energy: its power nu.D nu is negative at some velocity (for the quadratic matrix,
-            at the least that a descent from the worst of 4,000 directions finds). Also as `Term`.
+        SceneError: If a matrix creates energy: its power nu.D nu is negative at some velocity (for the quadratic matrix,
+            at the minimum that a descent from the worst of 4,000 directions finds). Also if a number is invalid (see
+            `Term`).
     """
 
     type: ClassVar[str] = "drag_matrix"

@@ -13,9 +13,9 @@ from lgvi_warp.physics.terms.base import CONSERVED, Term, number
 class EnergyUse(Term):
     """The account of the energy used: `energy_used` [J] is the time integral of the hotel load and of the power of all terms.
 
-    Thrusters tell their power by `power` or `shaft_speed`, pumps by `efficiency`; a scene without this term accounts nothing.
-    The sum begins with 0 and goes on where a run goes on. It is a sample, `lw.SaveAt(fields=[..., "energy_used"])`, and a
-    quantity of statistics.
+    Thrusters state their power by `power` or `shaft_speed`, pumps by `efficiency`; a scene without this term has no
+    account. The account starts at 0 and continues when a run is continued. It is a sample, `lw.SaveAt(fields=[...,
+    "energy_used"])`, and a quantity of statistics.
 
     Args:
         hotel: Power of all that is always on, computers and sensors [W]; 0 by default.

@@ -50,7 +50,7 @@ class Event(Term):
             A copy, or the event where it needs nothing; by default the latter.
 
         Raises:
-            SceneError: Where there is no such part.
+            SceneError: If there is no such part.
         """
         return self
 
@@ -166,7 +166,7 @@ class MissionDone(Event):
         guidance: Name of the guidance `lw.control.Waypoints`; "waypoints" by default. Its `at_end` is not "go_on".
 
     Raises:
-        SceneError: As a scene is built that has no such guidance; and as `Term`.
+        SceneError: When a scene is built that has no such guidance; or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -214,7 +214,7 @@ class MissionDone(Event):
 class Outside(Event):
     """Stop where the body's origin leaves the grid of a `current_field`, or sinks below its last level.
 
-    A field with `outside = "stop"` brings it along; a scene has it for no other field. Along an axis of one node, and above
+    A field with `outside = "stop"` adds this event itself; no other field can have it. Along an axis of one node, and above
     the first level, nothing stops.
 
     Args:

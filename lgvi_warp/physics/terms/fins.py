@@ -42,7 +42,7 @@ class Fins(Term):
         drag_normal: Drag coefficient that grows with sin^2 a, (n,); 0 by default.
 
     Raises:
-        SceneError: Where chord and normal span no plane, and as `Term`.
+        SceneError: If chord and normal span no plane; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "fins"

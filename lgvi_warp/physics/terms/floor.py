@@ -44,7 +44,7 @@ class Floor(InFile, Event):
         edges: The event that stops members which leave the grid.
 
     Raises:
-        SceneError: Where a grid has no spacing, or a flat floor has one; and as `Term`.
+        SceneError: If a grid has no spacing, or a flat floor has one; or a number is invalid (see `Term`).
 
     Examples:
         A slope that falls by 5 m on each 100 m to the north.
@@ -100,14 +100,14 @@ class Floor(InFile, Event):
             attributes: Attributes that a NetCDF file lacks or has wrong, for instance {"z.grid_mapping": "EPSG:3996"}.
             clearance: How far above the floor members stop [m]; 0 where it is left out.
             contact: "stop", the default, or "rest", as of the class.
-            name: As of `Event`.
+            name: As in `Event`.
 
         Returns:
             The floor, which holds the depths: nothing looks at the file again.
 
         Raises:
-            SceneError: Where the file cannot be read, has no floor, or does not cover the region; with the remedy.
-            MissingExtra: Where xarray, rasterio or pyproj is not installed.
+            SceneError: If the file cannot be read, has no floor, or does not cover the region; with the remedy.
+            MissingExtra: If xarray, rasterio or pyproj is not installed.
 
         Examples:
             >>> import lgvi_warp as lw
@@ -271,7 +271,7 @@ class Floor(InFile, Event):
             A box with the corners of the grid, from far above the sea to far below it.
 
         Raises:
-            SceneError: Where the floor is flat, and has no edges.
+            SceneError: If the floor is flat, and has no edges.
 
         Examples:
             >>> import lgvi_warp as lw

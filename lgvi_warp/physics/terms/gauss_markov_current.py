@@ -29,7 +29,7 @@ class GaussMarkovCurrent(NoisyTerm):
         start: "zero", the default: u = 0 at t = 0; or "stationary": u is drawn with the standard deviation.
 
     Raises:
-        SceneError: Where the time constant is not above 0, and as `Term`.
+        SceneError: If the time constant is not above 0; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "gauss_markov_current"

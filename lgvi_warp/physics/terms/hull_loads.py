@@ -16,9 +16,9 @@ from lgvi_warp.physics.terms.strips import GAUSS, StripTerm, across
 class HullLoads(StripTerm):
     """Loads on a slender hull in water that varies along it, as waves do, by strips (Lighthill 1960; Newman 1977, 7.4).
 
-    The vehicle's added mass and the water at its origin make the loads of water that is the same all along the hull. This term
-    adds what differs at each station: the pressure of the undisturbed water, the momentum of the water that the strip sets in
-    motion, and cross-flow drag at the flow there. It takes the place of `CrossFlow`: give one of them.
+    The vehicle's added mass and the water at its origin give the loads in water that is uniform along the hull. This term
+    adds the differences at each station: the pressure of the undisturbed water, the momentum of the water that the strip
+    sets in motion, and cross-flow drag at the flow there. It replaces `CrossFlow`: use one of them.
 
     Args:
         stations: Places along the body's x axis, (k,) [m], rising; two or more, from stern to bow.
@@ -28,7 +28,7 @@ class HullLoads(StripTerm):
         drag_coefficient: Drag coefficient Cd, (k,), or one number for all stations; 0 by default.
 
     Raises:
-        SceneError: Where stations do not rise or are fewer than two, and as `Term`.
+        SceneError: If stations do not rise or are fewer than two; or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

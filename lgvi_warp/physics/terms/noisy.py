@@ -60,7 +60,7 @@ class NoisyTerm(Term):
         draws: Number of draws in one step of a run.
 
     Raises:
-        SceneError: Where `noise_step` is not above 0, and as `Term`.
+        SceneError: If `noise_step` is not above 0; or a number is invalid (see `Term`).
     """
 
     timed: ClassVar[bool] = True

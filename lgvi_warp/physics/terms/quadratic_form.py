@@ -94,7 +94,7 @@ class QuadraticForm(Term):
         gertler_hagen: Form of the coefficients of a submarine's standard equations.
 
     Raises:
-        SceneError: Where a name is not known or given twice, and as `Term`.
+        SceneError: If a name is not known or given twice; or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -177,7 +177,7 @@ class QuadraticForm(Term):
             The term.
 
         Raises:
-            SceneError: Where a name is not known, is that of an added mass or of a fin, or given twice; all faults at once.
+            SceneError: If a name is not known, is that of an added mass or of a fin, or given twice; all faults at once.
 
         Examples:
             >>> import lgvi_warp as lw

@@ -85,8 +85,9 @@ class Thrusters(Commanded):
         command_for: The smallest commands that give these thrusts.
 
     Raises:
-        SceneError: Where a direction has no length, times do not rise, the command is given twice, or neither a coefficient
-            nor a polynomial nor a table is given; where a table does not rise, or stands beside a polynomial. Also as `Term`.
+        SceneError: If a direction has no length, times do not rise, the command is given twice, or neither a coefficient
+            nor a polynomial nor a table is given; where a table does not rise, or stands beside a polynomial. Also if a
+            number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

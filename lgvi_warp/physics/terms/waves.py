@@ -243,11 +243,11 @@ class Waves(WaveTerm, Harmonics):
         phases: Phases at t = 0 at the inertial origin, (k,) [rad]; 0 by default.
         headings_deg: Directions in which the waves travel, (k,) [deg] from north.
         depth: Depth of the sea [m], above 0; by default the water is deep.
-        periods_of: Who sees the periods where a uniform current acts: "ground", the default, a fixed place; or "water",
-            whoever drifts with the current.
+        periods_of: Frame of the periods in a uniform current: "ground", the default, as at a fixed place; or "water", as
+            when drifting with the current.
 
     Raises:
-        SceneError: Where a period is not above 0, and as `Term`.
+        SceneError: If a period is not above 0; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "waves"

@@ -60,7 +60,7 @@ class WrenchSchedule(Term):
         interpolation: "linear" between the times, the default; or "steps", each value held until the next time.
 
     Raises:
-        SceneError: Where times do not rise, and as `Term`.
+        SceneError: If times do not rise; or a number is invalid (see `Term`).
     """
 
     type: ClassVar[str] = "wrench_schedule"

@@ -15,7 +15,7 @@ DEPENDENT, NONE, FLAT, BESIDE, TOLD = 1e-9, 1e-12, 1e-9, 1e-13, 1e-10
 
 
 class BoundedLeastSquares(PseudoInverse):
-    """Numbers as those of `lw.control.BoundedLeastSquares`; effect, losses and the actuator as of `PseudoInverse`."""
+    """Numbers as those of `lw.control.BoundedLeastSquares`; effect, losses and the actuator as in `PseudoInverse`."""
 
     priorities = np.ones(6)
     iterations = 100

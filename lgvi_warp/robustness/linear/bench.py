@@ -182,13 +182,13 @@ class MotionBench:
         return packets
 
     def _rows(self, packets: Packets) -> dict[str, slice]:
-        """Rows of the memory by key, as of `Motion`."""
+        """Rows of the memory by key, as in `Motion`."""
         each = zip(self.keys, packets.laws.remembered, strict=True)
         rows = {key: rows for key, rows in each if rows.stop > rows.start}
         return rows | ({"": slice(0, self.bus.rows)} if self.bus else {})
 
     def _memory(self, packets: Packets) -> dict[str, np.ndarray]:
-        """Memory of the members, as of `Motion`."""
+        """Memory of the members, as in `Motion`."""
         view, m = packets.laws.memory.view, packets.members.count
         return {
             key: view[:, rows].transpose(0, 2, 1).reshape(-1, rows.stop - rows.start)[:m].copy()

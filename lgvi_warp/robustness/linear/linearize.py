@@ -34,7 +34,8 @@ class LinearModel:
     """x' = A x + B u after a period, y = C x + D u: deviations from a motion.
 
     The first twelve states are position [m] in inertial axes, rotation vector [rad] about the body's axes, velocity [m/s] and
-    angular velocity [rad/s] in body axes; they are the outputs. What actuators and parts of a controller remember follows.
+    angular velocity [rad/s] in body axes; they are the outputs. The memory of actuators and of parts of a controller
+    follows.
 
     Attributes:
         A: (n, n).
@@ -146,16 +147,16 @@ def linearize(
             held for a period beside actuators that keep their commands. Of a plant only.
         closed: Whether the controller is part of the model. Its inputs then are added to the commands. Default False.
         period: Period of a plant [s]; default that of the controller, else the step.
-        method: As of `lw.solve`; default that of the trim, else of the scene.
+        method: As in `lw.solve`; default that of the trim, else of the scene.
         h: Step [s]; default that of the trim, else of the scene.
-        step: Half a difference of numbers up to 1, and its ratio to larger ones; default 1e-5.
+        step: Increment of the central differences, relative for numbers above 1; default 1e-5.
 
     Returns:
         The model.
 
     Raises:
-        SceneError: If an argument is at fault, a part of the controller acts by chance or at some ticks only, or a member that
-            is a little beside the motion fails.
+        SceneError: If an argument is at fault, a part of the controller acts by chance or at some ticks only, or a member
+            slightly off the motion fails.
 
     Examples:
         >>> import lgvi_warp as lw

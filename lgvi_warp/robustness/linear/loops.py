@@ -154,7 +154,7 @@ def _apart(repeating: np.ndarray, before: np.ndarray, limits: np.ndarray) -> np.
 class Loops:
     """Loops of members (n,) at their steady motions, to be asked whether they settle with other numbers.
 
-    delay: their own, in steps. limits: (n, channels), the largest commands. repeating: as of `_what_repeats`.
+    delay: their own, in steps. limits: (n, channels), the largest commands. repeating: as in `_what_repeats`.
     """
 
     def __init__(

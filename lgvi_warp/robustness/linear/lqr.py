@@ -67,7 +67,7 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
     """Design a linear quadratic regulator: gains that minimise the sum over ticks of x^T Q x + u^T R u.
 
     Args:
-        model: The linear model, as of `lw.linear.linearize` with inputs="wrench" for `lw.control.StateFeedback`.
+        model: The linear model, as in `lw.linear.linearize` with inputs="wrench" for `lw.control.StateFeedback`.
         Q: Weights of the states, (n, n), or (n,) of its diagonal, >= 0.
         R: Weights of the inputs, (m, m), or (m,) of its diagonal, > 0.
 

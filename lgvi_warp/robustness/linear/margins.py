@@ -82,20 +82,20 @@ def _percentages(of: Any) -> np.ndarray:
 class Margins(Saved):
     """Margins of a loop by member.
 
-    Each is NaN for a member whose loop does not settle as it is, of which `why` tells more.
+    Each is NaN for a member whose unchanged loop does not settle; `why` has the reason.
 
     Attributes:
         loop: key of the law; "all laws" for the whole controller.
-        values: by name, (n,): "gain_lower" and "gain_upper", between which the factors on the demand lie that the loop bears
-            (0 and infinite where it bears all that were asked); "delay", the largest delay [s] beside the loop's own, in whole
-            steps; "phase", the phase margin [rad], and the crossover where it is least ("phase_frequency" [rad/s]): infinite,
-            at NaN, where no gain of the loop crosses 1; "disk", the disk margin of all components of the demand at once, what
-            it says of factors ("disk_gain_lower", "disk_gain_upper") and of phases ("disk_phase" [rad]), and where
-            ("disk_frequency" [rad/s]); peak gains, "sensitivity_peak", "complementary_peak" and "position[2]_peak" of what was
-            asked `to`, and where ("..._frequency" [rad/s]).
-        by_runs: the same, as runs show them; without those that were not asked.
-        why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
-            nothing" where its commands have no effect, "failed"; "" where it has.
+        values: by name, (n,): "gain_lower" and "gain_upper", the bounds of the factors on the demand that the loop
+            tolerates (0 and infinite if it tolerates all that were tried); "delay", the largest delay [s] beside the loop's
+            own, in whole steps; "phase", the phase margin [rad], and the crossover where it is least ("phase_frequency"
+            [rad/s]): infinite, at a frequency of NaN, if no gain of the loop crosses 1; "disk", the disk margin of all
+            components of the demand at once, the factors ("disk_gain_lower", "disk_gain_upper") and phases ("disk_phase"
+            [rad]) that it guarantees, and its frequency ("disk_frequency" [rad/s]); peak gains, "sensitivity_peak",
+            "complementary_peak" and "position[2]_peak" of what was asked `to`, and where ("..._frequency" [rad/s]).
+        by_runs: the same by runs, if they were requested.
+        why: (n,), reason why a member has no margins: "does not settle", "at its limit: thrusters[3]" where a motion stays
+            there, "moves nothing" where its commands have no effect, "failed"; "" if it has margins.
         step: step of the runs [s], to which delays are known.
         messages: what the user should know, such as that the step was shortened to fit the period.
         members: number of members, n.
@@ -105,7 +105,7 @@ class Margins(Saved):
     Methods:
         percentiles: Percentiles of each margin over the members that settle.
         curve: Distribution of a margin.
-        worst: The members that bear least.
+        worst: Members with the smallest margins.
     """
 
     study: ClassVar[str] = "margins"
@@ -271,54 +271,53 @@ def margins(
 ) -> Margins:
     """Compute the gain, delay and phase margins of each member's loop.
 
-    A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
-    vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at its
-    limit. Else the member goes on for twice the time, and again, up to `settle`. Then it is turned aside, and must come back
-    in a run. Where one of this is not so, it has no margins, and `why` says which.
+    A member's loop is examined about its motion after `about` seconds. The motion must be steady: velocities, rates, the
+    vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at
+    its limit. Otherwise the member runs on for twice the time, and again, up to `settle`. It is then turned aside, and must
+    return in a run. If one of these conditions fails, the member has no margins, and `why` names the condition.
 
-    By eigenvalues: those of the sampled loop about that motion. It is affine in the factor on the law's demand, and each delay
-    within a period is linearised: so all brackets are halved without a run. Neutral modes that no law sees do not count.
+    By eigenvalues: those of the sampled loop about that motion. It is affine in the factor on the law's demand, and each
+    delay within a period is linearised, so bisection needs no runs. Neutral modes that no law observes do not count.
 
-    By runs: every member has a factor, or a delay, of its own in a lane; each run divides all brackets at once. From the same
-    motion, turned by `tilt`, a loop settles if what its rates and commands swing shrinks from the second to the last
-    third of the run and is less than in the first; and if in the last third no command is at its limit, the body is aside by
-    less than 10 tilts, and turns by less within a period. Where it shrinks by little, a run of 1.5 times the length is judged
-    as well. The error is not judged: a slow integral hides a small fast limit cycle in it.
-
-    Where the answer changes more than once, the edge is one of them.
+    By runs: every member runs with its own factor or delay, and each run divides all brackets at once. The runs start from
+    the same motion, turned by `tilt`. A loop settles if the swing of its rates and commands shrinks from the second to the
+    last third of the run, and is less than in the first third. Also, in the last third no command is at its limit, and the
+    body is aside by less than 10 tilts and turns by less within a period. If the swing shrinks by little, a run of 1.5
+    times the length is examined, too. The error is not examined: a slow integral hides a small fast limit cycle in it. If
+    stability changes more than once, the margin is at one of the changes.
 
     Noise and drift of sensors are taken as 0, their mean, and faults as off; by eigenvalues rounding, too: see `messages`.
 
-    The phase margin is the least phase, lag or lead, that all components of the law's demand bear at once: with one component
-    that at the crossovers of its gain, with several at those of the characteristic loci of the sampled loop (MacFarlane,
-    Postlethwaite 1977, Int. J. Control 25(1)). It is infinite where no gain crosses 1 between 1e-5 of the Nyquist frequency
-    and that.
+    The phase margin is the least phase, lag or lead, applied to all components of the law's demand at once, at which the
+    loop becomes unstable: with one component that at the crossovers of its gain, with several at those of the
+    characteristic loci of the sampled loop (MacFarlane, Postlethwaite 1977, Int. J. Control 25(1)). It is infinite where no
+    gain crosses 1 between 1e-5 of the Nyquist frequency and that.
 
     The disk margin is that of the sampled loop, opened at all components of the law's demand: at any frequency each may have
     a complex factor of its own in the disk (1 + (1 - skew) d / 2) / (1 - (1 + skew) d / 2), |d| < margin (Seiler, Packard,
     Gahinet 2020, IEEE Control Systems 40(5)). It is 1 / the largest structured singular value of S + (skew - 1) / 2.
 
-    A peak gain is how much of a disturbance that is added to the law's demand comes through, at the frequency where most does:
-    to the demand that acts (S, the sensitivity), to the law's answer (T), and to each number of the motion in `to`, per unit
-    of the demand; with several components the largest singular value, so it is the H-infinity norm. It is infinite where the
-    gain grows towards frequency 0. The largest of the members is the worst-case gain of the ensemble.
+    A peak gain is the largest gain, over frequency, from a disturbance that is added to the law's demand: to the demand
+    that acts (S, the sensitivity), to the law's answer (T), and to each number of the motion in `to`, per unit of the
+    demand; with several components the largest singular value, so it is the H-infinity norm. It is infinite where the gain
+    grows towards frequency 0. The largest of the members is the worst-case gain of the ensemble.
 
     Args:
-        fleet: An Ensemble, or a Scene whose [ensemble] is meant; without waves and noise.
+        fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise.
         loop: Key of the law, such as "heading_pid"; None, the default, for all laws together.
         of: Some of "gain", "delay", "phase", "disk" and "peak"; the first two by default. A delay is that of all commands;
             "phase", "disk" and "peak" are by eigenvalues only.
         by: "eigenvalues", the default, "runs", or both.
-        about: Time after which the loop is looked at [s]; 60 by default.
-        settle: Longest time that a member is given to be steady [s]; 1200 by default.
+        about: Time at which the loop is examined [s]; 60 by default.
+        settle: Longest time until a member must be steady [s]; 1200 by default.
         seconds: Length of the runs [s]; 240 by default.
-        tilt: Angle by which they begin aside, about each axis of the body [rad]; 0.001 by default.
-        most: Largest factor, and one over the least; 100 by default.
+        tilt: Angle by which runs start turned about each axis of the body [rad]; 0.001 by default.
+        most: Largest factor that is tried, and the inverse of the least one; 100 by default.
         longest: Longest delay that is added [s]; 10 by default.
         skew: Skew of the disk, from -1 to 1: 0, the default, for factors and their inverses alike; 1 for the sensitivity S.
         to: Numbers of the motion whose peak gains are wanted too, as "position[2]" [m], "rotation[1]" [rad, body axes],
-            "velocity" [m/s], "angular_velocity" [rad/s], as of `linearize`; none by default.
-        method: As of `lw.solve`; default that of the scene.
+            "velocity" [m/s], "angular_velocity" [rad/s], as in `linearize`; none by default.
+        method: As in `lw.solve`; default that of the scene.
         h: Step [s]; default that of the scene.
 
     Returns:

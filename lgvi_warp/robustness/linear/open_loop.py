@@ -36,14 +36,14 @@ Matrices = tuple[np.ndarray, np.ndarray, np.ndarray]
 class OpenLoops:
     """Open loops of members: x' = A x + B u after a tick, y = C x; u = -y closes them.
 
-    States are combinations of those of the loop: what no law sees is left out.
+    States are linear combinations of the loop's states, without those that no law observes.
 
     Attributes:
-        at: where they are opened.
-        models: (A, B, C) of each member, (k, k), (k, r) and (r, k); None where `why` says why there is none.
-        names: of the inputs u and outputs y (r,): components of a demand, or commands.
+        at: input at which they are opened.
+        models: (A, B, C) of each member, (k, k), (k, r) and (r, k); None for a member without a loop.
+        names: names of the inputs u and outputs y (r,): components of a demand, or commands.
         dt: the period [s].
-        why: (n,), why a member has none, as of `lw.linear.margins`; "" where it has.
+        why: (n,), reason why a member has no loop, as in `lw.linear.margins`; "" if it has one.
         messages: what the user should know, such as what linear loops leave out.
         members: number of members, n.
     """
@@ -100,7 +100,7 @@ class OpenLoops:
             frequencies: w (k,) [rad/s].
 
         Returns:
-            (n, k, r), the largest first; NaN as of `response`.
+            (n, k, r), the largest first; NaN as in `response`.
         """
         L = self.response(frequencies)
         lost = np.isnan(L).any(axis=(2, 3))
@@ -182,17 +182,17 @@ def loop(
 ) -> OpenLoops:
     """Open the loop of each member at an input, and give it as a linear model of a period.
 
-    It is that of `margins`, about the motion that a member has after `about` seconds, which must be steady. Whether the closed
-    loop settles is not asked: an unstable one, too, has an open loop. What is not opened stays closed.
+    The loop is that of `margins`, about the motion of a member after `about` seconds, which must be steady. The closed loop
+    need not be stable. Loops that are not opened stay closed.
 
     Args:
-        fleet: An Ensemble, or a Scene whose [ensemble] is meant; without waves and noise of the water.
+        fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise of the water.
         at: Input: key of a law, such as "heading_pid", for all components of its demand; a component of the demand of all
             laws, "X" to "N"; a command, "control_fins[0]", or all those of an actuator, "control_fins". None, the default, for
             the whole demand of all laws.
-        about: Time after which the loop is looked at [s]; 60 by default.
-        settle: Longest time that a member is given to be steady [s]; 1200 by default.
-        method: As of `lw.solve`; default that of the scene.
+        about: Time at which the loop is examined [s]; 60 by default.
+        settle: Longest time until a member must be steady [s]; 1200 by default.
+        method: As in `lw.solve`; default that of the scene.
         h: Step [s]; default that of the scene.
 
     Returns:

@@ -41,10 +41,10 @@ class Trim(Saved):
     Attributes:
         start: the state, as the start of a scene.
         commands: by key of each term that takes commands, those that hold it, (channels,).
-        values: by name, what was free, and its value: roll, pitch and drift (course less heading) [rad], speed [m/s],
+        values: values of the free quantities by name: roll, pitch and drift (course less heading) [rad], speed [m/s],
             commands as "thrusters[0]".
-        fixed: by name, what was not.
-        residual: (6,), accelerations [m/s2, rad/s2] that are left, body axes.
+        fixed: values of the fixed quantities by name.
+        residual: (6,), remaining accelerations [m/s2, rad/s2], body axes.
         method: the method whose steps keep the motion.
         h: its step [s].
     """
@@ -128,7 +128,7 @@ def trim(
         free: Names of what may be chosen, of "roll", "pitch", "drift" (course less heading), "speed", and commands, such as
             "thrusters[0]", or "thrusters" for all of a term; None, the default, for all. The others are 0.
         fixed: Values of what is not free, by the same names; None, the default, for 0.
-        method: As of `lw.solve`; default that of the scene.
+        method: As in `lw.solve`; default that of the scene.
         h: Step [s]; default that of the scene.
 
     Returns:

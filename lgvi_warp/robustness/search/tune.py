@@ -39,7 +39,7 @@ class Tuned(Saved):
     Attributes:
         parameters: the numbers by name.
         before: those of the scene.
-        cost: their risk over the members that the search used: too good, since the numbers were chosen by them.
+        cost: their risk over the members that the search used: optimistic, since the numbers were chosen by these.
         fresh_cost: their risk over members that the search did not see; NaN where none can be drawn.
         fresh_before: that of the scene's numbers, over the same fresh members.
         of: name of the quantity.
@@ -161,13 +161,13 @@ def tune_gains(
 ) -> Tuned:
     """Tune numbers, such as gains, to minimise the risk over a fleet.
 
-    Every candidate meets the same members, with the same noise: a generation is an ensemble of candidates times members. Then
-    it is tried on fresh ones.
+    Every candidate runs on the same members, with the same noise: a generation is an ensemble of candidates times members.
+    The best one is then run on fresh members.
 
     Args:
-        fleet: The members, drawn by distributions; or a Scene, whose [ensemble] is meant.
+        fleet: The members, drawn by distributions; or a Scene, whose [ensemble] is used.
         over: (low, high), or (low, high, "log"), of each number by name: {"heading_pid.kp": (0.1, 10.0, "log")}.
-        minimise: The cost, one number of each member: a quantity, as of `lw.prepare`; or a metric, as of `lw.sweep`:
+        minimise: The cost, one number of each member: a quantity, as in `lw.prepare`; or a metric, as in `lw.sweep`:
             "iae depth", lw.metrics.SettlingTime("depth", within=0.5).
         risk: "mean", the default; the level of a quantity's quantile, such as 0.95; or `lw.metrics.CVaR(0.05)`, the mean of
             the worst 5 %. A member that fails has an infinite cost.
@@ -177,10 +177,11 @@ def tune_gains(
         seed: Seed of the search; 0 by default.
         constraints: Bounds that every member must keep: "disk above 0.5" of all laws, "phase heading_pid above 0.6" of one, as
             `lw.linear.margins` names margins; "overshoot depth below 0.3" of a metric, "max(depth) below 12.0" of a quantity.
-            Numbers that keep them are preferred to all others. A loop that does not settle keeps no bound. None by default.
+            Candidates that keep all bounds are preferred to all others. A loop that does not settle violates every bound.
+            None by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
-            None, the default, for nobody.
-        **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
+            None, the default: nothing is shown.
+        **settings: As in `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
         The numbers, with their risk over the members of the search and over fresh ones.

@@ -35,7 +35,7 @@ class WorstCase(Saved):
 
     Attributes:
         parameters: its numbers by name, those that were searched.
-        value: its quantity; infinite for a member that failed, of which it is the first that was found.
+        value: its quantity; infinite for a member that failed, the first such member that was found.
         of: name of the quantity.
         worst: "largest" or "smallest".
         at_bounds: by name, "low", "high" or "" of the numbers.
@@ -121,24 +121,24 @@ def worst_case(
 ) -> WorstCase:
     """Search for the worst case of a quantity within bounds of the scene's numbers.
 
-    Differential evolution, in which a generation is an ensemble, several times from other places; then the corners, where they
-    are few; then a walk from the worst place. What is left of the budget goes to Sobol points over the whole box, and to walks
-    from the worst of them. Noise is the same for all. What no member showed may be worse still: `unseen` of the answer says
-    how small it must be.
+    Differential evolution, in which a generation is an ensemble, runs several times from different starts. Then come the
+    corners of the box, if they are few, and a local search from the worst point. The rest of the budget goes to Sobol
+    points over the whole box, and to local searches from the worst of them. Noise is the same for all. Unseen cases may be
+    worse: `unseen` of the answer says how small it must be.
 
     Args:
-        fleet: A Scene or an Ensemble, whose scene is meant: numbers that are not searched are the scene's.
+        fleet: A Scene, or an Ensemble, of which the scene is used: numbers that are not searched are the scene's.
         within: (low, high) of each number by name, such as {"vehicle.buoyancy": (297.0, 302.0)}; (low, high, "log") where
             the search should go by the logarithm.
-        of: A quantity of one number, as of `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a metric, as of
-            `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
+        of: A quantity of one number, as in `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a metric, as
+            of `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
         worst: "largest", the default, or "smallest". A member that fails is worse than all others, and ends the search.
         budget: Number of members that may be run; 20,000 by default.
         restarts: Number of evolutions; 3 by default, fewer where the budget is small.
         seed: Seed of the search; 0 by default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
-            None, the default, for nobody.
-        **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
+            None, the default: nothing is shown.
+        **settings: As in `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
         The worst member.

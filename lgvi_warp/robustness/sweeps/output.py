@@ -42,7 +42,7 @@ class Sweep(SweepTable):
     Attributes:
         setup: what was run.
         cells: its cells, cases times points of the grid, in order.
-        records: what their members showed.
+        records: results of their members.
         conditions: what a member must fulfil to pass.
         baseline: name of the case that others are compared with.
         confidence: confidence level of all intervals.
@@ -94,7 +94,7 @@ class Sweep(SweepTable):
             second: name of another case; differences are second less first.
             at: values of the grid by name; None (default) for all points.
             quantile: level of the quantile to compare in place of means; None (default) for means.
-            matters: the least difference that matters, as of `lw.sweep`; None (default) for that of the sweep.
+            matters: the least difference that matters, as in `lw.sweep`; None (default) for that of the sweep.
 
         Returns:
             The comparisons, success first at each point; `row()` of one is a record of a table, and `verdict` "better",
@@ -111,7 +111,7 @@ class Sweep(SweepTable):
         """Correct p of comparisons that were made together for their number, by Holm.
 
         Args:
-            rows: the comparisons, as of `compare`.
+            rows: the comparisons, as in `compare`.
 
         Returns:
             The same with `p` corrected, and `real` by that and the sweep's confidence.
@@ -265,7 +265,7 @@ class Sweep(SweepTable):
             members: their indices.
             at: values of the grid by name; may be left out where there is no grid.
             save: which samples, and when; default as the scene says.
-            threads: number of threads; default as of `lw.solve`.
+            threads: number of threads; default as in `lw.solve`.
 
         Returns:
             Their result.

@@ -131,7 +131,7 @@ class SweepCell:
 def setup_of(
     scene: Any, cases: Any, grid: Any, vary: Any, members: Any, seed: Any, sampling: Any, metrics: Any,
     settings: Mapping[str, Any], rare: Any = None, *, predict: Callable[..., Prediction] = predict) -> Setup:  # fmt: skip
-    """Runs that a sweep would make; `settings` are those of solve, all others as of `sweep`."""
+    """Runs that a sweep would make; `settings` are those of solve, all others as in `sweep`."""
     faults = Faults()
     base, together = _base(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}

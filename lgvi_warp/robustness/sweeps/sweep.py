@@ -58,10 +58,11 @@ def sweep(
     """Compare controller designs on the same members: success rate, ranking, worst members.
 
     All cells have the same vehicles, starts, seas, sensor noise and faults: what is drawn depends on seed, member and name
-    alone. What a case sets does not vary in it; so does what it does not have. Cells that differ in numbers share a kernel. A
-    case that is refused or does not compile is noted, and the others go on.
+    alone. Numbers that a case sets, and numbers that it does not have, do not vary in it. Cells that differ in numbers
+    share a kernel. A case that is refused or does not compile is noted, and the others go on.
 
-    In memory are the numbers of one cell at a time with `out`, 8 bytes for each member and metric; without it, of all cells.
+    With `out`, memory holds the numbers of one cell at a time, 8 bytes for each member and metric; without it, those of all
+    cells.
 
     Args:
         scene: The scene, the path of a scene file, or an Ensemble whose scene, members, seed, vary and sampling are taken.
@@ -80,18 +81,19 @@ def sweep(
         interval: Of probabilities: "wilson" (default) or "clopper_pearson".
         matters: The least difference that matters: of success in points, 1.0; and of metrics in their units, {"success": 1.0,
             "overshoot depth": 0.1}. Comparisons then say better or worse by more than that, equivalent where the interval
-            lies within it, or undecided. Less of a metric is better, but where success limits it from below alone. By
-            default None.
-        rare: True for the probability that a member does not pass, however small, by lw.rare_event, in every cell whose case
-            says nothing else; or some of its arguments, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most": 200_000}.
-            Cells are compared by failing members of either. None (default) for those whose case asks.
+            lies within it, or undecided. A smaller metric is better, unless success limits it from below only. By default
+            None.
+        rare: True: estimate the probability that a member does not pass, however small, by lw.rare_event, in every cell
+            whose case does not set `rare`; or some arguments of it, {"relative_error": 0.2, "cheaper": [{"h": 0.1}],
+            "most": 200_000}. Two cells are compared by the failing members of both. None (default): only in cells whose
+            case sets it.
         out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
-            whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
-            code and what that leads to; by `version` where lw.control.Callback and lw.metrics.CustomMetric have one.
+            whose numbers, metrics, functions or settings have changed run anew. Your own functions are identified by their
+            code and what it refers to; or by the `version` of lw.control.Callback and lw.metrics.CustomMetric, if given.
         threads: As of solve.
         executor: As of solve; default "threads".
         scheduler: As of solve; default None.
-        progress: As of solve, of all cells together; None, the default, for nobody.
+        progress: As of solve, of all cells together; None, the default: nothing is shown.
         **settings: Further arguments of solve, such as method, h, t1, dtype.
 
     Returns:

@@ -196,7 +196,7 @@ class SweepTable:
             at: values of the grid by name; may be left out where there is no grid.
 
         Returns:
-            (value, lower, upper) of each time, as of `success`.
+            (value, lower, upper) of each time, as in `success`.
 
         Raises:
             SceneError: there is no such case or point, or it was refused.

@@ -31,7 +31,7 @@ class Sampling(Documented):
     that the sampling brings.
 
     Raises:
-        SceneError: Where a setting is wrong. The message lists every fault.
+        SceneError: If a setting is wrong. The message lists every fault.
     """
 
     kind: ClassVar[str] = ""
@@ -136,7 +136,7 @@ class Replicated(Sampling):
         replicates: R, a power of two from 1 to 64, 1 by default. The number of members must be a multiple of it.
 
     Raises:
-        SceneError: Where a setting is wrong. The message lists every fault.
+        SceneError: If a setting is wrong. The message lists every fault.
     """
 
     replicates: int = field(default=1, kw_only=True)

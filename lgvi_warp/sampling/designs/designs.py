@@ -31,11 +31,11 @@ class Saltelli(Sampling):
 
     Args:
         second_order: Whether second-order indices follow, True by default; without them groups have d + 2 members.
-        replicates: R, the number of sequences, scrambled independently, a group of each in turn; 1 by default.
+        replicates: R, the number of independently scrambled sequences, which take turns group by group; 1 by default.
         groups: Name -> names of factors that are taken for one, "current.velocity" for all its entries; by default none.
 
     Raises:
-        SceneError: Where a setting is wrong. The message lists every fault.
+        SceneError: If a setting is wrong. The message lists every fault.
     """
 
     second_order: bool = True
@@ -158,7 +158,7 @@ class Morris(Sampling):
         levels: Number of parts of each side, even, from 4; 4 by default.
 
     Raises:
-        SceneError: Where levels is not an even number from 4.
+        SceneError: If levels is not an even number from 4.
     """
 
     levels: int = 4
@@ -198,7 +198,7 @@ class Morris(Sampling):
             Multiples of 1 / (levels - 1) from 0 to 1, (n, dimensions).
 
         Raises:
-            ImportError: Where SALib is not installed.
+            ImportError: If SALib is not installed.
         """
         paths = int(members.max()) // self.group_size(space) + 1
         # A longer design begins with the shorter one; lengths are powers of two, so that the cache holds few.

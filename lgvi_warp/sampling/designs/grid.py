@@ -25,11 +25,12 @@ class Grid(Sampling):
     Names of `vary` that the grid does not contain are drawn at random. The number of members is the number of combinations.
 
     Args:
-        axes: By name, either a list of values (of an entry such as "start.position[2]", or of the whole quantity), or a number
-            of levels: the middles of so many equal parts of the name's distribution in `vary`, for each of its entries.
+        axes: By name, either a list of values (of an entry such as "start.position[2]", or of the whole quantity), or a
+            number of levels: the middles of that many equally probable parts of the name's distribution in `vary`, for each
+            of its entries.
 
     Raises:
-        SceneError: Where an axis is neither. The message lists every fault.
+        SceneError: If an axis is neither. The message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -22,8 +22,8 @@ class UnitCubePoints(Sampling):
     """A design of your own: points in the open unit cube, whose columns are in the order of the names.
 
     `ensemble.space` says which column is which: an entry that varies by itself has one column of its name, a joint
-    distribution has several, "start.attitude 0" and so on. The number of members is that of the points, or less: the
-    first ones.
+    distribution has several, "start.attitude 0" and so on. The number of members is that of the points; fewer members are
+    the first points.
 
     Args:
         points: Levels (n, dimensions) in (0, 1). Also a data frame, a mapping of columns, a structured array or an xarray
@@ -31,7 +31,7 @@ class UnitCubePoints(Sampling):
         names: Names of an array's columns, where they are not in the order of the cube.
 
     Raises:
-        SceneError: Where points are outside the cube, or do not fit the names. The message lists every fault.
+        SceneError: If points are outside the cube, or do not fit the names. The message lists every fault.
     """
 
     points: Any = None

@@ -23,10 +23,10 @@ SOBOL_BITS = 32
 class Sobol(Replicated):
     """A scrambled Sobol sequence (linear matrix scramble and digital shift, scipy.stats.qmc.Sobol): member i is point i.
 
-    Members may be added; powers of two are balanced. Another name that varies makes another sequence.
+    Members may be added; powers of two are balanced. Varying one more name changes the sequence.
 
     Args:
-        replicates: R, the number of sequences, scrambled independently, a member of each in turn; 1 by default.
+        replicates: R, the number of independently scrambled sequences, which take turns member by member; 1 by default.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -82,10 +82,10 @@ def _sobol_basis(seed: int, name: str, dimensions: int, bits: int, scramble: boo
 class Halton(Replicated):
     """A scrambled Halton sequence (random permutations of digits, scipy.stats.qmc.Halton): member i is point i.
 
-    Any number of members may be added. Another name that varies makes another sequence.
+    Any number of members may be added. Varying one more name changes the sequence.
 
     Args:
-        replicates: R, the number of sequences, scrambled independently, a member of each in turn; 1 by default.
+        replicates: R, the number of independently scrambled sequences, which take turns member by member; 1 by default.
     """
 
     kind: ClassVar[str] = "halton"

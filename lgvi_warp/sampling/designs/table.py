@@ -33,8 +33,8 @@ BINARY = (b"\x93NUMPY", b"PK\x03\x04", b"\x1f\x8b")
 class Table(Sampling):
     """Values of every member: from a CSV file whose first line names the columns, or from arrays by name.
 
-    Names of `vary` that the table does not contain are drawn at random. The number of members is that of the lines, or less:
-    the first ones; lines may be added.
+    Names of `vary` that the table does not contain are drawn at random. The number of members is that of the lines; fewer
+    members are the first lines. Lines may be added.
 
     Args:
         file: Path of the file. Its columns are numbers of the scene or entries of them, "vehicle.mass", "start.position[2]"
@@ -45,12 +45,12 @@ class Table(Sampling):
         sha256: Checksum that the file must have, written by `to_dict`; any by default.
         columns: Names of the columns to take; all by default.
         ignore: Names of the columns to leave out, such as an id; none by default.
-        weights: What each member counts for in statistics: the name of a column, or numbers (n,) from 0, in any unit. So the
-            members stand for another distribution than the one that they were drawn from: the weight of a member is the
-            ratio of the two densities (importance sampling), or that of a draw of a posterior. By default all count alike.
+        weights: Statistical weights of the members: the name of a column, or numbers (n,), at least 0, in any unit. The
+            members then represent another distribution than the one that they were drawn from: the weight of a member is
+            the ratio of the two densities (importance sampling), or that of a draw of a posterior. By default equal.
 
     Raises:
-        SceneError: Where the file cannot be read, or a cell is no number. The message lists every fault.
+        SceneError: If the file cannot be read, or a cell is no number. The message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -101,7 +101,7 @@ class Table(Sampling):
             The table, whether or not the file still exists.
 
         Raises:
-            SceneError: Where the values are no columns of one length.
+            SceneError: If the values are no columns of one length.
         """
         table = cls(values=values, weights=settings.get("weights"))
         for item in fields(cls):

@@ -32,7 +32,7 @@ class Distribution(Documented):
     Class attributes: `kind` is the name in a scene file; `widths` names the arguments of which exactly one sets the width.
 
     Raises:
-        SceneError: Where a number is wrong. The message lists every fault.
+        SceneError: If a number is wrong. The message lists every fault.
     """
 
     kind: ClassVar[str] = ""

@@ -30,7 +30,7 @@ class Copula(JointLaw):
             Any of lgvi_warp, a frozen one of scipy.stats, or an object with quantiles.
 
     Raises:
-        SceneError: Where the matrix is no correlation, or a marginal is none of a single number.
+        SceneError: If the matrix is no correlation matrix, or a marginal is not a distribution of a single number.
 
     Examples:
         >>> import lgvi_warp as lw

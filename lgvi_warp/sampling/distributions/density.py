@@ -25,9 +25,9 @@ AT_ONCE = 4_000_000
 class KernelDensity(JointLaw):
     """Gaussian kernel density of draws, such as those of a posterior: of one number, or of several together.
 
-    Its values are absolute: the scene's own value plays no part. The density is the mean of normal distributions about the
-    draws. Of one number, values rise with the level, so that Sobol points and other designs keep their evenness; of several,
-    one level chooses a draw, and the others the place about it.
+    Its values are absolute: the scene's own value is not used. The density is the mean of normal distributions about the
+    draws. For one number, values rise with the level, so that Sobol points and other designs stay evenly spread. For
+    several, one level selects a draw, and the others the displacement from it.
 
     Args:
         draws: Draws (n,) of one number, or (n, d) of d numbers together: the entries of a vector, or of several quantities,
@@ -36,7 +36,7 @@ class KernelDensity(JointLaw):
             rule: the draws' own covariance, times n^(-2 / (d + 4)).
 
     Raises:
-        SceneError: Where the draws do not vary or are fewer than 2, or a bandwidth is not above 0.
+        SceneError: If the draws do not vary or are fewer than 2, or a bandwidth is not above 0.
 
     Examples:
         >>> import lgvi_warp as lw

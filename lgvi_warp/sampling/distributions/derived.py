@@ -17,18 +17,19 @@ from lgvi_warp.sampling.distributions.named import as_distribution
 
 
 class Derived(JointLaw):
-    """Numbers that follow from one factor, or a few: vary = {"drag.quadratic": Derived({...}, k=...)}.
+    """Numbers computed from one random factor, or a few: vary = {"drag.quadratic": Derived({...}, k=...)}.
 
     The key in `vary` names the same numbers as the mapping: "drag.linear, drag.quadratic" for two. A file holds no functions:
     a run that is read from a file needs the ensemble again.
 
     Args:
-        functions: Function of each number, by its name: it takes the factors that its arguments name, each as an array that
-            multiplies with the scene's value of the number, and returns the number of each member.
-        factors: Distribution of each factor, of a single number; where a distribution is about the scene's value, that is 1.
+        functions: Function of each number, by its name. Its arguments are named like the factors, each an array that
+            multiplies with the scene's value of the number. It returns the number of each member.
+        factors: Distribution of each factor, of a single number; a distribution that is about the scene's value by default
+            is about 1 here.
 
     Raises:
-        SceneError: Where something is no function or no distribution, or a function takes what is no factor.
+        SceneError: If something is no function or no distribution, or a function takes what is no factor.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -22,10 +22,10 @@ class Factor(JointLaw):
     In a scene file: "drag_matrix.quadratic" = { factor = { uniform = { low = 0.8, high = 1.2 } } }.
 
     Args:
-        law: Distribution of the factor; where it is about the scene's value, that is 1.
+        law: Distribution of the factor; a distribution that is about the scene's value by default is about 1 here.
 
     Raises:
-        SceneError: Where `law` is no distribution of a single number.
+        SceneError: If `law` is no distribution of a single number.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -162,7 +162,7 @@ class CorrelatedNormal(JointLaw):
         mean: Mean, one or (d,); by default the scene's values.
 
     Raises:
-        SceneError: Where the matrix is not positive semidefinite or the numbers do not fit. The message lists every fault.
+        SceneError: If the matrix is not positive semidefinite or the numbers do not fit. The message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -237,7 +237,7 @@ class RotationNormal(AttitudeDistribution):
         covariance: Covariance of v, (3, 3) [rad^2]; instead of `std`.
 
     Raises:
-        SceneError: Where the numbers do not fit. The message lists every fault.
+        SceneError: If the numbers do not fit. The message lists every fault.
     """
 
     std: Spread | None = None

@@ -36,13 +36,13 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 class ScipyDistribution(Distribution):
     """A frozen distribution of scipy.stats, as lw.distributions.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
 
-    In `vary` it needs no wrapper. Its values are absolute: the scene's own value plays no part.
+    In `vary` it needs no wrapper. Its values are absolute: the scene's own value is not used.
 
     Args:
         distribution: The frozen distribution; its parameters are one number or one per component.
 
     Raises:
-        SceneError: Where it is not frozen, has no quantiles, or scipy refuses its numbers.
+        SceneError: If it is not frozen, has no quantiles, or scipy refuses its numbers.
     """
 
     distribution: Any = None
@@ -111,7 +111,7 @@ class ScipyDistribution(Distribution):
             The distribution.
 
         Raises:
-            SceneError: Where the name or a number is wrong. The message lists every fault.
+            SceneError: If the name or a number is wrong. The message lists every fault.
         """
         from scipy import stats
 
@@ -142,7 +142,7 @@ class ScipyDistribution(Distribution):
 class BinnedDistribution(Distribution):
     """Distribution given by a histogram, uniform within each bin.
 
-    Its values are absolute: the scene's own value plays no part. It is "histogram" in a scene file and
+    Its values are absolute: the scene's own value is not used. It is "histogram" in a scene file and
     scipy.stats.rv_histogram in `vary`; lw.statistics.Histogram is the statistic.
 
     Args:
@@ -181,7 +181,7 @@ class UserDistribution(Distribution):
         distribution: The object.
 
     Raises:
-        SceneError: Where the object gives no finite numbers at the levels 0.25 and 0.75.
+        SceneError: If the object gives no finite numbers at the levels 0.25 and 0.75.
     """
 
     distribution: Any = None

@@ -28,7 +28,7 @@ class OpenTURNSDistribution(JointLaw):
         distribution: The distribution.
 
     Raises:
-        SceneError: Where it gives no finite numbers in its middle.
+        SceneError: If it gives no finite numbers in its middle.
     """
 
     distribution: Any = None

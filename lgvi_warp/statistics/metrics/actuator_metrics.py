@@ -67,9 +67,10 @@ _ALL = {name: all_of(name) for name in CHANNELS}
 
 @dataclass(frozen=True, eq=False)
 class Effort(OfChannels):
-    """The integral over time of |command|, summed over channels [unit of the commands, s]; then statistics of it.
+    """The integral over time of |command|, summed over channels [unit of the commands, s]; then statistics over members.
 
-    A command counts from its tick to the next one: exact, since it is held between them. Faults are in it, delays are not.
+    A command counts from its tick to the next one: exact, since it is held between them. Faults are included, delays are
+    not.
 
     Args:
         of: "command" (the default), "actuator", or one channel, "command[2]".
@@ -110,7 +111,7 @@ def _saturated(samples: Fields, members: Members) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class SaturationShare(OfOne, Total):
-    """The share of each member's time under way in which some command is at its limit or beyond [1]; then statistics of it.
+    """Share of each member's time under way in which a command is at its limit or beyond [1]; then statistics over members.
 
     Limits are those of the terms that take the commands, `limit`; one without a limit never saturates.
 
@@ -143,12 +144,13 @@ def _wrench_and_twist(samples: Fields, members: Members) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class ActuatorEnergy(OfOne, Total):
-    """The integral over time of |power| that the actuators' wrench gives to the motion [J]; then statistics of it.
+    """The integral over time of |power| that the actuators' wrench gives to the motion [J]; then statistics over members.
 
-    The power is exerted . (velocity, angular velocity): of the forces that the actuators exert after limits, lags, the loss by
-    the advance speed, and faults, known to the controller or not. Between ticks it follows by the trapezoidal rule; without
-    lags, limited rates and delays with the wrench of the first of them, which holds until the next one. It is mechanical,
-    without the losses of motors and propellers. `ElectricalEnergy` has these, in a scene that accounts them.
+    The power is exerted . (velocity, angular velocity): of the forces that the actuators exert after limits, lags, the loss
+    by the advance speed, and faults, known to the controller or not. Between ticks the trapezoidal rule applies; without
+    lags, limited rates and delays, with the wrench of the first tick, which is held until the next one. The energy is
+    mechanical, without the losses of motors and propellers. `ElectricalEnergy` includes these, in a scene with an energy
+    account.
 
     Args:
         of: "exerted", the default.
@@ -175,10 +177,10 @@ class ActuatorEnergy(OfOne, Total):
 
 @dataclass(frozen=True, eq=False)
 class ElectricalEnergy(OfOne, Total):
-    """The energy that each member uses [J], by the account of `lw.terms.EnergyUse`; then statistics of it.
+    """The energy that each member uses [J], by the account of `lw.terms.EnergyUse`; then statistics over members.
 
-    It is what was used between the first tick and the last: electrical, with the hotel load and all losses that terms tell. A
-    sweep over a scene that keeps this account means it by "energy", too.
+    It is the energy used between the first tick and the last: electrical, with the hotel load and all losses that terms
+    state. In a sweep over a scene with this account, "energy" means this metric, too.
 
     Args:
         of: "energy_used", the default.
@@ -195,10 +197,10 @@ class ElectricalEnergy(OfOne, Total):
 
 @dataclass(frozen=True, eq=False)
 class TimeToFailure(OfOne):
-    """Time at which each member failed or an event stopped it [s], infinite at the end; then statistics of it.
+    """Time at which each member failed or an event stopped it [s], infinite at the end; then statistics over members.
 
-    Only lw.statistics.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed.
-    lw.statistics.Outcome is the probability to have ended by each time.
+    Only lw.statistics.MemberValues() includes all members: other statistics exclude infinite times, and members that
+    failed. lw.statistics.Outcome is the probability to have ended by each time.
 
     Args:
         of: "end", the default.
@@ -230,7 +232,7 @@ class TickSamples(dict[str, np.ndarray]):
 
 @dataclass(frozen=True, eq=False)
 class CustomMetric(Metric):
-    """A metric of the user's own: a function that sees each tick of a block of members in turn; then statistics of it.
+    """A metric of the user's own: a function of each tick of a block of members in turn; then statistics over members.
 
     The function is called as function(state, tick): `state` is None at the first tick, then what the function returned at the
     tick before; `tick` has the samples of n members by name, tick["position"] (n, 3), and tick.t, tick.dt [s]. It returns
@@ -241,8 +243,8 @@ class CustomMetric(Metric):
         fields: names of the samples that the function reads, as for lw.SaveAt.
         last: function of the last state that returns the metric (n,); by default the state itself.
         unit_of: unit of the metric, a text; by default "1".
-        version: what tells the functions from others in sweeps and stores, a text or a number, changed whenever they do; by
-            default None: what their code says.
+        version: text or number that identifies the functions in sweeps and stores; change it whenever they change; by
+            default None: their code identifies them.
     """
 
     type: ClassVar[str] = "own_metric"

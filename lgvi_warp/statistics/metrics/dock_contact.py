@@ -29,10 +29,10 @@ FIELDS = ("position", "attitude", "velocity")
 
 @dataclass(frozen=True, eq=False)
 class DockContact(Metric):
-    """First passage of each member through the plane of its dock within its mouth; then statistics of it.
+    """First passage of each member through the plane of its dock within its mouth; then statistics over members.
 
-    The dock is that of a guidance `lw.control.Docking`. Between two ticks the way is a cubic with the places and velocities
-    there. A member that did not dock has no number (NaN), and is left out of statistics.
+    The dock is that of a guidance `lw.control.Docking`. Between two ticks the path is the cubic through their positions and
+    velocities. A member that did not dock has no number (NaN), and is left out of statistics.
 
     Args:
         of: "speed": ahead along the centre line, over ground [m/s]; "offset": distance of the origin from the centre line [m];
@@ -40,7 +40,7 @@ class DockContact(Metric):
         docking: name of the guidance; by default "docking".
 
     Raises:
-        SceneError: where `of` is nothing of these; and as a run begins, where the scene has no such guidance.
+        SceneError: if `of` is none of these; at the start of a run, if the scene has no such guidance.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -106,7 +106,7 @@ class _Follow(Gatherer):
 
 @dataclass(frozen=True, eq=False)
 class Metric(MemberStatistic):
-    """One number of each member over all ticks of a controller, then statistics of it. Abstract.
+    """One number of each member over all ticks of a controller, then statistics over members. Abstract.
 
     It takes the samples at every tick, whatever the run keeps; in a scene without a controller, at the times of samples. A
     member that stops or fails has the number of its time under way, up to its last tick. Statistics leave out members that
@@ -114,9 +114,10 @@ class Metric(MemberStatistic):
 
     Args:
         of: what is tracked; see the classes derived from it.
-        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
-        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
-        stopped: has no meaning for a metric: leave it out.
+        then: Statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(), the
+            default, lw.statistics.Quantiles(), ...
+        measured: Whether to use the number that sensors measure, in place of the true one; by default False.
+        stopped: not used by metrics; omit it.
     """
 
     of_numbers: ClassVar[bool] = False

@@ -25,7 +25,7 @@ UNITS = {"end": "m", "largest": "m", "percent": "%"}
 
 @dataclass(frozen=True, eq=False)
 class NavigationError(Metric):
-    """Length of the `navigation_error` of each member over its ticks; then statistics of it.
+    """Length of the `navigation_error` of each member over its ticks; then statistics over members.
 
     "percent" is the error at the end over the length of the path over ground, by straight lines between ticks, as
     manufacturers state the error of logs and inertial systems. It is NaN for a member that does not move.
@@ -36,7 +36,7 @@ class NavigationError(Metric):
         horizontal: Whether the length is that of the north and east components alone; by default False.
 
     Raises:
-        SceneError: where `of` is none of these; and as a run begins, where nothing estimates the position, or where "percent"
+        SceneError: if `of` is none of these; and as a run begins, where nothing estimates the position, or where "percent"
             is asked of a run that goes on.
 
     Examples:

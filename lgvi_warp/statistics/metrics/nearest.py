@@ -80,18 +80,18 @@ def least_between(a: np.ndarray, b: np.ndarray, rate_a: np.ndarray, rate_b: np.n
 
 @dataclass(frozen=True, eq=False)
 class Nearest(Metric):
-    """The least distance of each member to an event over its path [m], 0 where the event stopped it; then statistics of it.
+    """Least distance of each member to an event over its path [m], 0 if the event stopped it; then statistics over members.
 
-    It looks at every tick of the controller; in a scene without one, at the times of samples. Between two looks the way is a
-    cubic with the places and velocities there, so that looks may be some steps apart. A member that something else stopped,
-    or that failed, has the distance of its time under way.
+    The distance is evaluated at every tick of the controller; without a controller, at the sample times. Between two of
+    these the path is the cubic through their positions and velocities, so they may be several steps apart. For a member
+    that failed, or that another event stopped, the path until then counts.
 
     Args:
         of: name of an event of the scene, "floor".
         kind: type of the event, "floor", "surface" or "box"; by default its name.
 
     Raises:
-        SceneError: where the event is of another type; and as a run begins, where the scene has no such event.
+        SceneError: if the event is of another type; at the start of a run, if the scene has no such event.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -46,8 +46,8 @@ class OfCourse(Metric):
     (the step); what is below or beyond is meant in the direction of the step, upward if the step is 0.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
-            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set-point, before any reference model; with
+            other guidance, the wanted value at the first tick. The step goes from the first actual value to the goal.
     """
 
     tracks: ClassVar[bool] = True
@@ -91,7 +91,7 @@ class OfStep(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class Overshoot(Largest, OfStep):
-    """Largest distance of each member beyond its goal [unit, or % of the step], 0 if it never does; then statistics of it.
+    """Largest distance of each member beyond its goal [unit, or % of the step], 0 if none; then statistics over members.
 
     Args:
         percent: whether in percent of the step; by default False.
@@ -121,7 +121,7 @@ class Overshoot(Largest, OfStep):
 
 @dataclass(frozen=True, eq=False)
 class Undershoot(Largest, OfStep):
-    """Largest distance of each member in the wrong direction [unit, or % of the step]; then statistics of it.
+    """Largest distance of each member in the wrong direction [unit, or % of the step]; then statistics over members.
 
     Args:
         percent: whether in percent of the step; by default False.
@@ -138,7 +138,7 @@ class Undershoot(Largest, OfStep):
 
 @dataclass(frozen=True, eq=False)
 class PeakTime(OfCourse):
-    """Time at which each member is farthest in the direction of its step [s], the first such tick; then statistics of it."""
+    """First time at which each member is farthest in the direction of its step [s]; then statistics over members."""
 
     type: ClassVar[str] = "peak_time"
     form: ClassVar[str] = "s"
@@ -160,9 +160,10 @@ class PeakTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class Peak(Overshoot):
-    """The number that each member has where it is farthest in the direction of its step [unit]; then statistics of it.
+    """Value of each member where it is farthest in the direction of its step [unit]; then statistics over members.
 
-    That of a heading is not wrapped: it lies within pi of the goal. It is step_info's Peak for a step from 0.
+    A heading is not wrapped: it lies within pi of the goal. For a step from 0 the value is the Peak of python-control's
+    step_info.
     """
 
     type: ClassVar[str] = "peak"
@@ -173,7 +174,7 @@ class Peak(Overshoot):
 
 @dataclass(frozen=True, eq=False)
 class RiseTime(OfCourse):
-    """Time of each member from 10 % to 90 % of its step [s]; then statistics of it.
+    """Time of each member from 10 % to 90 % of its step [s]; then statistics over members.
 
     From the first tick with at least 10 % of the step done to the first one with at least 90 %. Infinite where a member never
     gets there.
@@ -213,13 +214,13 @@ class RiseTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class SettlingTime(OfCourse):
-    """Time after which each member stays within a band about its goal [s]; then statistics of it.
+    """Time after which each member stays within a band about its goal [s]; then statistics over members.
 
-    The time of the first tick from which on |d| <= within at every tick of its time under way; infinite where it is outside
-    at the last one.
+    The time of the first tick from which on |d| <= within at every tick under way; infinite for a member that is outside at
+    its last tick.
 
     Args:
-        within: half the width of the band, in the unit of what it is of; by default 2 % of each member's step.
+        within: half the width of the band, in the unit of the quantity; by default 2 % of each member's step.
     """
 
     type: ClassVar[str] = "settling_time"
@@ -250,7 +251,7 @@ class SettlingTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class SteadyStateError(Total, OfTracking):
-    """The mean error over the last part of the run [unit], of its ticks; then statistics of it.
+    """The mean error over the last part of the run [unit], of its ticks; then statistics over members.
 
     NaN for members that stopped or failed before the last tick.
 
@@ -286,7 +287,7 @@ class SteadyStateError(Total, OfTracking):
 
 @dataclass(frozen=True, eq=False)
 class MaxError(Largest, OfTracking):
-    """The largest |e| of each member [unit]; then statistics of it."""
+    """The largest |e| of each member [unit]; then statistics over members."""
 
     type: ClassVar[str] = "max_error"
 
@@ -298,7 +299,7 @@ class MaxError(Largest, OfTracking):
 class CrossTrack(MaxError):  # noqa: N818  (no exception)
     """The largest horizontal distance of each member from the line through the wanted place along the wanted velocity [m].
 
-    Where no velocity is wanted, from the wanted place. Then statistics of it.
+    Without a wanted velocity, the distance from the wanted place. Then statistics over members.
 
     Args:
         of: "cross_track", the default.
@@ -322,7 +323,7 @@ class OverTime(Total, OfTracking):
 
 @dataclass(frozen=True, eq=False)
 class IAE(OverTime):
-    """The integral of |e| over time [unit s]; then statistics of it.
+    """The integral of |e| over time [unit s]; then statistics over members.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -345,7 +346,7 @@ class IAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class ISE(OverTime):
-    """The integral of e^2 over time [unit^2 s]; then statistics of it."""
+    """The integral of e^2 over time [unit^2 s]; then statistics over members."""
 
     type: ClassVar[str] = "ise"
     form: ClassVar[str] = "{0}^2 s"
@@ -354,7 +355,7 @@ class ISE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class ITAE(OverTime):
-    """The integral of t |e| over time [unit s^2]; then statistics of it."""
+    """The integral of t |e| over time [unit s^2]; then statistics over members."""
 
     type: ClassVar[str] = "itae"
     form: ClassVar[str] = "{0} s^2"
@@ -363,7 +364,7 @@ class ITAE(OverTime):
 
 @dataclass(frozen=True, eq=False)
 class RMSError(ISE):
-    """The root of the mean of e^2 over the time under way [unit]; then statistics of it. |e| where that time is 0."""
+    """Root mean square of e over the time under way [unit], |e| where that time is 0; then statistics over members."""
 
     type: ClassVar[str] = "rms"
     form: ClassVar[str] = "{0}"

@@ -25,8 +25,8 @@ class MemberStatistic(Statistic):
 
     Args:
         of: see the classes derived from it.
-        then: a statistic, or a list, without `of`: lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5, 0.99)),
-            lw.statistics.Exceedance(above=2.0).
+        then: statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean(),
+            lw.statistics.Quantiles(levels=(0.5, 0.99)), lw.statistics.Exceedance(above=2.0).
     """
 
     then: Any = None

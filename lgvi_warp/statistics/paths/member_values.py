@@ -21,7 +21,7 @@ class MemberValues(Statistic):
     """The number of every member, in the order of the members: eight bytes a member, component and row.
 
     It is meant for `then`, which has one row: lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(),
-    lw.statistics.MemberValues()]). Of a metric it has the numbers of members that failed too; otherwise those of members that
+    lw.statistics.MemberValues()]). For a metric it includes the numbers of failed members; otherwise those of members that
     are left out are NaN. It has no interval.
 
     Arrays of the estimate:
@@ -33,7 +33,7 @@ class MemberValues(Statistic):
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
             (see lw.statistics.Quantity).
         name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
-        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
+        stopped: "held" keeps a member that an event stopped in its last state; "left_out" excludes it from then on.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -61,14 +61,14 @@ class _Walk(Gatherer):
 class OfPath(MemberStatistic):
     """One number for each component of each member's whole path, then statistics of that number. Abstract.
 
-    Members that failed are left out: the rest of their path is not known. The name of an estimate has both types: "mean
-    path_maximum speed". Its one row is at the time of the end.
+    Members that failed are left out: the rest of their path is not known. An estimate is named by both types: "mean
+    path_maximum speed". It has one row, at the end of the run.
 
     Args:
         of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
             (see lw.statistics.Quantity).
-        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
-            0.99)), lw.statistics.Exceedance(above=2.0).
+        then: statistic of these numbers over the members, or a list, each without its `of`: lw.statistics.Mean() (the
+            default), lw.statistics.Quantiles(levels=(0.5, 0.99)), lw.statistics.Exceedance(above=2.0).
     """
 
     of_numbers: ClassVar[bool] = False
@@ -85,10 +85,10 @@ class OfPath(MemberStatistic):
 
 @dataclass(frozen=True, eq=False)
 class PathMaximum(OfPath):
-    """The largest value of a quantity over all sample times of each member, then statistics of it.
+    """The largest value of a quantity over all sample times of each member, then statistics over members.
 
-    Members that failed are left out: the rest of their path is not known. The name of an estimate has both types: "mean
-    path_maximum speed". Its one row is at the time of the end.
+    Members that failed are left out: the rest of their path is not known. An estimate is named by both types: "mean
+    path_maximum speed". It has one row, at the end of the run.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -105,7 +105,7 @@ class PathMaximum(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathMinimum(OfPath):
-    """The smallest value of a quantity over all sample times of each member, then statistics of it."""
+    """The smallest value of a quantity over all sample times of each member, then statistics over members."""
 
     type: ClassVar[str] = "path_minimum"
     _reduction: ClassVar[Reduction] = reductions.MINIMUM
@@ -113,7 +113,7 @@ class PathMinimum(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathRange(OfPath):
-    """The largest less the smallest value of a quantity over all sample times of each member, then statistics of it."""
+    """The largest less the smallest value of a quantity over each member's sample times, then statistics over members."""
 
     type: ClassVar[str] = "path_range"
     _reduction: ClassVar[Reduction] = reductions.RANGE
@@ -121,7 +121,7 @@ class PathRange(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathMean(OfPath):
-    """The average over time of a quantity of each member, then statistics of it.
+    """The average over time of a quantity of each member, then statistics over members.
 
     Linear between samples: the trapezoidal rule over the sample times, divided by the time from the first to the last.
     With one sample it is that sample.
@@ -133,7 +133,7 @@ class PathMean(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathRms(OfPath):
-    """The root of the average over time of a quantity's square for each member, then statistics of it.
+    """The root of the average over time of a quantity's square for each member, then statistics over members.
 
     The square is taken as linear between samples.
     """
@@ -144,7 +144,7 @@ class PathRms(OfPath):
 
 @dataclass(frozen=True, eq=False)
 class PathTime(OfPath, Condition):
-    """The time [s] for which a condition holds for each member, then statistics of it: "mean path_time depth above 2".
+    """Time [s] for which a condition holds in each member, then statistics over members: "mean path_time depth above 2".
 
     Linear between samples: a time between two samples counts by the fraction of the line between them that satisfies
     the condition. A quantity that is true or false has no line: half of the time counts for each of its ends at which

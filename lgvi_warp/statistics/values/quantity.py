@@ -48,8 +48,8 @@ class Quantity:
         labels: names of the d components; by default `name`, for one component.
         needs_limit: whether a condition on it needs a number to compare with; by default False: the function may return
             true or false.
-        entries: (field, numbers) for each field of the motion of which the function reads these alone, counted from 0; at a
-            controller's ticks the others are NaN. By default none: it reads whole fields.
+        entries: (field, indices) for each field of the motion of which the function reads these components alone, counted
+            from 0; at a controller's ticks the other components are NaN. By default none: it reads whole fields.
     """
 
     name: str

@@ -30,10 +30,10 @@ class Derivatives(Saved):
         by: names of the numbers (k,).
         value: the quantities (m,).
         jacobian: derivative of each quantity by each number (m, k) [unit of the quantity / unit of the number]; NaN for none.
-        error: estimate of the error of each derivative (m, k), by how far differences at several increments are apart, and by
-            round-off; no bound: now and then an error is up to some 3 times that. The error of the method's step is not in
-            it. NaN where there is no derivative.
-        increments: the largest increment that each derivative stands on (m, k) [unit of the number]; NaN where there is none.
+        error: estimate of the error of each derivative (m, k), from the disagreement of differences at several increments,
+            and from round-off. It is no bound: now and then an error is up to some 3 times that. It excludes the error of
+            the method's step. NaN where there is no derivative.
+        increments: the largest increment that each derivative uses (m, k) [unit of the number]; NaN where there is none.
         undefined: "quantity by number" -> why it has no derivative, in a sentence.
         messages: notes for the user.
         members: copies of members that were run.

@@ -44,16 +44,16 @@ def derivatives(
 ) -> Derivatives:
     """Compute derivatives of a run's outputs with respect to numbers of the scene, each with an error estimate.
 
-    Copies of a member, moved by many increments to both sides, run beside it in one call, with its noise; their differences
-    are extrapolated, and the increments that agree best are taken. What goes in steps, or jumps, has no derivative: it is
-    named with the reason, and its entries are NaN.
+    Copies of a member, moved by many increments to both sides, run with it in one call, with the same noise. Their
+    differences are extrapolated, and the increments that agree best are used. A quantity that changes in steps, or jumps,
+    has no derivative: it is named with the reason, and its entries are NaN.
 
     Args:
-        fleet: A Scene, whose [ensemble] is left out; or an Ensemble, of whose members each has derivatives of its own.
-        of: One or several quantities, as of `lw.prepare`: "position[2]", "max(depth)", "end_time floor",
+        fleet: A Scene, whose [ensemble] is ignored; or an Ensemble, each member of which has its own derivatives.
+        of: One or several quantities, as in `lw.prepare`: "position[2]", "max(depth)", "end_time floor",
             lw.metrics.ITAE("depth"), a function of a Result.
-        by: Names of the numbers, as of `lw.prepare`: "vehicle.mass", "start.position[2]", "depth_pid.kp", ...
-        method: As of `lw.solve`, as all settings that follow: what is left out is that of the scene.
+        by: Names of the numbers, as in `lw.prepare`: "vehicle.mass", "start.position[2]", "depth_pid.kp", ...
+        method: As in `lw.solve`, as all settings that follow: what is left out is that of the scene.
         h: Step [s].
         t1: End of the run [s].
         save: Samples to keep; default those that the quantities need.
@@ -66,7 +66,7 @@ def derivatives(
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            in [0, 1]. None, the default, for nobody.
+            in [0, 1]. None, the default: nothing is shown.
 
     Returns:
         Values, derivatives with their errors, and what has none.

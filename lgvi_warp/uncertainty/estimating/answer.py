@@ -23,13 +23,13 @@ class Estimated(Summarized, Saved):
         unit: unit of the value and of all errors.
         value: the estimate [`unit`].
         interval: its 95 % interval, of sampling and bias together, (low, high) [`unit`].
-        error: root mean square asked for [`unit`].
+        error: requested root mean square error [`unit`].
         sampling_error: standard error of sampling [`unit`].
-        bias: difference from the finer setting that the bias was told by, which is not taken off [`unit`].
-        bias_interval: its 95 % interval, with what is left beyond that setting, (low, high) [`unit`].
+        bias: estimated bias: difference from a finer setting; it is not subtracted from the value [`unit`].
+        bias_interval: its 95 % interval, with the remaining bias of that setting, (low, high) [`unit`].
         setting: the setting whose statistic is estimated, as "psi_x 0.025".
         settings: the same as arguments of `lw.solve`: method, h and dtype.
-        reference: the finer setting that the bias was told by, and the number of members.
+        reference: the finer setting of the estimated bias, and the number of members.
         estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
         members: number of members of the run by setting, "psi_x 0.025 less psi_x 0.2" for pairs.
         seconds: processor time of all, pilot included, without compiling [s].

@@ -61,7 +61,7 @@ class Bias:
 def difference(coarse: np.ndarray, fine: np.ndarray, least: float = 0.0) -> StepChange:
     """The paired difference of two settings' contributions (n,), of replicates where these are enough.
 
-    least: as of `estimators.plain`; where none of n members differs, up to 3 / n of them may, with 95 %.
+    least: as in `estimators.plain`; where none of n members differs, up to 3 / n of them may, with 95 %.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of steps that are too long may be huge
         apart, n = coarse - fine, len(coarse)

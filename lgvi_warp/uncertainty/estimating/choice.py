@@ -66,7 +66,7 @@ class Observed:
     z: (settings, n). normals: (n, d) of the members' numbers. least: smallest change of a contribution.
     costs: of a member alone [s]. pair: cost of a member of two settings, by their numbers [s]. settings: in the same order.
     at: the target, by which contributions were formed. alone: by the number of a setting, contributions of more members.
-    call: what a call takes by itself [s]. weight: of all contributions. reach: as of `Level`.
+    call: what a call takes by itself [s]. weight: of all contributions. reach: as in `Level`.
     """
 
     z: Sequence[np.ndarray]

@@ -75,9 +75,9 @@ def estimate(
     Choices follow counted costs: steps times the evaluations of forces of each. One seed gives one answer, to the bit, on any
     number of threads. `found.recipe` holds what was chosen, so that the same members can be run again later.
 
-    A sample of n members can miss a share of up to 3 / n that behaves otherwise. The spread, 512 to 2,048 members all over
-    what varies, and probes far out show how otherwise. A message of a mean names the share that may have been missed. Rare
-    branches of a Choice are strata of their own.
+    A sample of n members can miss a fraction of up to 3 / n of all members that behaves differently. To estimate its
+    effect, 512 to 2,048 members spread over all input values are run, and probes far from the middle. A message names the
+    fraction that a mean may have missed. Rare values of a Choice are separate strata.
 
     Args:
         fleet: the ensemble, or a Scene with one. Its distributions are drawn from anew; members and sampling do not matter.
@@ -101,7 +101,7 @@ def estimate(
             estimator and the seed are those of the recipe. Fleet, `of`, `risk` and `cheaper` must be as they were.
         heavy_tail: True reports a mean even if its variance seems to be infinite. Default False: it is refused.
         seed: seed of points and noise. Default: that of the ensemble.
-        threads: threads of the runs. Default: as of `lw.solve`.
+        threads: threads of the runs. Default: as in `lw.solve`.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Other than with threads, the cost
             is the elapsed time.
         scheduler: address of Dask's scheduler.
@@ -115,9 +115,9 @@ def estimate(
 
     Raises:
         SceneError: for faulty arguments, for a statistic of another kind or without finite variance, where members fail at the
-            finest setting, and where the estimator that is fixed cannot be had.
-        OSError: where `store` cannot be written.
-        KeyboardInterrupt: if Ctrl-C ends it, which tells how far it was; there is no answer then.
+            finest setting, and if the given estimator is not possible.
+        OSError: if `store` cannot be written.
+        KeyboardInterrupt: if Ctrl-C interrupts it. The message reports the progress; there is no answer.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -58,7 +58,7 @@ def replicated(y: np.ndarray, least: float = 0.0, replicates: int = REPLICATES) 
 
     docs/theory/estimators.md, (E13).
 
-    least: as of `plain`.
+    least: as in `plain`.
     """
     means = y.reshape(-1, replicates).mean(axis=0)
     variance = float(np.var(means, ddof=1)) / replicates + (UNSEEN * least / len(y)) ** 2
@@ -70,7 +70,7 @@ def regressed(y: np.ndarray, normals: np.ndarray, least: float = 0.0) -> MeanEst
 
     docs/theory/estimators.md, (E19).
 
-    least: as of `plain`.
+    least: as in `plain`.
     """
     n, d = normals.shape
     factors, left = fitted(y, normals)

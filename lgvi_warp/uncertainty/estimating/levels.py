@@ -79,7 +79,7 @@ class Runs:
     counted: counted time of all calls so far, which is the same in every call of `lw.estimate` [s].
     seconds: processor time of all runs so far, prepared and called, without preparing the first run of each kernel, which
         loads or compiles it [s].
-    execution: threads, executor and scheduler, as of `lw.prepare`.
+    execution: threads, executor and scheduler, as in `lw.prepare`.
     remembered: where calls are kept; None for nowhere.
     """
 

@@ -47,7 +47,7 @@ def mean_settings(
 ) -> list[MeanSetting]:  # fmt: skip
     """Settings whose bias at the end is at most an error, the cheapest first; SceneError where there is none.
 
-    of: the mean of one number, as of `lw.estimate`. methods: to try; None for those of `lw.estimate`. seconds: processor
+    of: the mean of one number, as in `lw.estimate`. methods: to try; None for those of `lw.estimate`. seconds: processor
         time to spend, about.
     """
     fleet = drawn(fleet)

@@ -62,8 +62,8 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
     """Find the smallest regions that hold given shares of the members' places, and their areas.
 
     The shares are 50, 90, 95 and 99 %. The regions are level sets of a kernel density, at the levels above which these shares
-    of new members would lie. So they may have several parts and holes. Members that failed have no end; those that never get
-    there have no place. Both are counted in `lacking`.
+    of new members would lie. So they may have several parts and holes. Members that failed have no end, and some members
+    may never reach the event: these have no place, and are counted in `lacking`.
 
     Args:
         result: A result with positions, in memory or in a store.

@@ -34,7 +34,7 @@ class RareEvent(Saved):
         event: what was asked for, in words.
         probability: of the event; members that fail count as it, where failed="event".
         interval: (lower, upper), of 95 % by Student's t of the logarithm.
-        relative_error: standard deviation of the probability's error, as a part of it.
+        relative_error: relative standard error of the probability.
         estimator: "importance", "subset", "plain" or "splitting".
         members: number of members that were run, by setting: "scene", and what `cheaper` says; with splitting in whole runs.
         failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None where
@@ -42,16 +42,16 @@ class RareEvent(Saved):
         normals: (m, d), the numbers that vary of these members as standard normals, in the order of `moved`.
         draws: (m, k), standard normals of noise of these members, for lw.prepare(..., draws="given"); k = 0 without noise, and
             with splitting.
-        weights: (m,), what each of them stands for; they sum to 1.
+        weights: (m,), weights of these members, with the sum 1.
         failed_share: part of the probability that is of members that failed, or have a number that is not finite.
         likeliest: values by name of the likeliest of these members, that with the least distance from the middle.
         likeliest_draws: (k,), standard normals of its noise.
         distance: its distance from the middle, in standard deviations of all that varies.
         moved: by name, the mean of the failing members in standard deviations from the middle.
         noise_moved: by term or sensor, a z-score of the failing members' draws: of their mean path or of their sum of squares.
-            That of noise which does not matter is about a standard normal number; from 4.5 on it is no chance.
-        runs: the runs of subset simulation: thresholds and limits of each level; with splitting, scores of members: what their
-            limit is expected to be at the end in what is not known of it, infinite where the event happened.
+            For noise that does not matter it is roughly a standard normal number; from 4.5 on it is not by chance.
+        runs: the runs of subset simulation: thresholds and limits of each level; with splitting, scores of members: the
+            expected limit at the end over its uncertainty, infinite where the event happened.
         plain_members: members that plain Monte Carlo would take for this error.
         plain_seconds: how long these would take at the pace of this call [s].
         seconds: how long the runs of members took [s].
@@ -61,7 +61,7 @@ class RareEvent(Saved):
             has the noise of an index, by the seed of the call, as in `run.states(final, indices=, seed=)`.
         moved_size: by name, the mean absolute value of the failing members in standard deviations; 0.80 of all members.
         moved_spread: by name, the standard deviation of the failing members in that of all members.
-        moved_z: by name, the z-score farthest from 0 of these three against all members; from 4.5 on it is no chance.
+        moved_z: by name, the z-score farthest from 0 of these three against all members; from 4.5 on it is not by chance.
         by_condition: where the event is any of several conditions, (probability, lower, upper) of each alone by its words, and
             of "any" and "all" of them, over the whole run; empty otherwise, and where a status is among them.
         ancestors: (m,), of each failing member the one of a first level from which it descends, or the run of splitting.

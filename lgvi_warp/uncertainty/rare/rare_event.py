@@ -72,20 +72,20 @@ def rare_event(
 ) -> RareEvent:
     """Estimate the probability of a rare event, with its interval, and list failing members.
 
-    Chains of members go level by level towards the event (subset simulation), over the numbers that vary and over the draws of
-    noise, in four independent runs; then members drawn about the failing ones, with weights, are the answer where checks say
-    that it is reliable, and more chains otherwise. Events more likely than 1e-3 are sampled directly.
+    Chains of members go level by level towards the event (subset simulation), over the numbers that vary and over the draws
+    of noise, in four independent runs. Importance sampling about the failing members then gives the answer if it passes its
+    checks; otherwise more chains do. Events more likely than 1e-3 are sampled directly.
 
     Args:
         fleet: A Scene or an Ensemble; what varies is its `vary`, by distributions, and its noise.
-        limit: The event: a quantity or a function of a Result, of which above 0 is the event, "max(depth) - 40.0"; conditions
-            in a sweep's words, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of an event of the
-            scene.
+        limit: The event: a quantity or a function of a Result that is above 0 in the event, "max(depth) - 40.0"; conditions
+            as in a sweep, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of an event of the scene.
         relative_error: Target relative standard error of the probability, 0.005 to 0.5; 0.1 by default.
-        by: "chains", the default, or "splitting", for a scene with noise and an event that is seen on the way: a number at the
-            end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
-        cheaper: Coarser settings that chains may use first; the answer is that of the scene's own. Numbers and settings of the
-            run that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by default.
+        by: "chains", the default, or "splitting", for a scene with noise and an event that can be followed in time: a
+            number at the end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
+        cheaper: Coarser settings that chains may use first; the answer is always of the scene's own setting. Each lists the
+            numbers and settings of the run that differ, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}]. None by
+            default.
         intervals: Splitting: number of time intervals, at most, 2 to 1,000; 50 by default. More intervals need fewer members,
             and each costs a call. They begin at samples and at ticks of a controller.
         failed: "event", the default: a member that fails counts as the event, and is reported apart; "refuse" for an error.
@@ -95,18 +95,18 @@ def rare_event(
             with splitting level by level, after its pilot was run again. A folder of other arguments is refused. None by
             default.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False for
-            nobody.
-        **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
+            as far as that is known. None, the default, shows it on a terminal where more than 10 s are expected; False:
+            nothing is shown.
+        **settings: As in `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
         The probability, its interval, what it took, and the members for which the event happens.
 
     Raises:
-        SceneError: If an argument is at fault; where the event never happens or always does; where the limit takes so few
-            values that nothing says how near a member is; and where members have more draws of noise than chains can keep.
+        SceneError: If an argument is at fault; where the event never happens or always does; where the limit takes too few
+            values to show how near a member is; and where members have more draws of noise than chains can keep.
         FailedMembers: With failed="refuse", where members failed.
-        OSError: Where `store` cannot be written.
+        OSError: If `store` cannot be written.
 
     Examples:
         >>> import lgvi_warp as lw

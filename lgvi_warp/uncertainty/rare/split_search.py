@@ -27,7 +27,7 @@ FEW_STARTS = 30
 
 @dataclass(frozen=True, eq=False)
 class SplitAnswer(RareAnswer):
-    """Answer of splitting; paths: of each failing member, as of `SplitRuns`; of_run: (m,), the independent run of each."""
+    """Answer of splitting; paths: of each failing member, as in `SplitRuns`; of_run: (m,), the independent run of each."""
 
     paths: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     of_run: np.ndarray = field(default_factory=lambda: np.zeros(0, int))

@@ -27,7 +27,7 @@ class ScalarModel:
     Args:
         scene: the scene.
         vary: name -> distribution, or names alone.
-        of: one or several quantities of interest, as of `sobol`.
+        of: one or several quantities of interest, as in `sobol`.
         levels: whether X holds numbers in (0, 1) in place of the values themselves.
         failed: "refuse" or "nan", for members that fail.
         settings: further arguments of `lw.prepare`.
@@ -212,7 +212,7 @@ def model(
     Args:
         scene: the scene.
         vary: name -> distribution, or names alone. The columns are the entries that `names` lists, in this order.
-        of: one or several quantities of interest, as of `sobol`.
+        of: one or several quantities of interest, as in `sobol`.
         levels: whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values
             themselves; joint distributions need it. Default False.
         failed: "refuse" for an error where members fail, "nan" for NaN in their place. Default "refuse".

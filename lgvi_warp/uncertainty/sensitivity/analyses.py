@@ -73,7 +73,7 @@ def sobol(
     Raises:
         SceneError: for faulty arguments, all in one message.
         TypeError: for an argument that does not exist.
-        FailedMembers: where members failed and the indices cannot be computed from the others.
+        FailedMembers: if members failed and the indices cannot be computed from the others.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -106,13 +106,13 @@ def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, fai
         fleet: the ensemble that was run, with Saltelli's design.
         outputs: its quantities of interest.
         confidence: level of the intervals, between 0 and 1. Default 0.95.
-        failed: "refuse" or "drop", as of `sobol`. Default "refuse".
+        failed: "refuse" or "drop", as in `sobol`. Default "refuse".
 
     Returns:
-        The indices, as of `sobol`.
+        The indices, as in `sobol`.
 
     Raises:
-        FailedMembers: where members failed and the indices cannot be computed from the others.
+        FailedMembers: if members failed and the indices cannot be computed from the others.
     """
     design = _design_of(fleet, outputs, Saltelli)
     factors, group = design.factors(fleet.space), design.group_size(fleet.space)
@@ -174,7 +174,7 @@ def morris(
 
     Args:
         scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
-        of: one or several quantities of interest, as of `sobol`.
+        of: one or several quantities of interest, as in `sobol`.
         samples: number of paths; samples (d + 1) members are run for d factors. Default 64.
         levels: number of levels of the grid that paths go along, even; a step moves a factor by half the grid. Default 4.
         vary: name -> distribution. Default: that of the scene or the ensemble.
@@ -189,7 +189,7 @@ def morris(
 
     Raises:
         SceneError: for faulty arguments, all in one message.
-        FailedMembers: where members failed and the effects cannot be computed from the others.
+        FailedMembers: if members failed and the effects cannot be computed from the others.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -216,13 +216,13 @@ def morris_of(
         outputs: its quantities of interest.
         confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
         resamples: number of the bootstrap's resamples. Default 100.
-        failed: "refuse" or "drop", as of `morris`. Default "refuse".
+        failed: "refuse" or "drop", as in `morris`. Default "refuse".
 
     Returns:
-        The elementary effects, as of `morris`.
+        The elementary effects, as in `morris`.
 
     Raises:
-        FailedMembers: where members failed and the effects cannot be computed from the others.
+        FailedMembers: if members failed and the effects cannot be computed from the others.
         ImportError: without SALib.
     """
     analyze = salib()

@@ -35,7 +35,7 @@ class GivenDataIndices(Indices):
         first_confidence: the larger distance from it to an end of its interval (m, d).
         lower: lower end of its interval (m, d).
         upper: upper end of its interval (m, d).
-        p: how likely so much would be seen by chance (m, d).
+        p: p-value: probability of an index of at least this size by chance (m, d).
         slope: coefficient of the linear regression of standardised numbers (m, d); its sign says the direction.
     """
 
@@ -62,8 +62,8 @@ def given_data(
     be independent: what correlated inputs explain together counts for each of them.
 
     Args:
-        result: What `lw.solve`, `lw.open_run` or `lw.Result.load` returned, or the path of a store.
-        of: One or several quantities of interest, as of `lw.uq.sobol`: "depth" (at the end), "max(depth)", "outcome floor",
+        result: A result of `lw.solve`, `lw.open_run` or `lw.Result.load`, or the path of a store.
+        of: One or several quantities of interest, as in `lw.uq.sobol`: "depth" (at the end), "max(depth)", "outcome floor",
             "end_time floor", "depth at 30", a Quantity, a function of a Result or of (samples, members).
         confidence: Level of the intervals; default 0.95.
 

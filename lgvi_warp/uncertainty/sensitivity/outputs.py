@@ -66,7 +66,7 @@ def evaluate(
 
     Args:
         fleet: the ensemble.
-        of: one or several quantities of interest, as of `sobol`.
+        of: one or several quantities of interest, as in `sobol`.
         common_noise: whether forces with noise act on every member alike. Default False.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the members that is
             done, from 0 to 1.

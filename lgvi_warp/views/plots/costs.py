@@ -27,7 +27,7 @@ Rows = Iterable[Mapping[str, Any]] | str | os.PathLike[str]
 def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw what a member's step costs against the number of members, and against the number of threads.
 
-    A dotted line says what as many threads would cost if each were as fast as one alone.
+    A dotted line is ideal scaling, every thread as fast as one alone.
 
     Args:
         rows: Rows that `python -m benchmarks run members threads` prints, or a file of them in JSON lines; rows of other

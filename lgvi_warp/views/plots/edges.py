@@ -38,8 +38,8 @@ MARKED = 0.05
 def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw how margins are distributed over the members that have them, a panel for each margin.
 
-    Curves say how many members have at most so much, by eigenvalues and by runs, as far as each was asked for. A line marks
-    what all but one in twenty members bear. Infinite margins lie beyond the right edge: their curve ends below 100 %.
+    Curves are cumulative distributions over the members, by eigenvalues and by runs, if requested. A line marks the margin
+    that 95 % of the members reach. Infinite margins lie beyond the right edge: their curve ends below 100 %.
 
     Args:
         found: Margins of `lw.linear.margins`.

@@ -97,7 +97,7 @@ def _first(result: Result, code: Status, when: np.ndarray) -> str:
 def histogram(
     result: Result, of: Any = "depth", at: float | None = None, *, ax: Any = None, path: FilePath | None = None
 ) -> Any:
-    """Draw how a number of the members is spread at one time, stacked by what had become of them by then.
+    """Draw a histogram of a number over the members at one time, stacked by their outcomes up to then.
 
     Members that ended are counted at their last state. Depths are on the vertical axis, downwards. Without samples a statistic
     lw.statistics.Histogram of the quantity is drawn.
@@ -105,7 +105,7 @@ def histogram(
     Args:
         result: A result, in memory or in a store.
         of: A quantity of one number, also over the path: "depth", "max(speed)", a `lw.statistics.Quantity`; default "depth".
-        at: Time [s], of which the nearest sample is taken; default None, the last.
+        at: Time [s]; the sample nearest to it is drawn. Default None: the last.
 
     Returns:
         The axes.

@@ -201,7 +201,7 @@ def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None,
         The axes.
 
     Raises:
-        NothingToDraw: Of some run nothing of the quantity was kept or gathered, or no member has a finite number.
+        NothingToDraw: A run kept or gathered nothing of the quantity, or no member has a finite number.
         SceneError: There are no results, or the quantity is not known or has several components.
 
     Examples:

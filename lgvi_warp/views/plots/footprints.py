@@ -30,13 +30,13 @@ def footprint(
 
     Args:
         result: A result with positions, in memory or in a store; or what `lw.studies.footprint` returns.
-        at: As of `lw.studies.footprint`; of its answer leave it out.
+        at: As in `lw.studies.footprint`; omit it if `result` is the answer of that.
 
     Returns:
         The axes.
 
     Raises:
-        SceneError: As of `lw.studies.footprint`.
+        SceneError: As in `lw.studies.footprint`.
 
     Examples:
         >>> import lgvi_warp as lw

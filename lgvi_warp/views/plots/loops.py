@@ -50,7 +50,8 @@ def _title(axes: Any, opened: OpenLoops, members: np.ndarray) -> None:
 def bode(opened: OpenLoops, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw gain and phase of open loops against frequency: the median and bands of the members.
 
-    Of loops with several inputs the characteristic loci are drawn, by size: the median and the band of all members of each.
+    For loops with several inputs the characteristic loci are drawn, sorted by size: the median and the band of each over
+    the members.
 
     Args:
         opened: Open loops of `lw.linear.loop`.
@@ -89,8 +90,8 @@ def bode(opened: OpenLoops, *, figure: Any = None, path: FilePath | None = None)
 def nyquist(opened: OpenLoops, *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw open loops in the complex plane near -1, a curve for each member; the one that comes nearest to -1 is marked.
 
-    The curves are those of positive frequencies. Of loops with several inputs the characteristic loci are drawn. A circle has
-    the radius 1.
+    The curves are those of positive frequencies. For loops with several inputs the characteristic loci are drawn. A circle
+    of radius 1 is drawn, too.
 
     Args:
         opened: Open loops of `lw.linear.loop`.

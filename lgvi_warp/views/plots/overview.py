@@ -38,10 +38,10 @@ MOST_FOLLOWED = AT_ONCE // 40 // 240 * 10
 def summary(result: Result, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw a run at a glance, in up to four panels that suit it.
 
-    There are paths of a few members from above, and the depth of all with the ends of those that an event stopped or that
-    failed. Then come the commands of a controller with their limits and faults where they were kept, else roll, pitch and yaw.
-    The last has the outcomes over time where some member ended, else the energy, as its error where the scene's laws conserve
-    it. What was not kept is left out; where no samples were, the statistics are drawn.
+    The first two show paths of a few members from above, and the depth of all members with the ends of those that failed or
+    that an event stopped. The third shows the commands of a controller with their limits and faults if they were kept, else
+    roll, pitch and yaw. The last shows the outcomes over time if any member ended, else the energy, or its error if the
+    scene conserves it. A panel without data is left out. Without samples the statistics are drawn.
 
     Args:
         result: A result, in memory or in a store.

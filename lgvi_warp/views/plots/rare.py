@@ -23,7 +23,7 @@ PLAIN, MOST = 1000, 1000
 
 @picture
 def rare(found: RareEvent, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
-    """Draw a rare event: how probable each limit is by the levels of each run, and failing members over plain ones.
+    """Draw a rare event: the probability to exceed each limit, by the levels of each run, and failing members over plain ones.
 
     The first panel says how probable it is that the limit is above a number, up to the event at 0; circles are the thresholds
     of levels. The second has the two numbers that the event moves most, in standard deviations from the middle.

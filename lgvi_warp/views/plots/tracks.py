@@ -219,12 +219,12 @@ BODY_AXES = ("forward (x)", "starboard (y)", "down (z)")
 
 @picture
 def attitude(result: Result, most: int = MOST_AXES, *, ax: Any = None, path: FilePath | None = None) -> Any:
-    """Draw where the body's axes of some members point: their paths on the unit sphere, up at the top.
+    """Draw the directions of the body's axes of some members, as paths on the unit sphere, up at the top.
 
     Args:
         result: A result with attitudes, in memory or in a store.
         most: The most members to draw; default 1.
-        ax: Matplotlib axes with projection="3d" to draw on; default None, those of a figure of its own.
+        ax: Matplotlib axes with projection="3d" to draw on; default None: those of a new figure.
 
     Returns:
         The axes.

@@ -35,8 +35,9 @@ def record(
 ) -> Path | None:
     """Record the fleet for the rerun viewer. The file appears only when it is complete.
 
-    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`, each in the colour of its
-    outcome from the moment it has it. Curves are of the members under way at each time. The same run always gives the
+    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`, each in the colour of
+    its outcome from the time at which it ended. Curves are of the members still under way at each time. The same run always
+    gives the
     recording and the application the same ids: the viewer keeps recordings and layouts apart by them.
 
     Args:
@@ -55,7 +56,7 @@ def record(
         NothingToDraw: No samples were kept, or no member has a finite start.
         SceneError: There are no such members, or the vehicle's mesh cannot be read.
         OSError: The file cannot be written, no viewer answers at the address, or it ends meanwhile; then the file is whole.
-        ValueError: There is no result; a SceneError, which is one, where there is neither a path nor a `to`.
+        ValueError: There is no result; or neither `path` nor `to` is given (a SceneError, which is a ValueError).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from tests.extensions.ocean.test_field_reader import nodes
 from tests.extensions.ocean.test_hostile_data import Pipes
 from tests.support import ocean_files
 
@@ -57,13 +58,6 @@ KINDS = {
     "access": (ocean_files.access, ARCTIC, box(5e4, 2.0, 20.0), 3e-5),
     "radar": (ocean_files.radar, (73.0, 31.5), box(2e4, 0.0, 0.0), 3e-5),
 }
-
-
-def nodes(field):
-    """North, east and depth of a field's nodes (x, y, z)."""
-    counts = field.velocities.shape[2:5]
-    axes = [o + d * np.arange(n) for o, d, n in zip(field.origin, field.spacing, counts, strict=True)]
-    return np.meshgrid(*axes, indexing="ij")
 
 
 def closed_form(origin, north, east, depth, seconds):

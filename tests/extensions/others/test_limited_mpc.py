@@ -8,20 +8,15 @@ from scipy.optimize import lsq_linear, nnls
 
 import lgvi_warp as lw
 from lgvi_warp.extensions.others.twin import linear_mpc
+from tests.extensions.others.test_linear_mpc import NAMES, RATES, T
+from tests.extensions.others.test_linear_mpc import NUMBERS as SYMMETRIC
 from tests.support.loops import twin_states
 from tests.support.refusals import refused, says
 
-T = 0.1
-STATES = ("position[2]", "velocity[2]", "angular_velocity[1]")
-NUMBERS = dict(
-    A=np.array([[1.0, T, 0.0], [0.0, 0.95, 0.01], [0.0, 0.02, 0.9]]),
-    B=np.array([[T * T / 40.0, 0.0], [T / 20.0, 0.001], [0.0, T / 5.0]]),
-    Q=np.array([3.0, 0.1, 0.2]), R=np.array([1e-4, 1e-3]), limit=np.array([5.0, 2.0]), horizon=6,
+NUMBERS = SYMMETRIC | dict(
     lower=np.array([-1.0, -2.0]), outputs=np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.2]]),
     output_limit=np.array([0.04, 0.06]), excess_cost=np.array([200.0, 50.0]),
 )  # fmt: skip
-NAMES = dict(states=STATES, inputs=("Z", "M"), tracked=("position[2]", "angular_velocity[1]"))
-RATES = dict(rate_limit=np.array([20.0, 10.0]))
 
 
 def law(**more):
@@ -188,6 +183,16 @@ def test_limits_of_errors_are_of_the_reference_that_it_sees_ahead():
     depths, forces = by_hand((1.0, 0.0), 0.2)
     np.testing.assert_allclose(result.samples["demand"][:, 0, 2], forces, atol=4e-5)
     np.testing.assert_allclose(result.position[:, 0, 2], depths, atol=1e-6)
+
+
+@pytest.mark.kernel
+def test_a_short_horizon_looks_ahead_too():
+    """Loops of a few rounds are unrolled. A reference that does not change gives nothing to see."""
+    still = lw.control.SetPoint(position=(0.0, 0.0, 8.0))
+    scenes = [diving(heave_law(preview=ahead, horizon=5, **SINKS), guidance=still) for ahead in (False, True)]
+    plain, ahead = (lw.solve(scene, "rk4", h=T / 5.0, t1=3.0, save=SAVE).samples["demand"] for scene in scenes)
+    assert np.abs(plain).max() > 10.0
+    np.testing.assert_allclose(ahead, plain, atol=1e-9)
 
 
 @pytest.mark.kernel

@@ -33,24 +33,26 @@ class Ballast(Commanded):
     """n volumes V that are displaced beside the vehicle's: force -rho g V R^T e3 at points of the body (Graver 2005, ch. 4).
 
     V is the command within its limit, after the lag and no faster than the rate limit: above 0 it lifts, below 0 it sinks. A
-    weight in water of N newtons is V = -N / (rho g). The vehicle's mass stays as it is, as where oil moves into a bladder.
+    weight in water of N newtons is V = -N / (rho g). The vehicle's mass does not change, as when oil is pumped into a
+    bladder.
 
-    With an efficiency the pump's work joins the energy used (`EnergyUse`): the water's pressure above that at the surface
-    times the volume that it pushes out, over the efficiency. What the pressure pushes back takes nothing, and gives nothing.
+    With an efficiency, the pump's work is part of the energy used (`EnergyUse`): the water's pressure above that at the
+    surface, times the volume that is pumped out, over the efficiency. Volume that the pressure pushes back costs nothing
+    and returns nothing.
 
     Args:
         position: Where each volume acts, (n, 3) [m] from the body's origin; one at the origin by default.
         limit: Largest size of the command, (n,) [m3]; 1e6 by default.
         time_constant: Time constant of the first-order lag from the command to V, (n,) [s]; 0 by default, no lag.
         rate_limit: Largest rate of V, the pump's, (n,) [m3/s]; none by default.
-        efficiency: Work against the water's pressure over electrical energy of each pump, (n,), above 0 and at most 1; left
-            out, the account of energy knows nothing of them, as of weights that drop.
+        efficiency: Work against the water's pressure over electrical energy of each pump, (n,), above 0 and at most 1; if
+            omitted, they do not count in the energy account, as for weights that drop.
         command: Volume that is held, (n,) [m3]; 0 by default.
         times: Times of the schedule, (k,) [s], rising.
         command_schedule: Volumes at these times, (k, n) [m3], linear between them; instead of `command`.
 
     Raises:
-        SceneError: Where times do not rise, or the command is given twice. Also as `Term`.
+        SceneError: If times do not rise, or the command is given twice. Also if a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -29,9 +29,9 @@ class BuoyancyEngine(Term):
     Going down, it turns to `volume_up` where the body's origin comes to `depth_bottom`; going up, to `volume_down` where it
     comes to `depth_top` (Graver 2005, 4; Eriksen et al. 2001). The turn is found within the step, to second order.
 
-    With an efficiency the pump's work joins the energy used (`EnergyUse`): the water's pressure above that at the surface
-    times the volume that it pushes out, over the efficiency. What the pressure pushes back takes
-    nothing, and gives nothing.
+    With an efficiency, the pump's work is part of the energy used (`EnergyUse`): the water's pressure above that at the
+    surface, times the volume that is pumped out, over the efficiency. Volume that the pressure pushes back costs nothing
+    and returns nothing.
 
     Args:
         pump_rate: Rate q of the pump [m3/s].
@@ -41,14 +41,14 @@ class BuoyancyEngine(Term):
         depth_bottom: Depth at which a dive turns [m], below `depth_top`.
         position: Where the volume acts, (3,) [m] from the body's origin; the origin by default.
         volume_start: Volume at the start [m3]; by default that of `first`.
-        gradient: Relative change of the water's density per depth [1/m], as of `Stratification`; 0 by default.
+        gradient: Relative change of the water's density per depth [1/m], as in `Stratification`; 0 by default.
         reference_depth: Depth at which the density is that of the environment [m]; 0 by default.
-        efficiency: Work against the water's pressure over electrical energy of the pump, above 0 and at most 1; left out, the
-            account of energy knows nothing of the pump.
-        first: Where it goes at the start: "down", the default, or "up".
+        efficiency: Work against the water's pressure over electrical energy of the pump, above 0 and at most 1; if omitted,
+            the pump does not count in the energy account.
+        first: Direction at the start: "down", the default, or "up".
 
     Raises:
-        SceneError: Where a volume or a depth is not below the other. Also as `Term`.
+        SceneError: If a volume or a depth is not below the other. Also if a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

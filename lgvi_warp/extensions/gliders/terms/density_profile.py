@@ -48,8 +48,8 @@ class DensityProfile(Term):
         density_at: Density at depths.
 
     Raises:
-        SceneError: Where depths do not rise, and as `Term`. A scene refuses a `stratification`, or an engine with a
-            `gradient`, beside it.
+        SceneError: If depths do not rise; or a number is invalid (see `Term`). A scene refuses a `stratification`, or an
+            engine with a `gradient`, beside it.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -90,8 +90,8 @@ class DensityProfile(Term):
             The profile, by TEOS-10 where it has temperatures (McDougall & Barker 2011).
 
         Raises:
-            SceneError: Where a column is missing or wrong; with the remedy.
-            MissingExtra: Where gsw is not installed, which makes densities of temperatures and salinities.
+            SceneError: If a column is missing or wrong; with the remedy.
+            MissingExtra: If gsw is not installed, which makes densities of temperatures and salinities.
 
         Examples:
             >>> import lgvi_warp as lw

@@ -39,12 +39,13 @@ class MovingMass(Term):
     """A mass in the vehicle that moves along a path, on a command, or both: a battery that slides and rolls, a trim weight.
 
     The vehicle's mass, inertia and center of gravity include it at its reference place. Its weight then acts where it is:
-    the torque (r - r0) x m g R^T e3. A path is linear between its times, and holds its ends. Where its inertia counts, a
-    Runge-Kutta method takes that of the vehicle with the mass where it is, and the vehicle goes back as the mass goes ahead.
+    the torque (r - r0) x m g R^T e3. A path is linear between its times, and holds its ends. If its inertia counts,
+    Runge-Kutta methods use the vehicle's inertia with the mass at its present place, and the vehicle recoils as the mass
+    moves.
 
-    A controller commands up to two channels: how far it slides from the path [m], and by which angle it, and the direction in
-    which it slides, turn about an axis [rad]. n' = (command - n) / time constant, |n'| at most the rate limit, the command
-    within the limit; both are 0 at the start, and without a controller.
+    A controller commands up to two channels: the distance by which the mass slides from the path [m], and the angle by
+    which mass and slide direction turn about an axis [rad]. n' = (command - n) / time constant, |n'| at most the rate
+    limit, the command within the limit; both are 0 at the start, and without a controller.
 
     Args:
         mass: Mass m [kg].
@@ -61,8 +62,9 @@ class MovingMass(Term):
             of the vehicle's mass.
 
     Raises:
-        SceneError: Where times do not rise or are missing, a direction has no length, numbers of channels are given without
-            channels, in a scene whose vehicle cannot include it at its reference place, and as `Term`.
+        SceneError: If times do not rise or are missing, a direction has no length, numbers of channels are given without
+            channels, in a scene whose vehicle cannot include it at its reference place; or a number is invalid (see
+            `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -28,19 +28,19 @@ STRETCH = {"box": 1.0, "circle": 4.0 / 3.0}
 class SurfaceBuoyancy(Term):
     """Buoyancy that fades as the hull comes out of the water, at the depth 0 or at the waves of the scene.
 
-    The vehicle's buoyancy is spread over parts of the hull, about its centre of buoyancy. Each loses what of its section is
-    above the surface; where all is below, nothing changes. In still water the law follows from a potential.
+    The vehicle's buoyancy is spread over parts of the hull, about its centre of buoyancy. Each part loses the buoyancy of
+    its section above the surface; a submerged hull keeps all of it. In still water the force has a potential.
 
     Args:
         heights: Height of the hull's sections, (k,) [m], linear between stations; one number for a hull of one part.
         stations: Places along the body's x axis, (k,) [m], rising, from stern to bow. Only their distances count, since the
-            middle of the volume is the centre of buoyancy. One station, the default, has the hull in one part, which heaves
-            and does not pitch.
+            centroid of the volume is put at the centre of buoyancy. With one station, the default, the hull is one part: it
+            heaves and does not pitch.
         section: "circle", the default, a round hull, whose sections grow as the square of the height; or "box", as broad above
             as below, whose sections grow as the height.
 
     Raises:
-        SceneError: Where stations do not rise, or two neighbours have no height, and as `Term`.
+        SceneError: If stations do not rise, or two neighbours have no height; or a number is invalid (see `Term`).
 
     Examples:
         A ball of 100 N in 80 N of water.

@@ -10,7 +10,7 @@ from lgvi_warp.reference.terms.following import Following
 
 
 class Ballast(Following):
-    """position (n, 3) [m]; density [kg/m3], gravity [m/s2]; times (k,) [s] and command (k, n) [m3]; more as of `Following`.
+    """position (n, 3) [m]; density [kg/m3], gravity [m/s2]; times (k,) [s] and command (k, n) [m3]; more as in `Following`.
 
     profile: None, or the twin of a `density_profile`, whose densities then act.
     """

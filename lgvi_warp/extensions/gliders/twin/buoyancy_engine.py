@@ -9,7 +9,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class BuoyancyEngine(Law):
-    """Numbers as those of `lw.terms.BuoyancyEngine`; density [kg/m3], gravity [m/s2]; profile as of `Ballast`.
+    """Numbers as those of `lw.terms.BuoyancyEngine`; density [kg/m3], gravity [m/s2]; profile as in `Ballast`.
 
     Memory: the volume now; 1 up, -1 down; volume and depth at the last look; the time since then, -1 before the first; with
     an efficiency the pressure at the last look [N/m2].

@@ -33,17 +33,18 @@ class DVL(MeasuringPart):
         reading_i = u_i . (nu + Omega x place) + noise xi_i
         u_i = (+-sin(angle) / sqrt(2), +-sin(angle) / sqrt(2), cos(angle))
 
-    A beam has no echo where it is lost by chance, where it looks upward, where the way along it to the floor, flat or on a
-    grid, is not within its range, and where the body is tilted too far. An `error_state_filter` takes each beam by itself, so
-    one is of use too. Without a filter the measured velocity becomes that of the log's place by least squares of three beams
-    or four, else it stays the last one, and is 0 before the first: a log without bottom lock tells no velocity.
+    A beam has no echo if it is lost by chance, points upward, or has no floor (flat or on a grid) within its range, or if
+    the body is tilted too far. An `error_state_filter` uses each beam by itself, so a single beam is useful, too. Without a
+    filter the measured velocity is that of the log's place, by least squares of three or four beams. With fewer beams there
+    is no bottom lock: the last velocity is kept, 0 before the first.
 
     Args:
         place: Place of the log (3,) [m], body axes; 0 by default.
         angle: Angle of the beams from the body's third axis [rad]; 30 degrees by default.
         noise: Standard deviation along a beam [m/s]; 0 by default.
         dropout: Probability with which a beam is lost at a tick; 0 by default.
-        burst: Mean length of a run of losses of a beam [ticks], as of `lw.control.Sensor`; by default each is by itself.
+        burst: Mean length of a run of losses of a beam [ticks], as in `lw.control.Sensor`; by default losses are
+            independent.
         outlier: Probability with which the reading of a beam is an outlier, each by itself; by default none is.
         outlier_std: Standard deviation of what an outlier adds to it [m/s].
         every: Ticks from one new reading to the next, a whole number; 1 by default.
@@ -55,8 +56,8 @@ class DVL(MeasuringPart):
         silent_to: Time until which it gives none [s]; inf by default, to the end.
 
     Raises:
-        SceneError: Where `every` is no whole number, or a range or a silence ends before it begins; and as `Term`. A scene
-            refuses a log whose floor is none of its events.
+        SceneError: If `every` is no whole number, or a range or a silence ends before it begins; or a number is invalid
+            (see `Term`). A scene refuses a log whose floor is none of its events.
 
     Examples:
         >>> import lgvi_warp as lw

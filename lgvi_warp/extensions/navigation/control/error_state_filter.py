@@ -51,42 +51,46 @@ def _sensor(default: str = "") -> Any:
 class ErrorStateFilter(MeasuringPart):
     """An error-state Kalman filter of 15 states: position, velocity, attitude, biases of accelerometers and gyroscopes.
 
-    List it after the sensors that it names. These hand their readings to it alone, and it replaces the measured position,
-    attitude, velocity over ground and angular velocity by its estimate. At each tick it goes on by what the IMU has
-    gained; then it takes each new reading, number by number in Joseph's form. A delayed fix corrects the position copied
-    as the fix was taken, with its covariances (stochastic cloning), of up to 8 fixes on their way. The filter believes the
-    noises that the scene gives for its sensors, whatever a member's are, times `process_scale` and `measurement_scale`; it
-    knows nothing of their bias, drift and quantum, but for the biases of the IMU.
+    List it after the sensors that it names. These pass their readings to the filter alone, and it replaces the measured
+    position, attitude, velocity over ground and angular velocity by its estimate. At each tick the IMU's increments
+    propagate the estimate; then each new reading updates it, number by number in Joseph's form. A delayed fix updates a
+    copy of the position made when the fix was taken, with its covariances (stochastic cloning); up to 8 fixes may be
+    pending. The filter assumes the scene's noises of its sensors for all members, times `process_scale` and
+    `measurement_scale`. It estimates the biases of the IMU, and models no other bias, drift or quantum.
 
-    The first estimate is the truth with an error as large as the sigmas below say, drawn once a member.
+    The first estimate is the truth plus an error with the standard deviations below, drawn once for each member.
 
     Sola (2017), arXiv:1711.02508, chapters 5 and 6; Roumeliotis & Burdick (2002) for the copy.
 
     Args:
         imu: Key of an `IMU`; "imu" by default.
-        dvl: Key of a `DVL`; "", the default, for none, as of those that follow.
+        dvl: Key of a `DVL`; "", the default, for none; the same for the following keys.
         depth: Key of a `Sensor` of "depth".
         heading: Key of a `Sensor` of "heading".
         fix: Key of a `Sensor` of "position" without latency, as GPS with `deepest`.
-        delayed_fix: Key of a `Sensor` of "position" whose `latency` is below 8 times its `every`, as USBL. Where the numbers
-            of a member would have more fixes on their way than those of the scene, the filter leaves out the others.
-        position_sigma: Of the first estimate (3,) [m], inertial axes; 1 by default; one number for all axes.
+        delayed_fix: Key of a `Sensor` of "position" whose `latency` is below 8 times its `every`, as USBL. If a member's
+            numbers give more pending fixes than the scene's, the filter ignores the excess.
+        position_sigma: Standard deviation of the first position (3,) [m], inertial axes; 1 by default; one number for all
+            axes.
         velocity_sigma: The same of the velocity (3,) [m/s], inertial axes; 0.1 by default.
         attitude_sigma: The same of the attitude (3,) [rad], body axes; 0.02 by default.
-        accelerometer_sigma: Of the bias, whose first estimate is 0 (3,) [m/s^2]; 0.02 by default.
+        accelerometer_sigma: Standard deviation of the accelerometers' bias, whose first estimate is 0 (3,) [m/s^2]; 0.02 by
+            default.
         gyroscope_sigma: The same of the gyroscopes (3,) [rad/s]; 1e-3 by default.
         start_error: Factor of the error of the first position, velocity and attitude; 1 by default, 0 for the truth.
-        process_scale: Factor of the IMU's noises and walks as the filter believes them; 1 by default.
+        process_scale: Factor of the IMU's noises and walks that the filter assumes; 1 by default.
         measurement_scale: Factor of the other noises; 1 by default.
         gate: Standard deviations of an innovation beyond which it is rejected, each number of a reading by itself: a beam, a
             coordinate of a fix. One number, or five (5,), for dvl, fix, delayed_fix, depth and heading; inf takes all. By
             default there is no gate.
-        most_rejected: Rejections in a row of one number after which the next is taken, whatever it is: the covariance is first
-            widened, along what that number sees, until the innovation is at the gate. 10 by default, inf for never.
-        report: Whether it notes sigmas, innovations, NEES and NIS for signals and statistics; True by default.
+        most_rejected: Number of consecutive rejections of one number after which the next reading is accepted: the
+            covariance is first enlarged along the measured direction, until the innovation is at the gate. 10 by default,
+            inf for never.
+        report: Whether it records sigmas, innovations, NEES and NIS for signals and statistics; True by default.
 
     Raises:
-        SceneError: As `Term`; and where a sensor that it names is missing, of another kind or without noise.
+        SceneError: If a number is invalid (see `Term`); and where a sensor that it names is missing, of another kind or
+            without noise.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -240,7 +244,7 @@ class ErrorStateFilter(MeasuringPart):
         return Packed(values | rows, memory=memory)
 
     def _gates(self, numbers: Numbers) -> dict[str, Any]:
-        """The gate of each sensor, and the mean square of the innovations of a right filter that pass, in their variances."""
+        """Gate of each sensor, and the mean square of a consistent filter's innovations that pass, in their variances."""
         if self.gate is None:
             return {}
         from scipy.special import erf

@@ -34,8 +34,9 @@ class IMU(MeasuringPart):
 
     T is the period of the controller, v the velocity over ground of the unit's place, xi standard normals that follow from the
     seed, the member, the tick and the unit's name. The Allan deviation is noise / sqrt(t) and walk sqrt(t / 3), in quadrature.
-    An `error_state_filter` takes what it hands on. Without one it replaces the measured angular velocity by the mean of the
-    last period; a log then stands before it, as it would take that rate for the truth. IEEE Std 952-1997 has the model.
+    An `error_state_filter` uses its increments. Without a filter it replaces the measured angular velocity by the mean of
+    the last period. List a `DVL` before it then, since a later one would take that rate for the truth. IEEE Std 952-1997
+    has the model.
 
     Args:
         place: Place of the unit (3,) [m], body axes; 0 by default.
@@ -49,7 +50,7 @@ class IMU(MeasuringPart):
         gyroscope_turn_on: The same of the gyroscopes (3,) [rad/s]; 0 by default.
 
     Raises:
-        SceneError: As `Term`.
+        SceneError: If a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -47,7 +47,7 @@ TURN = 6.283185307179586
 LEVEL = 0.01
 # Variance of the rate at a tick, from the means of two periods, over that of a mean.
 OF_RATE = 2.5
-# NEES above which it counts as diverged: ten times that of a right filter, which has it with a chance of 1e-24.
+# NEES above which it counts as diverged: ten times that of a consistent filter, which has it with a chance of 1e-24.
 DIVERGED = 150.0
 
 

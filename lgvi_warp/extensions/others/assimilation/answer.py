@@ -32,7 +32,8 @@ class Assimilated(Summarized, Saved):
             body axes], attitude (k, 3, 3), and the learned numbers by name, (k, ...).
         std: Standard deviations of the same; of the attitude (k, 3) [rad], about the body's axes.
         innovations: By name of the series, values less predictions (k, m); NaN where it has none.
-        innovation_std: What they should be, (k, m): root of the spread of the predictions and the instrument's variance.
+        innovation_std: Their expected standard deviations, (k, m): root of the sum of the predictions' variance and the
+            instrument's.
         whitened: Innovations over the root of their covariance, (k, m), by name of the series.
         left_out: By name of the series, the times at which the gate left it out, (k,), True or False.
         log_likelihood: Logarithm of the probability density of all measured values, each given those before it; without those
@@ -133,10 +134,10 @@ class Assimilated(Summarized, Saved):
             yield {"time": float(time), "effective": float(self.effective[k])} | entries
 
     def consistency(self, level: float = 0.95) -> dict[str, InnovationTest]:
-        """Compare innovations with what those of a right filter are: normal, of their own spread, independent in time.
+        """Compare innovations with what those of a consistent filter are: normal, of their own spread, independent in time.
 
         Args:
-            level: Probability that all of a right filter's numbers are inside their bands, in (0, 1); 0.95 by default.
+            level: Probability that all of a consistent filter's numbers are inside their bands, in (0, 1); 0.95 by default.
 
         Returns:
             By name of the series, root mean square, mean and correlation of the innovations with bands, and a verdict.

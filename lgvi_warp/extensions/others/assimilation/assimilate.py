@@ -67,9 +67,9 @@ def assimilate(
 ) -> Assimilated:
     """Assimilate measurements: correct the members of a fleet by measured series, and estimate numbers of the scene.
 
-    The members are the knowledge before the first measurement: their starts and numbers vary as far as these are not known.
-    They run to each time of the series, and a filter brings them to the values measured there. What actuators and controllers
-    remember goes on as it is.
+    The members are the prior: their starts and numbers vary by the uncertainty before the first measurement. They run to
+    each time of the series, where a filter updates them by the measured values. The memory of actuators and controllers
+    is not updated.
 
     Learned numbers move in the normal scores of their own distribution, z = Phi^-1(F(x)) (Bertino, Evensen & Wackernagel
     2003), so that each value is one that the distribution has: a log-normal number stays positive, a uniform one within its
@@ -81,11 +81,12 @@ def assimilate(
         series: One or several lw.studies.Series, what instruments measured.
         learn: Names of numbers that vary and are learned, such as ["current.velocity[0]"]; default none.
         filter: "etkf", the default, an ensemble Kalman filter without draws (Bishop, Etherton & Majumdar 2001); "enkf", with a
-            measurement for each member (Burgers, van Leeuwen & Evensen 1998); both without localisation, for spreads that are
-            small beside the bends of the motion; "particles", weights and systematic resampling (Kitagawa 1996), for any.
-        method: As of `lw.solve`.
+            measurement for each member (Burgers, van Leeuwen & Evensen 1998); both without localisation, for spreads that
+            are small enough for the motion to be nearly linear; "particles", weights and systematic resampling (Kitagawa
+            1996), for any.
+        method: As in `lw.solve`.
         h: Step [s], which divides every time of the series; default that of the scene.
-        dtype: As of `lw.solve`.
+        dtype: As in `lw.solve`.
         seed: Seed of what the filter draws.
         discount: With particles and learned numbers, these and the states are drawn anew at each resampling, with their mean
             and covariance (Liu & West 2001); a number between 1/3 and 1, or None to keep them; 0.99 by default.
@@ -93,9 +94,9 @@ def assimilate(
             left out, with a message: a chi-square test, for several values together with the same probability. None to take
             all; 5.0 by default.
         inflation: Factor on the covariance of the members before each measurement, at least 1 (default), for Kalman filters
-            that become too sure; or "adaptive", which estimates it from the innovations (Anderson 2009, Miyoshi 2011).
-        threads: As of `lw.solve`.
-        progress: As of `lw.solve`.
+            that become overconfident; or "adaptive", which estimates it from the innovations (Anderson 2009, Miyoshi 2011).
+        threads: As in `lw.solve`.
+        progress: As in `lw.solve`.
 
     Returns:
         The members after each time, with means, standard deviations and innovations.

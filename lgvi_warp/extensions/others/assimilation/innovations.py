@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of innovations: with a right filter they are standard normal, by their own covariance, and independent in time."""
+"""Tests of innovations: with a consistent filter they are standard normal by their covariance, and independent in time."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ class InnovationTest(Summarized):
     Attributes:
         count: Number of values that were compared.
         left_out: Number of values that the gate left out, which are not compared.
-        ratio: Root mean square of the innovations over what their covariance says, 1 for a right filter.
+        ratio: Root mean square of the innovations over what their covariance says, 1 for a consistent filter.
         ratio_band: Lower and upper end of its band (2,).
-        mean: Mean of each component's innovations over their standard deviations (m,), 0 for a right filter.
+        mean: Mean of each component's innovations over their standard deviations (m,), 0 for a consistent filter.
         mean_band: Half width of its band (m,).
-        correlation: Correlation of innovations with those of the measurement before, 0 for a right filter.
+        correlation: Correlation of innovations with those of the measurement before, 0 for a consistent filter.
         correlation_band: Half width of its band.
-        level: Probability that a right filter is inside all of these bands.
+        level: Probability that a consistent filter is inside all of these bands.
         verdict: The finding in words: "consistent", or what is outside its band.
     """
 

@@ -23,7 +23,7 @@ class Series:
     """Values that an instrument measured, with independent normal errors.
 
     Args:
-        of: What it measures: "position", "depth", "velocity", "euler[2]", a Quantity or a function, as of `lw.prepare`.
+        of: What it measures: "position", "depth", "velocity", "euler[2]", a Quantity or a function, as in `lw.prepare`.
         time: Rising times (k,) [s], from 0.
         values: Measured values, (k,) or (k, m) of m numbers; NaN for one that is missing.
         std: Standard deviation of the errors, a number or (m,), in the unit of the values.

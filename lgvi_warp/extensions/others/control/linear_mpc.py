@@ -56,47 +56,48 @@ class Condensed(NamedTuple):
 class LinearMPC(ControlLaw):
     """Linear model predictive control: optimal inputs over a horizon, within limits (Rawlings, Mayne & Diehl 2017, ch. 1).
 
-    With x' = A x + B u + d from tick to tick, the inputs of the next `horizon` periods make the sum of (x - x_s)^T Q (x - x_s)
-    + (u - u_s)^T R (u - u_s), and (x - x_s)^T P (x - x_s) at the end, least, with |u| up to `limit` and its rate up to
-    `rate_limit`. The first of them is the demand; at the next tick it begins anew. Where the best inputs without limits keep
-    these, they are taken, to round-off; else those within them are found by an interior-point method (Nocedal & Wright 2006,
-    algorithm 16.4), whose demand is right to 1e-6 of the limit, in float32 to 1e-2; a run says in its messages where a tick
-    had not converged.
+    The model is x' = A x + B u + d from tick to tick. At each tick the inputs of the next `horizon` periods minimise the
+    sum of (x - x_s)^T Q (x - x_s) + (u - u_s)^T R (u - u_s), plus (x - x_s)^T P (x - x_s) at the end. They keep |u| up to
+    `limit` and its rate up to `rate_limit`. The first of them is the demand; the next tick solves the problem anew. If the
+    unconstrained optimum keeps the limits, it is used, to round-off. Otherwise an interior-point method (Nocedal & Wright
+    2006, algorithm 16.4) solves the constrained problem: its demand is accurate to 1e-6 of the limit, in float32 to 1e-2. A
+    run reports in its messages where a tick had not converged.
 
-    d is what the model lacks: x, against the last reference as it goes on, less what it predicted, over `disturbance_time`.
-    x_s and u_s are the steady state under d in which the `tracked` errors are 0: so steady disturbances leave no error of
-    these. What the actuators did not deliver did not act. `lw.linear.mpc` makes the law from a linear model.
+    d is the estimated disturbance: the measured x minus its prediction, filtered over `disturbance_time`. x is taken
+    against the last reference, continued by its rates. x_s and u_s are the steady state under d in which the `tracked`
+    errors are 0, so steady disturbances cause no error in these. The part of a demand that actuators did not deliver is
+    not counted as an input. `lw.linear.mpc` makes the law from a linear model.
 
     Args:
         states: Names of the states (n,), errors of what is measured less what is wanted: "position[0]" to "position[2]" [m,
             inertial axes], "rotation[0]" to "rotation[2]" (the e_R of `PosePID`), "velocity[0]" to "velocity[2]" over ground
             [m/s], "angular_velocity[0]" to "angular_velocity[2]" [rad/s], body axes.
-        inputs: Which of "X", "Y", "Z", "K", "M", "N" are the inputs (m,).
-        A: What a period makes of the state, (n, n).
-        B: What it makes of inputs that are held, (n, m).
+        inputs: Names of the inputs (m,), among "X", "Y", "Z", "K", "M", "N".
+        A: State matrix of one period, (n, n).
+        B: Input matrix of one period, for held inputs, (n, m).
         Q: Weights of the states (n,), at least 0.
         R: Weights of the inputs (m,), above 0.
         limit: Largest inputs (m,) [N, N m].
         P: Weight of the state at the end of the horizon (n, n), symmetric; by default Q.
         rate_limit: Largest rates of the inputs (m,) [N/s, N m/s]; by default none.
         disturbance_time: Time over which the disturbance is filtered [s]; infinite: none is estimated. 5 by default.
-        tracked: Names of the states whose errors are to vanish, at most as many as inputs; by default the first of `states`,
-            as many as inputs.
+        tracked: Names of the states whose steady errors shall be 0, at most as many as inputs; by default the first of
+            `states`, as many as inputs.
         lower: Least inputs (m,) [N, N m], below `limit`; by default -limit.
         outputs: Combinations C of the states (p, n) that have a limit, C x <= output_limit at each tick of the horizon; by
-            default none. A limit from below is that of -C.
+            default none. For a lower limit give -C.
         output_limit: Largest outputs (p,), each in the unit of its line of C x.
-        excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0. A limit that can be kept is, if
-            this is above what it saves; where inputs cannot keep it, it is exceeded.
-        preview: Whether it looks ahead at what guidance will want over the horizon, which must be set-points and trajectories;
-            False by default: the reference goes on at its present velocity.
+        excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0. If the cost is high enough, a
+            limit that can be kept is kept; a limit that no inputs can keep is exceeded.
+        preview: Whether to use the future reference over the horizon, for which guidance must be set-points and
+            trajectories; False by default: the reference continues at its present velocity.
         horizon: Number of periods, 1 to 100, over which the model grows at most 1e4 times; 10 by default.
-        iterations: Largest number of iterations at a tick, of which most take about ten; 50 by default.
-        period: Period of the model [s]; a controller of another period is refused. By default whatever it has.
+        iterations: Largest number of iterations at a tick, 50 by default; most ticks take about ten.
+        period: Period of the model [s]; a controller of another period is refused. By default any period is accepted.
 
     Raises:
-        SceneError: Where names, shapes or weights are at fault, or inputs hold no steady state without an error of what is
-            tracked; and as `Term`.
+        SceneError: If names, shapes or weights are at fault, or no inputs hold a steady state without tracked errors; or
+            a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -219,10 +220,10 @@ class LinearMPC(ControlLaw):
         Returns:
             Its matrices.
         """
-        own = {name: value[min(i, len(value) - 1)] for name, value in numbers.items()}
-        A, B, limit, N = own["A"], own["B"] * own["limit"], own["limit"], self.horizon
+        values = {name: value[min(i, len(value) - 1)] for name, value in numbers.items()}
+        A, B, limit, N = values["A"], values["B"] * values["limit"], values["limit"], self.horizon
         n, m = B.shape
-        weights = [np.diag(own["Q"])] * (N - 1) + [own.get("P", np.diag(own["Q"]))]
+        weights = [np.diag(values["Q"])] * (N - 1) + [values.get("P", np.diag(values["Q"]))]
         powers = [np.eye(n)]
         for _ in range(N):
             powers.append(A @ powers[-1])
@@ -232,9 +233,9 @@ class LinearMPC(ControlLaw):
             for column in range(row + 1):
                 Gamma[row * n : (row + 1) * n, column * m : (column + 1) * m] = powers[row - column] @ B
         weighted = np.concatenate([W @ Gamma[j * n : (j + 1) * n] for j, W in enumerate(weights)])
-        cost = weighted.T @ Gamma + np.diag(np.tile(own["R"] * limit**2, N))
+        cost = weighted.T @ Gamma + np.diag(np.tile(values["R"] * limit**2, N))
         # About its steady state under d, x_s = S_x d and u_s = S_u d, the model has no disturbance.
-        steady = _steady_state(A, own["B"], vars(self)["tracked_places"])
+        steady = _steady_state(A, values["B"], vars(self)["tracked_places"])
         S_x, S_u = (np.zeros((n, n)), np.zeros((m, n))) if steady is None else np.split(steady, [n])
         at_once = weighted.T @ Phi
         slope = np.hstack([at_once, -at_once @ S_x - cost @ np.tile(S_u / limit[:, None], (N, 1))])
@@ -255,29 +256,29 @@ class LinearMPC(ControlLaw):
             return self.device
         return f"{DEVICE}.limited_mpc:{f'preview{self.horizon}' if self.preview else ''}"
 
-    def output_rows(self, own: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    def output_rows(self, values: Numbers) -> tuple[np.ndarray, np.ndarray]:
         """Rows of the limits of outputs of a member, tick by tick (horizon p, 2 + 2 n + k), and the outputs' lines (p, n).
 
         Each row is the limit, the cost of a unit beyond it, what state and disturbance make of the output, and what inputs do;
         all are in units of the largest effect of an input as a part of its limit.
         """
-        A, B, N, p = own["A"], own["B"] * own["limit"], self.horizon, len(own.get("outputs", ()))
+        A, B, N, p = values["A"], values["B"] * values["limit"], self.horizon, len(values.get("outputs", ()))
         n, m = B.shape
         still, made, answers = np.hstack([np.eye(n), np.zeros((n, n))]), np.zeros((n, N * m)), []
         for j in range(N if p else 0):
             still, made = A @ still + np.hstack([np.zeros((n, n)), np.eye(n)]), A @ made
             made[:, j * m : (j + 1) * m] += B
-            answers.append(own["outputs"] @ np.hstack([still, made]))
+            answers.append(values["outputs"] @ np.hstack([still, made]))
         if not p:
             return np.zeros((0, 2 + 2 * n + N * m)), np.zeros((0, n))
         rows = np.stack(answers)
         unit = np.abs(rows[:, :, 2 * n :]).max(axis=(0, 2))
         unit = np.where(unit > 0.0, unit, 1.0)
         # The problem is half of the sums that are made least.
-        ends = np.stack([own["output_limit"] / unit, 0.5 * own["excess_cost"] * unit], axis=-1)
+        ends = np.stack([values["output_limit"] / unit, 0.5 * values["excess_cost"] * unit], axis=-1)
         ends = np.broadcast_to(ends, (N, p, 2))
         rows = np.concatenate([ends, rows / unit[:, None]], axis=-1)
-        return rows.reshape(N * p, -1), own["outputs"] / unit[:, None]
+        return rows.reshape(N * p, -1), values["outputs"] / unit[:, None]
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Places, A, B, limits, and the matrices of the problem; memory of state, inputs and disturbance.
@@ -286,19 +287,18 @@ class LinearMPC(ControlLaw):
         places = [*(list(COORDINATES).index(name) for name in self.states), *map(COMPONENTS.index, self.inputs)]
         gain = -np.expm1(-period / numbers["disturbance_time"])
         matrices = {name: value for name, value in numbers.items() if name != "disturbance_time"}
-        names, arrays = list(matrices), repeated(*matrices.values())
+        by_name = dict(zip(matrices, repeated(*matrices.values()), strict=True))
         rows = []
-        for i in range(len(arrays[0])):
-            own = dict(zip(names, arrays, strict=True))
-            found = self.condensed(own, i, period)
-            limit = own["limit"][i]
-            change = period * own["rate_limit"][i] / limit if "rate_limit" in own else np.zeros(m)
+        for i in range(len(by_name["A"])):
+            found = self.condensed(by_name, i, period)
+            member = {name: value[i] for name, value in by_name.items()}
+            A, B, limit = (member[name] for name in ("A", "B", "limit"))
+            lower = member.get("lower", -limit) / limit
+            change = period * member["rate_limit"] / limit if "rate_limit" in member else np.zeros(m)
             half = found.cost[np.tril_indices(k)]
-            member = {name: value[i] for name, value in own.items()}
-            lower = (member.get("lower", -limit) / limit,) if self.limits_more else ()
-            ends, lines = self.output_rows(member) if self.limits_more else (np.zeros(0), np.zeros(0))
+            ends, lines = self.output_rows(member)
             outputs = (ends, -np.linalg.solve(found.cost, found.ahead), found.ahead, lines) if self.preview else (ends,)
-            parts = (places, own["A"][i], own["B"][i], limit, *lower, change, found.best, found.slope, half, *outputs)
+            parts = (places, A, B, limit, lower, change, found.best, found.slope, half, *outputs)
             rows.append(np.concatenate([np.ravel(part) for part in parts]))
         words = {"states": n, "inputs": m, "horizon": self.horizon, "iterations": self.iterations}
         rated = int(self.rate_limit is not None)

@@ -48,12 +48,12 @@ def mpc(
         horizon: Number of periods, 1 to 100; 10 by default.
         iterations: Largest number of iterations at a tick; 50 by default.
         disturbance_time: Time over which the disturbance is filtered [s]; infinite: none is estimated. 5 by default.
-        tracked: Names of the states whose errors are to vanish; by default the first, as many as inputs.
+        tracked: Names of the states whose steady errors shall be 0; by default the first, as many as inputs.
         lower: Least inputs (m,) [N, N m]; by default -limit.
         outputs: Combinations of the states (p, n) that have a limit, C x <= output_limit; by default none.
         output_limit: Largest outputs (p,).
         excess_cost: Cost of a unit of an output beyond its limit, at each tick (p,), above 0.
-        preview: Whether it looks ahead at set-points and trajectories; False by default.
+        preview: Whether to use the future reference of set-points and trajectories; False by default.
         name: Name of the part; by default its type.
 
     Returns:

@@ -12,26 +12,27 @@ import warp as wp
 from lgvi_kernels import device
 from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
-from lgvi_kernels.laws.control.integral import remembered3
+from lgvi_kernels.laws.control.convergence import count_unconverged
 from lgvi_warp.extensions.others.device.linear_mpc import (
     DEMAND,
     SEEN,
     advance,
+    demanded,
     entry,
-    estimate,
+    factor_entry,
+    look,
     place,
     see,
     see_later,
+    slope_at,
+    solve_factored,
     times,
+    unconverged,
 )
 
-# Rows of the table, with n states, m inputs, k = horizon m and q outputs: places of the states, of the inputs; A, B; largest
-# inputs, and as parts of these the least ones and the limits of changes, m each; best inputs without limits and slope of the
-# cost, (k, 2 n) each; the cost's matrix, line by line up to the diagonal. Then of each output at each tick: its limit, the
-# cost of a unit beyond it, what state and disturbance make of it (2 n), what the inputs make of it (k). With preview, what
-# shifts of the reference make of the best inputs without limits and of the slope of the cost, (k, horizon n) each, and the
-# lines of the outputs (q, n).
+# Rows of the table as in linear_mpc.py, then of each of q outputs at each tick: its limit, the cost of a unit beyond it, what
+# state and disturbance make of it (2 n), what the inputs make of it (k). With preview, what shifts of the reference make of
+# the best inputs without limits and of the slope of the cost, (k, horizon n) each, and the lines of the outputs (q, n).
 # Rows of the memory as in linear_mpc.py.
 # Sides C v <= room are k inputs from above and from below, where `rated` their changes too, and the outputs, which may exceed
 # theirs. Scratch rows of a side: slack, multiplier, excess, the rest of its cost (a unit's cost less the multiplier), room;
@@ -103,12 +104,12 @@ def spread(y: Any, p: Any, outputs: int, to: int, t: int, value: Any):
 
 
 @wp.func(inline=False)
-def factor(y: Any, p: Any, outputs: int, cost: int, each: int, L: int, zero: Any):
+def factor(y: Any, p: Any, outputs: int, cost: int, sides: int, L: int, zero: Any):
     """The Cholesky factor of H + C^T diag(weights) C, with inverses on its diagonal."""
     k = p.horizon * p.inputs
     m = p.inputs
     unity = ones(zero)
-    weights = each + wp.static(WEIGHT)
+    weights = sides + wp.static(WEIGHT)
     size = wp.static(OF_SIDE)
     hard = hard_sides(p)
     for i in range(k):
@@ -128,14 +129,7 @@ def factor(y: Any, p: Any, outputs: int, cost: int, each: int, L: int, zero: Any
             for r in range((i // m) * p.outputs, p.horizon * p.outputs):
                 at = row_of_output(p, outputs, hard + r) + 2 + 2 * p.states
                 total = total + remembered(y, weights + size * (hard + r)) * (row1(y, at + i) * row1(y, at + j))
-            least_pivot = by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * absolute(total)
-            for q in range(j):
-                total = total - remembered(y, L + entry(i, q)) * remembered(y, L + entry(j, q))
-            if i == j:
-                total = unity / root(positive(total - least_pivot, total, least_pivot))
-            else:
-                total = total * remembered(y, L + entry(j, j))
-            remember(y, L + entry(i, j), total)
+            factor_entry(y, L, i, j, total)
 
 
 @wp.func
@@ -163,7 +157,7 @@ def moves(y: Any, p: Any, outputs: int, at: int, t: int, change: Any):
 
 
 @wp.func(inline=False)
-def step(y: Any, p: Any, outputs: int, slope: int, to: int, each: int, L: int, zero: Any):
+def step(y: Any, p: Any, outputs: int, slope: int, to: int, sides: int, L: int, zero: Any):
     """Newton's step of the inputs; 1 / its largest length that keeps all that must be positive so, at least 1."""
     k = p.horizon * p.inputs
     hard = hard_sides(p)
@@ -171,22 +165,12 @@ def step(y: Any, p: Any, outputs: int, slope: int, to: int, each: int, L: int, z
     for i in range(k):
         remember(y, to + i, -remembered(y, slope + i))
     for t in range(count):
-        at = each + wp.static(OF_SIDE) * t
+        at = sides + wp.static(OF_SIDE) * t
         spread(y, p, outputs, to, t, -(remembered(y, at + wp.static(WEIGHT)) * gap_of(y, p, outputs, at, t)))
-    for i in range(k):
-        total = remembered(y, to + i)
-        for q in range(i):
-            total = total - remembered(y, L + entry(i, q)) * remembered(y, to + q)
-        remember(y, to + i, total * remembered(y, L + entry(i, i)))
-    for m in range(k):
-        i = k - 1 - m
-        total = remembered(y, to + i)
-        for q in range(i + 1, k):
-            total = total - remembered(y, L + entry(q, i)) * remembered(y, to + q)
-        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+    solve_factored(y, k, L, to)
     most = ones(zero)
     for t in range(count):
-        at = each + wp.static(OF_SIDE) * t
+        at = sides + wp.static(OF_SIDE) * t
         slack, more, excess = moves(y, p, outputs, at, t, side(y, p, outputs, to, t, zero))
         most = greatest(most, -slack / remembered(y, at + wp.static(SLACK)))
         most = greatest(most, -more / remembered(y, at + wp.static(MULTIPLIER)))
@@ -197,7 +181,7 @@ def step(y: Any, p: Any, outputs: int, slope: int, to: int, each: int, L: int, z
 
 
 @wp.func(inline=False)
-def begin(y: Any, p: Any, outputs: int, limits: int, lines: int, x: int, before: int, v: int, f: int, cost: int, each: int,
+def begin(y: Any, p: Any, outputs: int, limits: int, lines: int, x: int, before: int, v: int, f: int, cost: int, sides: int,
           zero: Any):  # fmt: skip
     """Inputs of 0, slacks of the room or 1, and multipliers of one size, which is returned.
 
@@ -212,7 +196,7 @@ def begin(y: Any, p: Any, outputs: int, limits: int, lines: int, x: int, before:
         size = greatest(size, absolute(remembered(y, f + i)))
         remember(y, v + i, zero)
     for t in range(hard + p.horizon * p.outputs):
-        at = each + wp.static(OF_SIDE) * t
+        at = sides + wp.static(OF_SIDE) * t
         room = unity
         start = size
         rest = zero
@@ -245,7 +229,7 @@ def begin(y: Any, p: Any, outputs: int, limits: int, lines: int, x: int, before:
 
 
 @wp.func(inline=False)
-def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, L: int, size: Any, busy: Any):
+def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, sides: int, L: int, size: Any, busy: Any):
     """A step of Mehrotra's predictor and corrector, in the lanes above 0; returns those that have not converged before it."""
     unity = ones(busy)
     zero = unity - unity
@@ -257,13 +241,9 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, 
     to = slope + k
     gap = zero
     off = zero
-    for i in range(k):
-        total = remembered(y, f + i)
-        for j in range(k):
-            total = total + row1(y, cost + entry(wp.max(i, j), wp.min(i, j))) * remembered(y, v + j)
-        remember(y, slope + i, total)
+    slope_at(y, k, f, cost, v, slope)
     for t in range(count):
-        at = each + wp.static(OF_SIDE) * t
+        at = sides + wp.static(OF_SIDE) * t
         slack = remembered(y, at + wp.static(SLACK))
         multiplier = remembered(y, at + wp.static(MULTIPLIER))
         spread(y, p, outputs, slope, t, multiplier)
@@ -284,19 +264,13 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, 
         remember(y, at + wp.static(WEIGHT), unity / softness)
     share_of = y.h.dtype(1.0) / y.h.dtype(count + soft)
     gap = share_of * gap
-    steep = zero
-    for i in range(k):
-        steep = greatest(steep, absolute(remembered(y, slope + i)))
-    rest = greatest(gap - by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * size, zero)
-    close = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
-    rest = greatest(rest, greatest(off - close * unity, steep - close * size))
-    busy = positive(rest, busy, zero)
+    busy = unconverged(y, k, slope, gap, off, size, busy)
     if any_positive(busy):
-        factor(y, p, outputs, cost, each, L, zero)
-        length = unity / step(y, p, outputs, slope, to, each, L, zero)
+        factor(y, p, outputs, cost, sides, L, zero)
+        length = unity / step(y, p, outputs, slope, to, sides, L, zero)
         ahead = zero
         for t in range(count):
-            at = each + wp.static(OF_SIDE) * t
+            at = sides + wp.static(OF_SIDE) * t
             slack, more, excess = moves(y, p, outputs, at, t, side(y, p, outputs, to, t, zero))
             multiplier = remembered(y, at + wp.static(MULTIPLIER)) + length * more
             ahead = ahead + (remembered(y, at + wp.static(SLACK)) + length * slack) * multiplier
@@ -309,14 +283,14 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, each: int, 
         share = share_of * ahead / gap
         aim = share * share * share * gap
         for t in range(count):
-            at = each + wp.static(OF_SIDE) * t
+            at = sides + wp.static(OF_SIDE) * t
             remember(y, at + wp.static(TARGET), remembered(y, at + wp.static(TARGET)) - aim)
             if t >= hard:
                 remember(y, at + wp.static(TARGET_OF_EXCESS), remembered(y, at + wp.static(TARGET_OF_EXCESS)) - aim)
-        most = step(y, p, outputs, slope, to, each, L, zero)
+        most = step(y, p, outputs, slope, to, sides, L, zero)
         length = positive(busy, least(unity, y.h.dtype(0.99) / most), zero)
         for t in range(count):
-            at = each + wp.static(OF_SIDE) * t
+            at = sides + wp.static(OF_SIDE) * t
             slack, more, excess = moves(y, p, outputs, at, t, side(y, p, outputs, to, t, zero))
             advance(y, at + wp.static(SLACK), length, slack)
             advance(y, at + wp.static(MULTIPLIER), length, more)
@@ -370,29 +344,13 @@ def made(features):
         best_of = before + m
         v = best_of + k
         f = v + k
-        each = f + 3 * k
+        sides = f + 3 * k
         count = hard_sides(p) + p.horizon * p.outputs
-        L = each + wp.static(OF_SIDE) * count
-        last = p.memory + 1
+        L = sides + wp.static(OF_SIDE) * count
+        p.memory + 1
         unity = ones(w.force.x)
         zero = unity - unity
-        see(r, y, p.work)
-        for i in range(n):
-            remember(y, x + i, remembered(y, p.work + place(y, p.first + i)))
-        for i in range(m):
-            # What was not delivered of the last demand did not act.
-            u = remembered(y, last + n + i) - remembered(y, p.unmet + place(y, p.first + n + i))
-            remember(y, last + n + i, u)
-            u = u / row1(y, limits + i)
-            if p.rated > 0:
-                # From beyond the limits they go back at once.
-                reach = y.h.dtype(0.999) * row1(y, limits + 2 * m + i) * unity
-                u = clamp(u, row1(y, limits + m + i) * unity - reach, unity + reach)
-            remember(y, before + i, u)
-        estimate(r, y, p, matrices)
-        for i in range(n):
-            remember(y, x + n + i, remembered(y, last + n + m + i))
-            remember(y, last + i, remembered(y, x + i))
+        look(r, y, p, limits, x, before, zero)
         over = -unity
         for i in range(k):
             best = times(y, free + 2 * n * i, x, 2 * n, zero)
@@ -407,36 +365,22 @@ def made(features):
         lines = wp.static(0)
         if wp.static(ahead > 0):
             lines = outputs + p.horizon * p.outputs * (2 + 2 * n + k) + 2 * k * p.horizon * n
-        size = begin(y, p, outputs, limits, lines, x, before, v, f, cost, each, zero)
+        size = begin(y, p, outputs, limits, lines, x, before, v, f, cost, sides, zero)
         for t in range(count):
-            room = remembered(y, each + wp.static(OF_SIDE) * t + wp.static(ROOM))
+            room = remembered(y, sides + wp.static(OF_SIDE) * t + wp.static(ROOM))
             over = greatest(over, side(y, p, outputs, best_of, t, zero) - room)
         if any_positive(over):
             busy = positive(over, unity, zero)
             for _ in range(p.iterations):
                 if any_positive(busy):
-                    busy = iterate(y, p, outputs, v, f, cost, each, L, size, busy)
+                    busy = iterate(y, p, outputs, v, f, cost, sides, L, size, busy)
             count_unconverged(y, p.unconverged, busy)
             for i in range(m):
                 remember(y, best_of + i, positive(over, remembered(y, v + i), remembered(y, best_of + i)))
         # A lane leaves nothing behind that others made it calculate.
         for i in range(L + entry(k, 0) - v):
             remember(y, v + i, zero)
-        for i in range(wp.static(DEMAND)):
-            remember(y, demand + i, zero)
-        for i in range(m):
-            u = remembered(y, best_of + i)
-            if p.rated > 0:
-                change = row1(y, limits + 2 * m + i)
-                last_u = remembered(y, before + i)
-                u = clamp(u, last_u - change, last_u + change)
-            u = clamp(u, row1(y, limits + m + i) * unity, unity) * row1(y, limits + i)
-            remember(y, last + n + i, u)
-            remember(y, demand + place(y, p.first + n + i), u)
-        remember(y, p.memory, unity)
-        w.force = w.force + remembered3(y, demand)
-        w.torque = w.torque + remembered3(y, demand + 3)
-        return w
+        return demanded(w, y, p, limits, best_of, before, demand, zero)
 
     return device(
         __name__, features, params=params, control=control, foresee=foresee if ahead else None, AHEAD=ahead or None

@@ -16,9 +16,9 @@ SEEN = 12
 DEMAND = 6
 WANTED = 18
 
-# Rows of the table, with n states, m inputs and k = horizon m: places of the states, of the inputs; A, B; limits of inputs and
-# of their changes (as parts of these), m each; the best inputs without limits (k, 2 n) of state and disturbance; the slope of
-# the cost, (k, 2 n); and its matrix, line by line up to the diagonal.
+# Rows of the table, with n states, m inputs and k = horizon m: places of the states, of the inputs; A, B; largest
+# inputs, and as parts of these the least ones and the limits of changes, m each; the best inputs without limits (k, 2 n) of
+# state and disturbance; the slope of the cost, (k, 2 n); and its matrix, line by line up to the diagonal.
 # Rows of the memory: whether it has begun; the state (n), the inputs (m) and the disturbance (n); the reference (WANTED).
 # Constraints |C v - middle| <= half are the k inputs, then where `rated` their k changes. Each has eight scratch rows: the
 # slacks above and below, their multipliers, 1 / the slacks, and what a step is to make of slack times multiplier.
@@ -116,7 +116,7 @@ def half(y: Any, p: Any, limits: int, j: int, unity: Any):
     k = p.horizon * p.inputs
     width = unity
     if j >= k:
-        width = row1(y, limits + p.inputs + j % p.inputs) * unity
+        width = row1(y, limits + 2 * p.inputs + j % p.inputs) * unity
     return width
 
 
@@ -155,8 +155,110 @@ def entry(i: int, j: int):
     return (i * (i + 1)) // 2 + j
 
 
+@wp.func
+def factor_entry(y: Any, L: int, i: int, j: int, total: Any):
+    """An entry of the Cholesky factor, from that of its matrix; inverses are on the diagonal."""
+    least_pivot = by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * absolute(total)
+    for q in range(j):
+        total = total - remembered(y, L + entry(i, q)) * remembered(y, L + entry(j, q))
+    if i == j:
+        total = ones(total) / root(positive(total - least_pivot, total, least_pivot))
+    else:
+        total = total * remembered(y, L + entry(j, j))
+    remember(y, L + entry(i, j), total)
+
+
+@wp.func
+def solve_factored(y: Any, k: int, L: int, to: int):
+    """Solve with the Cholesky factor, in place."""
+    for i in range(k):
+        total = remembered(y, to + i)
+        for q in range(i):
+            total = total - remembered(y, L + entry(i, q)) * remembered(y, to + q)
+        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+    for m in range(k):
+        i = k - 1 - m
+        total = remembered(y, to + i)
+        for q in range(i + 1, k):
+            total = total - remembered(y, L + entry(q, i)) * remembered(y, to + q)
+        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+
+
+@wp.func
+def slope_at(y: Any, k: int, f: int, cost: int, v: int, slope: int):
+    """The slope of the cost at inputs."""
+    for i in range(k):
+        total = remembered(y, f + i)
+        for j in range(k):
+            total = total + row1(y, cost + entry(wp.max(i, j), wp.min(i, j))) * remembered(y, v + j)
+        remember(y, slope + i, total)
+
+
+@wp.func
+def unconverged(y: Any, k: int, slope: int, gap: Any, off: Any, size: Any, busy: Any):
+    """The busy lanes whose gap, sides or slope are not yet small enough; the others are 0."""
+    zero = busy - busy
+    steep = zero
+    for i in range(k):
+        steep = greatest(steep, absolute(remembered(y, slope + i)))
+    rest = greatest(gap - by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * size, zero)
+    close = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
+    rest = greatest(rest, greatest(off - close * ones(busy), steep - close * size))
+    return positive(rest, busy, zero)
+
+
 @wp.func(inline=False)
-def factor(y: Any, p: Any, cost: int, each: int, L: int, zero: Any):
+def look(r: Any, y: Any, p: Any, limits: int, x: int, before: int, zero: Any):
+    """State, disturbance and the last inputs, as parts of their limits."""
+    n = p.states
+    m = p.inputs
+    last = p.memory + 1
+    unity = ones(zero)
+    see(r, y, p.work)
+    for i in range(n):
+        remember(y, x + i, remembered(y, p.work + place(y, p.first + i)))
+    for i in range(m):
+        # What was not delivered of the last demand did not act.
+        u = remembered(y, last + n + i) - remembered(y, p.unmet + place(y, p.first + n + i))
+        remember(y, last + n + i, u)
+        u = u / row1(y, limits + i)
+        if p.rated > 0:
+            # From beyond the limits they go back at once.
+            reach = y.h.dtype(0.999) * row1(y, limits + 2 * m + i) * unity
+            u = clamp(u, row1(y, limits + m + i) * unity - reach, unity + reach)
+        remember(y, before + i, u)
+    estimate(r, y, p, limits - n * n - n * m)
+    for i in range(n):
+        remember(y, x + n + i, remembered(y, last + n + m + i))
+        remember(y, last + i, remembered(y, x + i))
+
+
+@wp.func(inline=False)
+def demanded(w: Any, y: Any, p: Any, limits: int, best_of: int, before: int, demand: int, zero: Any):
+    """Demand the first of the best inputs, within all limits."""
+    n = p.states
+    m = p.inputs
+    last = p.memory + 1
+    unity = ones(zero)
+    for i in range(wp.static(DEMAND)):
+        remember(y, demand + i, zero)
+    for i in range(m):
+        u = remembered(y, best_of + i)
+        if p.rated > 0:
+            step = row1(y, limits + 2 * m + i)
+            last_u = remembered(y, before + i)
+            u = clamp(u, last_u - step, last_u + step)
+        u = clamp(u, row1(y, limits + m + i) * unity, unity) * row1(y, limits + i)
+        remember(y, last + n + i, u)
+        remember(y, demand + place(y, p.first + n + i), u)
+    remember(y, p.memory, unity)
+    w.force = w.force + remembered3(y, demand)
+    w.torque = w.torque + remembered3(y, demand + 3)
+    return w
+
+
+@wp.func(inline=False)
+def factor(y: Any, p: Any, cost: int, sides: int, L: int, zero: Any):
     """The Cholesky factor of H + C^T diag(multipliers / slacks) C, with inverses on its diagonal."""
     k = p.horizon * p.inputs
     unity = ones(zero)
@@ -164,28 +266,21 @@ def factor(y: Any, p: Any, cost: int, each: int, L: int, zero: Any):
         for j in range(i + 1):
             total = row1(y, cost + entry(i, j)) * unity
             if i == j:
-                total = total + weight(y, each, i)
+                total = total + weight(y, sides, i)
                 if p.rated > 0:
-                    total = total + weight(y, each, k + i)
+                    total = total + weight(y, sides, k + i)
                     if i + p.inputs < k:
-                        total = total + weight(y, each, k + i + p.inputs)
+                        total = total + weight(y, sides, k + i + p.inputs)
             if p.rated > 0:
                 if i - j == p.inputs:
-                    total = total - weight(y, each, k + i)
-            least_pivot = by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * absolute(total)
-            for q in range(j):
-                total = total - remembered(y, L + entry(i, q)) * remembered(y, L + entry(j, q))
-            if i == j:
-                total = unity / root(positive(total - least_pivot, total, least_pivot))
-            else:
-                total = total * remembered(y, L + entry(j, j))
-            remember(y, L + entry(i, j), total)
+                    total = total - weight(y, sides, k + i)
+            factor_entry(y, L, i, j, total)
 
 
 @wp.func
-def weight(y: Any, each: int, j: int):
+def weight(y: Any, sides: int, j: int):
     """Multipliers over slacks of a constraint."""
-    at = each + wp.static(OF_EACH) * j
+    at = sides + wp.static(OF_EACH) * j
     return remembered(y, at + 2) * remembered(y, at + 4) + remembered(y, at + 3) * remembered(y, at + 5)
 
 
@@ -216,7 +311,17 @@ def advance(y: Any, row: int, length: Any, change: Any):
 
 @wp.func(inline=False)
 def step(
-    y: Any, p: Any, limits: int, v: int, slope: int, to: int, each: int, L: int, before: int, none: int, zero: Any
+    y: Any,
+    p: Any,
+    limits: int,
+    v: int,
+    slope: int,
+    to: int,
+    sides: int,
+    L: int,
+    before: int,
+    none: int,
+    zero: Any,
 ):
     """Newton's step of the inputs; 1 / its largest length that keeps slacks and multipliers above 0, at least 1."""
     unity = ones(zero)
@@ -225,25 +330,15 @@ def step(
     for i in range(k):
         remember(y, to + i, -remembered(y, slope + i))
     for j in range(count):
-        at = each + wp.static(OF_EACH) * j
+        at = sides + wp.static(OF_EACH) * j
         r1, r2 = missed(y, p, limits, at, v, before, j, unity)
         a = (remembered(y, at + 2) * r1 - remembered(y, at + 6)) * remembered(y, at + 4)
         b = (remembered(y, at + 3) * r2 - remembered(y, at + 7)) * remembered(y, at + 5)
         spread(y, p, to, j, b - a)
-    for i in range(k):
-        total = remembered(y, to + i)
-        for q in range(i):
-            total = total - remembered(y, L + entry(i, q)) * remembered(y, to + q)
-        remember(y, to + i, total * remembered(y, L + entry(i, i)))
-    for m in range(k):
-        i = k - 1 - m
-        total = remembered(y, to + i)
-        for q in range(i + 1, k):
-            total = total - remembered(y, L + entry(q, i)) * remembered(y, to + q)
-        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+    solve_factored(y, k, L, to)
     most = unity
     for j in range(count):
-        at = each + wp.static(OF_EACH) * j
+        at = sides + wp.static(OF_EACH) * j
         r1, r2 = missed(y, p, limits, at, v, before, j, unity)
         d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
         most = greatest(most, greatest(-d1 * remembered(y, at + 4), -d2 * remembered(y, at + 5)))
@@ -252,7 +347,7 @@ def step(
 
 
 @wp.func(inline=False)
-def begin(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, zero: Any):
+def begin(y: Any, p: Any, limits: int, v: int, f: int, cost: int, sides: int, zero: Any):
     """Inputs of 0, slacks of half the width, and multipliers of one size, which is returned."""
     unity = ones(zero)
     k = p.horizon * p.inputs
@@ -261,7 +356,7 @@ def begin(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, zer
         size = greatest(size, absolute(remembered(y, f + i)))
         remember(y, v + i, zero)
     for j in range(k + p.rated * k):
-        at = each + wp.static(OF_EACH) * j
+        at = sides + wp.static(OF_EACH) * j
         width = half(y, p, limits, j, unity)
         remember(y, at, width)
         remember(y, at + 1, width)
@@ -271,8 +366,8 @@ def begin(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, zer
 
 
 @wp.func(inline=False)
-def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, L: int, before: int, none: int, size: Any,
-            busy: Any):  # fmt: skip
+def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, sides: int, L: int, before: int, none: int,
+            size: Any, busy: Any):  # fmt: skip
     """A step of Mehrotra's predictor and corrector, in the lanes above 0; returns those that have not converged before it."""
     unity = ones(busy)
     zero = unity - unity
@@ -282,13 +377,9 @@ def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, L
     to = slope + k
     gap = zero
     off = zero
-    for i in range(k):
-        total = remembered(y, f + i)
-        for j in range(k):
-            total = total + row1(y, cost + entry(wp.max(i, j), wp.min(i, j))) * remembered(y, v + j)
-        remember(y, slope + i, total)
+    slope_at(y, k, f, cost, v, slope)
     for j in range(count):
-        at = each + wp.static(OF_EACH) * j
+        at = sides + wp.static(OF_EACH) * j
         spread(y, p, slope, j, remembered(y, at + 2) - remembered(y, at + 3))
         r1, r2 = missed(y, p, limits, at, v, before, j, unity)
         off = greatest(off, greatest(absolute(r1), absolute(r2)))
@@ -298,19 +389,13 @@ def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, L
             remember(y, at + 4 + q, unity / remembered(y, at + q))
             remember(y, at + 6 + q, product)
     gap = (y.h.dtype(0.5) / y.h.dtype(count)) * gap
-    steep = zero
-    for i in range(k):
-        steep = greatest(steep, absolute(remembered(y, slope + i)))
-    rest = greatest(gap - by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * size, zero)
-    close = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
-    rest = greatest(rest, greatest(off - close * unity, steep - close * size))
-    busy = positive(rest, busy, zero)
+    busy = unconverged(y, k, slope, gap, off, size, busy)
     if any_positive(busy):
-        factor(y, p, cost, each, L, zero)
-        length = unity / step(y, p, limits, v, slope, to, each, L, before, none, zero)
+        factor(y, p, cost, sides, L, zero)
+        length = unity / step(y, p, limits, v, slope, to, sides, L, before, none, zero)
         ahead = zero
         for j in range(count):
-            at = each + wp.static(OF_EACH) * j
+            at = sides + wp.static(OF_EACH) * j
             r1, r2 = missed(y, p, limits, at, v, before, j, unity)
             d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
             ahead = ahead + (remembered(y, at) + length * d1) * (remembered(y, at + 2) + length * m1)
@@ -320,13 +405,13 @@ def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, each: int, L
         share = (y.h.dtype(0.5) / y.h.dtype(count)) * ahead / gap
         aim = share * share * share * gap
         for j in range(count):
-            at = each + wp.static(OF_EACH) * j
+            at = sides + wp.static(OF_EACH) * j
             remember(y, at + 6, remembered(y, at + 6) - aim)
             remember(y, at + 7, remembered(y, at + 7) - aim)
-        most = step(y, p, limits, v, slope, to, each, L, before, none, zero)
+        most = step(y, p, limits, v, slope, to, sides, L, before, none, zero)
         length = positive(busy, least(unity, y.h.dtype(0.99) / most), zero)
         for j in range(count):
-            at = each + wp.static(OF_EACH) * j
+            at = sides + wp.static(OF_EACH) * j
             r1, r2 = missed(y, p, limits, at, v, before, j, unity)
             d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
             advance(y, at, length, d1)
@@ -346,7 +431,7 @@ def control(w: Any, r: Any, y: Any, p: Any):
     k = p.horizon * m
     matrices = p.first + n + m
     limits = matrices + n * n + n * m
-    free = limits + 2 * m
+    free = limits + 3 * m
     slope_of = free + 2 * n * k
     cost = slope_of + 2 * n * k
     # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f,
@@ -358,28 +443,12 @@ def control(w: Any, r: Any, y: Any, p: Any):
     v = best_of + k
     f = v + k
     none = f + 3 * k
-    each = none + m
-    L = each + wp.static(OF_EACH) * (k + p.rated * k)
-    last = p.memory + 1
+    sides = none + m
+    L = sides + wp.static(OF_EACH) * (k + p.rated * k)
+    p.memory + 1
     unity = ones(w.force.x)
     zero = unity - unity
-    see(r, y, p.work)
-    for i in range(n):
-        remember(y, x + i, remembered(y, p.work + place(y, p.first + i)))
-    for i in range(m):
-        # What was not delivered of the last demand did not act.
-        u = remembered(y, last + n + i) - remembered(y, p.unmet + place(y, p.first + n + i))
-        remember(y, last + n + i, u)
-        u = u / row1(y, limits + i)
-        if p.rated > 0:
-            # From beyond the limits they go back at once.
-            most = unity + y.h.dtype(0.999) * row1(y, limits + m + i) * unity
-            u = clamp(u, -most, most)
-        remember(y, before + i, u)
-    estimate(r, y, p, matrices)
-    for i in range(n):
-        remember(y, x + n + i, remembered(y, last + n + m + i))
-        remember(y, last + i, remembered(y, x + i))
+    look(r, y, p, limits, x, before, zero)
     over = -unity
     for i in range(k):
         best = times(y, free + 2 * n * i, x, 2 * n, zero)
@@ -391,33 +460,19 @@ def control(w: Any, r: Any, y: Any, p: Any):
                 change = best - remembered(y, before + i)
             else:
                 change = best - remembered(y, best_of + i - m)
-            over = greatest(over, absolute(change) - row1(y, limits + m + i % m))
+            over = greatest(over, absolute(change) - row1(y, limits + 2 * m + i % m))
     if any_positive(over):
         for i in range(k):
             remember(y, f + i, times(y, slope_of + 2 * n * i, x, 2 * n, zero))
-        size = begin(y, p, limits, v, f, cost, each, zero)
+        size = begin(y, p, limits, v, f, cost, sides, zero)
         busy = positive(over, unity, zero)
         for _ in range(p.iterations):
             if any_positive(busy):
-                busy = iterate(y, p, limits, v, f, cost, each, L, before, none, size, busy)
+                busy = iterate(y, p, limits, v, f, cost, sides, L, before, none, size, busy)
         count_unconverged(y, p.unconverged, busy)
         for i in range(m):
             remember(y, best_of + i, positive(over, remembered(y, v + i), remembered(y, best_of + i)))
         # A lane leaves nothing behind that others made it calculate.
         for i in range(L + entry(k, 0) - v):
             remember(y, v + i, zero)
-    for i in range(wp.static(DEMAND)):
-        remember(y, demand + i, zero)
-    for i in range(m):
-        u = remembered(y, best_of + i)
-        if p.rated > 0:
-            step = row1(y, limits + m + i)
-            last_u = remembered(y, before + i)
-            u = clamp(u, last_u - step, last_u + step)
-        u = clamp(u, -unity, unity) * row1(y, limits + i)
-        remember(y, last + n + i, u)
-        remember(y, demand + place(y, p.first + n + i), u)
-    remember(y, p.memory, unity)
-    w.force = w.force + remembered3(y, demand)
-    w.torque = w.torque + remembered3(y, demand + 3)
-    return w
+    return demanded(w, y, p, limits, best_of, before, demand, zero)

@@ -69,10 +69,10 @@ OF_FILES = ("file", "mesh")
 def scene_writer(scene: Scene, inputs: str) -> Any:
     """Check that a unit can be made of a scene, and return the function (target, report) that writes it.
 
-    inputs: as of `VehicleUnit`.
+    inputs: as in `VehicleUnit`.
 
     Raises:
-        SceneError: Where it cannot; the message lists every fault.
+        SceneError: If it cannot; the message lists every fault.
     """
     files = dict(_of_wrapper())
     content = _content(scene, inputs)

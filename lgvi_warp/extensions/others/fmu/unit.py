@@ -60,7 +60,7 @@ class VehicleUnit:
     allocation; or "set_points" of the guidance. variables: in the order of their value references.
 
     Raises:
-        SceneError: Where the scene is none that a unit can be made of.
+        SceneError: If the scene is none that a unit can be made of.
     """
 
     def __init__(self, scene: Scene, inputs: str):
@@ -182,7 +182,7 @@ class VehicleUnit:
         """Move from a time on [s] for a length of time [s], a whole number of steps.
 
         Raises:
-            ValueError: Where time and length do not fit, or the vehicle fails.
+            ValueError: If time and length do not fit, or the vehicle fails.
         """
         if self._late is not None:
             raise ValueError(self._late)

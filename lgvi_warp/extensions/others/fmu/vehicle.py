@@ -33,7 +33,7 @@ class EachLaunch(Launches):
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
-        """The same as of `Launches`, with the step of the launch in hand as the only one of a sample."""
+        """The same as in `Launches`, with the step of the launch in hand as the only one of a sample."""
         stages, leads, _ = super().times
         return stages, leads, wp.array(np.array([NEVER, NEVER], np.int32), dtype=wp.int32, device="cpu")
 

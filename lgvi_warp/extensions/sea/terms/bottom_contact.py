@@ -28,13 +28,13 @@ LEAST = 0.08
 class BottomContact(Term):
     """Contact of hull points with a floor whose `contact` is "rest": springs, dampers and dry friction.
 
-    A point that is d in the floor is pushed out by stiffness d + damping times its speed into it, never pulled. Along the
-    floor a spring and a damper hold it, up to friction times that push; beyond, it slides. What is at rest stays at rest.
+    A point at a depth d below the floor is pushed out by stiffness * d + damping * (its speed into the floor), never
+    pulled. Along the floor a spring and a damper hold it, up to friction times that push; beyond, it slides. A vehicle at
+    rest stays at rest.
 
-    A step h cannot follow a contact that is too stiff for it: stiffness and damping are at most those with which the fastest
-    oscillation of the vehicle on all its points turns by 1 rad in a step, and loses its speed in one. Those are the defaults,
-    so the floor is the harder, the shorter the step: a net weight W lies W h^2 / m deep or more, m the mass with that of the
-    water that moves along.
+    The step h limits stiffness and damping. At the limits, the fastest oscillation of the vehicle on all its points
+    advances by 1 rad in a step, and loses its speed in one step. The limits are the defaults, so a shorter step makes a
+    harder floor. At rest, a net weight W sinks in by W h^2 / m or more, with m the mass including added mass.
 
     Args:
         points: Points of the hull that may touch the floor, (k, 3) [m] from the body's origin.
@@ -44,7 +44,8 @@ class BottomContact(Term):
         floor: Name of the floor; "" by default, for the only one whose `contact` is "rest".
 
     Raises:
-        SceneError: As `Term`. A scene refuses it where it has no such floor, or several and none is named.
+        SceneError: If a number is invalid (see `Term`). A scene refuses it where it has no such floor, or several and none
+            is named.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -33,8 +33,8 @@ STEEPEST = 1.0 / 7.0
 class SeaState(WaveTerm):
     """A random sea by its significant height and peak period, a sum of linear waves of equal energy (Goda 2010).
 
-    Every member has a sea of its own: the frequency of each component is drawn within its share of the spectrum, so that the
-    record does not repeat, and so are phase and heading.
+    Every member has a sea of its own: the frequency of each component is drawn within its share of the spectrum, so that
+    the record does not repeat. Phase and heading are drawn, too.
 
     Args:
         significant_height: Significant wave height Hs [m], 4 times the standard deviation of the surface.
@@ -44,22 +44,22 @@ class SeaState(WaveTerm):
         peakedness: Peak enhancement of a JONSWAP spectrum, from 1; 3.3 by default.
         spreading: Exponent s of the directions, spread as cos^2s of half the angle from the mean (Longuet-Higgins et al.
             1963), whose standard deviation is sqrt(2 / (s + 1)) rad; by default all waves have the mean direction.
-        amplitudes: "equal", the default, so that Hs is that of every member; or "rayleigh", random as those of a piece of a
-            long record.
+        amplitudes: "equal", the default: every member has exactly Hs; or "rayleigh": random, as in a piece of a long
+            record.
         components: Number of waves; 20 by default.
         depth: Depth of the sea [m]; by default that of the scene's floor where it is flat, else the water is deep.
-        periods_of: Who sees the periods where a uniform current acts: "ground", the default, a fixed place, as a moored buoy
-            does; or "water", whoever drifts with the current.
-        seed: Whole number from 0 of a sea that all members share; None, the default, gives each one of its own, by the seed
-            of the ensemble.
-        levels: Random numbers from 0 to 1 behind frequency, phase, and where there are any, heading and amplitude of each
-            wave, (components, 2 to 4); by default drawn.
+        periods_of: Frame of the periods in a uniform current: "ground", the default, as a moored buoy measures them; or
+            "water", as a buoy that drifts with the current does.
+        seed: Whole number from 0 of a sea that all members share; None, the default: each member has its own sea, by the
+            seed of the ensemble.
+        levels: Uniform random numbers in (0, 1) that determine the frequency, the phase and, if random, the heading and
+            amplitude of each wave, (components, 2 to 4); by default drawn.
 
     Methods:
         density: The spectrum of the surface.
 
     Raises:
-        SceneError: Where a number is out of bounds; and as `Term`.
+        SceneError: If a number is out of bounds; or a number is invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -24,8 +24,9 @@ WHY = "the largest tides are 8 m above their mean: is it in feet or cm?"
 class Tide(SurfaceLevel):
     """A tide, which moves the surface and leaves the floor and the inertial axes where they are.
 
-    Height of the surface above the depth 0: mean + sum of amplitude cos(2 pi t / period + phase) + table at t. By it go the
-    surface of `surface_buoyancy`, waves, pressure cells, the event `surface` and the depths at which a buoyancy engine turns.
+    Height of the surface above the depth 0: mean + sum of amplitude cos(2 pi t / period + phase) + table at t. It shifts
+    the surface of `surface_buoyancy`, waves, pressure cells and the event `surface`, and the depths at which a buoyancy
+    engine turns.
 
     Args:
         amplitudes: Amplitudes of the constituents, (k,) [m].
@@ -34,11 +35,12 @@ class Tide(SurfaceLevel):
         phases: Their phases at t = 0, (k,) [rad]; 0 by default. A phase lag g at that time is the phase -g.
         times: Times of a table, (m,) [s], rising.
         heights: Heights at these times, (m,) [m], linear between them and held outside; added to the constituents.
-        mean: Height of the mean surface above the depth 0 [m], as of a chart whose depths count from its lowest tide; 0 where
-            it is left out.
+        mean: Height of the mean surface above the depth 0 [m], such as for a chart whose depths are relative to the lowest
+            tide; 0 if omitted.
 
     Raises:
-        SceneError: Where amplitudes have neither periods nor speeds, or both; a table has one column; or as `Term`.
+        SceneError: If amplitudes have neither periods nor speeds, or both; a table has one column; or a number is
+            invalid (see `Term`).
 
     Examples:
         >>> import lgvi_warp as lw

@@ -73,15 +73,15 @@ def test_attitude_stays_orthogonal(dtype, bound, scene):
 
 
 @pytest.mark.parametrize(
-    ("there", "back", "steps"),
+    ("forward", "back", "steps"),
     [(method, method, steps) for method in ("psi", "psi_s", "psi_1") for steps in (1, 500)]
     + [("phi", "phi_adjoint", steps) for steps in (1, 200)],
 )
-def test_reversed_momenta_lead_back(there, back, steps):
+def test_reversed_momenta_lead_back(forward, back, steps):
     # Psi_{-h} Psi_h = identity, and Phi*_h = (Phi_{-h})^-1: the maps are even in the momenta.
     scene = scene_of((10.0, 12.0, 15.0), (1.0, 2.0, 2.5), net=-0.3, moment=(0.0, 0.1, -0.5))
     b, R, nu, Om = (x[0] for x in random_states(2, 1, 0.5, 0.5))
-    end = last(lw.solve(one(scene, b, R, nu, Om), there, h=0.01, t1=0.01 * steps))
+    end = last(lw.solve(one(scene, b, R, nu, Om), forward, h=0.01, t1=0.01 * steps))
     start = last(lw.solve(one(scene, end[0], end[1], -end[2], -end[3]), back, h=0.01, t1=0.01 * steps))
     # One step: round-off. 500 steps: round-off 1e-16 a step and operation, grown at most 100 times on the way.
     assert difference((start[0], start[1], -start[2], -start[3]), (b, R, nu, Om)) < (1e-14 if steps == 1 else 1e-11)

@@ -347,7 +347,6 @@ def made(features):
         sides = f + 3 * k
         count = hard_sides(p) + p.horizon * p.outputs
         L = sides + wp.static(OF_SIDE) * count
-        p.memory + 1
         unity = ones(w.force.x)
         zero = unity - unity
         look(r, y, p, limits, x, before, zero)

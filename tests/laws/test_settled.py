@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_kernels.laws import control_fins_with, thrusters_with
+from lgvi_kernels.maps.compose import ANEW, plays
 from lgvi_warp.physics import terms
 from lgvi_warp.reference.terms.control_fins import ControlFins
 from tests.laws.case import Case
@@ -75,3 +77,40 @@ def test_code_without_zeros_is_that_of_members_with_others():
         assert difference(alone, last(whole, i)) < 1e-13
         ends.append(alone)
     assert difference(*ends) > 1e-3
+
+
+@pytest.mark.parametrize("made", [thrusters_with.made, control_fins_with.made], ids=["thrusters", "fins"])
+def test_commands_that_nothing_follows_behind_are_settled_once_a_step(made):
+    within = {features: plays(made(features), "settle_later") for features in (("driven",), ("driven", "lag"), ())}
+    assert within[("driven",)] is None
+    assert None not in (within[("driven", "lag")], within[()])
+    assert plays(made(("driven",)), ANEW) is not None
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3])
+@pytest.mark.parametrize("method", ["rk4", "rk8"])
+def test_commands_of_a_tick_act_as_held_ones_do(method, delay):
+    # One tick, at the start; its commands begin at a whole step, and nothing follows behind them. The host sums held ones.
+    controller = lw.Controller(
+        period=1.0,
+        delay=delay,
+        guidance=[lw.control.SetPoint(position=(0.0, 0.0, 5.0), heading=0.3)],
+        laws=[lw.control.PosePID(kp=(4.0,) * 3, kd=(6.0,) * 3, kr=(1.0,) * 3, kw=(0.4,) * 3)],
+    )
+    named = lw.Scene.named("bluerov2_heavy")
+
+    def with_thrusters(**fields):
+        return [
+            term.with_fields({"time_constant": None} | fields) if term.key == "thrusters" else term
+            for term in named.terms
+        ]
+
+    settings = dict(method=method, h=0.02)
+    save = lw.SaveAt(fields=[*lw.SaveAt().fields, "command"])
+    loop = lw.solve(replace(named, terms=with_thrusters(), controller=controller), t1=1.0, save=save, **settings)
+    command = loop.command[0, 0]
+    assert np.abs(command).max() > 0.05
+    resting = replace(named, terms=with_thrusters())
+    begun = last(lw.solve(resting, t1=delay, **settings)) if delay else ()
+    held = replace(named, terms=with_thrusters(command=command))
+    assert difference(last(loop), last(lw.solve(one(held, *begun), t1=1.0 - delay, **settings))) < 1e-12

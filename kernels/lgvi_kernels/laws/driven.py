@@ -104,17 +104,16 @@ def make_driven(name, rows, limit, lag, rate, features, words=(), count=0):
 
     @wp.func
     def move(state: Any, view: Any, p: Any, length: Any):
-        if wp.static(moves):
-            time = length * ones(view.b.x)
-            # A loop of its own: an exponential within a condition would be computed for each channel, and dropped.
-            if wp.static(not limited) and p.alike > 0:
-                remaining = left_after(time, row1(view, p.first + wp.static(lag)))
-                for i in range(wp.static(count) if wp.static(count > 0) else p.count):
-                    u = wanted(view, p, i)
-                    remember(view, p.memory + i, fused(remaining, remembered(view, p.memory + i) - u, u))
-            else:
-                for i in range(p.count):
-                    step_to(view, p, i, time)
+        time = length * ones(view.b.x)
+        # A loop of its own: an exponential within a condition would be computed for each channel, and dropped.
+        if wp.static(not limited) and p.alike > 0:
+            remaining = left_after(time, row1(view, p.first + wp.static(lag)))
+            for i in range(wp.static(count) if wp.static(count > 0) else p.count):
+                u = wanted(view, p, i)
+                remember(view, p.memory + i, fused(remaining, remembered(view, p.memory + i) - u, u))
+        else:
+            for i in range(p.count):
+                step_to(view, p, i, time)
         return state
 
     @wp.func
@@ -131,4 +130,6 @@ def make_driven(name, rows, limit, lag, rate, features, words=(), count=0):
             remember(view, p.report + i, place(view, p, i))
         return state
 
+    if not moves:
+        return Driven(params, behind, place, report=report)
     return Driven(params, behind, place, evolve, follow, report)

@@ -32,6 +32,8 @@ def plays(law, role):
     if role == ANEW:
         return None if hasattr(law, "follow") else getattr(law, "settle", None)
     if role == "settle_later":
+        if getattr(law, "held", False):
+            return None
         return getattr(law, role, None) or plays(law, "settle")
     if role.startswith(SETTLED):
         return getattr(law, role, None) or plays(law, role.removeprefix(SETTLED))

@@ -79,7 +79,7 @@ def solve(
         statistics: Statistics gathered over the members at every sample time during the run, such as
             lw.statistics.Mean("position"); they are in result.statistics. An empty sequence gathers none, whatever the scene
             says.
-        keep: Members whose samples are kept. "all" (default). "none": memory does not grow with the number of members or steps.
+        keep: Members whose samples are kept. "all" (default). "none": memory does not grow with members or steps.
             "failed" (without those that an event stopped) or indices of members: these are run again after the run, with the
             same bits, and are in result.kept.
         until: lw.Until(...) ends the run before the last member, once the interval of a statistic is narrow enough. False

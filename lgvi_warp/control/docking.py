@@ -26,7 +26,7 @@ class Docking(Guidance):
     funnel has the radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is nearer than
     `judged` and outside the funnel starts again. It goes to the beginning of the line, `approach` before the dock,
     displaced by `offset` to starboard, and from there along the line. A vehicle that reaches the dock's plane inside the
-    mouth is docked: its wanted speed is then 0, its wanted position and heading are the dock's.
+    mouth is docked: its wanted speed is then 0, and its wanted position and heading are the dock's.
 
     Args:
         position: The dock, (3,) [m], inertial axes: the middle of its mouth.

@@ -250,7 +250,7 @@ def tradeoff(
     The cost of a step is CPU time of the thread that runs it: the least of several readings, one number for all steps
     of a method. Readings that disagree are reported in the messages. Errors are measured against a reference that two
     independent runs agree on to a tenth of the smallest error shown. Where noise acts, all runs see one path of it, drawn
-    every noise_step of the scene or, without one, finer than any step that is tried; where that cannot be, or the path is too
+    every noise_step of the scene or, without one, finer than any step that is tried; if no path can be shared, or it is too
     rough for errors of members, statistics are compared with those of the finest run.
 
     Args:

@@ -45,7 +45,7 @@ class Prepared:
 
     Args:
         fleet: the members of a call without X.
-        table: members whose columns a call with X replaces; or why there are none.
+        table: members whose columns a call with X replaces; or a text: why no call can have an X.
         names: names of the columns of X.
         of: quantities of interest; empty for whole results.
         runner: object that prepares and runs the calls.

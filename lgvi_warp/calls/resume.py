@@ -45,8 +45,8 @@ def resume(
         scheduler: Address of Dask's scheduler.
         progress: As in solve.
         force: Whether to continue on another machine or with other versions, where the bits may differ.
-        keepers: The keepers that the run was given.
-        statistics: The statistics that the run was given. Needed if they are of functions.
+        keepers: The keepers that were passed to the run.
+        statistics: The statistics that were passed to the run. Needed if one is of a function, which a store does not hold.
 
     Returns:
         The result of the complete run, which reads from the store.

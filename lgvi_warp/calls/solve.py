@@ -62,7 +62,7 @@ def solve(
         method: A name or a Method. Default: chosen by the scene's forces, "psi_s" without damping.
         h: Step [s].
         t1: End of the run [s], counted from t = 0.
-        save: Which samples to save, and when; default every [run] save_every of the scene, else the start and the end.
+        save: Fields and times to save. Default: the interval `save_every` of the scene's [run], else start and end only.
         dtype: "float64" (default), "float32", or "float32_compensated", which keeps each number of the state as a sum of two
             (for many short steps, far from the origin).
         threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less than a
@@ -79,7 +79,7 @@ def solve(
         statistics: Statistics gathered over the members at every sample time during the run, such as
             lw.statistics.Mean("position"); they are in result.statistics. An empty sequence gathers none, whatever the scene
             says.
-        keep: Members whose samples are kept. "all" (default). "none": memory grows with neither members nor steps.
+        keep: Members whose samples are kept. "all" (default). "none": memory does not grow with members or steps.
             "failed" (without those that an event stopped) or indices of members: these are run again after the run, with the
             same bits, and are in result.kept.
         until: lw.Until(...) ends the run before the last member, once the interval of a statistic is narrow enough. False

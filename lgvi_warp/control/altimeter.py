@@ -39,8 +39,8 @@ class Altimeter(Sensor):
         outlier_std: Standard deviation of what an outlier adds to the reading [m].
 
     Raises:
-        SceneError: If the beam has no direction; and as `Sensor`. A scene refuses it where it has no floor, or several and
-            none is named.
+        SceneError: If the beam has no direction; and as `Sensor`. A scene refuses it if it has no floor, or several of
+            which none is named.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -22,12 +22,12 @@ SOURCES = ("altimeter", "chart")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Altitude(Guidance):
-    """An altitude above the sea floor: the wanted depth is that of the floor less the altitude, so that depth laws follow it.
+    """Altitude above the sea floor: the wanted depth, for depth laws, is the floor's depth minus the wanted altitude.
 
-    By an altimeter the floor's depth is that of the point where the beam meets the floor, from the measured depth, the
+    With an altimeter, the floor's depth is the depth of the point that the beam hits, from the measured depth, the
     measured attitude and the reading. A beam that looks ahead makes the vehicle climb before a slope. Without an echo the
-    vehicle goes deeper until there is one. By the chart it is the depth of the scene's floor at the measured position, or
-    at `look_ahead` ahead of it if it is shallower there.
+    vehicle goes deeper until there is one. With the chart, it is the depth of the scene's floor at the measured
+    position, or at the distance `look_ahead` ahead if the floor is shallower there.
 
     Args:
         altitude: Wanted altitude [m], above 0.

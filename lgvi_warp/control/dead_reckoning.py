@@ -20,13 +20,13 @@ DEPTHS = ("reckoned", "measured")
 class DeadReckoning(MeasuringPart):
     """Dead reckoning: position from measured attitude and velocity, starting at the position of the first tick.
 
-    List it after the sensors that it uses. Without a sensor of the position it starts at the true one.
+    List it after the sensors that it uses. Without a position sensor it starts at the true position.
 
     Args:
         rule: "trapezoid", the default, takes the mean of the velocities at both ticks; "euler" that of the last tick.
         velocity: "velocity", the default, over ground; or "water_velocity", through the water: then a current carries the
             estimate away.
-        depth: "reckoned", the default, as the rest of the position; or "measured", left as it is.
+        depth: "reckoned", the default, like north and east; or "measured": the measured depth is kept.
         start_error: Added to the position of the first tick, (3,) [m], inertial axes; 0 by default.
 
     Raises:

@@ -25,8 +25,8 @@ class Docking(Guidance):
     ground falls linearly with the distance, from `speed` at `slowing` before the dock to `contact_speed` at the dock. The
     funnel has the radius `mouth` at the dock and grows by tan(`funnel`) with the distance. A vehicle that is nearer than
     `judged` and outside the funnel starts again. It goes to the beginning of the line, `approach` before the dock,
-    displaced by `offset` to starboard, and from there along the line. Once in the mouth at the dock's plane it is docked:
-    speed 0, and the dock's place and heading.
+    displaced by `offset` to starboard, and from there along the line. A vehicle that reaches the dock's plane inside the
+    mouth is docked: its wanted speed is then 0, and its wanted position and heading are the dock's.
 
     Args:
         position: The dock, (3,) [m], inertial axes: the middle of its mouth.
@@ -39,12 +39,12 @@ class Docking(Guidance):
         funnel: Half the opening angle of the funnel [rad], at most 1.5.
         approach: Distance from the dock at which the line begins [m].
         judged: Distance from the dock within which a vehicle must be in the funnel [m], at most `approach`.
-        offset: Distance to starboard of the line's beginning to which a vehicle goes to start again [m]; with twice the
-            turning radius it ends its turn on the line. 0 by default.
+        offset: Distance to starboard of the line's beginning at which a new approach begins [m]; 0 by default. With twice
+            the turning radius, the vehicle ends its turn on the line.
         kappa: Gain of the integral [1/s]; 0.1 by default.
 
     Raises:
-        SceneError: If the funnel counts before the line begins, or the contact speed is above the speed; or a number is
+        SceneError: If `judged` exceeds `approach`, or the contact speed is above the speed; or a number is
             invalid (see `Term`).
 
     Examples:

@@ -114,11 +114,11 @@ class FirstPassage(Condition, Counted):
     """Time until a condition first holds, as the samples show it.
 
     The probability is Aalen & Johansen's estimate. A member that an event stopped in a state in which the condition does
-    not hold never passes; with stopped="left_out" it is censored, as if it would have passed like the others. A member that
-    fails before it passes counts until its last good sample; NaN where no member is known at any time. If none fails, the
-    probability is the fraction of all members. Interval: Wilson's with the number of members whose fraction has the
-    variance of a beta product (Fay, Brittain & Proschan 2013), which accounts for few members at risk; where no member is
-    at risk, its upper end allows for all unknown members.
+    not hold never passes; with stopped="left_out" it is censored: its chance to pass later is taken as that of the others.
+    A member that fails before it passes counts until its last good sample; NaN where no member is known at any time. If
+    none fails, the probability is the fraction of all members. Interval: Wilson's with the number of members whose fraction
+    has the variance of a beta product (Fay, Brittain & Proschan 2013), which accounts for few members at risk; where no
+    member is at risk, its upper end allows for all unknown members.
 
     A member passes between the sample before and the sample that shows it, where the line between the two crosses the
     limit; a quantity without a limit, which is true or false, passes at the sample that shows it. A passage that comes

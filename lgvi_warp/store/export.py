@@ -64,9 +64,8 @@ def export(
     Args:
         run: A result, a result.npz, a store, or a folder with one of the two; or what `lw.studies.footprint` returns. For
             ".fmu" a scene, or a scene file.
-        to: The file. Or "netcdf", all that a store holds with its arrays as they are, or "parquet": for these `out` is the
-            file.
-        out: The file for these two words; by default beside the run.
+        to: The file. Or one of two formats, with `out` as the file: "netcdf", all arrays of a store unchanged, or "parquet".
+        out: The file, if `to` is "netcdf" or "parquet"; by default beside the run.
         members: Indices or a slice of the members, or a mask of all; by default all whose samples were kept. For maps and MCAP
             1,000 at most.
         origin: Latitude and longitude of the axes' origin [deg]; by default that of the run's environment, if it has one.

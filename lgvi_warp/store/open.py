@@ -135,7 +135,7 @@ def open_run(
         members: Indices of the members to open, counted from 0, in the order wanted; a slice; or a mask with a truth value for
             each member; default all.
         incomplete: Whether to open a run that has not ended as well; members that were not reached read as NaN and status 0.
-        statistics: The statistics that the run was given. Needed if they are of functions, which a store does not hold.
+        statistics: The statistics that were passed to the run. Needed if one is of a function, which a store does not hold.
 
     Returns:
         The result.

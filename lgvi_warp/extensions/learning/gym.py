@@ -44,15 +44,15 @@ class Vehicles:
     episode of each environment is another member of the ensemble: with other draws of all that varies. Laws of the scene
     stay active, and the actions are added to their demands.
 
-    `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since all began [s], what is measured and what
-    is wanted (`lw.control.CallbackInput`) of m vehicles at once.
+    `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since the environments began [s], the measured
+    and the wanted values (`lw.control.CallbackInput`) of m vehicles at once.
 
     Args:
         fleet: The ensemble, or a scene with its own; with a controller.
         observe: Names of numbers (docs/controllers/gym.md has the list), those of `lw.control.Policy` among them; or a
             function that returns (m, k).
-        act: "demand" (default): actions are added to the laws' demands. "command": they are the commands of the only term that
-            takes some, on which then no law acts; or the key of such a term.
+        act: "demand" (default): actions are added to the laws' demands. "command", or the key of a term: actions are the
+            commands of the only term that takes commands, or of this term, in place of the laws'.
         reward: Function that returns (m,); it may take the actions (m, n) as a fourth argument. None (default): 0.
         terminated: Function that returns truth values (m,), where an episode is to end; None (default) for none.
         duration: Length of an episode [s], after which it is truncated; default the scene's [run] duration, else without end.

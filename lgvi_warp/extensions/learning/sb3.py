@@ -21,9 +21,9 @@ Indices = int | Iterable[int] | None
 def sb3(env: Vehicles) -> Any:
     """Return a vector environment as the `VecEnv` that learners of Stable-Baselines3 take.
 
-    Where an episode ends, the step returns the first observation of the next one, whatever the autoreset of `env`; the last
-    one is in infos[i]["terminal_observation"], "TimeLimit.truncated" says whether time alone ended it, and "status" why the
-    vehicle ended by itself. The environment is shared, not copied: use one of the two.
+    If an episode ends, the step returns the first observation of the next one, whatever the autoreset of `env`. In infos[i],
+    "terminal_observation" is the last observation of the episode, "TimeLimit.truncated" says whether only its time was up,
+    and "status" why the vehicle ended by itself. The environment is shared, not copied: use one of the two.
 
     Args:
         env: The environment, an `lw.gym.VectorEnv` with bounds of its actions.

@@ -180,7 +180,7 @@ class Term(Documented):
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
 
     Attributes:
-        type: Name in a scene file, which knows the class as soon as it is made.
+        type: Name in a scene file; files can use it as soon as the class is defined.
         device: Module of lgvi_kernels.laws by name (by default the type), that of an extension by its path, or any object with
             the same functions.
         timed: Whether the law depends on time.

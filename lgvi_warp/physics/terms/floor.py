@@ -35,7 +35,7 @@ class Floor(InFile, Event):
         depth: Depth of the floor [m]; or a grid of depths, (x, y) [m], at the nodes along north and east.
         origin: Place of the grid's first node, (2,) [m]: north and east; zeros by default.
         spacing: Distance of the nodes along north and east, (2,) [m]; needed with a grid.
-        clearance: How far above the floor members stop [m]; 0 where it is left out. Give it where it is to vary.
+        clearance: Height above the floor at which members stop [m]; 0 if omitted. Set it if it varies by member.
         contact: "stop", the default, or "rest": members land there by a term `lw.terms.BottomContact`.
 
     Methods:
@@ -98,7 +98,7 @@ class Floor(InFile, Event):
                 and "up" of a GeoTIFF.
             fill: What stands where depths are missing: "refuse", the default, nothing; "nearest"; or "zero", land.
             attributes: Attributes that a NetCDF file lacks or has wrong, for instance {"z.grid_mapping": "EPSG:3996"}.
-            clearance: How far above the floor members stop [m]; 0 where it is left out.
+            clearance: Height above the floor at which members stop [m]; 0 if omitted.
             contact: "stop", the default, or "rest", as of the class.
             name: As in `Event`.
 

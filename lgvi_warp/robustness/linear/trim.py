@@ -40,7 +40,7 @@ class Trim(Saved):
 
     Attributes:
         start: the state, as the start of a scene.
-        commands: by key of each term that takes commands, those that hold it, (channels,).
+        commands: by key of each actuator, the commands that hold the motion, (channels,).
         values: values of the free quantities by name: roll, pitch and drift (course less heading) [rad], speed [m/s],
             commands as "thrusters[0]".
         fixed: values of the fixed quantities by name.

@@ -38,10 +38,10 @@ class Tuned(Saved):
 
     Attributes:
         parameters: the numbers by name.
-        before: those of the scene.
-        cost: their risk over the members that the search used: optimistic, since the numbers were chosen by these.
+        before: the scene's own numbers.
+        cost: their risk over the members of the search: optimistic, since the numbers were chosen with these members.
         fresh_cost: their risk over members that the search did not see; NaN where none can be drawn.
-        fresh_before: that of the scene's numbers, over the same fresh members.
+        fresh_before: risk of the scene's own numbers, over the same fresh members.
         of: name of the quantity.
         risk: what the risk is, in words.
         members: number of members that the search used.
@@ -50,9 +50,9 @@ class Tuned(Saved):
         restarts: (r,), the least risk of each evolution.
         runs: number of members that were run.
         units: unit of the quantity and of the numbers, by name.
-        constraints: by text, such as "disk above 0.5": "worst", the number of the member of the search that keeps it least;
-            "fresh_worst" and "fresh_before", of fresh members with these numbers and with those of the scene; "fresh_broken",
-            how many fresh members break it. A number is NaN where a member has none.
+        constraints: by text, such as "disk above 0.5": "worst", the value that is nearest to breaking it, or breaks it most,
+            among members of the search; "fresh_worst", the same among fresh members; "fresh_before", among fresh members with
+            the scene's own numbers; "fresh_broken", how many fresh members break it. NaN if a member has no value.
         messages: what the margins of constraints leave out.
         feasible: whether all members of the search keep all constraints.
     """

@@ -34,15 +34,15 @@ class WorstCase(Saved):
     """The worst member that a search found: a lower bound of the true worst.
 
     Attributes:
-        parameters: its numbers by name, those that were searched.
-        value: its quantity; infinite for a member that failed, the first such member that was found.
+        parameters: values of the searched numbers, by name.
+        value: the quantity of this member; infinite if it failed, in which case it is the first failed member found.
         of: name of the quantity.
         worst: "largest" or "smallest".
-        at_bounds: by name, "low", "high" or "" of the numbers.
-        restarts: (r,), the worst value of each evolution: where they differ, more may be found.
+        at_bounds: by name of a number, the bound at which it lies: "low", "high", or "" for none.
+        restarts: (r,), the worst value of each evolution: if they differ, a longer search may find a worse one.
         runs: number of members that were run.
-        fleet: the member, to run it again; None where this was read from a file, beside which the numbers lie as the table
-            worst_case.csv: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")) is the member.
+        fleet: the member, to run it again; None if this was read from a file. The table worst_case.csv beside the file has its
+            numbers: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")) is then the member.
         of_metric: whether the quantity is a metric, which is infinite where a loop never gets there; by default False.
         points: number of members that were spread evenly over the box, whatever their quantity.
         units: unit of the quantity and of the numbers, by name.

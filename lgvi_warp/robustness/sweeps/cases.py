@@ -32,9 +32,9 @@ class Case:
     Args:
         name: its name.
         set: numbers that differ from those of the scene, by name: {"heading_pid.kp": 2.0, "drag.quadratic[0]": 3.0}. A number
-            that varies is fixed by that.
-        replace: lists that differ: {"laws": [...]}, of a controller's lists, or "events"; "controller" itself; and "terms",
-            whose entries replace those of the same name and are added otherwise.
+            that varies in the fleet is constant in this case.
+        replace: lists that differ: {"laws": [...]} or another list of the controller, "events", the whole "controller", or
+            "terms". An entry of "terms" replaces the term of the same name, or is added if there is none.
         vehicle: another vehicle: lw.Vehicle(...), or numbers of it by field; None (default) for that of the scene.
         scene: another scene, to which the rest is applied; None (default) for that of the sweep.
         rare: True for the probability that a member does not pass, however small, by lw.rare_event; or some of its arguments,

@@ -48,7 +48,7 @@ class Sweep(SweepTable):
         confidence: confidence level of all intervals.
         interval: how intervals of probabilities are formed.
         rares: rare failures of the cells that ask for them; None where none does.
-        matters: the least difference that matters, by "success" [points] and metric [its unit]; those that were given.
+        matters: smallest differences that matter, as given: by "success" [points] or name of a metric [its unit].
         cases: names of the cases.
         metrics: names of the metrics.
         table: the rows as an xarray Dataset.

@@ -61,7 +61,7 @@ def sweep(
     alone. Numbers that a case sets, and numbers that it does not have, do not vary in it. Cells that differ in numbers
     share a kernel. A case that is refused or does not compile is noted, and the others go on.
 
-    With `out`, memory holds the numbers of one cell at a time, 8 bytes for each member and metric; without it, those of all
+    With `out`, memory holds the numbers of one cell at a time, 8 bytes for each member and metric; without `out`, of all
     cells.
 
     Args:

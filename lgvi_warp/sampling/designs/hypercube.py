@@ -26,7 +26,7 @@ class LatinHypercube(Replicated):
 
     Args:
         group: Members in a hypercube, 2 to 2^20; it must be given. The number of members must be a multiple of it.
-        replicates: R, the number of hypercubes that are filled at once and take turns member by member; 1 by default.
+        replicates: R, the number of hypercubes filled at once: consecutive members go to each in turn; 1 by default.
 
     Raises:
         SceneError: If a setting is wrong. The message lists every fault.

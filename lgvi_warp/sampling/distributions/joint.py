@@ -153,7 +153,7 @@ class Levels(JointLaw):
 class CorrelatedNormal(JointLaw):
     """Normal distribution with a covariance between the entries of one quantity, or of several, named "a, b" in `vary`.
 
-    Of a symmetric matrix the entries are those on and above the diagonal (of a diagonal one, those on it).
+    Entries of a symmetric matrix are those on and above the diagonal; entries of a diagonal matrix, those on the diagonal.
 
     Args:
         covariance: Covariance (d, d), in the units and order of the entries; it may be singular.

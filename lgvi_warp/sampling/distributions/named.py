@@ -36,7 +36,7 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 class ScipyDistribution(Distribution):
     """A frozen distribution of scipy.stats, as lw.distributions.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
 
-    In `vary` it needs no wrapper. Its values are absolute: the scene's own value is not used.
+    `vary` also accepts the scipy distribution itself. Its values are absolute: the scene's own value is not used.
 
     Args:
         distribution: The frozen distribution; its parameters are one number or one per component.

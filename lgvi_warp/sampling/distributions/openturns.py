@@ -19,7 +19,7 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 @dataclass(frozen=True, eq=False)
 class OpenTURNSDistribution(JointLaw):
-    """A distribution of OpenTURNS, of one number or of several together; in `vary` it needs no wrapper.
+    """A distribution of OpenTURNS, of one number or of several together; `vary` also accepts it without this class.
 
     Its values are absolute. Several numbers follow from levels one after the other, each given those before (Rosenblatt). A
     file stores only its text, so that a run read from a file needs the ensemble again.

@@ -50,8 +50,8 @@ class RareEvent(Saved):
         moved: by name, the mean of the failing members in standard deviations from the middle.
         noise_moved: by term or sensor, a z-score of the failing members' draws: of their mean path or of their sum of squares.
             For noise that does not matter it is roughly a standard normal number; from 4.5 on it is not by chance.
-        runs: the runs of subset simulation: thresholds and limits of each level; with splitting, scores of members: the
-            expected limit at the end over its uncertainty, infinite where the event happened.
+        runs: the runs of subset simulation: thresholds and limits of each level. With splitting, scores take their place: the
+            expected limit at the end divided by its uncertainty; infinite if the event happened.
         plain_members: members that plain Monte Carlo would take for this error.
         plain_seconds: how long these would take at the pace of this call [s].
         seconds: how long the runs of members took [s].
@@ -64,8 +64,8 @@ class RareEvent(Saved):
         moved_z: by name, the z-score farthest from 0 of these three against all members; from 4.5 on it is not by chance.
         by_condition: where the event is any of several conditions, (probability, lower, upper) of each alone by its words, and
             of "any" and "all" of them, over the whole run; empty otherwise, and where a status is among them.
-        ancestors: (m,), of each failing member the one of a first level from which it descends, or the run of splitting.
-            Members of one ancestor are related.
+        ancestors: (m,), for each failing member its ancestor in the first level; with splitting, its run. Members of one
+            ancestor are related.
     """
 
     study: ClassVar[str] = "rare"

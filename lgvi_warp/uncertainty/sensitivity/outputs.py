@@ -62,7 +62,7 @@ def evaluate(
 ) -> Outputs:
     """Run an ensemble, some thousands of members at a time, and keep its quantities of interest only.
 
-    A member failed if its status says so or a quantity of it is not finite; one stopped by an event did not fail.
+    A member failed if its status is a failure or one of its quantities is not finite. A stop by an event is no failure.
 
     Args:
         fleet: the ensemble.

@@ -62,9 +62,9 @@ svg, img { max-width: 100%; height: auto; } .outcome { display: inline-block; wi
 def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
     """Write one HTML file with the results of a run or of studies; it opens without a network.
 
-    Of a run it has the outcomes of the members with remedies, notes and warnings, the pictures that suit it, the statistics
-    with their intervals, how it was run, the scene as it was written, and how to run it again. Of a study it has the pictures
-    and tables that lie in its folder.
+    The report of a run has the outcomes of the members with remedies, notes and warnings, pictures, the statistics with their
+    intervals, the settings, the scene as it was written, and the command that runs it again. The report of a study has the
+    pictures and tables of its folder.
 
     Args:
         result: A result, or the folder of a run, a trade-off, a stability map, a sensitivity study or a sweep, or of several.

@@ -41,7 +41,7 @@ class DensityProfile(Term):
         depths: Depths, (k,) [m], rising.
         densities: Densities there, (k,) [kg/m3], at the pressure of their depth.
         compressibility: Relative loss of the hull's volume per depth [1/m]; none by default.
-        reference_depth: The depth d0 at which the hull has its volume B / (rho0 g) [m]; 0 where it is left out.
+        reference_depth: The depth d0 at which the hull has its volume B / (rho0 g) [m]; 0 if omitted.
 
     Methods:
         from_cast: Profile of a CTD cast, from arrays of temperature and salinity or from a file.

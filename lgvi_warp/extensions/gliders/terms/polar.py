@@ -17,9 +17,9 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 class Polar(Term):
     """Drag, side force, lift and moments by angle of attack a and sideslip b (Graver 2005; Zhang et al. 2013).
 
-    With V the speed of the body's origin through the water, a = atan2(w, u), b = asin(v / V), along the axes of the flow:
-    drag (K_D0 + K_D a^2) V^2, side force K_b b V^2, lift (K_L0 + K_L a) V^2, and the moments (K_MR b + K_p p) V^2,
-    (K_M0 + K_M a + K_q q) V^2, (K_MY b + K_r r) V^2. All numbers with the signs as published; 0 by default.
+    V is the speed of the body's origin through the water, a = atan2(w, u), b = asin(v / V). In the axes of the flow they are
+    drag (K_D0 + K_D a^2) V^2, side force K_b b V^2, lift (K_L0 + K_L a) V^2 and the moments (K_MR b + K_p p) V^2,
+    (K_M0 + K_M a + K_q q) V^2, (K_MY b + K_r r) V^2. Coefficients have their published signs and are 0 by default.
 
     Args:
         drag: K_D0 [kg/m].

@@ -21,7 +21,7 @@ class Stratification(Term):
 
     Args:
         gradient: Relative change of buoyancy per depth [1/m]: positive where denser water lies below. With
-            `compressibility` it is the change due to the water alone, without it that of the water less that of the hull's
+            `compressibility` it is the change due to the water alone; without, the water's change minus that of the hull's
             volume.
         reference_depth: Depth [m] at which buoyancy is B; 0 by default.
         compressibility: Relative loss of the hull's volume per depth [1/m] (Eriksen et al. 2001); none by default.

@@ -26,17 +26,17 @@ ROWS, BIAS_ROWS = 18, slice(12, 18)
 class IMU(MeasuringPart):
     """Inertial measurement unit: increments of velocity and rotation from one tick to the next, with errors.
 
-    It sums over the whole period between two ticks, as units do that correct for coning and sculling:
+    It sums the motion over the whole period between two ticks, like a unit that corrects for coning and sculling:
 
         turn     = log(R_k-1^T R_k) + T b_w + sqrt(T) gyroscope_noise xi
         velocity = R_k-1^T (v_k - v_k-1 - g T) + T b_a + sqrt(T) accelerometer_noise xi,   in the axes of the last tick
-        b <- b + sqrt(T) walk xi;   at first bias + turn_on xi, once a member
+        b <- b + sqrt(T) walk xi,   starting at bias + turn_on xi, drawn once for each member
 
     T is the period of the controller, v the velocity over ground of the unit's place, xi standard normals that follow from the
-    seed, the member, the tick and the unit's name. The Allan deviation is noise / sqrt(t) and walk sqrt(t / 3), in quadrature.
-    An `error_state_filter` uses its increments. Without a filter it replaces the measured angular velocity by the mean of
-    the last period. List a `DVL` before it then, since a later one would take that rate for the truth. IEEE Std 952-1997
-    has the model.
+    seed, the member, the tick and the unit's name. The Allan variance is noise^2 / t + walk^2 t / 3 (IEEE Std 952-1997).
+    An `error_state_filter` uses its increments. Without a filter the unit replaces the measured angular velocity by its
+    mean over the last period. In that case list a `DVL` before the unit: a later `DVL` would use this mean in place of the
+    true rate.
 
     Args:
         place: Place of the unit (3,) [m], body axes; 0 by default.

@@ -73,8 +73,8 @@ def assimilate(
 
     Learned numbers move in the normal scores of their own distribution, z = Phi^-1(F(x)) (Bertino, Evensen & Wackernagel
     2003), so that each value is one that the distribution has: a log-normal number stays positive, a uniform one within its
-    bounds. Numbers that members were given as arrays move as they are, or as logarithms where the scene refuses the other
-    sign.
+    bounds. Numbers that were given to the members as arrays have no distribution: they move as they are, or as their
+    logarithms if the scene refuses the other sign.
 
     Args:
         fleet: An Ensemble, or a Scene with its [ensemble]; of tens to thousands of members.
@@ -82,16 +82,16 @@ def assimilate(
         learn: Names of numbers that vary and are learned, such as ["current.velocity[0]"]; default none.
         filter: "etkf", the default, an ensemble Kalman filter without draws (Bishop, Etherton & Majumdar 2001); "enkf", with a
             measurement for each member (Burgers, van Leeuwen & Evensen 1998); both without localisation, for spreads that
-            are small enough for the motion to be nearly linear; "particles", weights and systematic resampling (Kitagawa
-            1996), for any.
+            are small enough for the motion to be nearly linear; "particles", a particle filter with systematic resampling
+            (Kitagawa 1996), for any spread.
         method: As in `lw.solve`.
         h: Step [s], which divides every time of the series; default that of the scene.
         dtype: As in `lw.solve`.
         seed: Seed of what the filter draws.
         discount: With particles and learned numbers, these and the states are drawn anew at each resampling, with their mean
             and covariance (Liu & West 2001); a number between 1/3 and 1, or None to keep them; 0.99 by default.
-        gate: Values of an instrument farther from their predictions than this many standard deviations of the innovation are
-            left out, with a message: a chi-square test, for several values together with the same probability. None to take
+        gate: Largest distance of a value from its prediction, in standard deviations of the innovation; values beyond are left
+            out, with a message. Several values of one instrument take a chi-square test of the same probability. None takes
             all; 5.0 by default.
         inflation: Factor on the covariance of the members before each measurement, at least 1 (default), for Kalman filters
             that become overconfident; or "adaptive", which estimates it from the innovations (Anderson 2009, Miyoshi 2011).

@@ -44,8 +44,8 @@ class BottomContact(Term):
         floor: Name of the floor; "" by default, for the only one whose `contact` is "rest".
 
     Raises:
-        SceneError: If a number is invalid (see `Term`). A scene refuses it where it has no such floor, or several and none
-            is named.
+        SceneError: If a number is invalid (see `Term`). A scene refuses it if it has no such floor, or several of which
+            none is named.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -207,6 +207,7 @@ class Packing:
 LARGE_TABLE = 16_384
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def rows_shared(plan: Plan) -> bool:
     """Whether all members share the rows of the laws, of the controller's parts and of the events, and these are many.
 

@@ -170,7 +170,7 @@ def path_error(method: Method, rates: Rates, h: float, t1: float) -> float:
         return math.inf
     z = h * rates.modes
     if method.tableau is None:
-        return SPLITTING["damped" if rates.drag != 0.0 else "conservative"] * float(np.abs(z).max()) ** 2
+        return SPLITTING["damped" if rates.drag != 0.0 else "conservative"] * float(np.abs(z).max() ** 2)
     # What grows is bounded by the rest of the motion, which turns it over at the same rate.
     z = np.where(z.real > 0.0, 1j * np.abs(z), z)
     explicit = 1j * z.imag if method.linearly_implicit else z

@@ -432,6 +432,11 @@ def test_a_long_step_is_told_and_a_method_that_is_named_is_not_looked_at():
     assert make_plan(fleet, h=0.1, t1=t1).grid.messages == ()
 
 
+def test_of_rates_whose_squares_exceed_floating_point_numbers_the_step_is_told_to_be_long():
+    (text,) = planned(torpedo(lw.terms.Drag(linear=[1e200] * 6))).grid.messages
+    assert "is long for this motion" in text
+
+
 @pytest.mark.parametrize(("name", "order"), [("rk4", 4), ("rk8", 8)])
 def test_the_error_of_an_oscillator_is_the_methods_own(name, order):
     """A pendulum of rate w: after n steps the phase is off by n |R(ihw) - exp(ihw)|, which is of the method's order."""

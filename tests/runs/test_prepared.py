@@ -260,6 +260,13 @@ def test_columns_that_their_owner_changes_are_others(paper):
     assert before == 124.0
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_mass_whose_square_is_no_number_gives_no_warning_of_numpy():
+    vehicle = lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0])
+    scene = lw.Scene(vehicle, terms=[lw.terms.Drag(quadratic=[5.0, 6.0, 7.0, 0.1, 0.1, 0.1])])
+    make_plan(lw.Ensemble(scene, None, 0, None, Table(values={"vehicle.mass": [1e160]})), "psi_x", **SHORT)
+
+
 def test_noise_of_a_call_is_its_own():
     noise = WrenchNoise(force=(1.0, 0.0, 0.0))
     scene = lw.Scene(lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0]), terms=[noise])

@@ -513,3 +513,17 @@ def test_a_result_keeps_its_warnings(tmp_path):
     assert again.warnings.counts() == result.warnings.counts() != {}
     for name in ("warnings", "warning_time", "warning_value", "substeps", "status", "failure_time"):
         np.testing.assert_array_equal(getattr(again, name), getattr(result, name))
+
+
+FORM = lw.terms.QuadraticForm(products=["X_u|u|", "Z_uw", "M_uq"], values=[-500.0, -20.0, -10.0])
+
+
+@pytest.mark.parametrize(("term", "axis"), [(FORM, 0), (lw.terms.Polar(drag_by_attack=60.0), 2)])
+def test_stiff_drag_is_warned_of_where_it_does_not_grow_with_sizes_and_speeds(term, axis):
+    """A form brakes where its coefficients are negative; a glider's polar less at an angle of attack than across the flow."""
+    scene = lw.Scene(lw.Vehicle(mass=10.0, inertia=[1.0, 2.0, 2.5]), terms=[term])
+    run = lw.prepare(scene, [f"start.velocity[{axis}]"], method="psi_x", h=0.1, t1=0.1)
+    for speeds in ([2.0], [0.01] * 299 + [2.0]):
+        for _ in range(2):  # few members are packed by the kernel, on which bounds rest, from the second time on
+            stiff = run(np.array(speeds)[:, None]).warnings & np.uint16(Warnings.DRAG_STIFF) > 0
+            np.testing.assert_array_equal(stiff, np.array(speeds) == 2.0)

@@ -108,7 +108,6 @@ class QuadraticForm(Term):
     strengths: ClassVar[tuple[str, ...]] = ("values",)
     dissipative: ClassVar[bool] = False
     pattern_device: ClassVar[str] = "quadratic_form_pattern"
-    braking_grows_with: ClassVar[tuple[str, ...]] = ("values",)
 
     products: Any = declared(_read_products)
     values: Any = number(("k",), "kg/m, kg, kg m, kg m2")

@@ -46,7 +46,6 @@ class Polar(Term):
     usual: ClassVar[Mapping[str, str]] = {"": "coefficients are as large as the vehicle makes them"}
     dissipative: ClassVar[bool] = False
     brakes: ClassVar[bool] = True
-    braking_grows_with: ClassVar[tuple[str, ...]] = ("drag", "drag_by_attack")
 
     drag: Any = number((), "kg/m", 0.0, least=0.0)
     drag_by_attack: Any = number((), "kg/m/rad2", 0.0, least=0.0)

@@ -79,12 +79,12 @@ def test_code_without_zeros_is_that_of_members_with_others():
     assert difference(*ends) > 1e-3
 
 
-@pytest.mark.parametrize("made", [thrusters_with.made, control_fins_with.made], ids=["thrusters", "fins"])
-def test_commands_that_nothing_follows_behind_are_settled_once_a_step(made):
-    within = {features: plays(made(features), "settle_later") for features in (("driven",), ("driven", "lag"), ())}
+@pytest.mark.parametrize("law_of", [thrusters_with.made, control_fins_with.made], ids=["thrusters", "fins"])
+def test_commands_that_nothing_follows_behind_are_settled_once_a_step(law_of):
+    within = {features: plays(law_of(features), "settle_later") for features in (("driven",), ("driven", "lag"), ())}
     assert within[("driven",)] is None
     assert None not in (within[("driven", "lag")], within[()])
-    assert plays(made(("driven",)), ANEW) is not None
+    assert plays(law_of(("driven",)), ANEW) is not None
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.3])

@@ -123,7 +123,7 @@ def test_pack_fills_up_with_the_last_member():
 @pytest.mark.parametrize("n", [1, 256, 257, 5000, 1_000_000])
 def test_shares_keep_all_threads_at_work(n, steps, threads):
     size = shares(n, threads, steps)
-    runs = parts(n, steps, threads, joined=False)
+    runs = parts(n, steps, threads, apart=False)
     assert size % 256 == 0
     assert 256 <= size <= 16_384
     assert {run.count for run in runs[:-1]} <= {size}
@@ -131,7 +131,7 @@ def test_shares_keep_all_threads_at_work(n, steps, threads):
     # Blocks of 256 are the smallest; else a block is a few million steps of vehicles, or a quarter of a thread's members.
     assert size == 256 or (size - 256) * steps < 4_000_000
     assert threads == 1 or size == 256 or len(runs) >= 4 * threads * (1 - 256 / size)
-    assert parts(n, steps, threads, joined=True) == blocks(n)
+    assert parts(n, steps, threads, apart=True) == blocks(n)
 
 
 def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):

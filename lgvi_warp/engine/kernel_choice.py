@@ -316,7 +316,7 @@ def with_tables(part: Any, module: Any) -> Any:
 
 @functools.cache
 def _tabled(module: Any, lanes: Any, fields: tuple[tuple[str, int, str], ...]) -> Any:
-    """As `with_tables`; cached, since the device code of a kernel is its key. lanes: as in `Term.lanes`."""
+    """The module of `with_tables`, cached, since the device code of a kernel is its key. lanes: see `Term.lanes`."""
     # Where a scene has tables, here: other runs do without this code.
     from lgvi_kernels.laws.control.gain_table import tabled
     from lgvi_kernels.maps.compose import numbers_struct

@@ -188,11 +188,10 @@ def at_start(
     def note(warning: Warnings, size: Callable[[], Any], limit: float) -> None:
         if warning not in among:
             return
-        above = np.asarray(size()) > limit
-        if above.any():
-            over = np.broadcast_to(above, m)
-            bits[over] |= np.uint16(warning)
-            value[over] = np.broadcast_to(size(), m)[over]
+        sizes = np.broadcast_to(size(), m)
+        over = sizes > limit
+        bits[over] |= np.uint16(warning)
+        value[over] = sizes[over]
 
     def lost() -> np.ndarray:
         way, place = h * _size(members.velocity), np.finfo(plan.dtype).eps * _size(members.position)

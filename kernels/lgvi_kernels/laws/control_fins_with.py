@@ -240,5 +240,5 @@ def made(features):
         settle=settle,
         settle_later=None if straight else settle_later,
         settled_push=make_push(True),
-        held="driven" in features and not {"lag", "rate"} & set(features),
+        held=following.held,
     )

@@ -14,7 +14,8 @@ class Driven(NamedTuple):
 
     params: the struct of its numbers; behind: (p) -> the first row to work with that is the law's own. place: (view, p, i) ->
     where channel i is; look_up: (view, p), called before places are read, or None where none is needed. evolve, follow,
-    report: roles of its law. commanded: (view, p, i, t) -> the command of a schedule; None behind a controller.
+    report: roles of its law. commanded: (view, p, i, t) -> the command of a schedule; None behind a controller. held: whether
+    channels are where a controller commands them, which is the same over a step.
     """
 
     params: Any
@@ -25,6 +26,7 @@ class Driven(NamedTuple):
     report: Any = None
     look_up: Any = None
     commanded: Any = None
+    held: bool = False
 
 
 @wp.func
@@ -131,5 +133,5 @@ def make_driven(name, rows, limit, lag, rate, features, words=(), count=0):
         return state
 
     if not moves:
-        return Driven(params, behind, place, report=report)
+        return Driven(params, behind, place, report=report, held=True)
     return Driven(params, behind, place, evolve, follow, report)

@@ -57,9 +57,9 @@ def left_along(length: Any, lag: Any):
 
 
 @wp.func
-def lagged(n: Any, start: Any, end: Any, mean: Any, left: Any):
-    """Behind a straight command by a lag: n less the command decays, and falls behind its slope; see left_along."""
-    return fused(left, n - start, fused(-mean, end - start, end))
+def lagged(n: Any, start: Any, end: Any, mean_part: Any, end_part: Any):
+    """Behind a straight command by a lag: n less the command decays, and falls behind its slope; parts: of left_along."""
+    return fused(end_part, n - start, fused(-mean_part, end - start, end))
 
 
 @wp.func

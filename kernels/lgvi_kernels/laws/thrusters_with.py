@@ -178,9 +178,7 @@ def made(features):
                 watts = watts + table1(view, p.first + p.shared + p.power + i * (1 + 3 * p.power_size), p.power_size, n)
         return watts
 
-    # Commands that nothing follows behind are the same over a step.
-    roles = {"held": "driven" in features and not {"lag", "rate"} & set(features)}
-    roles |= {"evolve": following.evolve, "follow": following.follow, "report": following.report}
+    roles = {"evolve": following.evolve, "follow": following.follow, "report": following.report, "held": following.held}
     if propeller:
         roles |= {"damping": thruster_damping, "push": thruster_push}
     if powered:

@@ -25,7 +25,7 @@ def plays(law, role):
 
     A role is the name of a function: "law", "damping", "flow", "evolve", "distance". "potential" and "force" are those of
     "law" that follow from a potential, and those that do not; "matrix" is "damping" of a law that has no "push"; "law
-    of actuators" and so on: of laws that report where they are.
+    of actuators" and so on: of laws that report where they are. A law whose `held` is true settles once a step.
     """
     if role.endswith(OF_ACTUATORS):
         return plays(law, role.removesuffix(OF_ACTUATORS)) if hasattr(law, "report") else None

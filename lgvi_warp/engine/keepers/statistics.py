@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -48,14 +49,16 @@ class Gathered:
 
     def merge(self, block: Block, part: list[Part]) -> None:
         """Add the parts of a block, or those of several in their order, to the trees."""
-        for statistic, statistic_part in zip(self.statistics, part, strict=False):
-            if statistic.since - statistic_part.keys():
+        first = block.first // self._size
+        numbers = range(first, first + len(blocks(block.count, self._size)))
+        each = list(zip(itertools.product(numbers, range(len(self.trees))), part, strict=True))
+        for (_, of), statistic_part in each:
+            if (statistic := self.statistics[of]).since - statistic_part.keys():
                 raise ValueError(f"{statistic.key!r} is of an earlier version, which took other events for censoring")
         # Squares of a failing member may overflow: the statistic reports it, so no warning from NumPy.
         with np.errstate(invalid="ignore", over="ignore"):
-            for i, statistic_part in enumerate(part):
-                later, of = divmod(i, len(self.trees))
-                self.trees[of].add(block.first // self._size + later, statistic_part)
+            for (number, of), statistic_part in each:
+                self.trees[of].add(number, statistic_part)
 
     def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
         """Estimates from the blocks so far, of one statistic or (None, the default) of all."""

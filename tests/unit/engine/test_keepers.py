@@ -25,6 +25,14 @@ def test_statistics_are_sent_without_what_they_gathered():
     assert received.time.tolist() == [0.0, 1.0, 2.0]
 
 
+@pytest.mark.parametrize("count", [1, 3, 4])
+def test_parts_of_a_block_are_as_many_as_the_statistics(count):
+    # As a damaged store has them: parts too many are none of a later block.
+    gathered = Gathered(np.arange(3.0), 1000, [lw.statistics.Mean("position"), lw.statistics.Covariance("position")])
+    with pytest.raises(ValueError, match="zip"):
+        gathered.merge(blocks(1000)[0], [{}] * count)
+
+
 def test_members_beyond_those_that_ran_are_not_run_again():
     status = np.zeros(5, np.uint8)
     assert Observation(keep=(2, 5, 7)).again(status).tolist() == [2]

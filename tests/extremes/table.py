@@ -20,29 +20,30 @@ TELLING = 0.01
 
 TEXT = """# At the extremes
 
-Each line is one vehicle at an extreme, run by the kernel and, step by step the same, by the same map in extended precision
-(NumPy's longdouble, `tests/extremes/extended.py`). A cell holds the error at the end and the bound that was derived for it,
-or the status that the vehicle was flagged with. `tests/extremes/test_extremes.py` runs every line and asserts both.
+For readers who want to know how rounding and extreme inputs affect a run. Each row of the tables is one vehicle at an
+extreme. The kernel runs it, and the same map runs it in extended precision, with the same steps (NumPy's longdouble,
+`tests/extremes/extended.py`). A cell has the error at the end and its derived bound, or the status of the vehicle.
+`tests/extremes/test_extremes.py` runs every row and asserts error, bound and status.
 
-* **error**: the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|: what rounding made of the map. The error of the
-  map itself, of second order in the step, is no part of it: it is that of the method (docs/guide/accuracy_and_speed.md).
-* **bound**: G (3 sqrt(n) ({roundings} u + 2 t) + {constants} n u) for n steps: u is the unit of round-off (2^-53 or 2^-24),
-  t the tolerance to which psi_s solves its equation (24) twice a step (psi_x solves none), {constants} the constants that
-  are rounded once for all steps, and G how much a small error grows during the run, from runs in extended precision that
-  start beside it. Where the bound is above 1 the motion is so unstable that this precision says nothing about its phase:
-  *lost*.
-* Positions are asserted as well, to the bound times the way and 4 n u of the distance from the origin: in float32 at 1e7 m
-  that is metres a step, more than the vehicle moves, and its status is OK. Where a position is off by more than a
-  hundredth of the way, the cell says so. `dtype="float32_compensated"` has no such error.
+* **error**: the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|, the effect of rounding. The error of the
+  method, of second order in the step, is not included ([accuracy and speed](../guide/accuracy_and_speed.md)).
+* **bound**: G (3 sqrt(n) ({roundings} u + 2 t) + {constants} n u) for n steps. u is the unit of round-off (2^-53 or
+  2^-24). t is the tolerance to which psi_s solves its equation (24), twice a step (psi_x solves no equation).
+  {constants} is the number of constants that are rounded once for all steps. G is the growth of a small error during
+  the run, from runs in extended precision with slightly different starts. *lost*: the bound is above 1, so the phase of
+  this unstable motion is unknown in this precision.
+* Positions are asserted too, to the bound times the path length plus 4 n u times the distance from the origin. In
+  float32 at 1e7 m this is metres a step, more than the vehicle moves, and the status is OK. If a position is off by
+  more than a hundredth of the path length, the cell says so. `dtype="float32_compensated"` has no such error.
 
 Statuses: {statuses}.
 
-What no line shows: a negative, zero, infinite, or subnormal mass or inertia is refused before the run; a start that is not
-finite gets NON_FINITE or STEP_TOO_LARGE, alone among 100,000 or all at once; no bit of another vehicle changes for it
-(`tests/extremes/test_inputs.py`, `test_neighbours.py`). rk8 with tolerances shares its steps within a packet, so there the
-neighbours of a failing vehicle change, within their tolerance. Explicit methods know no step that is too large.
-A subnormal number (below 1e-38 in float32, 2e-308 in float64) is zero in the kernel. A body that damping brings to rest keeps
-momenta about as small, and a step costs what it cost before (`tests/extremes/test_rest.py`).
+Not in the tables: a negative, zero, infinite or subnormal mass or inertia is refused before the run. A member whose
+start is not finite gets NON_FINITE or STEP_TOO_LARGE. No bit of another vehicle changes. Tests have one such member
+among 100,000, or only such members (`tests/extremes/test_inputs.py`, `test_neighbours.py`). rk8 with tolerances shares
+its steps within a packet, so other vehicles in the packet of a failing vehicle change, within their tolerance. Explicit
+methods such as rk4 never report STEP_TOO_LARGE. The kernel sets subnormal numbers (below 1e-38 in float32, 2e-308 in
+float64) to zero, so steps stay as fast when damping brings a body to rest (`tests/extremes/test_rest.py`).
 
 Machine: {cpu}, {simd}. Written by `python -m tests.extremes.table`; do not edit.
 

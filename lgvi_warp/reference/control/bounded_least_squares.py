@@ -66,12 +66,31 @@ def nearest(A: Array, b: Array, s: Array, x: Array, low: Array, high: Array, ite
             state[first] = 1 if step[first] > 0.0 else -1
             x[first] = high[first] if step[first] > 0.0 else low[first]
             continue
-        gain = -state * (slopes @ A)
-        gain[(gain <= FLAT * np.abs(A).sum(axis=0) * np.abs(slopes).max()) | (high <= low)] = 0.0
-        if not gain.any():
+        if not released(A, s, slopes, x, state, low, high):
             break
-        state[gain.argmax()] = 0
     return x
+
+
+def released(A: Array, s: Array, slopes: Array, x: Array, state: Array, low: Array, high: Array) -> bool:
+    """Move channels from limits to their own least error: the one of the largest gain, others if that is the other limit."""
+    flat, steep, width = FLAT * np.abs(slopes).max(), np.abs(A).sum(axis=0), high - low
+
+    def gains() -> Array:
+        gain = -state * (slopes @ A)
+        return np.where((width > 0.0) & (gain > flat * steep), gain, 0.0)
+
+    first, any_gain = gains().argmax(), gains().any()
+    for k in range(len(x)):
+        gain, side = gains()[k], state[k]
+        curvature = np.square(s * A[:, k]).sum()
+        across = gain > (width[k] - BESIDE * width[k]) * curvature
+        if gain > 0.0 and (across or k == first):
+            step = side * (width[k] if across else gain / curvature)
+            x[k] = (low[k] if side > 0 else high[k]) if across else x[k] - step
+            state[k] = -side if across else 0
+            change = s**2 * A[:, k] * step
+            slopes, flat = slopes + change, max(flat, FLAT * np.abs(change).max())
+    return bool(any_gain)
 
 
 def free_solution(A: Array, b: Array, s: Array, held: Array, free: Array) -> tuple[Array, Array]:

@@ -92,24 +92,27 @@ def orthogonalise(y: Any, p: Any, channels: int, six: int, L: int, lines: int, z
     unity = ones(zero)
     dependent = by_digits(y, y.h.dtype(1e-9), y.h.dtype(3e-4))
     for i in range(six):
-        line = lines + i * p.count
         size = zero
         for k in range(p.count):
-            state = remembered(y, p.work + k)
-            a = positive(absolute(state), zero, column(y, p, channels, k, i))
+            a = positive(absolute(remembered(y, p.work + k)), zero, column(y, p, channels, k, i))
             size = size + a * a
-            remember(y, line + k, a)
-        for j in range(i):
-            other = lines + j * p.count
-            c = zero - less_products(y, line, other, p.count, zero)
-            remember(y, L + 6 * i + j, c)
-            for k in range(p.count):
-                remember(y, line + k, remembered(y, line + k) - c * remembered(y, other + k))
+            remember(y, lines + i * p.count + k, a)
+        remember(y, L + 7 * i, size)
+    # Each line leaves all later ones at once: their products wait for one another no more.
+    for j in range(six):
+        line = lines + j * p.count
         left = zero - less_products(y, line, line, p.count, zero)
-        inverse = positive(left - (dependent * dependent) * size, unity / root(positive(left, left, unity)), zero)
-        remember(y, L + 6 * i + i, inverse)
+        enough = left - (dependent * dependent) * remembered(y, L + 7 * j)
+        inverse = positive(enough, unity / root(positive(left, left, unity)), zero)
+        remember(y, L + 7 * j, inverse)
         for k in range(p.count):
             remember(y, line + k, inverse * remembered(y, line + k))
+        for i in range(j + 1, six):
+            other = lines + i * p.count
+            c = zero - less_products(y, other, line, p.count, zero)
+            remember(y, L + 6 * i + j, c)
+            for k in range(p.count):
+                remember(y, other + k, remembered(y, other + k) - c * remembered(y, line + k))
 
 
 @wp.func(inline=False)
@@ -168,15 +171,30 @@ def errors(y: Any, p: Any, six: int, L: int, b: int, noise: Any, zero: Any):
         remember(y, slopes + j, total)
 
 
+@wp.func
+def gain_of(y: Any, p: Any, channels: int, k: int, slopes: int, flat: Any, width: Any):
+    """The slope of a channel away from its limit; 0 where it is flat, and of a channel without a range."""
+    zero = width - width
+    slope = zero
+    steep = zero
+    for i in range(6):
+        a = column(y, p, channels, k, i)
+        slope = slope + a * remembered(y, slopes + i)
+        steep = steep + absolute(a)
+    gain = zero - remembered(y, p.work + k) * slope
+    return positive(width, positive(gain - flat * steep, gain, zero), zero)
+
+
 @wp.func(inline=False)
 def iterate(y: Any, p: Any, channels: int, six: int, demand: int, busy: Any):
-    """A step of the active set towards the least error of the free channels, up to the first limit; else one is freed.
+    """A step of the active set to the least error of the free channels, up to the first limit; else others leave theirs.
 
     Returns: above 0 in the lanes that have not found the least error.
     """
     unity = ones(busy)
     zero = unity - unity
     goals = p.work + p.count
+    priority = p.first + wp.static(PRIORITIES)
     b = demand + 6
     L = demand + wp.static(VECTORS)
     lines = L + wp.static(MATRICES)
@@ -194,7 +212,7 @@ def iterate(y: Any, p: Any, channels: int, six: int, demand: int, busy: Any):
     for i in range(six):
         slope = remembered(y, b + 18 + i)
         steepest = greatest(steepest, absolute(slope))
-        given = slope * row1(y, p.first + wp.static(PRIORITIES + 6) + i)
+        given = slope * row1(y, priority + 6 + i)
         given = positive(remembered(y, L + 7 * i), given, zero)
         remember(y, b + i, remembered(y, b + i) - given)
     solve_triangle(y, L, six, b, b + 6)
@@ -221,9 +239,9 @@ def iterate(y: Any, p: Any, channels: int, six: int, demand: int, busy: Any):
         first = positive(nearer, y.h.dtype(k) * unity, first)
         length = positive(nearer, ratio, length)
     blocked = first + y.h.dtype(0.5) * unity
-    flat = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4))
+    flat = by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4)) * steepest
     worst = zero
-    freed = zero - unity
+    freed = zero
     for k in range(p.count):
         at = channels + wp.static(ROWS) * k
         scale = row1(y, at + wp.static(EFFORTS) + 6)
@@ -239,22 +257,38 @@ def iterate(y: Any, p: Any, channels: int, six: int, demand: int, busy: Any):
         found = positive(here, positive(goal - x, unity, zero - unity), state)
         remember(y, p.commands + k, positive(busy, moved, x))
         remember(y, p.work + k, positive(busy, found, state))
-        slope = zero
-        steep = zero
-        for i in range(six):
-            a = column(y, p, channels, k, i)
-            slope = slope + a * remembered(y, b + 18 + i)
-            steep = steep + absolute(a)
-        gain = zero - state * slope
-        gain = positive(high - low, gain - flat * (steep * steepest), zero)
+        gain = gain_of(y, p, channels, k, b + 18, flat, high - low)
         freed = positive(gain - worst, y.h.dtype(k) * unity, freed)
         worst = greatest(worst, gain)
-    # Where no limit was met, the channel of the steepest slope away from its limit is freed.
+    # Where no limit was met, the channel of the steepest slope away from its limit goes to its least error, the others held,
+    # and so does each whose least error is at its other limit.
     free = positive(blocked, zero, positive(worst, busy, zero))
-    for k in range(p.count):
-        here = y.h.dtype(0.5) * unity - absolute(freed - y.h.dtype(k) * unity)
-        here = positive(free, here, zero)
-        remember(y, p.work + k, positive(here, zero, remembered(y, p.work + k)))
+    if any_positive(free):
+        for k in range(p.count):
+            at = channels + wp.static(ROWS) * k
+            scale = row1(y, at + wp.static(EFFORTS) + 6)
+            low = lowest(y, at, zero) / scale
+            high = highest(y, at, zero) / scale
+            width = high - low
+            gain = positive(free, gain_of(y, p, channels, k, b + 18, flat, width), zero)
+            curvature = zero
+            for i in range(six):
+                a = row1(y, priority + i) * column(y, p, channels, k, i)
+                curvature = curvature + a * a
+            across = gain - (width - beside * width) * curvature
+            here = y.h.dtype(0.5) * unity - absolute(freed - y.h.dtype(k) * unity)
+            gain = positive(across, gain, positive(here, gain, zero))
+            state = remembered(y, p.work + k)
+            x = remembered(y, p.commands + k)
+            step = state * positive(across, width, gain / positive(gain, curvature, unity))
+            step = positive(gain, step, zero)
+            remember(y, p.commands + k, positive(gain, positive(across, positive(state, low, high), x - step), x))
+            remember(y, p.work + k, positive(gain, positive(across, zero - state, zero), state))
+            for i in range(six):
+                s = row1(y, priority + i)
+                change = (s * s) * (column(y, p, channels, k, i) * step)
+                remember(y, b + 18 + i, remembered(y, b + 18 + i) + change)
+                flat = greatest(flat, by_digits(y, y.h.dtype(1e-9), y.h.dtype(1e-4)) * absolute(change))
     return positive(blocked, busy, free)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of a BlueROV2 Heavy in Gazebo, ahead, sideways and down: readings of another team's simulation, and SciPy."""
+"""Steps of a BlueROV2 Heavy in Gazebo, ahead, sideways and down: another team's simulation compared with this package."""
 
 from typing import Any
 
@@ -57,7 +57,7 @@ def rigid_body() -> tuple[Any, Any]:
 
 
 def pushed(scene: lw.Scene, axis: str) -> lw.Scene:
-    """The scene with a step along an axis. The vertical thrusters hold the depth but in heave."""
+    """Scene with a step of thrust along an axis. Except for heave, the vertical thrusters hold the depth."""
     force = np.array([0.0, 0.0, 0.0 if axis == "heave" else HOLD])
     force[AXES.index(axis)] += SPEEDS[axis][0]
     push = lw.terms.WrenchSchedule(times=TIMES, force=[[0.0, 0.0, HOLD], [0.0, 0.0, HOLD], force])
@@ -65,7 +65,7 @@ def pushed(scene: lw.Scene, axis: str) -> lw.Scene:
 
 
 def independent(scene: lw.Scene, t: Any) -> Any:
-    """States by SciPy at times: position, quaternion, and velocities in body axes."""
+    """States at given times, integrated by SciPy: position, quaternion, and velocities in body axes."""
     vehicle, (drag, push) = scene.vehicle, scene.terms
     M = np.asarray(vehicle.rigid_body_mass_matrix) + vehicle.added_mass_matrix
     inverse, linear, quadratic = np.linalg.inv(M), np.asarray(drag.linear), np.asarray(drag.quadratic)
@@ -97,7 +97,7 @@ def independent(scene: lw.Scene, t: Any) -> Any:
 
 
 def reading(axis: str, rate: float, t: Any, speed: Any) -> float:
-    """Mean of the speed [m/s] where the source's script reads it, at a rate of the simulation."""
+    """Mean speed [m/s] at the times of the source's readings. rate: simulated seconds per second."""
     return float(np.interp(rate * np.array(READINGS[axis]), t, speed).mean())
 
 
@@ -141,7 +141,7 @@ def measured() -> Content:
 
 
 def draw(content: Content, figure: Any) -> None:
-    """Speeds over time with the readings, and the angles that grow."""
+    """Draw the speeds over time with the readings, and the growing angles."""
     rows = {row.what: row for row in content.rows}
     speeds, angles = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.6, 1.0)})
     for axis, style in zip(AXES, ("-", "--", ":"), strict=True):

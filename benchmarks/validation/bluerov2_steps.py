@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of a BlueROV2's thrusters: the equations of von Benzon et al. (2022), written down anew and integrated by SciPy."""
+"""Steps of a BlueROV2's thrusters: the equations of von Benzon et al. (2022), integrated by SciPy."""
 
 from typing import Any
 
@@ -62,7 +62,7 @@ def rates(y: Any, thrusts: Any) -> Any:
 
 
 def independent(t: Any, published: bool) -> Any:
-    """States (12, k) at times. published: thrust behind the lag of third order; else the command behind one of first order."""
+    """States (12, k) at given times. published: the thrust has a third-order lag, else the command a first-order lag."""
     A, B, C = LAG
     states = 8 * (3 if published else 1)
     y, found = np.concatenate([[0.0, 0.0, 10.0], np.zeros(9 + states)]), []
@@ -107,7 +107,7 @@ def measured() -> Content:
 
 
 def _numbers(ends: Any, place: Any, nu: Any, pitch: Any, yaw: Any) -> dict[tuple[str, str], float]:
-    """Compared numbers at the ends of the three steps."""
+    """Rows of compared numbers at the ends of the three steps."""
     ahead, down, about = ends
     return {
         ("surge at 10.9 s", "m/s"): nu[0, ahead],

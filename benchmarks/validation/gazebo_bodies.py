@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bodies of the test suite of Gazebo: three with added mass that are shaken, three that rise or sink without drag."""
+"""Bodies of the test suite of Gazebo: three shaken bodies with added mass, and three that rise or sink without drag."""
 
 from typing import Any
 
@@ -75,7 +75,7 @@ def rates(body: str, t: float, R: Any, nu: Any, spin: Any) -> tuple[Any, Any]:
 
 
 def euler(body: str) -> float:
-    """Rate about z after 1 s [rad/s], by Euler's steps of 0.1 ms."""
+    """Rate about z after 1 s [rad/s], computed by Euler steps of 0.1 ms."""
     R, nu, spin = np.eye(3), np.zeros(3), np.zeros(3)
     for i in range(round(1.0 / FINE)):
         push, twist = rates(body, i * FINE, R, nu, spin)
@@ -85,9 +85,9 @@ def euler(body: str) -> float:
 
 
 def tables(body: str) -> dict[str, Any]:
-    """A scene from the printed numbers: the wrench in body axes follows from SciPy's attitude.
+    """Scene from the printed numbers. The wrench in body axes is computed with the attitude from SciPy.
 
-    Straight lines between the times, by least squares, have the impulse of the curve.
+    It is linear between the times; a least-squares fit gives it the impulse of the exact curve.
     """
     solution, times = independent(body), np.linspace(0.0, 1.0, KNOTS)
     places, weights = np.polynomial.legendre.leggauss(4)
@@ -123,12 +123,12 @@ def tables(body: str) -> dict[str, Any]:
 
 
 def shaken(body: str) -> lw.Scene:
-    """The scene of a body; that of body 1 is the file."""
+    """Scene of a body; body 1 is the scene file itself."""
     return lw.Scene.load(ROOT / SCENES[0]) if body == "body 1" else lw.Scene.from_dict(tables(body))
 
 
 def heights(scene: lw.Scene) -> dict[str, tuple[float, float]]:
-    """Height [m] of each rising body after 1 s, and by steps of Gazebo's length, which move with the new velocity."""
+    """Height [m] of each rising body after 1 s, exact and by Gazebo's steps, which move with the new velocity."""
     found = {}
     for name, (mass, volume, _) in RISING.items():
         vehicle = lw.Vehicle(

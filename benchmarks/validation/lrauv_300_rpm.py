@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The long-range AUV Tethys at 300 revolutions a minute: the tests of its simulation in Gazebo, and the closed form."""
+"""The long-range AUV Tethys at 300 revolutions a minute: tests of its simulation in Gazebo, and the exact solution."""
 
 from typing import Any
 
@@ -41,7 +41,7 @@ class Exact:
 
 
 def measured() -> Content:
-    """Run the scene, and read its speeds where the tests read theirs."""
+    """Run the scene, and take its speeds at the times of the tests."""
     scene = lw.Scene.load(ROOT / SCENES[0])
     exact, result = Exact(scene), lw.solve(scene)
     t, way, speed = result.time, result.position[:, 0, 0], result.velocity[:, 0, 0]
@@ -60,7 +60,7 @@ def measured() -> Content:
 
 
 def draw(content: Content, figure: Any) -> None:
-    """Speed over time, with the closed form and with what the tests allow."""
+    """Draw the speed over time, with the closed form and the tolerances of the tests."""
     axes = figure.subplots()
     axes.plot(*content.curves["speed"], color=COMPUTED, label="this package")
     axes.plot(*content.curves["exact"], ".", color="0.4", label="closed form")

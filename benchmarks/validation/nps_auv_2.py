@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A turn of the NPS AUV II: the equations of Healey and Lienard (1993), written down anew and integrated by SciPy."""
+"""A turn of the NPS AUV II: the equations of Healey and Lienard (1993), integrated by SciPy."""
 
 from typing import Any
 
@@ -115,7 +115,7 @@ FORCE, FIRST, SECOND, FACTOR = (np.array(column) for column in zip(*PRODUCTS, st
 
 
 def across(nu: Any, published: bool) -> Any:
-    """Drag of the flow across the hull. published: by the eleven strips of the published program, else by its integral."""
+    """Cross-flow drag of the hull. published: sum of the published program's eleven strips, else the integral."""
     _, v, w, _, q, r = nu
     x, dx = STRIPS if published else GAUSS
     side, up = v + x * r, w - x * q
@@ -127,7 +127,7 @@ def across(nu: Any, published: bool) -> Any:
 
 
 def force(nu: Any, published: bool) -> Any:
-    """All that depends on the velocities but the inertia of the dry body."""
+    """Forces and moments that depend on the velocities, without the inertia of the dry body."""
     u, v, _, _, _, r = nu
     total = across(nu, published) + np.bincount(FORCE, FACTOR * nu[FIRST] * nu[SECOND], 6)
     plane, turned = 0.5 * DENSITY * LENGTH**2, 0.5 * DENSITY * LENGTH**3

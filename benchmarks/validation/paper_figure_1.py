@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fig. 1 of Nordkvist and Sanyal (2010): the energy of their vehicle by Psi, and where it is after 150 s."""
+"""Fig. 1 of Nordkvist and Sanyal (2010): energy of their vehicle by Psi, and its position after 150 s."""
 
 import importlib.util
 import json
@@ -22,7 +22,7 @@ TIMES = (5.0, 50.0, 150.0)  # s
 
 
 def measured() -> Content:
-    """Run the paper's method at its step, and a method of order 8 against the truth."""
+    """Run the paper's method with its step, and a method of order 8; compare both with the reference."""
     # The example starts deeper, below a surface; the paper at 10 m.
     scene = lw.Scene.load(ROOT / SCENES[0], {"start.position": [0.0, 0.0, 10.0]})
     truth = json.loads((ROOT / SCENES[1]).read_text())["truth"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Free decay in roll and pitch of a REMUS 100 at rest: another program, and the period of small swings."""
+"""Free decay in roll and pitch of a REMUS 100 at rest: comparison with another program, and with the period of small swings."""
 
 from typing import Any
 
@@ -50,7 +50,7 @@ def measured() -> Content:
 
 
 def _small(axis: str) -> float:
-    """2 pi / omega of small swings about rest [s], of the scene's inertia; what couples to this axis goes with it freely."""
+    """Period 2 pi / omega [s] of small swings about rest, from the scene's inertia with its coupling to free axes."""
     vehicle = lw.Scene.load(ROOT / SCENES[0]).vehicle
     M = np.asarray(vehicle.rigid_body_mass_matrix) + vehicle.added_mass_matrix
     own, rest = (3, [0, 1, 2, 4, 5]) if axis == "roll" else (4, [0, 1, 2, 3, 5])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of a REMUS 100's stern planes: Prestero (2001), his simulation as read off figures, and what he measured at sea."""
+"""Steps of a REMUS 100's stern planes: Prestero (2001), his simulation as read from figures, and his sea trials."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ SEA = {"up": (-0.5, 20.0), "down": (0.4, -18.0)}
 
 
 def measured() -> Content:
-    """Run both scenes and take the numbers that are published of them."""
+    """Run both scenes and take the numbers for which a published number exists."""
     rows, curves = [], {}
     for way, path in zip(WAYS, SCENES, strict=True):
         result = lw.solve(lw.Scene.load(ROOT / path))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rudder steps of a REMUS 100: Prestero (2001), his simulation as read off figures, and what he measured at sea."""
+"""Rudder steps of a REMUS 100: Prestero (2001), his simulation as read from figures, and his sea trials."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ SCENES = ("examples/validation/remus_100_turn.toml",)
 
 
 def measured() -> Content:
-    """Run the scene and take the numbers that are published of it."""
+    """Run the scene and take the numbers for which a published number exists."""
     result = lw.solve(lw.Scene.load(ROOT / SCENES[0]))
     t, (north, east, _) = result.time, result.position[:, 0].T
     yaw = np.degrees(result.angular_velocity[:, 0, 2])
@@ -46,7 +46,7 @@ def measured() -> Content:
 
 
 def draw(content: Content, figure: Any) -> None:
-    """Yaw rate over time, and the path from above within what is published of it."""
+    """Draw the yaw rate over time, and the path from above with the published extremes."""
     rows = {row.what: row for row in content.rows}
     rates, above = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.6, 1.0)})
     rates.plot(*content.curves["yaw rate"], color=COMPUTED, label="computed")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A zigzag of the REMUS 100 of T. I. Fossen's Python Vehicle Simulator: its equations, and its step as it is."""
+"""A zigzag of the REMUS 100 of T. I. Fossen's Python Vehicle Simulator: its equations, and its own step."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ ANGLE, FIRST, EVERY, SPEED = np.radians(10.0), 5.0, 6.0, 2.0  # rad, s, s, m/s
 
 
 def rudder(t: float) -> float:
-    """The commanded rudder [rad]: from the first time on to and fro."""
+    """Commanded rudder angle [rad], which alternates from the first time on."""
     turns = int(np.floor((t - FIRST) / EVERY + 1e-9)) + 1
     return 0.0 if turns <= 0 else ANGLE * (1.0 if turns % 2 else -1.0)
 
@@ -30,7 +30,7 @@ def rudder(t: float) -> float:
 def other(method: str, times: Any, parts: int) -> tuple[Any, Any, Any]:
     """Positions (k, 3) [m], angles (k, 3) [rad] and twists (k, 6) of the other simulator's equations at sampled times.
 
-    method: "euler", its own step; or "rk4", with the rudder exactly behind its command. parts: steps in its 0.02 s.
+    method: "euler", its own method; or "rk4", with the exact lag of the rudder. parts: steps per 0.02 s.
     """
     step = {"euler": remus.euler_step, "rk4": remus.rk4_step}[method]
     state = [
@@ -50,7 +50,7 @@ def other(method: str, times: Any, parts: int) -> tuple[Any, Any, Any]:
 
 
 def measured() -> Content:
-    """Run the scene, the other simulator's equations by rk4, and its own step."""
+    """Run the scene, and the other simulator's equations by rk4 and by its own step."""
     result = lw.solve(lw.Scene.load(ROOT / SCENES[0]))
     t, place, R = result.time, result.position[:, 0], result.attitude[:, 0]
     heading = np.degrees(np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0])))

@@ -23,7 +23,7 @@ BEFORE = 30.0  # s: computed before what is compared, for the glide to become st
 
 
 def legs() -> Any:
-    """Measurements, a record a leg."""
+    """Measurements, one record for each leg."""
     return np.genfromtxt(ROOT / SCENES[1], delimiter=",", names=True, skip_header=5)
 
 
@@ -41,7 +41,7 @@ def flown(known: Any, more: dict[str, Any] | None = None) -> tuple[Any, Any]:
         more: Numbers of the scene that are replaced.
 
     Returns:
-        Mean speed [m/s] and depth rate [m/s] of each leg over the time in which it was measured.
+        Mean speed [m/s] and depth rate [m/s] of each leg over the time of its measurement.
     """
     scene = lw.Scene.load(ROOT / SCENES[0]).with_numbers(more or {})
     pitch, n = np.radians(known["pitch_deg"]), len(known)
@@ -66,7 +66,7 @@ def flown(known: Any, more: dict[str, Any] | None = None) -> tuple[Any, Any]:
 
 
 def fit() -> tuple[float, float]:
-    """Mass [kg] and drag [kg/m] that the depth rates of the first legs ask for; no speed is used."""
+    """Fit mass [kg] and drag [kg/m] to the depth rates of the first legs; no speed is used."""
     known = legs()[:FITTED]
 
     def misses(unknown: Any) -> Any:
@@ -112,12 +112,12 @@ def measured() -> Content:
 
 
 def _mean(what: str, known: Any, computed: Any, chosen: Any) -> Row:
-    """Means of chosen legs; known to within the standard deviation between them."""
+    """Row of the mean over chosen legs; its uncertainty is the standard deviation between them."""
     return Row(what, "m/s", known[chosen].mean(), known[chosen].std(ddof=1), computed[chosen].mean())
 
 
 def _rms(differences: Any, chosen: Any) -> float:
-    """Root mean square of chosen legs."""
+    """Row of the root mean square over chosen legs."""
     return float(np.sqrt(np.mean(differences[chosen] ** 2)))
 
 

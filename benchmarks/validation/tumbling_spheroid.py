@@ -32,7 +32,7 @@ def end_on(ratio: float) -> float:
 
 
 def pushed(scene: lw.Scene) -> list[float]:
-    """k1 as runs show it: from rest under a force, 1 + k1 = F t / (m u)."""
+    """k1 from runs that start from rest under a force: 1 + k1 = F t / (m u)."""
     mass, force, time = scene.vehicle.mass, 100.0, 2.0
     found = []
     for ratio, _ in LAMB:
@@ -45,7 +45,7 @@ def pushed(scene: lw.Scene) -> list[float]:
 
 
 class Exact:
-    """The motion in closed form: the angle from broadside turns as half the angle of a pendulum, Lamb, art. 124 and after."""
+    """Exact motion: the angle from broadside is half the angle of a pendulum, Lamb, art. 124 and following."""
 
     def __init__(self, scene: lw.Scene, turn: float):
         self.ahead, _, self.across = np.diag(scene.vehicle.mass_matrix)
@@ -75,7 +75,7 @@ class Exact:
         return float(quad(lambda s: self._speeds(s)[1], 0.0, t, epsabs=1e-12, epsrel=1e-12, limit=500)[0])
 
     def _speeds(self, t: float) -> tuple[float, float]:
-        """Along and across the impulse: what is fixed in space is (A u, B w)."""
+        """Path along and across the impulse (A u, B w), which is constant in space."""
         a = self.angle(t)
         s, c = np.sin(a), np.cos(a)
         return self.impulse * (c * c / self.across + s * s / self.ahead), self.impulse * s * c * (

@@ -60,7 +60,7 @@ def measured() -> Content:
 
 
 def _crossed(level: Any, t: Any, x: Any, at: int) -> tuple[float, float]:
-    """Time and place between two samples where a level is 0."""
+    """Time and place at which a level crosses 0 between two samples."""
     part = level[at] / (level[at] - level[at + 1])
     return t[at] + part * (t[at + 1] - t[at]), x[at] + part * (x[at + 1] - x[at])
 

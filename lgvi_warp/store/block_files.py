@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`BlockFiles`: the keeper that writes blocks into a store and knows their files; the format of markers and of
-parts."""
+"""`BlockFiles`: the keeper that writes blocks into a store and knows their files; the format of markers and of parts."""
 
 from __future__ import annotations
 

@@ -54,8 +54,7 @@ def export(
     overwrite: bool = False,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Path:
-    """Export a run, some of its members, or a scene to a file for other programs; the file's extension selects the
-    format.
+    """Export a run, some of its members, or a scene to a file for other programs; the file name selects the format.
 
     ".csv" and ".parquet": a table with one row per member and sample time, or one row per member if there are no
     samples. ".nc": NetCDF-4 with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap":

@@ -59,8 +59,7 @@ class KeptStore(Store):
         return self.folder.parent
 
     def write_given(self, group: Any, plan: Plan) -> None:
-        """Write the indices of the group's members; the arrays from which the ensemble was made are in the run's
-        group."""
+        """Write the indices of the group's members; the arrays from which the ensemble was made are in the run's group."""
         whole_array(group, KEPT_MEMBER, self.members, (KEPT_MEMBER,), MEMBERS)
         if not self.chosen.all():
             whole_array(group, "chosen", self.chosen.astype(np.uint8), (KEPT_MEMBER,), CHOSEN)

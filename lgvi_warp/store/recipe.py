@@ -157,8 +157,7 @@ UNTOLD = (
 
 
 def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """User's functions that differ between two provenances, as in `differences`; and names of functions not
-    compared."""
+    """User's functions that differ between two provenances, as in `differences`; and names of functions not compared."""
     before, current = stored.get("functions", {}), now.get("functions", {})
     differ, untold = list[tuple[str, str, str]](), list[str]()
     for name in dict.fromkeys([*before, *current]):
@@ -171,8 +170,7 @@ def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[
 
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Remove from provenance what changes no bit: threads, Python, paths, the scene's [ensemble], [run], shape and
-    texts.
+    """Remove from provenance what changes no bit: threads, Python, paths, the scene's [ensemble], [run] and texts.
 
     The user's functions are removed too, since `_functions` compares them.
     """

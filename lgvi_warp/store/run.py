@@ -101,8 +101,7 @@ class StoredRun:
         return runs if self.only is None else [runs[i] for i in self.only]
 
     def _begin(self) -> tuple[str, ...]:
-        """Create the folder, or check that it holds this run. Returns warnings about differences that change the
-        bits."""
+        """Create the folder, or check that it holds this run. Returns warnings about differences that change the bits."""
         path, store = self.store.folder, self.store
         exists = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
         if exists and store.existing == "refuse":

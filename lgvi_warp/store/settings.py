@@ -92,8 +92,7 @@ class Store:
         return self.folder
 
     def write_given(self, group: Any, plan: Plan) -> None:
-        """Write the states and parameters that the ensemble received as arrays: nothing else in the store contains
-        them.
+        """Write the states and parameters that the ensemble received as arrays: nothing else in the store has them.
 
         Args:
             group: zarr group of the store.

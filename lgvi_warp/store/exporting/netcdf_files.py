@@ -28,7 +28,7 @@ def new_netcdf(target: Path) -> Iterator[Any]:
 
 
 def _abandon(file: Any, target: Path) -> None:
-    """Close a file that does not fit on the disk: HDF5 holds it open until the rest is written, here into a null device."""
+    """Close a file that does not fit on the disk. HDF5 keeps it open until the rest is written, here to nowhere."""
     folder = "/dev/fd"
     for name in os.listdir(folder) if os.path.isdir(folder) else ():
         with contextlib.suppress(OSError):

@@ -165,8 +165,7 @@ def plane_of(environment: Environment, purpose: str) -> LocalPlane:
 
 
 def tracks_of(result: Result, members: Any, environment: Environment) -> Tracks:
-    """Choose members of a run by a slice or indices; None: all members with samples, or all of a run without
-    samples."""
+    """Choose members of a run by a slice or indices; None: all members with samples, or all of a run without samples."""
     source = result.kept if not result.samples and result.kept is not None else result
     present = np.arange(result.members) if source is result else result.kept_members
     identities = _identities(result, source)

@@ -132,7 +132,7 @@ def _channels(recording: Any, run: Drawn) -> None:
 
 
 def _log(recording: Any, run: Drawn) -> None:
-    """Log each outcome at its first member, with the number of members and the value, and each fault at its begin."""
+    """Log each outcome at its first member, with the number of members and the value, and each fault when it begins."""
     import rerun as rr
 
     def say(when: float, text: str, level: str, color: tuple[int, int, int]) -> None:

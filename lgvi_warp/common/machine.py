@@ -31,7 +31,7 @@ def simd() -> str:
 
 
 def register_width(dtype: str, extension: str | None = None) -> int:
-    """Number of vehicles for which one number each fills a SIMD register; extension: as in `simd`, default this machine."""
+    """Number of vehicles for which one number each fills a SIMD register; extension: as in `simd`, default this one."""
     return REGISTER_BYTES[extension or simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 

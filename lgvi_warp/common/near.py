@@ -69,7 +69,7 @@ def near_keywords(kind: type) -> None:
 
 
 def arguments_of(*functions: Any) -> tuple[str, ...] | None:
-    """Keywords of functions, the first of which passes its `**settings` on; None if the last function takes any keyword."""
+    """Keywords of functions, the first of which passes its `**settings` on; None if the last one takes any keyword."""
     names = dict[str, None]()
     for function in functions:
         while hasattr(function, "__wrapped__"):

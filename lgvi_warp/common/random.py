@@ -43,7 +43,7 @@ def uniforms(seed: int, name: str, first: int, count: int, components: int) -> n
 
 
 def uniforms_of(seed: int, name: str, members: np.ndarray, components: int) -> np.ndarray:
-    """Uniform numbers like `uniforms`, (n, components), for members (n,) in any order; runs of members are drawn at once."""
+    """Uniform numbers like `uniforms`, (n, components), for members (n,) in any order; neighbours are drawn at once."""
     first, count = int(members[0]), len(members)
     if count == 1 or np.all(np.diff(members) == 1):
         return uniforms(seed, name, first, count, components)

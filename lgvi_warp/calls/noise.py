@@ -26,8 +26,7 @@ class NoiseOfCalls:
     """Draws of a run and their source.
 
     layout: columns of the draws. given: whether calls pass the draws. seed, members: of the ensemble. plan: plan of the
-    members that the run was prepared for; its kernel decides how normals are rounded. varied: names of the varied
-    numbers.
+    members that the run was prepared for; its kernel decides how normals are rounded. varied: names of the varied numbers.
     grid: steps.
     """
 

@@ -194,7 +194,7 @@ def costs(plan: Plan, runs: Sequence[Block], threads: int, observed: Observation
     """Measure the time to set up a run, and the time of one step of all members with its samples.
 
     Trials run one block per thread. The number of steps is doubled until a trial takes long enough; a second trial of
-    half the steps separates the cost of a step from the cost of a block before its first step.
+    half the steps separates the cost of a step from the start-up cost of a block.
 
     observed: Data that the run keeps; None: samples of all members and no statistics.
     Returns: (set-up, one step) [s], for all blocks on all threads.

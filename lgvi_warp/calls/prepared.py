@@ -101,8 +101,8 @@ class Prepared:
     ) -> Any:
         """Run members with the numbers of X from t = 0. By default row i has the noise of member i in every call.
 
-        With noise, an algorithm that follows rows from call to call (a Markov chain, subset simulation, an optimiser)
-        must select the noise of each row: new `indices` or another `seed` give new noise; the same values give the same
+        Some algorithms follow rows from call to call (Markov chains, subset simulation, optimisers). With noise, they
+        must select the noise of each row: new `indices` or another `seed` give new noise, the same values give the same
         noise.
 
         X: (n, d), columns in the order of `names`; or columns by name, in any order: a mapping, a data frame, a
@@ -344,7 +344,7 @@ def prepare(
     executor: Any = "threads",
     scheduler: str | None = None,
 ) -> Prepared:
-    """Prepare a run that is called many times with different numbers. Its noise is frozen: row i has that of member i.
+    """Prepare a run that is called many times with different numbers. Row i always has the noise of member i.
 
     Checks, choices, compilation and everything that does not depend on `vary` are done once. A call then costs little
     more than the kernel, and its results are bit-identical to `solve`. The function can be pickled and called from
@@ -358,7 +358,7 @@ def prepare(
         depths = run(X)                                    # X (n, 2), depths (n,)
 
     Args:
-        fleet: A Scene or an Ensemble. If `vary` is None, its [ensemble] says what varies.
+        fleet: A Scene or an Ensemble. If `vary` is None, its [ensemble] names the numbers that vary.
         vary: Names of the numbers that vary, ["vehicle.mass", "start.position[2]"], or a mapping of names to
             distributions.
         of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result,

@@ -70,8 +70,8 @@ def solve(
         threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less
             than a million steps of vehicles).
         width: Vehicles per packet; default from the CPU.
-        checks: "safe" (default) gives each member a status, freezes it when it fails, and warns if its parameters and
-            its start do not suit the step; "all" also warns of problems during the run; "none" compiles no checks.
+        checks: "safe" (default) gives each member a status, freezes failed members, and warns if parameters or start do
+            not suit the step. "all" also warns of problems during the run. "none" compiles no checks.
         on_failure: "freeze" (default) keeps a failed member at its last good state. "raise" raises MembersFailed after
             the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone. The
             order and the symmetry of each step are kept, symplecticity is not.
@@ -82,8 +82,8 @@ def solve(
             lw.statistics.Mean("position"). The estimates are in result.statistics. An empty sequence gathers no
             statistics, even if the scene names some.
         keep: Members whose samples are kept. "all" (default) keeps every member. With "none", memory does not grow with
-            members or steps. "failed" (members that an event stopped do not count) and indices of members run these
-            members again after the run, with the same bits; their samples are in result.kept.
+            members or steps. "failed" or indices of members: these members run again after the run, with the same bits,
+            and their samples are in result.kept. Members that an event stopped are not failed.
         until: lw.Until(...) ends the run before the last member, once the interval of a statistic is narrow enough.
             False runs all members, even if the scene has such a rule.
         store: A folder "runs/x/run.zarr", or a Store with more settings. Samples are written there block by block and

@@ -90,8 +90,7 @@ def of_scene(scene: Any) -> Scene:
 def simple_scene() -> Scene:
     """A scene of one vehicle without symmetry, for laws that are checked without a scene.
 
-    Returns: A vehicle of 20 kg, slightly heavy, with different inertias in all axes and a centre of buoyancy off all
-        axes.
+    Returns: A vehicle of 20 kg, slightly heavy, with different inertias in all axes and a centre of buoyancy off all axes.
     """
     body = Vehicle(
         20.0,

@@ -62,10 +62,9 @@ def check_law(
     Each new law costs the compilation of one small kernel. These properties are checked for the roles that the law has:
 
     * All roles: numbers are finite, also at rest and along single axes. Lanes are independent, and the position of a
-      member
-      in a packet has no effect. Without noise and memory, forces do not depend on the length of the step. Numbers that
-      vary by member have the same effect as shared numbers. `packed` fills the fields that `params` names. The law is
-      the same in all body axes and about all origins that a method may choose.
+      member in a packet has no effect. Without noise and memory, forces do not depend on the length of the step.
+      Numbers that vary by member have the same effect as shared numbers. `packed` fills the fields that `params` names.
+      The law is the same in all body axes and about all origins that a method may choose.
     * `law`: independent of velocities, and of the time unless `timed`. With POTENTIAL, force and torque are the
       derivatives of `potential`, and `energy` adds the same potential.
     * `damping`: nu . D nu >= 0. With `dissipative = False` the smallest power is reported and is not a fault.
@@ -299,7 +298,7 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _damping(bench: Bench, step: float) -> Iterator[Check]:
-    """Check nu.D nu >= 0 at the views' velocities, and at the velocities where D found there has the smallest power."""
+    """Check nu.D nu >= 0 at the views' velocities, and at the velocities with the smallest power for this D."""
     if not {"damping", "load"} & set(bench.roles):
         return
     views = bench.views

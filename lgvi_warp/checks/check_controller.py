@@ -62,9 +62,8 @@ PERIOD = 0.1
 class TwinMeasurement:
     """Motion that a twin reads at a tick, as in lgvi_warp.reference.control.
 
-    position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s]
-    and angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick: index of the next step, and of the
-    tick.
+    position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
+    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick: index of the next step, and of the tick.
     """
 
     position: np.ndarray
@@ -104,10 +103,8 @@ def check_controller(
 
     * `packed` fills the fields that `params` names, and gives the same result in all axes that a method may choose.
     * Numbers are finite at random ticks, without a control error, with an error of half a turn, at rest, and with each
-      number
-      of the part at its bounds.
-    * Lanes are independent: the output of a lane does not depend on the others, and equals that of a packet of one
-      vehicle.
+      number of the part at its bounds.
+    * Lanes are independent: the output of a lane does not depend on the others, and equals that of a packet of one vehicle.
     * Numbers that vary by member have the same effect as shared numbers.
     * The part writes only its own rows of the memory. Only allocation and faults write commands.
     * The part uses measurements alone: nothing depends on the true position.
@@ -117,9 +114,8 @@ def check_controller(
 
     Args:
         part: a sensor, a guidance, a law, an allocation or a fault, built-in or the user's own.
-        scene: scene with the vehicle, the actuators and, if the part needs other parts, a controller. The part is added
-            to it, or replaces the part of the same name. None (default) for a simple vehicle with a
-            `lw.terms.ControlWrench`.
+        scene: scene with the vehicle, the actuators and, if the part needs other parts, a controller. The part is added to
+            it, or replaces the part of the same name. None (default) for a simple vehicle with a `lw.terms.ControlWrench`.
         twin: an object with the same role for one vehicle in NumPy, as the parts in `lgvi_warp/reference/control`: some
             of `begin()`, `measure(y)`, `guide(r, y)`, `control(w, r, y, unmet)`, `allocate(w, actuators)`. Default
             None: no twin.

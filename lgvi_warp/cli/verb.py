@@ -73,8 +73,7 @@ COMMON: dict[tuple[str, ...], dict[str, Any]] = {
 class Verb:
     """A verb: a function of its arguments that returns the exit code, and its one-line help.
 
-    arguments: Function that adds its arguments to a parser. reads: whether it writes no files. aliases: its other
-        names.
+    arguments: Function that adds its arguments to a parser. reads: whether it writes no files. aliases: its other names.
     """
 
     call: Callable[[argparse.Namespace], int]

@@ -15,8 +15,7 @@ from lgvi_warp.common.real_numbers import is_whole, settle, whole_remedy
 def declared(reader: Callable[..., Any], default: Any = dataclasses.MISSING, **arguments: Any) -> Any:
     """Declare a field by its reader, with additional arguments of the reader. If its default is None, None is not read.
 
-    reader: Function that adds a fault for a wrong value of a key, and returns the converted value, as methods of
-        `Faults`.
+    reader: Function that adds a fault for a wrong value of a key, and returns the converted value, as methods of `Faults`.
     """
     return dataclasses.field(default=default, metadata={"reader": reader, "arguments": arguments})
 

@@ -120,8 +120,7 @@ class StatusArray(np.ndarray):
     def counts(self) -> dict[str, int]:
         """Count members by outcome.
 
-        Returns: Number of members by name of the status in lower case, in the order of the codes; only those that
-            occur.
+        Returns: Number of members by name of the status in lower case, in the order of the codes; only those that occur.
         """
         values, numbers = np.unique(np.asarray(self), return_counts=True)
         return {Status(v).name.lower(): int(n) for v, n in zip(values, numbers, strict=True)}

@@ -158,8 +158,7 @@ class Group(NamedTuple):
 class LawArrays:
     """The numbers of a kernel's laws: their structs, their rows of a table, and their memory.
 
-    kinds: for each group of laws (terms, a controller's parts, events) Warp's struct of its numbers, and its NumPy
-        type.
+    kinds: for each group of laws (terms, a controller's parts, events) Warp's struct of its numbers, and its NumPy type.
     memory: memory of laws and method from step to step; the second half is a backup.
     places: positions of each law's rows in table and memory; empty before `write`.
     remembered: memory rows of each law, without its scratch rows. scratch: the first of the method's own rows.

@@ -61,8 +61,7 @@ def _named(value: Any) -> Any:
 def beginning(plan: Plan) -> int:
     """Kind of start of a plan's first launch (see lgvi_kernels.advance.beginning).
 
-    Members continue exactly if their numbers and the settings of their states are unchanged; otherwise from their
-    states.
+    Members continue exactly if their numbers and the settings of their states are unchanged; otherwise from their states.
     """
     final = plan.ensemble.final
     if final is None:

@@ -22,8 +22,7 @@ class CallbackInput:
         velocity: Velocities (m, 3) [m/s]: measured over ground in body axes, or reference in inertial axes.
         angular_velocity: Angular velocities (m, 3) [rad/s], body axes.
         heading: Headings (m,) [rad].
-        water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None (default) in reference
-            values.
+        water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None (default) in reference values.
         speed: Reference speed ahead (m,) [m/s]; None (default) in measured values.
         angular_acceleration: Reference angular accelerations (m, 3) [rad/s^2], axes of the reference attitude; None
             (default) in measured values.

@@ -53,8 +53,7 @@ def run_blocks(
     """Run blocks and merge their results into the keepers, in block order; returns the number of merged members.
 
     remaining: blocks that the store does not have yet; None (default) for all.
-    enough: function of the members so far, called after each block: whether the run may end; later blocks are then
-        dropped.
+    enough: function of the members so far, called after each block: whether the run may end; later blocks are then dropped.
     after: function that is called with each merged block.
     """
     fresh = set(remaining or ())

@@ -309,8 +309,7 @@ class Packets:
     def raw_slopes(self, k0: int, k1: int) -> tuple[np.ndarray, list[np.ndarray], list[Any]]:
         """The samples that the last launch wrote in these steps, and their slopes and the frame's, by each number.
 
-        Returns: samples (samples, members, numbers), their slopes by each number, and slopes of the frame's Q and
-            origin.
+        Returns: samples (samples, members, numbers), their slopes by each number, and slopes of the frame's Q and origin.
         """
         assert self.slopes is not None
         s0, s1 = self.plan.launches.samples_due(k0, k1)

@@ -181,9 +181,8 @@ def choose_plan(
     """Make all decisions before a run; raise SceneError if the settings, the method and the scene do not fit together.
 
     width: members of a packet, one per lane; None: the width that suits this machine's registers.
-    survey_all: whether the kernel is chosen from all members, or from the first SURVEYED. In the second case the run
-        checks the others when it reaches them, and starts again, with all members surveyed, if one needs another
-        kernel.
+    survey_all: whether the kernel is chosen from all members, or from the first SURVEYED. In the second case the run checks
+        the others when it reaches them, and starts again, with all members surveyed, if one needs another kernel.
     """
     faults, scene = Faults(), ensemble.scene
     check_settings(faults, scene, method, dtype, width, checks, on_failure)

@@ -31,8 +31,7 @@ def run_single_block(
 ) -> tuple[dict[str, np.ndarray], MemberStatus, Rows]:
     """Advance all members; returns their samples (k, n, ...) by field, their outcome, and the final rows of packets.
 
-    names: of the samples to keep. warned: whether warnings are evaluated. advanced: called with the vehicle-steps so
-        far.
+    names: of the samples to keep. warned: whether warnings are evaluated. advanced: called with the vehicle-steps so far.
     final: whether to return the final rows of the packets; otherwise they are empty.
     """
     samples, packets = _advanced(plan, names, advanced, warned)

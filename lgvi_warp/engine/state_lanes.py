@@ -102,10 +102,7 @@ def kernel_of(width: int, real: Any) -> Any:
 
 
 def _place(values: np.ndarray | None) -> tuple[tuple[int, int, int], Any]:
-    """Memory layout of numbers: address, and the strides in bytes between members and between numbers; and the array.
-
-    And what lies there.
-    """
+    """Memory layout of numbers: address, and the strides in bytes between members and between numbers; and the array."""
     if values is None:
         return (0, 0, 0), None
     if values.dtype != np.float64:

@@ -58,8 +58,7 @@ class Work:
     ) -> tuple[Any, ...] | Exception | None:
         """Advance one block, or read it from the store: returns the value described in `Work`, or an error of its members.
 
-        halted: called before each launch: whether to stop. advanced: called with the vehicle-steps of this block so
-            far.
+        halted: called before each launch: whether to stop. advanced: called with the vehicle-steps of this block so far.
         """
         from lgvi_warp.engine.plan import NotSurveyed
 

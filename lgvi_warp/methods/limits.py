@@ -46,8 +46,7 @@ def longest_stage(method: Method) -> float:
 def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
     """Largest stable h w [rad] of a method for an oscillation of angular frequency w; inf if a status reports the failure.
 
-    It is measured. For a composition without a measurement it is the limit of the base method divided by the longest
-    stage.
+    It is measured. For a composition without a measurement it is the limit of the base method divided by the longest stage.
     """
     if method.gauss or method.adaptive:
         # A status reports where the iteration of the stages, or the step control, fails.

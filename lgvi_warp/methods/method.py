@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Methods as data: a program of sub-maps with coefficients, composed with itself by stage coefficients.
 
-Sub-maps (mathematics in the README's table): T and K are the flows of the kinetic energy p.M^-1 p / 2 and of the
-potential, D is the discrete Moser-Veselov rotation of equation (24), Ab and Ap are the two halves of T. The leftmost is
-applied first.
+Sub-maps (mathematics in the README's table): T and K are the flows of the kinetic energy p.M^-1 p / 2 and of the potential,
+D is the discrete Moser-Veselov rotation of equation (24), Ab and Ap are the two halves of T. The leftmost is applied first.
 """
 
 from __future__ import annotations
@@ -158,17 +157,14 @@ class Method(Summarized, Documented):
             * "phi", "phi_adjoint", "psi": the maps of Nordkvist & Sanyal 2010;
             * "psi_s" (default), "psi_1", "psi_x", "psi_x8", "psi_w": symmetric splittings of order 2;
             * a composition of a symmetric method: "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)" and so on; or
-              of
-              the two halves of its step: "bm4(psi_x)", "bm6(psi_x)";
+              of the two halves of its step: "bm4(psi_x)", "bm6(psi_x)";
             * "rkn4_6", "rkn6_11", "rkn6_14": splittings into two parts, for weight and restoring moment;
             * "gauss4" to "gauss12": Gauss collocation with fixed-point iteration, for forces that depend on position
               and time;
             * explicit Runge-Kutta methods that store R as two rows: "rk4", "rk5" (Dormand & Prince), "rk5_ck" (Cash &
-              Karp),
-              "rk8" (of DOP853); explicit methods on the rotation group: "cg3" (Crouch & Grossman), "rkmk4"
+              Karp), "rk8" (of DOP853); explicit methods on the rotation group: "cg3" (Crouch & Grossman), "rkmk4"
               (Munthe-Kaas);
-            * "rkw3": linearly implicit in the damping, for strong damping and steady motion; without damping it is
-              "rk4".
+            * "rkw3": linearly implicit in the damping, for strong damping and steady motion; without damping it is "rk4".
         solver: Solver of equation (24) of that paper: "quartic" (default), "cayley", "newton" (on the exponential map,
             as in the paper) or "moser_veselov" (explicit).
         iterations: Newton steps, or fixed-point iterations, of every solve, 0 to 100. None (default) iterates each
@@ -323,8 +319,7 @@ class Method(Summarized, Documented):
             lead: Coefficient of the lead; None without a lead.
 
         Returns:
-            (lengths of the stages; lengths of the lead after each stage and, as the last number, before the first
-            stage).
+            (lengths of the stages; lengths of the lead after each stage and, as the last number, before the first stage).
         """
         c, g = lead or 0.0, self.stages
         if self.two_part:

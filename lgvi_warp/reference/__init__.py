@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The NumPy twin of lgvi_kernels: one vehicle, float64, plain rotation matrices, numpy only.
 
-It has the file and function names of the kernels, the paper's symbols, and one function per printed equation. In all
-files:
+It has the file and function names of the kernels, the paper's symbols, and one function per printed equation. In all files:
 
 x, body, h: the state at the start, inertia and laws, the length of the step [s]; t, times: [s].
 b, R, nu, Om: position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s] and angular velocity (3,)

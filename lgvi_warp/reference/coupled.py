@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The step for a full 6x6 inertia, of one vehicle, in the symbols of docs/explain/coupled_inertia.md.
 
-I6 = [[M, C], [C^T, J]] at the user's origin O in the user's axes; E = M^-1 C, Js = J - C^T M^-1 C, and
-H = p.M^-1 p / 2 + (pi - E^T p).Js^-1 (pi - E^T p) / 2 + U. The turns need a diagonal, ascending Js, and an E that is
-upper triangular (scheme X, no solve) or symmetric (scheme W, one 3-dimensional solve). Axes Q and another origin
-achieve this.
+I6 = [[M, C], [C^T, J]] at the user's origin O in the user's axes; E = M^-1 C, Js = J - C^T M^-1 C, and H = p.M^-1 p / 2 +
+(pi - E^T p).Js^-1 (pi - E^T p) / 2 + U. The turns need a diagonal, ascending Js, and an E that is upper triangular (scheme
+X, no solve) or symmetric (scheme W, one 3-dimensional solve). Axes Q and another origin achieve this.
 """
 
 import math

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Explicit Runge-Kutta methods on y = (b, two rows of R, p, pi), of one vehicle, with all its laws.
 
-The middle row of R is the cross product of the others. The memory of a law is known at every stage if it depends on
-time and itself alone (`Law.follow`). The memory of other laws is advanced by half a step before and after, as in K, to
-order 2.
+The middle row of R is the cross product of the others. The memory of a law is known at every stage if it depends on time
+and itself alone (`Law.follow`). The memory of other laws is advanced by half a step before and after, as in K, to order 2.
 """
 
 import math

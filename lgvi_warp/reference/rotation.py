@@ -110,9 +110,8 @@ def in_principal_axes(solve: Callable[[Array, Array, int | None], Array]) -> Cal
 def iterate(value: Function, differential: Function, x: Array, a: Array, iterations: int | None) -> Array:
     """Newton steps on value(x) = 0: this many, or (None) until the residual, divided by |a|, no longer falls.
 
-    A test against round-off alone would never end, since the residual stagnates above round-off near |J^-1 a| = 1.
-    Raises NoSolution if it stays large, and LinAlgError (a ValueError) if the differential is singular in a fixed
-    number of steps.
+    A test against round-off alone would never end, since the residual stagnates above round-off near |J^-1 a| = 1. Raises
+    NoSolution if it stays large, and LinAlgError (a ValueError) if the differential is singular in a fixed number of steps.
     """
     if iterations is not None:
         for _ in range(iterations):

@@ -68,23 +68,22 @@ class Result(Summarized):
 
     Attributes:
         time: Times of the samples [s], shape (k,).
-        samples: Arrays of the fields that were kept, by name. Each is also an attribute: position (k, n, 3) [m,
-            inertial], attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n,
-            3) [rad/s, body]. Signals of a controller are kept if SaveAt(fields=...) names them. They are the values
-            after the tick at each
-            time: command (k, n, channels); actuator (k, n, channels), after delay, fault, limit and lag; demand, unmet
-            and exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity,
-            _depth, _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading,
-            _speed. Signals of a filter (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k,
-            n, 6), nees, nis, nis_count (k, n), innovation and innovation_sigma (k, n, 12). energy_used (k, n) [J] needs
-            a term `lw.terms.EnergyUse`; navigation_error (k, n, 3) [m, inertial] needs an estimate of the position.
+        samples: Arrays of the saved fields, by name; each is also an attribute. Motion: position (k, n, 3) [m, inertial],
+            attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
+            Signals of a controller need SaveAt(fields=...), and are the values after the tick at each time. These are
+            command (k, n, channels); actuator (k, n, channels), after delay, fault, limit and lag; demand, unmet and
+            exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
+            _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed.
+            Signals of a filter (see lw.control.ErrorStateFilter) are estimate_sigma (k, n, 15), estimate_bias (k, n, 6),
+            nees, nis, nis_count (k, n), innovation and innovation_sigma (k, n, 12). energy_used (k, n) [J] needs a term
+            `lw.terms.EnergyUse`; navigation_error (k, n, 3) [m, inertial] needs an estimate of the position.
         status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
         failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN
             without failure or event.
         failure_value: The value that crossed its limit, shape (n,): |J^-1 a| or the relative residual (psi_x: half the
             angle of its turns). It is 0 for a non-finite state and for an event, and NaN without failure or event.
-        warnings: Bits of Warnings, shape (n,). Warnings about the motion need checks="all", which checks it every 128 steps
-            and at the end.
+        warnings: Bits of Warnings, shape (n,). Warnings about the motion need checks="all", which checks it every 128
+            steps and at the end.
         warning_time: Time at which each member's most serious warning was first seen [s], shape (n,); 0 for a warning
             about its start, NaN without a warning.
         warning_value: The value that caused the warning at that time, shape (n,); NaN without a warning.
@@ -101,9 +100,8 @@ class Result(Summarized):
         kept: Result with the samples of the members in kept_members, if `keep` selected some members; else None.
         kept_members: Indices of these members, shape (m,).
         store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
-        jacobian: Derivatives of the samples with respect to the numbers in `tangents`, by name of the field, each with
-            the shape of the samples and a last dimension for the numbers. NaN after a member ended. Empty without
-            `tangents`.
+        jacobian: Derivatives of the samples with respect to the numbers in `tangents`, by field. Each has the shape of
+            the samples and a last dimension for these numbers. NaN after a member ended. Empty without `tangents`.
         tangents: Names of these numbers, as given in `solve(tangents=...)`.
         end: Value of `final`, or a function without arguments that reads it; None if it was not kept.
         compile_seconds: Time to load the kernel [s].
@@ -397,8 +395,7 @@ class Result(Summarized):
         * inputs that differ between members, by name and component: "vehicle.buoyancy", "start.position[2]";
         * `outcome`, the status by name, and `end_time` [s];
         * the final state, for the fields that were kept: `position[0]` to `position[2]` [m, inertial axes], `euler[0]`
-          ...
-          [rad], `velocity[0]` ... [m/s] and `angular_velocity[0]` ... [rad/s], body axes.
+          ... [rad], `velocity[0]` ... [m/s] and `angular_velocity[0]` ... [rad/s], body axes.
 
         `frame.attrs["units"]` has the units. From a store, only the samples of the last time are read.
 

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Error of a planned run, measured on its first member by a comparison of the step with half the step.
 
-Estimates from rates (`step_error`) linearise the motion at the start. They miss the error of damping near a method's
-limit.
+Estimates from rates (`step_error`) linearise the motion at the start. They miss the error of damping near a method's limit.
 """
 
 from __future__ import annotations

@@ -163,8 +163,7 @@ def path_error(method: Method, rates: Rates, h: float, t1: float) -> float:
 
     h: Step [s].
     t1: End [s].
-    Returns: Approximate largest error in position divided by the length of the path [1]; infinite if the step is
-        unstable.
+    Returns: Approximate largest error in position divided by the length of the path [1]; infinite if the step is unstable.
     """
     if not np.isfinite(rates.modes).all():
         return math.inf

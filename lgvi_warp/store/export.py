@@ -56,11 +56,10 @@ def export(
 ) -> Path:
     """Export a run, some of its members, or a scene to a file for other programs; the file name selects the format.
 
-    ".csv" and ".parquet": a table with one row per member and sample time, or one row per member if there are no
-    samples. ".nc": NetCDF-4 with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap":
-    odometry and transforms in the axes of ROS. docs/guide/exports.md lists columns, names, units and axes. A footprint
-    is exported as its regions, to ".geojson" or ".kml". A scene is exported to ".fmu": its vehicle as a unit of the FMI
-    standard.
+    ".csv" and ".parquet": a table with one row per member and sample time, or one row per member if there are no samples.
+    ".nc": NetCDF-4 with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and
+    transforms in the axes of ROS. docs/guide/exports.md lists columns, names, units and axes. A footprint is exported as
+    its regions, to ".geojson" or ".kml". A scene is exported to ".fmu": its vehicle as a unit of the FMI standard.
 
     Args:
         run: A result, a result.npz, a store, a folder with one result.npz or store, or the result of
@@ -70,8 +69,7 @@ def export(
         out: Path of the new file if `to` is "netcdf" or "parquet"; by default next to the run.
         members: Indices, a slice or a mask of the members; by default all members whose samples were kept. Maps and
             MCAP take at most 1,000 members.
-        origin: Latitude and longitude of the axes' origin [deg]; by default the origin of the run's environment, if
-            set.
+        origin: Latitude and longitude of the axes' origin [deg]; by default the origin of the run's environment, if set.
         start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; by default the start of the run's environment.
         inputs: Inputs of an ".fmu": "commands" (default) of the actuators, which replace the scene's controller; or
             "set_points" of the controller, which is then part of the unit.

@@ -56,7 +56,7 @@ class Shown:
 
 
 def of_members(count: int, total: int) -> str:
-    """Say how many members are drawn of how many."""
+    """Write a number of members out of all, as "1,000 of 100,000 members"."""
     if count < total:
         return f"{count:,} of {total:,} members"
     return f"{total:,} member{'s' * (total != 1)}"
@@ -65,8 +65,8 @@ def of_members(count: int, total: int) -> str:
 def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
     """Choose the members that pictures and recordings show when they draw only some.
 
-    The first choice are the members that reach farthest along each axis. Up to a third of the choice are members that
-    did not end "ok", divided evenly between the outcomes. The others are chosen by a hash of their index. The hash is
+    The members that reach farthest along each axis come first. Up to a third of the chosen members did not end "ok",
+    divided evenly between the outcomes. The other members are chosen by a hash of their index. The hash is
     representative for grids, tables, Sobol points and random draws, and the same run always gives the same choice. At
     most 240 evenly spaced times are shown. Quantiles are computed from at most 20,000 members, chosen by the same hash.
 

@@ -68,8 +68,7 @@ class Spread:
 class Drawn:
     """Drawing data of one run.
 
-    source: The members whose samples were kept: the result itself, or its kept members; choice: the drawn members of
-        these.
+    source: The members whose samples were kept: the result itself, or its kept members; choice: the drawn members of these.
     few: The drawn members at the drawn times, in memory; counted: mask of those under way at each time, shape (f, m).
     label, rgb: Name and colour of the run in a comparison; "" and None for a single run, which is coloured by outcome.
     shares: Share of all members by status at each time, shape (f,) each; OK for those under way.

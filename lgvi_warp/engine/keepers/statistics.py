@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 class Gathered:
     """The statistics of a run so far: for each statistic a tree of parts. time: (k,) [s].
 
-    With R replicates, member i belongs to replicate i mod R, and parts contain the numbers of each replicate
-    separately.
+    With R replicates, member i belongs to replicate i mod R, and parts contain the numbers of each replicate separately.
     """
 
     # Name of its results in a store.

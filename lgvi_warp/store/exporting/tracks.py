@@ -296,7 +296,7 @@ DERIVED = {
 
 
 def derived_of(tracks: Tracks, names: Sequence[str]) -> tuple[DerivedNumber, ...]:
-    """Those of the names that are derived numbers and can be computed from kept samples."""
+    """Derived numbers with these names that can be computed from kept samples."""
     chosen = (DERIVED[name] for name in names)
     return tuple(
         item

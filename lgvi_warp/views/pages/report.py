@@ -62,9 +62,9 @@ svg, img { max-width: 100%; height: auto; } .outcome { display: inline-block; wi
 def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
     """Write one HTML file with the results of a run or of studies. The file needs no network to be read.
 
-    The report of a run has the outcomes of the members with remedies, notes and warnings, pictures, the statistics with
-    their intervals, the settings, the original text of the scene, and the command that repeats the run. The report of a
-    study has the pictures and tables of its folder.
+    The report of a run has the outcomes of the members with remedies, notes and warnings, pictures, and statistics with
+    intervals. It also has the settings, the original text of the scene, and the command that repeats the run. The
+    report of a study has the pictures and tables of its folder.
 
     Args:
         result: A result, or a folder with a run, a trade-off, a stability map, a sensitivity study, a sweep or several

@@ -18,8 +18,7 @@ DEFAULTS = {"dtype": "float64", "checks": "safe", "on_failure": "freeze"}
 def how_to_run_again(provenance: Mapping[str, Any]) -> tuple[str | None, str, str]:
     """Write instructions to repeat a run: (command, or None if no file holds the scene; a remark; text of the scene file).
 
-    The text is the original one, or else is made from the scene's tables. An ensemble from Python replaces the file's
-    own.
+    The text is the original one, or else is made from the scene's tables. An ensemble from Python replaces the file's own.
     """
     scene, source = provenance["scene"], provenance.get("source", {})
     written = isinstance(source.get("text"), str)

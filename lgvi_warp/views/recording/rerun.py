@@ -35,10 +35,9 @@ def record(
 ) -> Path | None:
     """Record the fleet for the rerun viewer. The file appears only when it is complete.
 
-    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`. A hull takes the
-    colour of its outcome at the time at which the member ended. Curves show the members under way at each time. The
-    same run always gives the recording and the application the same ids, by which the viewer distinguishes recordings
-    and layouts.
+    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`. A hull takes the colour
+    of its outcome at the time at which the member ended. Curves show the members under way at each time. The same run
+    always gives the recording and the application the same ids, by which the viewer distinguishes recordings and layouts.
 
     Args:
         result: A result with position, attitude and velocity, in memory or in a store; or a mapping of names to

@@ -271,8 +271,7 @@ def slopes_of_samples(
 ) -> dict[str, np.ndarray]:
     """Slopes of `unpacked` by one number, in the user's axes and from the user's origin.
 
-    raw, raw_slope: (samples, members, numbers) in the kernel's axes. turn: slopes of the frame's Q and origin, (1 or m,
-        ...).
+    raw, raw_slope: (samples, members, numbers) in the kernel's axes. turn: slopes of the frame's Q and origin.
     """
     slopes = divided(fields, raw_slope, table)
     values = divided(fields, raw, table)

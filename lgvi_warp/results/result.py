@@ -394,8 +394,9 @@ class Result(Summarized):
 
         * inputs that differ between members, by name and component: "vehicle.buoyancy", "start.position[2]";
         * `outcome`, the status by name, and `end_time` [s];
-        * the final state, for the fields that were kept: `position[0]` to `position[2]` [m, inertial axes], `euler[0]`
-          ... [rad], `velocity[0]` ... [m/s] and `angular_velocity[0]` ... [rad/s], body axes.
+        * the final state, for the fields that were kept: `position[0]` to `position[2]` [m, inertial axes], `euler[0]` to
+          `euler[2]` [rad], `velocity[0]` to `velocity[2]` [m/s] and `angular_velocity[0]` to `angular_velocity[2]`
+          [rad/s], body axes.
 
         `frame.attrs["units"]` has the units. From a store, only the samples of the last time are read.
 

@@ -90,8 +90,8 @@ def solve(
             are not held in memory. lw.resume completes the run if it is interrupted.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
-        blocks: With a store, the blocks to run, such as range(0, 100), to divide a run between machines. The range may
-            go beyond the last block. The result has the members of these blocks.
+        blocks: With a store, the blocks to run, such as range(0, 100), for a run in parts. The range may go beyond the
+            last block. The result has the members of these blocks.
         on_block: Function to monitor a run. It is called with a copy of each block's Result as soon as the block is
             finished, in order and in the calling thread. Default: none.
         start: `result.final` of another run of these members, to continue it. With the same settings and numbers, the

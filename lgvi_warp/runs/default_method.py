@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The default method of a run, chosen from the terms of the scene and from the estimated error at its step.
 
-A scene without damping gets a symplectic method. A splitting shifts the equilibria of damped motion, and Runge-Kutta
-methods keep them. A damped scene therefore gets the cheapest Runge-Kutta method that is stable and accurate at the
-step, by the rates of the motion.
+A scene without damping gets a symplectic method, or rk4 if its inertia changes. A splitting changes the steady motion
+of a damped scene, and Runge-Kutta methods keep it. A damped scene therefore gets the cheapest Runge-Kutta method that
+is stable and accurate at the step, judged by the rates of the motion.
 """
 
 from __future__ import annotations

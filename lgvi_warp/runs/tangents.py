@@ -93,7 +93,7 @@ def _names(faults: Faults, tangents: Any) -> tuple[str, ...]:
 
 
 def _timed(name: str, fleet: Ensemble) -> bool:
-    """Whether a name belongs to an event, or to a part of the controller other than a circle (whose radius has slopes)."""
+    """Whether a name belongs to an event, or to a part of the controller other than a circle."""
     scene = fleet.scene
     parts = scene.controller.parts if scene.controller else ()
     return name.partition(".")[0] in {part.key for part in (*parts, *scene.events) if not isinstance(part, Loiter)}

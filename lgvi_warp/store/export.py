@@ -71,7 +71,7 @@ def export(
             MCAP take at most 1,000 members.
         origin: Latitude and longitude of the axes' origin [deg]; by default the origin of the run's environment, if set.
         start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; by default the start of the run's environment.
-        inputs: Inputs of an ".fmu": "commands" (default) of the actuators, which replace the scene's controller; or
+        inputs: Inputs of an ".fmu": "commands" (default) of the actuators, in place of the scene's control laws; or
             "set_points" of the controller, which is then part of the unit.
         overwrite: Whether to replace an existing file; by default the export is refused.
         progress: Function that is called with the finished fraction, or True to show it; by default nothing is shown.

@@ -34,7 +34,7 @@ PATIENCE = 30.0
 class Live:
     """Shows the members of a run in a viewer as their blocks are finished.
 
-    1,000 members are drawn, divided between the blocks in proportion to their size. The members are chosen by a hash of
+    About 1,000 members are drawn, divided between the blocks in proportion to their size. The members are chosen by a hash of
     their index, as in `lgvi_warp.select_members`. Bodies and paths are coloured by outcome. Curves show single members,
     since quantiles need all members. If the viewer is closed or does not respond, the view ends and the run continues.
     """

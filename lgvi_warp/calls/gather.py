@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`gather`: statistics of samples at hand, in memory or in a store, as if they had been gathered during the run."""
+"""`gather`: statistics computed after a run from its saved samples, in memory or in a store."""
 
 from __future__ import annotations
 
@@ -26,29 +26,31 @@ from lgvi_warp.store.open import open_run
 
 
 def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], weights: Any = None) -> Estimates:
-    """Gather statistics of a finished run from the samples that it kept: in memory, or in a store block by block.
+    """Compute statistics of a finished run from the samples that it kept, in memory or in a store, block by block.
 
-    The estimates equal those gathered during a run, to the bit: blocks of members are reduced and joined in the same order.
-    If a store holds rounded samples (Store(dtype="float32") of a run in float64), the estimates are of the rounded
-    samples. Times are those of the samples.
+    The estimates are bit-identical to those gathered during the run: blocks of members are reduced and joined in the
+    same order. If a store holds rounded samples (Store(dtype="float32") of a run in float64), the rounded samples are
+    used. The estimates are given at the times of the samples.
 
     Metrics need samples at every tick of the controller, with the signals that they read: save=lw.SaveAt(every=period,
-    fields=...). They differ from those of the run by round-off, because a run converts ticks to the user's axes in its
-    kernel. Outcomes and end times need no samples.
+    fields=...). Such metrics differ from metrics gathered during the run by round-off, because a run converts ticks to
+    the user's axes in its kernel. Statistics of outcomes and end times need no samples.
 
     Args:
-        result: A result of `lw.solve`, `lw.open_run` or `lw.Result.load`, or the path of a store. Of a store with 10^6
-            members only a few blocks' samples are in memory at a time.
-        statistics: Statistics, as in `lw.solve`, or tables of a scene file.
-        weights: Weights of the members (n,), at least 0, in any unit, to represent another distribution than the one that
-            they were drawn from. By default the weights of the run (see lw.designs.Table), else equal weights. Weighted
-            members of a Sobol sequence or another design are treated as independent: their intervals are wide.
+        result: A result of `lw.solve`, `lw.open_run` or `lw.Result.load`, or the path of a store. From a store, the
+            samples of only a few blocks are in memory at a time.
+        statistics: Statistics, as in `lw.solve`, or their tables from a scene file.
+        weights: Weights of the members (n,), at least 0, in any unit (importance sampling). With weights the members
+            represent another distribution than the one from which they were drawn. Default: the weights of the run (see
+            lw.designs.Table), or equal weights. With weights, the members of a Sobol sequence or another design are
+            treated as independent, so their intervals are wide.
 
     Returns:
-        The estimates by name, with `messages` on what the user should know.
+        The estimates by name. Their `messages` are notes and warnings for the user.
 
     Raises:
-        SceneError: If samples are needed that were not kept, or a statistic does not fit the scene; every fault is named.
+        SceneError: If a statistic needs samples that were not kept, or does not fit the scene. The message names every
+            fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -77,7 +79,7 @@ def gather(result: Result | str | os.PathLike[str], statistics: Sequence[Any], w
 
 
 def _weights(weights: Any, members: int) -> np.ndarray | None:
-    """The weights (n,) of mean 1 that were asked for; None for none."""
+    """The requested weights (n,), scaled to mean 1; None without weights."""
     if weights is None:
         return None
     faults = Faults()
@@ -94,7 +96,7 @@ def _weights(weights: Any, members: int) -> np.ndarray | None:
 
 
 def _checked(kept: KeptSamples, requested: tuple[Statistic, ...]) -> tuple[Statistic, ...]:
-    """The statistics, where they fit the scene and the samples that were kept."""
+    """Check that the statistics fit the scene and the samples that were kept, and return them."""
     faults, result, events = Faults(), kept.result, kept.events
     known = outcomes([event.key for event in events], [event.status for event in events])
     alike = {event.key for event in events if sum(other.status == event.status for other in events) > 1}
@@ -121,7 +123,7 @@ def _checked(kept: KeptSamples, requested: tuple[Statistic, ...]) -> tuple[Stati
 
 
 def _part_of_block(kept: KeptSamples, run: Gathered, block: Block) -> list[Part]:
-    """The part of one block: its samples are passed on in the order of time."""
+    """Parts of one block's statistics: its samples are passed to them in the order of time."""
     asked, time, samples = run.statistics, kept.result.time, kept.result.samples
     at_ticks = any(statistic.ticks for statistic in asked)
     ticks = kept.tick_rows("statistics") if at_ticks else None

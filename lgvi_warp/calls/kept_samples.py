@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The samples of a result block by block, as a run would pass them on: from memory, or from the chunks of a store."""
+"""The samples of a result, read block by block in the order of a run: from memory, or from the chunks of a store."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ FIELD_BYTES = 72
 
 
 class KeptFields(Fields):
-    """Samples of a block that were kept; one that was not is named with what keeps it."""
+    """Samples of a block that were kept. For a missing field, the error says how to keep it."""
 
     def __missing__(self, name: str) -> Any:
         raise not_kept("statistics", name, tuple(self))
 
 
 def not_kept(key: str, field: str, kept: tuple[str, ...]) -> SceneError:
-    """The fault of a sample that is needed and was not kept."""
+    """Make the error for a field whose samples are needed but were not kept."""
     if not kept:
         remedy = 'run with keep="all", or gather it on the way: solve(..., statistics=[...])'
         return refusal(key, field, "is needed of every member, and no samples of all were kept", remedy)
@@ -49,7 +49,7 @@ def not_kept(key: str, field: str, kept: tuple[str, ...]) -> SceneError:
 
 
 class KnownMembers:
-    """Stored facts about a block's members, without their ensemble: numbers, and the start as the first sample has it."""
+    """Stored facts about a block's members, without their ensemble: their numbers, and their start from the first sample."""
 
     def __init__(self, result: Result, at: slice, start: KeptFields | None):
         self.parameters, self.starts = (_of_members(numbers, at) for numbers in (result.parameters, result.starts))
@@ -62,21 +62,21 @@ class KnownMembers:
 
 
 def _of_members(numbers: Mapping[str, np.ndarray], at: slice) -> dict[str, np.ndarray]:
-    """Numbers of some members, those that all share as they are."""
+    """Select the numbers of some members. A number that all members share is returned unchanged."""
     if isinstance(numbers, Arrays):
         return dict(numbers.part(at))
     return {name: values[at] if len(values) > 1 else values for name, values in numbers.items()}
 
 
 class KeptSamples:
-    """A result as its blocks: samples, members and ends of each.
+    """A result divided into blocks, with the samples, members and ends of each block.
 
     Attributes:
-        total: number of members of the whole run, by which blocks are divided.
-        weights: what the members count for (n,); None where all count alike.
-        replicates: number of independent replicates of the design; 1 where the members are not those of a whole design.
+        total: number of members of the whole run, from which the blocks are computed.
+        weights: weights of the members (n,); None for equal weights.
+        replicates: number of independent replicates of the design; 1 if the members are not those of a whole design.
         events: the events of the scene.
-        ticks: (m,), the rows of samples at the ticks of the controller; None without a controller.
+        ticks: (m,), indices of the samples at the ticks of the controller; None without a controller.
     """
 
     def __init__(self, result: Result, weights: np.ndarray | None = None):
@@ -95,7 +95,7 @@ class KeptSamples:
                 yield Block(block.first, min(block.stop, self.result.members))
 
     def weights_of(self, block: Block) -> np.ndarray | None:
-        """Weights of a block's members; None where all count alike."""
+        """Weights of a block's members; None for equal weights."""
         return None if self.weights is None else np.asarray(self.weights[block.first : block.stop])
 
     @functools.cached_property
@@ -113,7 +113,7 @@ class KeptSamples:
         return None if table is None else float(table["period"])
 
     def tick_rows(self, key: str) -> np.ndarray | None:
-        """The rows of samples at the controller's ticks; None without a controller. Refuses samples that lack a tick."""
+        """Indices of the samples at the controller's ticks; None without a controller. Refuses samples that lack a tick."""
         if self.period is None:
             return None
         h = self.result.provenance["step"]
@@ -146,7 +146,7 @@ class KeptSamples:
         return KnownMembers(self.result, slice(block.first, block.stop), start)
 
     def of_block(self, block: Block, names: tuple[str, ...]) -> Result:
-        """The members of a block as a result in memory, with some of their samples."""
+        """Make a result in memory from the members of a block and some of their samples."""
         result, at = self.result, slice(block.first, block.stop)
         rows = np.arange(len(result.time))
         parameters, starts = (numbers.part(at) if isinstance(numbers, Arrays) else numbers
@@ -159,7 +159,7 @@ class KeptSamples:
     def pieces(
         self, block: Block, names: tuple[str, ...], rows: np.ndarray, controller: Any = None
     ) -> Iterator[tuple[slice, KeptFields]]:
-        """Samples of a block at some of the times, a few at once: their places among `rows`, and the samples."""
+        """Yield the samples of a block at the times of `rows`, a few times at once, as (their slice of `rows`, samples)."""
         result, at = self.result, slice(block.first, block.stop)
         status = np.asarray(result.status[at])
         at_once = max(1, READ_AT_ONCE // (FIELD_BYTES * max(len(names), 1) * block.count))

@@ -26,14 +26,14 @@ from lgvi_warp.store.run import disk_error_with_remedy
 def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], overwrite: bool = False) -> Folder:
     """Merge stores that hold blocks of one run (`run --blocks`) into a new store.
 
-    Every file is compared with its checksum on the way. Members that the run keeps (keep="failed" or indices) are run again
-    here, as `resume` does, once all blocks are there. A run that only its own ensemble can resume is not complete before
-    that.
+    Every file is compared with its checksum while it is copied. If all blocks are there, the members whose samples the
+    run keeps (keep="failed" or indices) are run again here, as `resume` does. On another machine, or if a scene file
+    cannot describe the ensemble, they are not run here: the store is complete only after `lw.resume(path, fleet)`.
 
     Args:
         paths: Stores, or folders with one store each.
         out: The new store, or the folder for it.
-        overwrite: Whether to replace a run that is there; default False.
+        overwrite: Whether to replace an existing run at `out`; default False.
 
     Returns:
         The new store, complete or not.
@@ -80,7 +80,7 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
 
 
 def _undamaged(parts: Sequence[Folder]) -> Folder:
-    """The first of the stores whose files outside the blocks are whole. Raises SceneError if there is none."""
+    """Find the first store whose files outside the blocks are undamaged. Raises SceneError if there is none."""
     damage = []
     for part in parts:
         if not (faults := part.damage()):
@@ -101,7 +101,7 @@ def _copy_frame(part: Folder, target: Path) -> None:
 
 
 def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Commits) -> None:
-    """Copy a block from the first store that has it whole. Raises SceneError if it is damaged in each that has it."""
+    """Copy a block from the first store with an undamaged copy. Raises SceneError if every copy is damaged."""
     damage = []
     for part in parts:
         block_files = part.block_files
@@ -129,7 +129,7 @@ def _copy_block(parts: Sequence[Folder], block: Block, target: Path, commits: Co
 
 
 def _put_together(parts: Sequence[Folder], target: Path) -> bool:
-    """Copy frame and blocks into a new store at the target; return whether members are to be run again for it."""
+    """Copy frame and blocks into a new store at the target. Return whether it still needs members to be run again."""
     beside = scratch.beside(target, scratch.NEW)
     try:
         _copy_frame(_undamaged(parts), beside)

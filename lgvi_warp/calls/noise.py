@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The noise of a prepared run's calls: whose counters draw it, or the standard normals that a call gives."""
+"""Noise of a prepared run's calls: drawn by the counters of given members, or standard normals passed to the call."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ DRAWN, GIVEN = "drawn", "given"
 class NoiseOfCalls:
     """Draws of a run and their source.
 
-    layout: what is drawn. given: whether calls give it. seed, members: of the ensemble. plan: of the members that the run was
-    prepared for, whose kernel says how normals are rounded. varied: names of what varies. grid: steps.
+    layout: columns of the draws. given: whether calls pass the draws. seed, members: of the ensemble. plan: plan of the
+    members that the run was prepared for; its kernel decides how normals are rounded. varied: names of the varied numbers.
+    grid: steps.
     """
 
     layout: DrawLayout
@@ -38,9 +39,9 @@ class NoiseOfCalls:
     grid: TimeGrid
 
     def of_call(self, xi: Any, members: int, keys: dict[str, Any]) -> GivenDraws | None:
-        """The normals that a call gives to so many members, None where it draws them.
+        """Check and return the normals that a call passes for this many members; None if they are drawn.
 
-        keys: what else would say whose noise each row has, by name.
+        keys: other arguments of the call that select noise (seed, indices), by name.
         """
         faults = Faults()
         if xi is not None and not self.given:
@@ -61,7 +62,7 @@ class NoiseOfCalls:
         return GivenDraws(self.layout, self._checked(xi, members, shape))
 
     def _checked(self, xi: Any, members: int, shape: str) -> np.ndarray:
-        """Normals of a call as an array (members, m), float32 or float64."""
+        """Check the normals of a call and return them as an array (members, m), float32 or float64."""
         faults = Faults()
         values = xi if type(xi) is np.ndarray and xi.dtype in (np.float32, np.float64) else faults.real("xi", xi, shape)
         faults.raise_if_any()
@@ -78,7 +79,7 @@ class NoiseOfCalls:
 
 
 def check_size(members: int, numbers: int, size: int) -> None:
-    """Refuse more normals than a call may hold, with the sum."""
+    """Refuse a call with normals of more than MOST_BYTES; the message says how many bytes they would take."""
     if (total := members * numbers * size) > MOST_BYTES:
         problem = f"would be {members:,} members times {numbers:,} normals of {size} bytes, {total / 1e9:,.1f} GB"
         raise refusal(
@@ -87,7 +88,7 @@ def check_size(members: int, numbers: int, size: int) -> None:
 
 
 def checked_indices(indices: Any, members: int | None = None) -> np.ndarray:
-    """Whose noise is meant, int64 (members,); members: how many there must be, None for any number."""
+    """Check indices of members and return them as int64 (n,); members: the required length n, None for any."""
     keys = members_of("indices", indices)
     if members not in (None, len(keys)) or keys.max() >= MOST_MEMBERS:
         problem = "are not one whole number from 0 for each member"
@@ -97,26 +98,26 @@ def checked_indices(indices: Any, members: int | None = None) -> np.ndarray:
 
 
 def draws_of(run: Any, indices: Any = None, *, seed: int | None = None, members: int | None = None) -> np.ndarray:
-    """Standard normals of the random number generator: those that a call uses if it is not given its draws.
+    """Return the standard normals that the random number generator draws in a call without given draws.
 
-    run(X, lw.uq.draws_of(run, indices)) has the bits of a call with these indices of the same run prepared without
-    draws="given" (but for the last digit with `rkmk4` in float32, and with width=1). So they are a starting point for
-    changes: of one gust, of the leading draws, of the noise of a chain.
+    run(X, lw.uq.draws_of(run, indices)) gives the same bits as a call with these indices of the same run prepared
+    without draws="given". The last digit may differ with `rkmk4` in float32, and with width=1. These normals are a
+    starting point for changes, for example of one gust, of the leading draws, or of the noise of a Markov chain.
 
     Args:
         run: A run made by `lw.prepare`.
-        indices: (n,), indices of members in an ensemble of this seed, whole numbers from 0: their draws are returned.
-            Default None for 0 to members - 1.
-        seed: Seed of the noise, a whole number from 0; default that of the ensemble.
-        members: How many, where there are no indices; default those of the ensemble.
+        indices: (n,), whole numbers from 0: indices of the members whose draws are returned, in an ensemble of this
+            seed. Default None for 0 to members - 1.
+        seed: Seed of the noise, a whole number from 0; default the seed of the ensemble.
+        members: Number of members if `indices` is None; default as many as the ensemble has.
 
     Returns:
-        Standard normals (n, m), whose columns `run.draws` lists. They are of the type in which the kernel draws: float32 of a
-        run in float32, with or without compensation, else float64; and float64 where a term draws its start, as a stationary
-        current does.
+        Standard normals (n, m); `run.draws` lists the columns. Their type is the type in which the kernel draws:
+        float32 for a run in float32 (also with compensation), otherwise float64. It is also float64 if a term draws its
+        initial value, as a stationary current does.
 
     Raises:
-        SceneError: For faulty arguments, and where the normals would take more than 1 GB.
+        SceneError: If arguments are at fault, or the normals would take more than 1 GB.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -51,10 +51,10 @@ PROBE_BYTES, SYNCS = 64_000_000, 4
 @explained
 @dataclass(frozen=True)
 class Prediction:
-    """Time, memory and disk space that a run will take.
+    """Predicted time, memory and disk space of a run.
 
-    Blocks are written while others advance: the slower of the two decides how long a run takes. Its text, `str(prediction)`,
-    says it in lines.
+    Blocks are written while others advance, so the slower of writing and advancing determines the time of the run.
+    `str(prediction)` is a summary for a user.
 
     Attributes:
         members: Number of members.
@@ -65,11 +65,11 @@ class Prediction:
         set_up: Time to set up all blocks [s].
         advance: Time of the steps of all members [s].
         write: Time to write the store [s].
-        memory: Peak memory of the process [bytes], including what it holds already.
-        disk: Size of the store, or about that of the result's file [bytes].
-        free_memory: Memory of the machine [bytes]; None if the system does not tell.
+        memory: Peak memory of the process [bytes], including its memory before the run.
+        disk: Size of the store, or the approximate size of the file of a result in memory [bytes].
+        free_memory: Memory of the machine [bytes]; None if unknown.
         free_disk: Free space on the disk [bytes]; None if unknown.
-        messages: What the run will tell of its settings, such as that the step is shortened to fit.
+        messages: Messages that the run will give about its settings, for example about a shortened step.
     """
 
     members: int
@@ -88,7 +88,7 @@ class Prediction:
 
     @property
     def seconds(self) -> float:
-        """Time of the run without compilation [s]: set-up, then the slower of steps and writing."""
+        """Time of the run without compilation [s]: the set-up plus the longer of `advance` and `write`."""
         return self.set_up + max(self.advance, self.write)
 
     def __str__(self) -> str:
@@ -122,18 +122,18 @@ def _share(wanted: int, available: int | None, of: str) -> str:
 def predict(
     fleet: Ensemble | Scene, *, threads: int | None = None, store: Store | str | None = None, **settings: Any
 ) -> Prediction:
-    """Predict what lw.solve(fleet, **settings) will take, from a trial of about a second.
+    """Predict time, memory and disk space of lw.solve(fleet, **settings) from a trial of about a second.
 
-    The prediction includes statistics, and the second run of the members of keep=[...]. It excludes that of keep="failed",
-    since the number of failures is not known. With `until`, the whole ensemble is predicted. If the cost of steps changes
-    during the run (events, adaptive steps), its time differs from the prediction.
+    The prediction includes statistics, and the second run of the members in keep=[...]. It excludes the second run of
+    keep="failed", since the number of failures is not known. With `until`, the prediction is for the whole ensemble. If
+    the cost of a step changes during the run (events, adaptive steps), the time of the run differs from the prediction.
 
     Args:
         fleet: An Ensemble, or a Scene, which stands for its own ensemble.
         threads: Number of threads; default as in `lw.solve`.
-        store: As for solve; the disk is the one that its folder lies on. None: a run in memory.
-        **settings: Arguments of solve that decide the plan and what is kept: method, h, t1, save, dtype, width, checks,
-            on_failure, statistics, keep, until.
+        store: As for `lw.solve`; free space is read from the disk of its folder. Default None: a run in memory.
+        **settings: Arguments of `lw.solve` that determine the plan and the saved data: method, h, t1, save, dtype,
+            width, checks, on_failure, statistics, keep, until.
 
     Returns:
         The prediction.
@@ -193,10 +193,10 @@ def predict(
 def costs(plan: Plan, runs: Sequence[Block], threads: int, observed: Observation | None = None) -> tuple[float, float]:
     """Measure the time to set up a run, and the time of one step of all members with its samples.
 
-    Trials run one block per thread. The number of steps is doubled until a trial takes long enough; a second trial of half
-    the steps separates the cost of a step from what a block costs before its first step.
+    Trials run one block per thread. The number of steps is doubled until a trial takes long enough; a second trial of
+    half the steps separates the cost of a step from the start-up cost of a block.
 
-    observed: What the run keeps; None: samples of all members and no statistics.
+    observed: Data that the run keeps; None: samples of all members and no statistics.
     Returns: (set-up, one step) [s], for all blocks on all threads.
     """
     chosen = runs[:threads]
@@ -232,9 +232,9 @@ def _seconds(plan: Plan, steps: int, chosen: Sequence[Block], threads: int, obse
 
 
 def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
-    """Size of a result in memory, and about that of its file [bytes].
+    """Size of a result in memory [bytes]; the size of its file is about the same.
 
-    fields: of the samples that it holds; None: all of the plan.
+    fields: Names of the sampled fields in the result; None: all fields of the plan.
     """
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
@@ -253,10 +253,10 @@ NO_STATISTICS = Sizes()
 
 @dataclass(frozen=True)
 class Sized:
-    """A run whose size in memory and on disk is computed.
+    """Computes the size of a run in memory and on disk.
 
-    store: Where it is written; None: kept in memory.
-    fields: Names of the fields whose samples are kept; None: all of the plan.
+    store: Store of the run; None: the run is kept in memory.
+    fields: Names of the fields whose samples are kept; None: all fields of the plan.
     statistics: Sizes of its statistics.
     """
 
@@ -267,14 +267,14 @@ class Sized:
 
     @property
     def disk(self) -> int:
-        """Size of the files without a store's metadata [bytes]; for a run in memory about that of its result's file."""
+        """Size of the files without a store's metadata [bytes]; for a run in memory, about the size of its result's file."""
         if self.store is None:
             return result_bytes(self.plan, self.fields) + self.statistics.estimates
         each = self.statistics.file + len(marker(self._sums()))
         return size(self.plan, self.store) + each * len(blocks(self.plan.ensemble.members))
 
     def _sums(self) -> dict[str, list[int]]:
-        """Content of a block's marker: files with sizes and checksums, here the longest possible ones."""
+        """Content of a block's marker: files with sizes and checksums, here with the longest possible numbers."""
         assert self.store is not None
         block, k = blocks(self.plan.ensemble.members)[0], len(self.plan.grid.times)
         keys = {key: column.bytes for column in columns(self.plan, self.store) for key in column.keys(block, k)}
@@ -283,7 +283,7 @@ class Sized:
 
     @property
     def held(self) -> int:
-        """Memory held at the end of the run [bytes]: its result, or what stays in memory beside a store."""
+        """Memory held at the end of the run [bytes]: the result, or the data that stay in memory when a store is written."""
         held = self.statistics.joined + self.statistics.estimates
         if self.store is None:
             return held + result_bytes(self.plan, self.fields)
@@ -309,7 +309,7 @@ class Sized:
 
 
 def memory(runs: Sequence[Sized], threads: int) -> int:
-    """Compute the most memory [bytes] that several runs, one after the other, add to the process."""
+    """Compute the peak memory [bytes] that several runs, one after the other, add to the process."""
     peaks = [
         sum(earlier.held for earlier in runs[: i + 1]) + max(run.working(threads), run.statistics.reading)
         for i, run in enumerate(runs)
@@ -318,9 +318,9 @@ def memory(runs: Sequence[Sized], threads: int) -> int:
 
 
 def size_of_rerun(plan: Plan, observed: Observation, store: Store | None, fields: Sequence[str]) -> list[Sized]:
-    """Find the run of the members that are run again for their samples.
+    """Find the sizes of the second run, in which selected members are run again for their samples.
 
-    store: Where the run is written; None: in memory.
+    store: Store of the run; None: the run is kept in memory.
     """
     if isinstance(observed.keep, str):
         return []
@@ -332,9 +332,10 @@ def size_of_rerun(plan: Plan, observed: Observation, store: Store | None, fields
 
 
 def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, int]:
-    """Predict the time that writing takes, from metadata that are written and removed again, and the speed of the disk.
+    """Predict the time of writing a store, from a trial that writes and removes metadata, and from the disk's speed.
 
-    Returns: Time for metadata, chunks and the wait until the last blocks are safe [s]; size of the metadata [bytes].
+    Returns: Time for metadata, chunks and the wait until the disk has the last blocks [s]; size of the metadata
+        [bytes].
     """
     from lgvi_warp.results.provenance import messages, provenance
 
@@ -358,7 +359,7 @@ def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, i
 
 
 def disk_speed(folder: Path, threads: int) -> float:
-    """Measure how fast all threads together write files that are synced and removed again [bytes/s]."""
+    """Measure the speed at which all threads together write and sync files [bytes/s]; the files are removed again."""
     data = np.random.default_rng(0).bytes(PROBE_BYTES // threads)
 
     def write(i: int) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`prepare`: a run that is called many times with other numbers, at little more than what its kernel takes."""
+"""`prepare`: a run that is called many times with different numbers, at little more than the cost of its kernel."""
 
 from __future__ import annotations
 
@@ -37,29 +37,29 @@ from lgvi_warp.scene.settings import EnsembleSettings
 
 
 class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of the scene)
-    """Raised when members failed and the answer cannot be computed from the remaining ones."""
+    """Raised if members failed and the quantities cannot be computed from the remaining members."""
 
 
 class Prepared:
-    """A run to be called many times, made by `prepare`; the noise of row i is that of member i, unless a call says another.
+    """A run made by `prepare` that can be called many times. By default row i of X has the noise of member i.
 
     Args:
-        fleet: the members of a call without X.
-        table: members whose columns a call with X replaces; or a text: why no call can have an X.
+        fleet: members of a call without X.
+        table: members whose columns a call with X replaces; or a text that says why no call can have an X.
         names: names of the columns of X.
-        of: quantities of interest; empty for whole results.
+        of: quantities of interest; empty if calls return whole results.
         runner: object that prepares and runs the calls.
-        levels: columns of the cube, in the order of the names, where X holds levels; None where it holds values.
-        refuse: whether a failed member is an error; else its quantities are NaN.
-        common_noise: whether noise acts on every member alike.
-        noise: noise that is drawn, and its source.
+        levels: if X holds levels, the columns of the unit cube in the order of the names; None if X holds values.
+        refuse: whether a failed member is an error; otherwise its quantities are NaN.
+        common_noise: whether all members have the same noise.
+        noise: the noise of the calls, and its source.
         made_of: arguments of `prepare`, by position and by name, for a pickle.
 
     Attributes:
         names: names of the columns of X (d,).
-        common_noise: whether noise acts on every member alike.
-        noise: noise that is drawn, and its source.
-        draws: draws of noise and sensors in a call.
+        common_noise: whether all members have the same noise.
+        noise: the noise of the calls, and its source.
+        draws: random draws of forces and sensors in a call.
 
     Methods:
         states: run members from given states.
@@ -85,7 +85,7 @@ class Prepared:
 
     @property
     def draws(self) -> tuple[NoiseDraws, ...]:
-        """Draws of noise and sensors in a call: standard normals, the columns of xi in this order; none without noise."""
+        """Standard normal draws of forces and sensors in a call, in the order of the columns of xi; empty without noise."""
         return self.noise.layout.draws
 
     @shows_progress
@@ -99,23 +99,25 @@ class Prepared:
         indices: Any = None,
         progress: Callable[[float], None] | bool | None = None,
     ) -> Any:
-        """Run members with these numbers, from t = 0; in every call row i has member i's noise, unless told otherwise.
+        """Run members with the numbers of X from t = 0. By default row i has the noise of member i in every call.
 
-        With noise, what follows rows from call to call (a chain, subset simulation, an optimiser) must say which noise each
-        row has: new `indices` or another `seed` for noise that is new, the same ones for noise that is kept.
+        Some algorithms follow rows from call to call (Markov chains, subset simulation, optimisers). With noise, they
+        must select the noise of each row: new `indices` or another `seed` give new noise, the same values give the same
+        noise.
 
-        X: (n, d), columns in the order of `names`; or by name, in any order: a mapping of columns, a data frame, a structured
-            array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3). Without X the members
-            are drawn from the distributions.
-        xi: (n, m), float32 or float64, of a run prepared with draws="given": the standard normals that noise and sensors take
-            in place of drawing them; `draws` lists the columns, and lw.uq.draws_of(run, indices) those that would be drawn.
-        seed: seed of the noise of forces and sensors, and of the members that are drawn, a whole number from 0; default that
+        X: (n, d), columns in the order of `names`; or columns by name, in any order: a mapping, a data frame, a
+            structured array, an xarray Dataset. A name may also stand for a whole vector, "current.velocity": (n, 3).
+            Without X the members are drawn from the distributions.
+        xi: (n, m), float32 or float64, only for a run prepared with draws="given": standard normals that forces and
+            sensors use instead of drawing them. `draws` lists the columns; lw.uq.draws_of(run, indices) returns the
+            default draws.
+        seed: seed of the noise of forces and sensors, and of the drawn members, a whole number from 0; default the seed
             of the ensemble.
-        indices: (n,), beside X: whose noise each row has, that of the member with this index in an ensemble of this seed,
-            whole numbers from 0. Rows with the same index have the same noise. Default None for 0 to n - 1.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
-            in [0, 1].
-        Returns: The quantities, (n,) of a single number and (n, m) of several; a `Result` without `of`.
+        indices: (n,), together with X, whole numbers from 0: each row has the noise of the member with this index in an
+            ensemble of this seed. Rows with the same index have the same noise. Default None for 0 to n - 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the finished fraction of the
+            work, in [0, 1].
+        Returns: The quantities: (n,) for a single number, (n, m) for several numbers; a `Result` if `of` is None.
         """
         if X is not None and members is not None:
             raise refusal("members", members, "is given beside X, whose rows are the members", "leave out one of them")
@@ -138,31 +140,32 @@ class Prepared:
         seed: int | None = None,
         t0: float | None = None,
     ) -> Any:
-        """Run members from given states, or on from the end of another run, for as long as the run was prepared for.
+        """Run members from given states, or continue from the end of another run, for the duration of the prepared run.
 
-        In every call row i has member i's noise, unless indices or the seed differ; what goes on has the noise that follows.
-        From `result.final` on, with the numbers that it has, calls one after the other have the bits of one run.
+        By default row i has the noise of member i in every call. A run that is continued continues its noise too. Calls
+        that continue one another from `result.final`, with its numbers, give together the same bits as one long run.
 
         Args:
             position: (n, 3) [m], inertial axes; or `result.final` of another run, in place of all four arrays.
             attitude: (n, 3, 3), body to inertial axes.
             velocity: (n, 3) [m/s], body axes.
             angular_velocity: (n, 3) [rad/s], body axes.
-            parameters: arrays (n, ...) by name, as in `Ensemble.from_states`; default None, those of the scene, or of
+            parameters: arrays (n, ...) by name, as in `Ensemble.from_states`; default None: the numbers of the scene,
+                or of `result.final`.
+            xi: standard normals, as in a call of the run.
+            indices: (n,), whole numbers from 0 that select the noise of each member, such as its index in another
+                ensemble; members with the same index have the same noise. Default None for 0 to n - 1, or those of
                 `result.final`.
-            xi: as of a call.
-            indices: (n,), whole numbers from 0 that key the noise of each member, such as its index in another ensemble;
-                members with the same index have the same noise. Default None for 0 to n - 1, or those of `result.final`.
-            seed: the seed of the noise, a whole number from 0. Default None for 0, or that of `result.final`.
-            t0: time of the states [s], a whole number of steps: waves, schedules and noise are those from there on. Default
-                None for 0, or that of `result.final`. Times of samples that the run was prepared with count from here.
+            seed: the seed of the noise, a whole number from 0. Default None for 0, or the seed of `result.final`.
+            t0: time of the states [s], a whole number of steps. Waves, schedules and noise start at this time. Default
+                None for 0, or the time of `result.final`. Sample times of the prepared run count from t0.
 
         Returns:
-            As of a call.
+            The quantities, or a `Result`, as from a call of the run.
 
         Raises:
-            SceneError: if an array has a wrong shape or unphysical values, or the seed is no whole number. States that are not
-                finite are taken: their members fail.
+            SceneError: if an array has a wrong shape or unphysical values, or the seed is no whole number. States that
+                are not finite raise no error: their members fail.
             FailedMembers: if members failed, unless failed="nan".
         """
         scene, final = self._fleet.scene, position if isinstance(position, Final) else None
@@ -197,7 +200,7 @@ class Prepared:
         return fleet.with_seed(fleet.seed if seed is None else seed, members)
 
     def _with_noise(self, fleet: Ensemble, seed: int | None, indices: Any) -> Ensemble:
-        """Members whose noise is that of these indices and this seed; None for those that they have. They are new ones."""
+        """Set the seed and the indices of the noise of a new ensemble; None leaves the seed or the indices unchanged."""
         if seed is not None:
             fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
         if indices is None:
@@ -210,7 +213,7 @@ class Prepared:
         return fleet
 
     def _given(self, fleet: Ensemble, xi: Any, keys: dict[str, Any]) -> Ensemble:
-        """Members with the standard normals of a call, or those that their counters draw."""
+        """Attach the standard normals of a call to the members; without them, the members' counters draw the noise."""
         given = self.noise.of_call(xi, fleet.members, keys)
         if given is None:
             return fleet
@@ -225,7 +228,7 @@ class Prepared:
         return fleet.with_given(given)
 
     def _members(self, X: Any) -> Ensemble:
-        """The ensemble of the members with these numbers."""
+        """Make the ensemble whose members have the numbers of X."""
         if isinstance(self._table, str):
             raise SceneError([f"X: {self._table}"])
         numbers = self.numbers(X)
@@ -236,16 +239,16 @@ class Prepared:
         return Ensemble(self._fleet.scene, None, self._fleet.seed, self._fleet.vary, UnitCubePoints(inside))
 
     def numbers(self, X: Any) -> np.ndarray:
-        """Numbers of members as an array.
+        """Convert X to an array of the members' numbers.
 
         Args:
-            X: as of a call.
+            X: numbers of the members, as in a call of the run.
 
         Returns:
             (n, d), columns in the order of the names.
 
         Raises:
-            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
+            SceneError: if a label is missing, unknown or doubled, or an entry is not a real number.
         """
         faults, names = Faults(), self.names
         shape = f"give an array of shape (n, {len(names)}), columns {', '.join(names)}"
@@ -293,9 +296,9 @@ class Prepared:
 
 
 def members_at(scene: Any, final: Final, parameters: Any = None) -> Ensemble:
-    """Members of a scene in the states, and with the parameters, that others ended with.
+    """Make members of a scene that start with the final states and the parameters of another run.
 
-    parameters: (n, ...) by name, in place of those that they had; entries of a number by their own names.
+    parameters: arrays (n, ...) by name that replace the parameters of that run; entries of a vector by their own names.
     """
     n, of_scene, had, faults = final.members, scene.parameters(), dict(final.parameters), Faults()
     for name in (name for name, value in of_scene.items() if name in had and had[name].shape[1:] != np.shape(value)):
@@ -341,37 +344,41 @@ def prepare(
     executor: Any = "threads",
     scheduler: str | None = None,
 ) -> Prepared:
-    """Prepare a run that is called many times with other numbers; noise is frozen by row: row i always has that of member i.
+    """Prepare a run that is called many times with different numbers. Row i always has the noise of member i.
 
-    Checks, choices, compilation and everything that does not depend on `vary` are done once. A call then costs little more
-    than the kernel, and equals `solve` to the bit. The function may be called from several threads, and pickled.
+    Checks, choices, compilation and everything that does not depend on `vary` are done once. A call then costs little
+    more than the kernel, and its results are bit-identical to `solve`. The function can be pickled and called from
+    threads.
 
-    Noise of forces and sensors is frozen by row: row i has the noise of member i of the ensemble's seed in every call. A
-    method that follows rows from call to call, such as a Markov chain, calls run(X, seed=, indices=).
+    Noise of forces and sensors is frozen: in every call row i has the noise that `solve` gives to member i with the
+    ensemble's seed. A method that follows rows from call to call, such as a Markov chain, calls run(X, seed=,
+    indices=).
 
         run = lw.prepare(scene, ["vehicle.mass", "start.position[2]"], of="max(depth)", h=0.01, t1=60.0)
         depths = run(X)                                    # X (n, 2), depths (n,)
 
     Args:
-        fleet: A Scene or an Ensemble; its [ensemble] is used where `vary` is None.
-        vary: Names of what varies, ["vehicle.mass", "start.position[2]"], or a mapping of names to distributions.
-        of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result; "outcome
-            floor"; a metric as in `lw.sweep`, "iae depth", lw.metrics.ITAE("depth"). Default None: calls return results.
-        method: As in `lw.solve`, but if omitted, chosen once, for `fleet`. If h, t1, dtype, width, checks, on_failure,
-            device, threads, executor or scheduler are omitted, they are taken from the scene's [run].
+        fleet: A Scene or an Ensemble. If `vary` is None, its [ensemble] names the numbers that vary.
+        vary: Names of the numbers that vary, ["vehicle.mass", "start.position[2]"], or a mapping of names to
+            distributions.
+        of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result,
+            "outcome floor", or a metric as in `lw.sweep` ("iae depth", lw.metrics.ITAE("depth")). Default None: calls
+            return results.
+        method: As in `lw.solve`; default: chosen once, for `fleet`. If h, t1, dtype, width, checks, on_failure, device,
+            threads, executor or scheduler are omitted, they are taken from the scene's [run].
         h: Step [s].
         t1: End of the run [s].
-        save: Samples to keep, as in `lw.solve`; default with `of`: those that the quantities need.
+        save: Samples to keep, as in `lw.solve`. Default with `of`: the samples that the quantities need.
         dtype: "float64", "float32" or "float32_compensated".
         statistics: Statistics gathered over the members of each call, in result.statistics; default none.
-        levels: Whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values;
-            joint distributions need it. Default False.
-        failed: "refuse" (default) for an error where members fail, "nan" for NaN in their place; for `of` only.
-        common_noise: Whether forces with noise act on every member alike. Default False.
-        draws: "drawn" (default): counters draw the noise of forces and sensors; "given": each call gives the standard normals,
-            run(X, xi), as `draws` of the run lists them.
-        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less than a
-            million steps of vehicles).
+        levels: Whether X holds levels in (0, 1), which the distributions convert to values, instead of values. Joint
+            distributions need levels. Default False.
+        failed: "refuse" (default): an error if members fail; "nan": their quantities are NaN. It acts with `of` only.
+        common_noise: Whether all members have the same noise of forces. Default False.
+        draws: "drawn" (default): counters draw the noise of forces and sensors. "given": each call passes standard
+            normals, run(X, xi), with the columns that `draws` of the run lists.
+        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less
+            than a million steps of vehicles).
         width: Vehicles per packet; default from the CPU.
         checks: "safe", "all" or "none".
         on_failure: "freeze", "raise" or "substep".
@@ -380,10 +387,10 @@ def prepare(
         scheduler: Address of Dask's scheduler.
 
     Returns:
-        The function; its `names` are the columns of X.
+        The function, a `Prepared`; its `names` are the columns of X.
 
     Raises:
-        SceneError: For faulty arguments, all in one message.
+        SceneError: If arguments are at fault; the message names every fault.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -450,7 +457,7 @@ def _prepared_again(arguments: tuple[Any, ...], settings: dict[str, Any]) -> Pre
 def _columns(
     full: Ensemble, listed: tuple[str, ...], levels: bool
 ) -> tuple[tuple[str, ...], Ensemble | str, list[int] | None]:
-    """(names of the columns of X; an ensemble with these columns, or why X has none; columns of the cube for levels)."""
+    """Return (names of the columns of X; an ensemble with them, or a text why there is no X; columns of the unit cube)."""
     scene, names, cube_columns = full.scene, listed, None
     of_sampling = [*full.sampling.own_values(), *full.sampling.distributions()]
     if of_sampling:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`resume`: continue a run in a store that was stopped."""
+"""`resume`: complete an interrupted run in a store."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ def resume(
     keepers: Sequence[Keeper] = (),
     statistics: Sequence[Any] | None = None,
 ) -> Result:
-    """Continue a run in a store: it ends with the same bytes as a run that was never stopped.
+    """Complete an interrupted run in a store. The store then has the same bytes as after a run without interruption.
 
-    Every finished block is read and compared with its checksums; blocks that are torn, missing or changed run again.
+    Every finished block is read and compared with its checksums. Missing, incomplete or changed blocks run again.
 
     Args:
         path: A store, or a folder with one store.
-        fleet: The run's Ensemble, or Scene. Needed if a scene file cannot describe it (distributions of your own).
+        fleet: The run's Ensemble, or Scene. Needed if a scene file cannot describe it (user-defined distributions).
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         threads: Number of threads; default as in `lw.solve`.
         scheduler: Address of Dask's scheduler.
-        progress: As in solve.
-        force: Whether to continue on another machine or with other versions, where the bits may differ.
+        progress: As in `lw.solve`.
+        force: Whether to resume on another machine or with other versions, which may change the bits.
         keepers: The keepers that were passed to the run.
-        statistics: The statistics that were passed to the run. Needed if one is of a function, which a store does not hold.
+        statistics: The statistics that were passed to the run. Needed if one uses a function, which a store cannot save.
 
     Returns:
-        The result of the complete run, which reads from the store.
+        The result of the complete run, which reads its samples from the store.
 
     Raises:
-        SceneError: If there is no run, or it is not the same run.
+        SceneError: If the path holds no run, or the arguments describe another run.
         OSError: If the disk cannot be written.
         MembersFailed: If members failed and the run's on_failure is "raise".
 

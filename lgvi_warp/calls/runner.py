@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many runs of one scene, whose settings, plan and kernel are settled once, and quantities of their members."""
+"""Many runs of one scene that share settings, plan and kernel, and the quantities of their members."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ PATHS_AT_ONCE = 16_384
 
 @dataclass
 class _Kind:
-    """Plans of ensembles in which the same names vary, by what their survey found."""
+    """Plans of ensembles in which the same names vary, keyed by the findings of their survey."""
 
     shared: SharedResultsCache
     plans: dict[Any, Plan] = field(default_factory=dict)
@@ -63,10 +63,10 @@ class Outputs:
     provenance: dict[str, Any]
 
     def text(self, remedy: str) -> str:
-        """Describe how many members failed, and of what.
+        """Say how many members failed, and with which status.
 
         Args:
-            remedy: what the user can do, which ends the text.
+            remedy: last part of the text: what the user can do.
 
         Returns:
             One line of text.
@@ -77,7 +77,7 @@ class Outputs:
 
 
 class Runner:
-    """Runs of many ensembles, with the settings of `solve`; what they share is settled once."""
+    """Runs many ensembles with the same settings of `solve`; their common work is done once."""
 
     def __init__(self, fleet: Ensemble, statistics: Sequence[Any], **settings: Any):
         faults = Faults()
@@ -91,7 +91,7 @@ class Runner:
         self._last: tuple[Survey, Plan] | None = None
 
     def plan(self, fleet: Ensemble) -> Plan:
-        """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
+        """Plan a run of some members; the kernel is chosen for these members, as in `solve`."""
         if fleet.final is not None or fleet.start_time:
             return self.plan(fleet.from_zero()).from_time(fleet)
         names = frozenset(fleet.varied_names)
@@ -128,9 +128,9 @@ class Runner:
     ) -> Result:
         """Run some members.
 
-        final: whether the result holds what another run needs to go on.
-        Returns: Their result, whose provenance names the members' number but not their values, and whose messages leave out
-            what is odd about their values.
+        final: whether the result has `final`, from which another run can continue.
+        Returns: Their result. Its provenance has the number of members but not their values, and its messages leave out
+            warnings about these values.
         """
         few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
 
@@ -144,10 +144,10 @@ class Runner:
     def samples(
         self, fleet: Ensemble, progress: Callable[[float], None] | None = None
     ) -> tuple[SimpleNamespace, np.ndarray | None] | None:
-        """Run few members for their samples alone, at a part of the cost of a Result.
+        """Run few members for their samples alone, at a lower cost than a Result.
 
-        Returns: What plain quantities read of a Result, and the status (n,), None where all reached the end. None where it
-            takes a Result.
+        Returns: (the attributes of a Result that plain quantities read, status (n,) or None if all members reached the
+            end); None in place of the pair if the run needs a Result.
         """
         request, plan = self.request, self.plan(fleet)
         if progress is not None or plan.on_failure == "raise" or request.observed != ALL_SAMPLES:
@@ -170,7 +170,7 @@ class Runner:
         progress: Callable[[float], None] | None = None,
         warned: bool = True,
     ) -> Outputs:
-        """Run members, so many at a time, and keep their quantities alone."""
+        """Run the members in groups of `at_once`, and keep only their quantities."""
         groups, ends, content, n = [], [], dict[str, Any](), fleet.members
         for first in range(0, n, at_once):
             stop = min(first + at_once, n)
@@ -185,9 +185,9 @@ class Runner:
 def outputs(
     of: Sequence[OfResult], groups: Sequence[list[np.ndarray]], ends: Sequence[np.ndarray], content: dict[str, Any]
 ) -> Outputs:
-    """Join the quantities of groups of members, and count how these ended.
+    """Join the quantities of groups of members, and count the members by status.
 
-    groups: for each, as in `values_of`. ends: the status of each group's members.
+    groups: quantities of each group, as from `values_of`. ends: the status of each group's members.
     """
     labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
     values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
@@ -199,24 +199,24 @@ def outputs(
 
 
 def _not_numbers(of: Sequence[OfResult], numbers: Sequence[np.ndarray]) -> np.ndarray:
-    """Mask of members (n,) with a quantity that is no number, or infinite where it may not be."""
+    """Mask of members (n,) with a quantity that is NaN, or infinite where infinity is not allowed."""
     odd = [np.isnan(x) if each.may_be_infinite else ~np.isfinite(x) for each, x in zip(of, numbers, strict=True)]
     return np.asarray(np.concatenate(odd, axis=1).any(axis=1))
 
 
 def values_of(result: Any, fleet: Ensemble, of: Sequence[OfResult]) -> list[np.ndarray]:
-    """The numbers (n, m) of each quantity."""
+    """Compute the numbers (n, m) of each quantity."""
     members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in of) else None
     return [each.values(result, members) for each in of]
 
 
 def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
-    """Tell of a part of the work as a part of the whole."""
+    """Progress function of a part of the work, which covers the fractions from `begin` to `end` of the whole."""
     return lambda fraction: progress(begin + (end - begin) * fraction)
 
 
 def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -> SaveAt | None:
-    """The samples that quantities need, where the user does not say which to keep."""
+    """Choose the samples to save: those of `save`, or else those that the quantities need."""
     fields = ordered(name for each in of for name in each.fields)
     if save is not None or not of:
         if not isinstance(save, SaveAt):
@@ -239,7 +239,7 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
 
 
 def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
-    """The statistics that quantities need, beside samples."""
+    """List the statistics that quantities need in addition to samples."""
     gathered = dict[str, Statistic]()
     for each in of:
         gathered |= each.gathered(scene.events)

@@ -30,12 +30,12 @@ FEW, MORE = 2, 4
 class Sizes:
     """Sizes of a run's statistics [bytes].
 
-    file: A block's parts in a file.
-    part: A block's parts in memory.
-    joined: All parts that a run has joined, at their largest.
-    estimates: The estimates that are read from these.
-    taking: Further memory of a block while it gathers.
-    reading: Further memory while estimates are read.
+    file: Parts of one block in a file.
+    part: Parts of one block in memory.
+    joined: Parts of all blocks after they are joined, at their largest.
+    estimates: Estimates that are computed from the joined parts.
+    taking: Additional memory of a block while it gathers statistics.
+    reading: Additional memory while estimates are computed.
     """
 
     file: int = 0
@@ -68,7 +68,7 @@ def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
 
 
 def with_ends(of_statistics: Sizes, plan: Plan, stored: bool, kept: bool) -> Sizes:
-    """The same sizes with those of what members end with, where a run keeps it."""
+    """Add the sizes of the members' final states, if the run keeps them."""
     if not kept:
         return of_statistics
     each, block = _file_of_ends(plan), blocks(plan.ensemble.members)[0]
@@ -78,7 +78,7 @@ def with_ends(of_statistics: Sizes, plan: Plan, stored: bool, kept: bool) -> Siz
 
 
 def _file_of_ends(plan: Plan) -> int:
-    """The size of a block's part of the end of a run in a file [bytes]."""
+    """Size of one block's final states in a file [bytes]."""
     from lgvi_warp.engine.keepers.final import Finals
     from lgvi_warp.engine.packets import Packets
 
@@ -90,7 +90,7 @@ def _file_of_ends(plan: Plan) -> int:
 
 
 def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
-    """The sizes for this many sample times, measured on members that stay at their starts."""
+    """Measure the sizes for this many sample times, with members that do not move."""
     from lgvi_warp.engine.packets import Packets
 
     block, *others = blocks(plan.ensemble.members)
@@ -120,7 +120,7 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
 
 
 def _fullest(statistic: Statistic, part: Part, count: int) -> list[Part]:
-    """A tree of the parts of `count` blocks at its fullest: one part of each level, the largest first."""
+    """The largest number of parts in the joining tree of `count` blocks: one part of each level, the largest first."""
     tree = [part]
     for level in range(1, count.bit_length()):
         tree.append(statistic.join(tree[-1], tree[-1], (level, 0)))
@@ -132,7 +132,7 @@ def _bytes(arrays: Any) -> int:
 
 
 def _peak(action: Callable[[], Any]) -> tuple[Any, int]:
-    """(result of an action, memory that it took at most [bytes])."""
+    """Run an action and return (its result, its peak memory [bytes])."""
     mine = not tracemalloc.is_tracing()
     if mine:
         tracemalloc.start()

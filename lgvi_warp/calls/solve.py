@@ -52,60 +52,63 @@ def solve(
     start: Final | None = None,
     tangents: str | Sequence[str] | None = None,
 ) -> Result:
-    """Advance every member of the fleet from t = 0, or from `start`, to t1 and return the samples and statistics asked for.
+    """Advance every member of the fleet from t = 0, or from `start`, to t1 and return the requested samples and statistics.
 
-    Omitted arguments are taken from the scene's [run] section; the defaults below apply if that has no value. Only
-    `progress` prints. The same inputs give the same bits for any number of threads, on one type of machine.
+    Omitted arguments are taken from the scene's [run] section; the defaults below apply if it has no value. Nothing is
+    printed unless `progress` is True. On one type of machine the same inputs give the same bits for any number of
+    threads.
 
     Args:
         fleet: An Ensemble, or a Scene, which stands for its own ensemble (one vehicle if it has none).
         method: A name or a Method. Default: chosen by the scene's forces, "psi_s" without damping.
         h: Step [s].
         t1: End of the run [s], counted from t = 0.
-        save: Fields and times to save. Default: the interval `save_every` of the scene's [run], else start and end only.
-        dtype: "float64" (default), "float32", or "float32_compensated", which keeps each number of the state as a sum of two
-            (for many short steps, far from the origin).
-        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less than a
-            million steps of vehicles).
+        save: Fields and times to save. Default: the interval `save_every` of the scene's [run], else start and end
+            only.
+        dtype: "float64" (default), "float32", or "float32_compensated", which stores each number of the state as the
+            sum of two float32 (for many short steps, or positions far from the origin).
+        threads: Number of threads; default all cores, one for a short run of few members (fewer than 2,000, and less
+            than a million steps of vehicles).
         width: Vehicles per packet; default from the CPU.
-        checks: "safe" (default) gives each member a status, freezes it when it fails, and warns if its parameters and its
-            start do not suit the step; "all" also warns of problems during the run; "none" compiles no checks.
-        on_failure: "freeze" (default) keeps a member that fails at its last good state. "raise" raises MembersFailed after
-            the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone: order and
-            the symmetry of each step are kept, symplecticity is not.
+        checks: "safe" (default) gives each member a status, freezes failed members, and warns if parameters or start do
+            not suit the step. "all" also warns of problems during the run. "none" compiles no checks.
+        on_failure: "freeze" (default) keeps a failed member at its last good state. "raise" raises MembersFailed after
+            the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone. The
+            order and the symmetry of each step are kept, symplecticity is not.
         device: "cpu" (default): runs are on CPU cores. Any other device, such as "cuda", is refused.
-        progress: True shows a bar on a terminal and in a notebook, lines elsewhere, on stderr; a function is called with the
-            fraction of the work that is done, in [0, 1], from the threads that do it. Default: nothing is shown.
+        progress: True shows a bar on a terminal and in a notebook, and lines elsewhere, on stderr. A function is called
+            with the finished fraction of the work, in [0, 1], from the working threads. Default: nothing is shown.
         statistics: Statistics gathered over the members at every sample time during the run, such as
-            lw.statistics.Mean("position"); they are in result.statistics. An empty sequence gathers none, whatever the scene
-            says.
-        keep: Members whose samples are kept. "all" (default). "none": memory does not grow with members or steps.
-            "failed" (without those that an event stopped) or indices of members: these are run again after the run, with the
-            same bits, and are in result.kept.
-        until: lw.Until(...) ends the run before the last member, once the interval of a statistic is narrow enough. False
-            runs all members, whatever the scene says.
-        store: A folder "runs/x/run.zarr", or a Store with more settings. Samples are written there block by block and are
-            not held in memory; lw.resume continues such a run after it was stopped.
+            lw.statistics.Mean("position"). The estimates are in result.statistics. An empty sequence gathers no
+            statistics, even if the scene names some.
+        keep: Members whose samples are kept. "all" (default) keeps every member. With "none", memory does not grow with
+            members or steps. "failed" or indices of members: these members run again after the run, with the same bits,
+            and their samples are in result.kept. Members that an event stopped are not failed.
+        until: lw.Until(...) ends the run before the last member, once the interval of a statistic is narrow enough.
+            False runs all members, even if the scene has such a rule.
+        store: A folder "runs/x/run.zarr", or a Store with more settings. Samples are written there block by block and
+            are not held in memory. lw.resume completes the run if it is interrupted.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
-        blocks: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may name more
-            blocks than exist. The result has the members of these blocks.
-        on_block: Function that is called with a copy of each block's Result as soon as the block is finished, in order and
-            in the calling thread: to monitor a run. Default: none.
-        start: `result.final` of another run of these members, to continue it: with the same settings and numbers the two
-            equal one run, to the bit. Samples, statistics and messages are of this run alone. Default: from t = 0.
-        tangents: Names of numbers, such as "vehicle.mass" or "start.velocity[0]", or one name: the derivatives of all
-            samples with respect to these are in result.jacobian. The kernel integrates them with the motion, two per run;
-            each costs one to two runs without them. Default: none.
+        blocks: With a store, the blocks to run, such as range(0, 100), for a run in parts. The range may go beyond the
+            last block. The result has the members of these blocks.
+        on_block: Function to monitor a run. It is called with a copy of each block's Result as soon as the block is
+            finished, in order and in the calling thread. Default: none.
+        start: `result.final` of another run of these members, to continue it. With the same settings and numbers, the
+            two runs give the same bits as one. Samples, statistics and messages are of this run alone. Default: from t
+            = 0.
+        tangents: Name or names of numbers, such as "vehicle.mass" or "start.velocity[0]". The derivatives of all
+            samples with respect to these numbers are in result.jacobian. The kernel integrates the derivatives with the
+            motion, two per run; each derivative costs one to two runs without derivatives. Default: none.
 
     Returns:
-        A Result, of every member unless `until` or `blocks` says otherwise.
+        A Result, with every member unless `until` or `blocks` selects fewer.
 
     Raises:
         SceneError: If arguments are at fault; the message names every fault.
         MembersFailed: If members failed and on_failure is "raise".
-        Interrupted: If Ctrl-C interrupts a run in memory. It is a KeyboardInterrupt whose `result` has the members that
-            were finished.
+        Interrupted: If Ctrl-C interrupts a run in memory. It is a KeyboardInterrupt whose `result` has the finished
+            members.
 
     Examples:
         >>> import lgvi_warp as lw

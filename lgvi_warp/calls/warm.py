@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kernels compiled ahead of a run, several at a time, each in a process of its own."""
+"""Compilation of kernels before a run, several at a time, each in its own process."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def warm(plans: Sequence[Plan], workers: int) -> Iterator[tuple[Plan, Phases]]:
 
 
 def _phases(data: bytes) -> Phases:
-    """Compile the kernels of a pickled plan in this process: its own, and that which packs the states of many members."""
+    """Compile the kernels of a pickled plan in this process: its step kernel, and the kernel that packs members' states."""
     plan: Plan = pickle.loads(data)
     plan.compile()
     kernel_for(plan.spec, MANY)

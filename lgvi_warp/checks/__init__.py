@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of a law's device code against finite differences, linear algebra and the host code of its term."""
+"""Checks of a law's device code against finite differences, linear algebra and the host code of its term."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A term evaluated alone, its numbers packed as for a run: the means of the checks; and random views, those of check_law."""
+"""Evaluation of a single term with numbers packed as for a run, and random views, for `check_law`."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ ORIGIN = np.array([0.1, -0.2, 0.15])
 class Views:
     """States and times at which a law is evaluated.
 
-    attitude: (k, 3, 3), body to inertial; position: (k, 3) [m], inertial; velocity: (k, 3) [m/s] and rate: (k, 3) [rad/s],
-    body axes; time: (k,) [s], the same for all lanes of a packet.
+    attitude: (k, 3, 3), body to inertial; position: (k, 3) [m], inertial; velocity: (k, 3) [m/s] and rate: (k, 3)
+    [rad/s], body axes; time: (k,) [s], the same for all lanes of a packet.
     """
 
     attitude: np.ndarray
@@ -54,11 +54,11 @@ class Views:
         return replace(self, position=self.position + by * np.eye(3)[axis])
 
     def turned(self, axis: int, by: float) -> Views:
-        """The views with every attitude turned by an angle [rad] about one of its body axes."""
+        """The views with every attitude rotated by an angle [rad] about one of its body axes."""
         return replace(self, attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
 
     def elsewhere(self) -> Views:
-        """The same states, expressed in the body axes TURN about the origin ORIGIN."""
+        """The same states, expressed in body axes that are rotated by TURN and have their origin at ORIGIN."""
         return Views(
             self.attitude @ TURN,
             self.position + notation.rotate_out(self.attitude, ORIGIN[None]),
@@ -68,7 +68,7 @@ class Views:
         )
 
     def description(self, i: int) -> str:
-        """One view in words, for a message."""
+        """Describe one view in words, for a message."""
         turn = notation.quaternion_from_matrix(self.attitude[i])
         where = f"at position {short(self.position[i])} m, quaternion {short(turn)}, t = {self.time[i]:.3g} s"
         return f"{where}, velocity {sizes(self.velocity[i])} m/s, rate {sizes(self.rate[i])} rad/s"
@@ -79,7 +79,7 @@ MOST_SAMPLES = 1_000_000
 
 
 def of_scene(scene: Any) -> Scene:
-    """The scene in which a law is checked: what the user gave, or a simple one for None."""
+    """The scene in which a law is checked: the user's scene, or a simple one for None."""
     if scene is None:
         return simple_scene()
     if not isinstance(scene, Scene):
@@ -90,7 +90,7 @@ def of_scene(scene: Any) -> Scene:
 def simple_scene() -> Scene:
     """A scene of one vehicle without symmetry, for laws that are checked without a scene.
 
-    Returns: A vehicle of 20 kg, slightly heavy, whose inertias all differ and whose centre of buoyancy is off all axes.
+    Returns: A vehicle of 20 kg, slightly heavy, with different inertias in all axes and a centre of buoyancy off all axes.
     """
     body = Vehicle(
         20.0,
@@ -109,10 +109,10 @@ REMEDY = (
 
 
 class TermBench:
-    """A term, or a part of a controller, with its numbers and the kernels that evaluate it alone, one for each width.
+    """A term, or a part of a controller, with its numbers and the kernels that evaluate it alone, one kernel per width.
 
-    roles: those that its device code has; count: of views, or of members; width: the first, which is used.
-    parameters: of the scene, with the term's own; own: those of the term, by name.
+    roles: roles in its device code; count: number of views, or of members; width: width of the first kernel.
+    parameters: parameters of the scene, including the term's own; own: parameters of the term, by name.
     """
 
     def __init__(self, term: Term, module: Any, scene: Scene, count: int, seed: int, roles: Iterable[str],
@@ -128,7 +128,7 @@ class TermBench:
 
 
 class Device:
-    """The arrays of a kernel: a term's numbers, table and memory packed as for a run, and what the kernel writes."""
+    """Arrays of a kernel: a term's numbers, table and memory packed as for a run, and the kernel's output."""
 
     def __init__(self, bench: TermBench, packed: Any, width: int, fields: int, scratch: int = 0, bus: int = 0):
         self.kernel, self.packets, self.fields = bench.kernels[width], bench.count // width, fields
@@ -138,7 +138,7 @@ class Device:
         self.out = wp.zeros((self.packets, fields), dtype=self.kernel.Lane, device="cpu")
 
     def launch(self, *arguments: Any, repeats: int = 1) -> None:
-        """Launch the kernel for all packets, some times over."""
+        """Launch the kernel for all packets, `repeats` times."""
         inputs = [self.laws.structs[0].array, self.laws.table.array, *arguments, self.laws.memory.array, self.out]
         with build_lock:
             wp.launch(self.kernel.kernel, self.packets * repeats, inputs, device="cpu")
@@ -150,7 +150,7 @@ class Device:
 
 
 class Bench(TermBench):
-    """A term that is evaluated at random views, and at corners: at rest and along single axes.
+    """A term that is evaluated at random views, and at special views: at rest and along single axes.
 
     packets: the term's numbers on the device; set once packed() has been checked.
     """
@@ -167,16 +167,16 @@ class Bench(TermBench):
         self.corners = tuple(corner_views(packets, width, around))
 
     def context(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> PackingContext:
-        """The context that packed() receives; parameters: of the scene by name, each (1, ...) or (n, ...)."""
+        """Make the context that packed() receives; parameters: of the scene by name, each (1, ...) or (n, ...)."""
         return packing_context(parameters, self.count, self.seed, KICK, elsewhere)
 
     def at(self, views: Views, h: float = KICK, step: int = STEP) -> dict[str, np.ndarray]:
-        """Evaluate every role of the law: by role, (count, numbers of the role); h [s], step: of the kick."""
+        """Evaluate every role of the law: arrays (count, numbers) by role; h [s], step: length and number of the step."""
         return self.packets.evaluate(views, h, step)
 
 
 class Bank(Device):
-    """A law's numbers in some context, after the law has remembered at some views."""
+    """A law's numbers in some context, after the law has stored its memory at some views."""
 
     def __init__(self, bench: Bench, context: PackingContext, views: Views):
         packed = bench.term.packed(Ensemble.own(bench.term, context.parameters), context)
@@ -190,13 +190,13 @@ class Bank(Device):
         return self.laws.memory.array
 
     def evaluate(self, views: Views, h: float = KICK, step: int = STEP) -> dict[str, np.ndarray]:
-        """Evaluate every role of the law, and its energy where it has one: by role, (count, numbers of the role)."""
+        """Evaluate every role of the law, and its energy if it has one: arrays (count, numbers) by role."""
         out = self.run_device(views, -1, h, step)
         roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
         return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
 
     def run_device(self, views: Views, second: int, h: float = KICK, step: int = STEP) -> np.ndarray:
-        """Evaluate the law once at each view: (k, OUT_FIELDS); h: length of the kick, or of the time before the views [s]."""
+        """Evaluate the law once at each view: (k, OUT_FIELDS); h: length of the kick, or of the time before views [s]."""
         flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
         rows = np.concatenate(flat, axis=1)
         lanes = Lanes(self.packets, rows.shape[1], self.kernel.Lane)
@@ -209,7 +209,7 @@ class Bank(Device):
 def packing_context(
     parameters: Mapping[str, np.ndarray], count: int, seed: int, h: float, elsewhere: bool = False
 ) -> PackingContext:
-    """The context that packed() receives.
+    """Make the context that packed() receives.
 
     parameters: parameters of the scene by name, each (1, ...) or (n, ...).
     h: step [s].
@@ -224,9 +224,9 @@ def packing_context(
 
 
 def built(term: Term, module: Any, width: int, make: Callable[..., Any], remedy: str) -> Any:
-    """The compiled kernel that evaluates a law, or a part of a controller.
+    """Compile the kernel that evaluates a law, or a part of a controller.
 
-    make: (module, numbers, width, real) -> kernel and types.
+    make: function of (module, numbers, width, real) that returns kernel and types.
     """
     try:
         hash(module)
@@ -258,7 +258,7 @@ def random_views(packets: int, width: int, seed: int, around: np.ndarray) -> Vie
 
 
 def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views]:
-    """Views at which a careless law divides by zero.
+    """Views at which careless device code divides by zero.
 
     Velocity and rate are zero, along one axis, or so small that their squares vanish. The attitude is the identity, the
     position is `around` or the origin, and the time is 0.
@@ -278,10 +278,10 @@ def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views
 
 
 def short(values: np.ndarray) -> str:
-    """Numbers for a message, rounded to three decimals."""
+    """Format numbers for a message, rounded to three decimals."""
     return str(np.round(np.asarray(values), 3).tolist())
 
 
 def sizes(values: np.ndarray) -> str:
-    """Numbers (n,) for a message with three significant digits, for those that may be very small."""
+    """Format numbers (n,), some of them very small, for a message with three significant digits."""
     return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"

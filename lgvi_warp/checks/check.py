@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a law is right: its device code at random views, against finite differences and linear algebra."""
+"""`check_law`: check of a law's device code at random views, against finite differences and linear algebra."""
 
 from __future__ import annotations
 
@@ -59,28 +59,29 @@ def check_law(
 ) -> LawReport:
     """Check a term's device code against its host code, at random states.
 
-    Each new law costs the compilation of one small kernel. The checks, each made where the law has the role:
+    Each new law costs the compilation of one small kernel. These properties are checked for the roles that the law has:
 
-    * All roles: numbers are finite, also at rest and along single axes. Lanes do not mix, and the place of a member among
-      others does not matter. Without noise and memory, forces do not depend on the length of the step. Numbers that vary
-      by member give the same as shared ones. `packed` fills the fields that `params` names, and the law is the same in
-      all body axes and about all origins that a method may choose.
+    * All roles: numbers are finite, also at rest and along single axes. Lanes are independent, and the position of a
+      member in a packet has no effect. Without noise and memory, forces do not depend on the length of the step.
+      Numbers that vary by member have the same effect as shared numbers. `packed` fills the fields that `params` names.
+      The law is the same in all body axes and about all origins that a method may choose.
     * `law`: independent of velocities, and of the time unless `timed`. With POTENTIAL, force and torque are the
       derivatives of `potential`, and `energy` adds the same potential.
-    * `damping`: nu . D nu >= 0. With `dissipative = False` the least power is reported and is no fault.
+    * `damping`: nu . D nu >= 0. With `dissipative = False` the smallest power is reported and is not a fault.
     * `push`: the force and torque of `damping`, or of `load`.
-    * `load`: as `damping`, in water made for the check that varies everywhere.
-    * `follow`: what it leaves in the memory depends on the time alone, and is the same by two parts of the time as at once.
-    * `carried_inertia`: symmetric; it and `carried_momentum` see no velocities.
+    * `load`: as `damping`, in artificial water that varies everywhere.
+    * `follow`: the stored memory depends on the time alone; two parts of an interval give the same as the whole
+      interval.
+    * `carried_inertia`: symmetric; it and `carried_momentum` do not depend on velocities.
     * `distance`: the same in all body axes.
     * `power`: the same in all body axes and about all origins.
-    * `flow`: rate and gradient are the derivatives of the velocity, `water` gives the same velocity, and FLOW fits it.
+    * `flow`: rate and gradient are derivatives of the velocity, `water` gives the same velocity, and FLOW describes it.
 
     Args:
         term: the term, built-in or the user's own.
         scene: scene with the vehicle and the environment to use; None (default) for a simple vehicle.
-        samples: number of views (default 64): any attitude, positions some metres around the scene's start, velocities
-            [m/s] and angular velocities [rad/s] of order 1, times from 0 to 10 s.
+        samples: number of random states, called views (default 64): any attitude, positions some metres around the
+            scene's start, velocities [m/s] and angular velocities [rad/s] of order 1, times from 0 to 10 s.
         seed: seed of the random views (default 0).
         step: step of the finite differences [m, rad, s] (default 1e-5).
 
@@ -88,7 +89,8 @@ def check_law(
         A report of all checks; `ok` says whether all passed.
 
     Raises:
-        SceneError: if `term` is no term, or its device code lacks something, has a wrong signature or does not compile.
+        SceneError: if `term` is not a term, or its device code is incomplete, has a wrong signature or does not
+            compile.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -112,7 +114,7 @@ def check_law(
 
 
 def _numbers(bench: Bench, step: float) -> Iterator[Check]:
-    """Whether packed() fills what params() names; then packs, and lets the law remember once."""
+    """Check that packed() fills the fields of params(); then pack, and let the law store its memory once."""
     term, context = bench.term, bench.context(bench.parameters)
     packed, checks = packed_numbers(term, bench.Params, lambda: term.packed(bench.own, context))
     yield from checks
@@ -131,7 +133,7 @@ def _numbers(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _finite(bench: Bench, step: float) -> Iterator[Check]:
-    """Whether numbers are finite at all views, at rest and along single axes; notes a law that is zero everywhere."""
+    """Check that numbers are finite at all views, at rest and along single axes; report a law that is zero everywhere."""
     here = bench.at(bench.views)
     at_random = _all_finite("finite", here, bench.views)
     yield first_wrong(_all_finite("finite at rest, along axes", bench.at(views), views) for views in bench.corners)
@@ -145,7 +147,7 @@ def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check
 
 
 def _of_every_law(bench: Bench, step: float) -> Iterator[Check]:
-    """Checks that hold for every law: blind to what it must not look at, lanes apart, varied as shared."""
+    """Checks of every law: independent of other inputs, lanes independent, varied numbers act as shared ones."""
     views, kind, here = bench.views, type(bench.term).__name__, bench.at(bench.views)
     faster = bench.at(replace(views, velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
     later = bench.at(replace(views, time=views.time + 3.7))
@@ -162,7 +164,7 @@ def _of_every_law(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _steps(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
-    """A force is the same whatever step the method takes; what a law remembers may follow from its steps."""
+    """Check that a force does not depend on the method's step; a law with memory may depend on it."""
     if bench.term.memory:
         return
     longer = bench.at(bench.views, h=OTHER_KICK)
@@ -176,7 +178,7 @@ def _steps(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 
 def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
-    """The same law whatever lane it is in, however its numbers are given, in whatever axes."""
+    """Check that the law is the same in every lane, for shared and varied numbers, and in all axes."""
     views = bench.views
     # Last first: every member is in another lane, and in another packet.
     back = np.arange(bench.count)[::-1]
@@ -197,7 +199,7 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 
 def _event_axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
-    """The same distance from a frame with other axes; an event sees the body's origin in all of them."""
+    """Check that the distance is the same in a frame with other axes; an event uses the body's origin in all of them."""
     if "distance" not in here:
         return
     turned_views = replace(bench.views, attitude=bench.views.attitude @ TURN)
@@ -209,12 +211,12 @@ def _event_axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 
 def _tried(bench: Bench, context: PackingContext, views: Views, where: str) -> dict[str, np.ndarray] | str:
-    """The law's numbers by role in another context, or a message where packed() fails in it."""
+    """Evaluate the law in another context: its numbers by role, or a message if packed() fails in it."""
     return attempt(lambda: Bank(bench, context, views).evaluate(views), where)
 
 
 def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
-    """The same wrench from a frame with other axes and origin."""
+    """Check that the wrench is the same in a frame with other axes and origin."""
     views, turned_views = bench.views, bench.views.elsewhere()
     turned = _tried(bench, bench.context(bench.parameters, True), turned_views, "in other axes of the body")
     if "power" in here:
@@ -238,7 +240,7 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 
 def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
-    """(force; torque) (k, 6) of a law, or of a matrix or a load at the views' velocities."""
+    """(force; torque) (k, 6) of a law; for a matrix or a load, at the views' velocities."""
     if role not in ("damping", "load", "carried_inertia"):
         return value
     twist = np.concatenate([views.velocity, views.rate], axis=1)
@@ -247,14 +249,14 @@ def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
 
 
 class Slope(NamedTuple):
-    """A central difference, `value` (k, ...), and a bound of its error: of the step, by twice the step, and of rounding."""
+    """A central difference `value` (k, ...), and a bound of its error: step error, from twice the step, and rounding."""
 
     value: np.ndarray
     allowed: np.ndarray
 
 
 def _slope(values: Any, step: float, reach: np.ndarray) -> Slope:
-    """Slope of values(by), from by = +-step and +-2 step; reach (k,): size of what varies, which sets the rounding."""
+    """Slope of values(by), from by = +-step and +-2 step; reach (k,): magnitude of the varied quantity, for rounding."""
     near, far = [(np.asarray(values(by)), np.asarray(values(-by))) for by in (step, 2.0 * step)]
     first, second = (near[0] - near[1]) / (2.0 * step), (far[0] - far[1]) / (4.0 * step)
     size = np.maximum.reduce([np.abs(value) for value in (*near, *far)])
@@ -264,7 +266,7 @@ def _slope(values: Any, step: float, reach: np.ndarray) -> Slope:
 
 
 def _potential(bench: Bench, step: float) -> Iterator[Check]:
-    """force = -R^T dU/db, torque = -dU/dR, left-trivialised."""
+    """Check force = -R^T dU/db and torque = -dU/dR (left-trivialised)."""
     if "law" not in bench.roles or not getattr(bench.module, "POTENTIAL", False):
         return
     views, term = bench.views, bench.term
@@ -296,7 +298,7 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _damping(bench: Bench, step: float) -> Iterator[Check]:
-    """nu.D nu >= 0 at the views' velocities, and at those that the D found there would speed up most."""
+    """Check nu.D nu >= 0 at the views' velocities, and at the velocities with the smallest power for this D."""
     if not {"damping", "load"} & set(bench.roles):
         return
     views = bench.views
@@ -322,7 +324,7 @@ def _damping(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _push(bench: Bench, step: float) -> Iterator[Check]:
-    """push is what damping says: w - D (nu; Om)."""
+    """Check that push equals damping: w - D (nu; Om)."""
     if "push" not in bench.roles:
         return
     views, here = bench.views, bench.at(bench.views)
@@ -336,12 +338,12 @@ def _push(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _matrices(here: dict[str, np.ndarray]) -> np.ndarray:
-    """The matrices (k, 6, 6) of damping, or of loads."""
+    """Matrices (k, 6, 6) of damping, or of loads."""
     return (here["damping"] if "damping" in here else here["load"][:, :36]).reshape(-1, 6, 6)
 
 
 def _power(bench: Bench, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """nu.D nu (k,) [W], what rounding may make of it, and the velocities (k, 6)."""
+    """Compute (nu.D nu (k,) [W]; the effect of rounding on it; the velocities (k, 6))."""
     D = _matrices(bench.at(views))
     twist = np.concatenate([views.velocity, views.rate], axis=1)
     power = np.einsum("ki,kij,kj->k", twist, D, twist)
@@ -349,7 +351,7 @@ def _power(bench: Bench, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarr
 
 
 def _flow(bench: Bench, step: float) -> Iterator[Check]:
-    """du/dt and du/db are the derivatives of u; the host's water() is the same; FLOW says what u does."""
+    """Check that du/dt and du/db are the derivatives of u, that the host's water() equals u, and that FLOW describes u."""
     if "flow" not in bench.roles or bench.noisy:
         return
     views, kind = bench.views, getattr(bench.module, "FLOW", None)
@@ -371,7 +373,7 @@ def _flow(bench: Bench, step: float) -> Iterator[Check]:
 
 
 def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) -> Check:
-    """water(), or water_at_start() at t = 0, is what flow() gives. rounded (k,): what a position's rounding moves."""
+    """Check that water(), or water_at_start() at t = 0, equals flow(). rounded (k,): effect of a position's rounding."""
     term, views = bench.term, bench.views
     velocity = term.water(bench.own, views.position[:, None], views.time, bench.parameters)
     if velocity is None and type(term).water_at_start is Term.water_at_start:
@@ -387,7 +389,7 @@ def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) 
 
 
 def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
-    """Whether FLOW allows what the velocity does."""
+    """Check that FLOW allows the observed variation of the velocity."""
     varies = any(np.any(np.abs(slope.value) > slope.allowed) for slope in moves)
     changes = bool(np.any(np.abs(passes.value) > passes.allowed))
     least = "varying" if varies else "uniform" if changes else "steady"
@@ -397,7 +399,7 @@ def _flow_kind(kind: Any, moves: list[Slope], passes: Slope) -> Check:
 
 
 def _follow(bench: Bench, step: float) -> Iterator[Check]:
-    """follow() sees the time alone, and is exact: two parts of a time give what the whole gives."""
+    """Check that follow() depends on the time alone and is exact: two parts of an interval give the same as the whole."""
     if not bench.term.memory or not hasattr(bench.module, "follow"):
         return
     views, context = bench.views, bench.context(bench.parameters)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a part of a controller is right: its device code at random ticks, alone and in packets, and against a twin."""
+"""`check_controller`: check of a controller part's device code at random ticks, alone, in packets, and against a twin."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ PERIOD = 0.1
 
 @dataclass(frozen=True)
 class TwinMeasurement:
-    """Motion that a twin reads at a tick, as lgvi_warp.reference.control has it.
+    """Motion that a twin reads at a tick, as in lgvi_warp.reference.control.
 
     position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
-    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick, numbers of the step that begins and of the tick.
+    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick: index of the next step, and of the tick.
     """
 
     position: np.ndarray
@@ -81,7 +81,7 @@ class TwinMeasurement:
 
 @dataclass(frozen=True)
 class TwinReference:
-    """The wanted motion of a twin: position (3,) [m] and velocity (3,) [m/s], inertial; R (3, 3); speed ahead [m/s].
+    """Reference motion of a twin: position (3,) [m] and velocity (3,) [m/s], inertial; R (3, 3); speed ahead [m/s].
 
     angular_velocity (3,) [rad/s] and angular_acceleration (3,) [rad/s^2] in the axes of R.
     """
@@ -97,37 +97,38 @@ class TwinReference:
 def check_controller(
     part: Part, *, scene: Scene | None = None, twin: Any = None, samples: int = 64, seed: int = 0
 ) -> LawReport:
-    """Check the device code of a part of a controller at random ticks, which follow one another.
+    """Check the device code of a part of a controller at random ticks, four in a row for each member.
 
     Each new part costs the compilation of two small kernels. The checks:
 
-    * `packed` fills the fields that `params` names, and gives the same in all axes that a method may choose.
-    * Numbers are finite: at random ticks, where nothing is left to do, half a turn away and at rest, and with each number of
-      the part at its bounds.
-    * Lanes do not mix: a lane answers the same whatever the others are, and the same as a packet of one.
-    * Numbers that vary by member give what shared ones give.
-    * Memory stays in its rows. Only allocation and faults write commands.
-    * The truth is not reached: nothing depends on the true position behind the measurement.
-    * A twin, where given, agrees at every tick.
+    * `packed` fills the fields that `params` names, and gives the same result in all axes that a method may choose.
+    * Numbers are finite at random ticks, without a control error, with an error of half a turn, at rest, and with each
+      number of the part at its bounds.
+    * Lanes are independent: the output of a lane does not depend on the others, and equals that of a packet of one vehicle.
+    * Numbers that vary by member have the same effect as shared numbers.
+    * The part writes only its own rows of the memory. Only allocation and faults write commands.
+    * The part uses measurements alone: nothing depends on the true position.
+    * The output equals that of the twin, if given, at every tick.
 
-    The last line tells the processor time for a vehicle and a tick.
+    The last line of the report is the processor time for a vehicle and a tick.
 
     Args:
         part: a sensor, a guidance, a law, an allocation or a fault, built-in or the user's own.
-        scene: scene with the vehicle, the actuators and, where the part needs others, a controller: the part joins it, or
-            replaces the one of its name. None (default) for a simple vehicle with a `lw.terms.ControlWrench`.
-        twin: an object with the same role for one vehicle in NumPy, as the parts in `lgvi_warp/reference/control`: some of
-            `begin()`, `measure(y)`, `guide(r, y)`, `control(w, r, y, unmet)`, `allocate(w, actuators)`. None (default): none.
-        samples: number of members (default 64), of four ticks each: any attitudes, positions some metres around the scene's
-            start, velocities, angular velocities and demands of order 1.
+        scene: scene with the vehicle, the actuators and, if the part needs other parts, a controller. The part is added to
+            it, or replaces the part of the same name. None (default) for a simple vehicle with a `lw.terms.ControlWrench`.
+        twin: an object with the same role for one vehicle in NumPy, as the parts in `lgvi_warp/reference/control`: some
+            of `begin()`, `measure(y)`, `guide(r, y)`, `control(w, r, y, unmet)`, `allocate(w, actuators)`. Default
+            None: no twin.
+        samples: number of members (default 64), of four ticks each: any attitudes, positions some metres around the
+            scene's start, velocities, angular velocities and demands of order 1.
         seed: seed of the random ticks (default 0).
 
     Returns:
         A report of all checks; `ok` says whether all passed.
 
     Raises:
-        SceneError: if `part` is no part, does not fit the scene, or its device code lacks something, has a wrong signature or
-            does not compile.
+        SceneError: if `part` is not a part or does not fit the scene, or its device code is incomplete, has a wrong
+            signature or does not compile.
     """
     if not isinstance(part, Part) or part.section not in SECTIONS:
         remedy = "give an object such as lw.control.HeadingPID(kp=1.0), not its class; lw.laws.check_law checks terms"
@@ -158,7 +159,7 @@ def check_controller(
 
 
 def _with_part(part: Part, scene: Scene) -> Scene:
-    """The scene with the part in its controller; with guidance, a law and an actuator where it has none."""
+    """Add the part to the scene's controller, with guidance, a law and an actuator if the scene has none."""
     controller = scene.controller
     if controller is None:
         lists: dict[str, list[Part]] = {section: [] for section in SECTIONS}
@@ -188,12 +189,12 @@ def _with_part(part: Part, scene: Scene) -> Scene:
 
 
 def _name(bench: PartBench) -> str:
-    """The roles of the part, for the names of checks."""
+    """Roles of the part, for the names of checks."""
     return ", ".join(bench.roles)
 
 
 def _finite(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
-    """Whether all numbers are finite; notes a part that does nothing."""
+    """Check that all numbers are finite; report a part without any effect."""
     name = f"{_name(bench)}: finite"
     at_random = finite(name, here.all(), bench.ticks)
     asleep = not _does(bench, here)
@@ -212,7 +213,7 @@ def _finite(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
 
 
 def _does(bench: PartBench, here: Answers) -> bool:
-    """Whether the part changes anything."""
+    """Whether the part changes any number."""
     before = bench.ticks.rows[..., :OUT_FIELDS].transpose(1, 0, 2).reshape(bench.count, -1)
     return not np.array_equal(here.ticks, before) or not np.array_equal(
         here.memory[:, : bench.bus.rows], bench.ticks.bus
@@ -220,7 +221,7 @@ def _does(bench: PartBench, here: Answers) -> bool:
 
 
 def _numbers_at_bounds(bench: PartBench) -> dict[str, np.ndarray]:
-    """All parameters, with each number of the part at its least, at its most, and as it is; empty where none has bounds."""
+    """Parameters with each number of the part at its lower bound, upper bound and own value; empty without bounds."""
     part, moved = bench.part, {}
     rng = np.random.default_rng(bench.seed)
     for item in part.number_fields():
@@ -238,7 +239,7 @@ def _numbers_at_bounds(bench: PartBench) -> dict[str, np.ndarray]:
 
 
 def _lanes(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
-    """A lane answers the same whatever the others are, and alone; nothing follows from the true position."""
+    """Check that a lane's output does not depend on other lanes, nor on the true position, and is the same alone."""
     name, width = _name(bench), bench.width
     mixed = np.zeros_like(here.all())
     for stays in (0, width - 1):
@@ -255,7 +256,7 @@ def _lanes(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
 
 
 def _packing(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
-    """The same part however its numbers are given, in whatever axes."""
+    """Check that the part is the same for shared and varied numbers, and in all axes."""
     names = [f"{bench.part.key}.{name}" for name in bench.part.parameters()]
     others = bench.parameters | {name: OTHER * bench.parameters[name] for name in names}
     odd = np.arange(bench.count) % 2 == 1
@@ -282,7 +283,7 @@ def _packing(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
 
 
 def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
-    """Nothing changes outside the part's rows but the commands, and those by allocation and faults alone."""
+    """Check that only the part's rows and the commands change, and the commands only by allocation and faults."""
     bus, first, last = bench.bus, *here.own
     before = here.memory.copy()
     before[:, : bus.rows], before[:, last:] = bench.ticks.bus, np.nan
@@ -313,7 +314,7 @@ def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
 
 
 def _twin(bench: PartBench, packed: Any, here: Answers, twin: Any) -> Iterator[Check]:
-    """The twin's numbers at every tick of every member."""
+    """Compare with the twin's output at every tick of every member."""
     if twin is None:
         return
     wanted, commands = (
@@ -362,6 +363,6 @@ def _of_twin(bench: PartBench, twin: Any, i: int) -> tuple[np.ndarray, np.ndarra
 
 
 def _motion(ticks: RandomTicks, group: str, k: int, i: int) -> dict[str, np.ndarray]:
-    """The vectors of a tick of a member by name, the attitude as R."""
+    """Vectors of a tick of a member by name, with the attitude as R."""
     names = [name for of, name in COLUMNS if of == group and name not in AXES]
     return {name: ticks.vector(group, name)[k, i].copy() for name in names} | {"R": ticks.attitude(group)[k, i].copy()}

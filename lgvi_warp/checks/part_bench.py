@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A part of a controller evaluated alone, its numbers packed as for a run, at random ticks: the means of check_controller."""
+"""Evaluation of a single part of a controller at random ticks, with numbers packed as for a run, for check_controller."""
 
 from __future__ import annotations
 
@@ -51,39 +51,39 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class RandomTicks:
-    """Measured, wanted and demanded values before a part acts, at consecutive ticks.
+    """Measurements, references and demands before a part acts, at consecutive ticks.
 
     rows: (TICKS, k, TICK_FIELDS), the columns of `lgvi_kernels.advance.examine_part` for k members.
-    bus: (k, rows), what others left in the first rows of the memory.
+    bus: (k, rows), outputs of other parts in the first rows of the memory.
     """
 
     rows: np.ndarray
     bus: np.ndarray
 
     def vector(self, group: str, name: str) -> np.ndarray:
-        """A vector of all ticks (TICKS, k, 3), a view of the rows."""
+        """A vector of all ticks (TICKS, k, 3), as a view of the rows."""
         first = COLUMNS[group, name]
         return self.rows[..., first : first + 3]
 
     def attitude(self, group: str) -> np.ndarray:
-        """The attitude that is measured or wanted (TICKS, k, 3, 3), body to inertial axes."""
+        """The measured or reference attitude (TICKS, k, 3, 3), body to inertial axes."""
         return np.stack([self.vector(group, name) for name in ("north", "east", "down")], axis=-2)
 
     def elsewhere(self) -> RandomTicks:
-        """The same ticks at another true position, which only sensors before the part may know."""
+        """The same ticks at another true position, which only sensors before the part may use."""
         rows = self.rows.copy()
         rows[..., examine_part.TRUE_POSITION :] += 17.0
         return replace(self, rows=rows)
 
     def but_lane(self, lane: int, width: int) -> RandomTicks:
-        """Ticks in which all lanes of a packet differ but one."""
+        """Ticks in which all lanes of a packet change except one."""
         others = np.arange(self.rows.shape[1]) % width != lane
         rows, bus = self.rows.copy(), self.bus.copy()
         rows[:, others], bus[others] = np.roll(rows, 1, axis=1)[:, others] + 0.5, bus[others] + 0.5
         return replace(self, rows=rows, bus=bus)
 
     def description(self, i: int) -> str:
-        """The first tick of a member in words, for a message."""
+        """Describe the first tick of a member in words, for a message."""
         place, wanted, velocity, rate = (
             self.vector(*name)[0, i]
             for name in (("measured", "position"), ("wanted", "position"), ("measured", "velocity"),
@@ -97,9 +97,9 @@ class RandomTicks:
 class Answers(NamedTuple):
     """Output of a part over ticks.
 
-    ticks: (k, TICKS * OUT_FIELDS), what is measured, wanted and demanded after it.
-    memory: (k, rows), the bus, the part's rows and the guard behind them, after the last tick.
-    own: first and last but one of the part's rows.
+    ticks: (k, TICKS * OUT_FIELDS), measurements, references and demands after the part has acted.
+    memory: (k, rows), the bus, the part's rows and the guard rows after them, after the last tick.
+    own: index of the part's first row, and of the row after its last.
     """
 
     ticks: np.ndarray
@@ -107,12 +107,12 @@ class Answers(NamedTuple):
     own: tuple[int, int]
 
     def all(self) -> np.ndarray:
-        """The numbers that must be the same where the part is: (k, numbers)."""
+        """Numbers that must not depend on the place of the part: (k, numbers)."""
         return np.concatenate([self.ticks, self.memory[:, : self.own[1]]], axis=1)
 
 
 class PartBench(TermBench):
-    """A part that is evaluated at random ticks, one `period` [s] apart, in packets of a register and of one."""
+    """A part that is evaluated at random ticks, one `period` [s] apart, in packets of one register and of one vehicle."""
 
     def __init__(self, part: Part, scene: Scene, samples: int, seed: int):
         code = kernel_choice.device_module(part, part.device_in(False), built_in)
@@ -123,19 +123,19 @@ class PartBench(TermBench):
         super().__init__(part, module, scene, count, seed, ROLES, (width, 1), make_examine_part, REMEDY)
 
     def packed(self, parameters: Mapping[str, np.ndarray] | None = None, elsewhere: bool = False) -> Any:
-        """Packed numbers of the part; parameters: of the scene by name, each (1, ...) or (n, ...), by default its own."""
+        """Packed numbers of the part; parameters: of the scene by name, each (1, ...) or (n, ...), default the part's."""
         numbers = self.parameters if parameters is None else parameters
         context = packing_context(numbers, self.count, self.seed, self.period / EVERY, elsewhere)
         return packed_with_tables(self.part, Ensemble.own(self.part, numbers), context)
 
     def answers(self, packed: Any, ticks: RandomTicks, width: int | None = None) -> Answers:
-        """Let the part act at each tick, from its memory at the start."""
+        """Let the part act at each tick, starting from its initial memory."""
         device = _PartDevice(self, packed, ticks, width or self.width)
         out = np.stack([device.tick(k) for k in range(TICKS)], axis=1)
         return Answers(out.reshape(self.count, -1), device.memory(), (self.bus.rows, device.end))
 
     def nanoseconds(self, packed: Any) -> float:
-        """Processor time [ns] of the part for a member and a tick, less that of a kernel that only copies; the least seen."""
+        """Processor time [ns] of the part for a member and a tick, minus that of a copying kernel; the smallest seen."""
         device, spent = _PartDevice(self, packed, self.ticks, self.width), []
         for acts in (1, 0):
             rounds = []
@@ -160,13 +160,13 @@ class _PartDevice(Device):
         self.rows = Lanes(self.packets, TICK_FIELDS, self.kernel.Lane)
 
     def tick(self, k: int) -> np.ndarray:
-        """Let the part act once: (count, OUT_FIELDS)."""
+        """Let the part act once, and return its output (count, OUT_FIELDS)."""
         put_rows(self.rows.view, self.ticks.rows[k])
         self.act(k, 1, 1)
         return self.written()
 
     def act(self, k: int, acts: int, repeats: int) -> None:
-        """Let the part act at tick k, some times over, or nothing."""
+        """Let the part act `acts` times at tick k, in each of `repeats` repetitions."""
         self.launch(self.rows.array, k, k * EVERY, self.period / EVERY, self.period, acts, repeats=repeats)
 
     def memory(self) -> np.ndarray:
@@ -179,7 +179,7 @@ def random_ticks(count: int, bus: int, seed: int, around: np.ndarray) -> RandomT
     """Random ticks around a position.
 
     around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
-    Returns: Any attitude; velocities [m/s], angular velocities [rad/s], demands [N, N m] and what others left in the memory of
+    Returns: Any attitude; velocities [m/s], angular velocities [rad/s], demands [N, N m] and outputs of other parts of
         order 1.
     """
     rng = np.random.default_rng(seed)
@@ -199,10 +199,10 @@ def turn(ticks: RandomTicks, group: str, attitude: np.ndarray) -> None:
 
 
 def corner_ticks(ticks: RandomTicks) -> list[RandomTicks]:
-    """Ticks at which a careless part divides by zero.
+    """Ticks at which careless device code divides by zero.
 
-    Returns: What is wanted is what is measured; the wanted attitude is turned by half a turn; everything is at rest, level, at
-        the origin, and nothing is demanded.
+    Returns: Three cases: the reference equals the measurement; the reference attitude is half a turn away; all is at
+        rest, level, at the origin, without a demand.
     """
     same, turned, rest = (replace(ticks, rows=ticks.rows.copy(), bus=np.zeros_like(ticks.bus)) for _ in range(3))
     for name in ("position", "velocity", "angular_velocity"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Findings of a check of device code: single checks, and the report that lists them."""
+"""Results of a check of device code: single checks, and the report that lists them."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Check(NamedTuple):
 
 @dataclass(frozen=True)
 class LawReport:
-    """The checks of one law, or part of a controller; printing it gives a table.
+    """The checks of one law, or of one part of a controller; printed as a table.
 
     Attributes:
-        term: the term, or the part, that was checked.
-        checks: one entry for each check, in the order they were made.
+        term: the checked term or part.
+        checks: one entry for each check, in order.
     """
 
     term: Term
@@ -58,19 +58,19 @@ class LawReport:
 
 
 class Described(Protocol):
-    """Views, or ticks, that a message can describe."""
+    """Views or ticks that a message can describe."""
 
     def description(self, i: int) -> str:
-        """One of them in words."""
+        """Describe one view or tick in words."""
 
 
 def judged(
     name: str, difference: np.ndarray | str, allowed: np.ndarray | float, views: Described, remedy: str
 ) -> Check:
-    """A check of deviations: the one that exceeds its limit by most, and the view where it occurs.
+    """Make a check of deviations: it shows the deviation that exceeds its limit by most, and its view.
 
-    difference: (k,) or (k, d), deviations at k views; or what kept them from being found.
-    allowed: largest deviation that is allowed; for each view (k,) where it is an array.
+    difference: (k,) or (k, d), deviations at k views; or a text that says why they could not be computed.
+    allowed: largest allowed deviation; an array has one limit for each view (k,).
     """
     if isinstance(difference, str):
         return Check(name, np.inf, 0.0, False, difference)
@@ -87,13 +87,13 @@ def judged(
 
 
 def finite(name: str, values: np.ndarray | str, views: Described, remedy: str = "guard divisions and roots") -> Check:
-    """Whether the values (k, n) at k views are numbers."""
+    """Check that the values (k, n) at k views are finite."""
     wrong = values if isinstance(values, str) else (~np.isfinite(values).all(axis=1)).astype(float)
     return judged(name, wrong, 0.0, views, remedy)
 
 
 def first_wrong(checks: Iterable[Check]) -> Check:
-    """The first check that fails, or else the last; those behind it are not made."""
+    """Return the first check that fails, or else the last check; later checks are not made."""
     for check in checks:
         if not check.ok:
             break
@@ -101,7 +101,7 @@ def first_wrong(checks: Iterable[Check]) -> Check:
 
 
 def attempt(make: Callable[[], Any], where: str) -> Any:
-    """Pack, or say what fails."""
+    """Call a function that packs numbers; return its result, or a message on its failure."""
     try:
         return make()
     except Exception as error:
@@ -109,9 +109,9 @@ def attempt(make: Callable[[], Any], where: str) -> Any:
 
 
 def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tuple[Packed | None, list[Check]]:
-    """Whether packed() fills what params() names.
+    """Check that packed() fills the fields that params() names.
 
-    Returns: What was packed, None where that fails; and the check.
+    Returns: (the packed numbers, or None after a failure; the check).
     """
     packed = attempt(pack, "with shared numbers")
     if not isinstance(packed, Packed):
@@ -131,6 +131,6 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
 
 
 def unpacked(problem: str) -> Check:
-    """The check of numbers that the device cannot take."""
+    """Check that failed because the device cannot use the numbers."""
     text = f"{problem}. Give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
     return Check("packed", 1.0, 0.0, False, text)

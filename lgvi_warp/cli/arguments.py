@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command's verbs, and how its arguments are read."""
+"""The command's verbs, and the parser of its arguments."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """Read the command's arguments, by default the process's; a fault, or a help that was asked for, ends the process."""
+    """Parse the command's arguments, by default those of the process. A fault or --help ends the process."""
     top = parser()
     chosen, unknown = top.parse_known_args(arguments)
     if unknown:
@@ -114,7 +114,7 @@ def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 def _suggestion(word: str, options: Sequence[str]) -> str:
-    """Suggest an option for a word: that of an argument, of its name here or in other packages, or the nearest one."""
+    """Suggest an option for an unknown one: by the name of an argument here or in other packages, or by similarity."""
     asked = word.strip("-").replace("-", "_").casefold()
     name = next((name for name, words in ELSEWHERE.items() if asked in (name, *words)), asked)
     option = f"--{RUN.get(name, name).replace('_', '-')}"

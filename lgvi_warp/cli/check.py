@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verb check: whether a scene can run, and what is odd about it."""
+"""The verb check: validate a scene, and flag implausible values."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def check_arguments(verb: Any) -> None:
     reads=True,
 )
 def check(chosen: argparse.Namespace) -> int:
-    """Run the verb check: print what is odd about a scene; at most one of its members runs."""
+    """Run the verb check: print implausible values of a scene; at most one of its members runs."""
     from lgvi_warp.scene import plausibility
     from lgvi_warp.scene.ensemble import Ensemble
 
@@ -43,7 +43,7 @@ def check(chosen: argparse.Namespace) -> int:
 
 
 def _settings(ensemble: Any) -> tuple[str, tuple[str, ...], str]:
-    """The run in a few words, remarks on its settings, and the choice of its method. Raises SceneError as a run would."""
+    """Describe the run, messages on its settings, and the choice of its method. Raises SceneError as a run would."""
     from lgvi_warp.runs.default_method import DAMPED, cost
     from lgvi_warp.runs.measured_error import measured_error
     from lgvi_warp.runs.request import Request

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run one verb, and turn what it raises into a line on stderr and an exit code."""
+"""Run one verb, and turn its errors into a line on stderr and an exit code."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ def main(
     """Run the command.
 
     Args:
-        arguments: Its arguments; default None, those of the process.
-        verbs: Name -> function of each verb; default those of the command.
+        arguments: Arguments of the command; default None: those of the process.
+        verbs: Function of each verb by name; default: all verbs of the command.
 
     Returns:
-        The exit code, as arguments.EPILOG lists it.
+        The exit code; arguments.EPILOG lists the codes.
     """
     with Streams() as streams:
         if not (sys.argv[1:] if arguments is None else arguments):
@@ -68,7 +68,7 @@ def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) 
 
 
 def left(chosen: argparse.Namespace) -> str:
-    """Say what an interrupted verb leaves."""
+    """Say which files an interrupted verb leaves."""
     if chosen.verb in READING:
         return "nothing was to be written"
     if chosen.verb == "sweep":
@@ -89,8 +89,8 @@ def left(chosen: argparse.Namespace) -> str:
 def entry(*, run: Callable[[], int] = main) -> None:
     """Run the command as the console script does, and end the process.
 
-    Half a second is saved: garbage collection is off while modules load, and the libraries' cleanup at exit is skipped, when
-    every file is closed already.
+    Two measures save half a second: garbage collection is off while modules load, and at the end, when every file is
+    closed, the libraries' cleanup is skipped.
     """
     gc.disable()
     # The recorder prints what it raises as errors as well, which are told of in one line.

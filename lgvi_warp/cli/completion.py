@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verb completion: print the script by which a shell completes the command."""
+"""The verb completion: print the script with which a shell completes the command."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SHELLS = ("bash", "zsh", "fish", "tcsh", "powershell")
 
 
 def values() -> dict[str, tuple[str, ...]]:
-    """List the values of options that are checked with the scene and not by the parser."""
+    """List the values of options whose values the scene checks, not the parser."""
     from lgvi_warp.common.machine import DTYPES
     from lgvi_warp.engine.executors import NAMES
     from lgvi_warp.methods import method
@@ -56,7 +56,7 @@ def completion(chosen: argparse.Namespace) -> int:
 
 
 def add_values(parser: Any, file: Any) -> None:
-    """Add the values of options to a parser that is asked for nothing else, and `file` where a path belongs."""
+    """Add the values of options to a parser that is used only for completion, and `file` for options that take a path."""
     known = values()
     for action in (action for verb in parser.verbs.values() for action in verb._actions):
         if action.choices is None and action.nargs != 0:

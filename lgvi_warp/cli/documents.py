@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The results of verbs as tables for JSON; docs/reference/json.md states their keys."""
+"""The results of verbs as tables for JSON; docs/reference/json.md describes their keys."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def of_statistics(estimates: Any) -> list[dict[str, Any]]:
 
 
 def of_energy(drawn: Any, members: int) -> dict[str, Any] | None:
-    """Largest changes over some members of what the motion may conserve, what of it is conserved, and what does work.
+    """Energy and momenta of some members: their largest changes, the conserved ones, and the terms that do work.
 
     drawn: These members, as a result; None for none.
     """
@@ -66,7 +66,7 @@ def of_energy(drawn: Any, members: int) -> dict[str, Any] | None:
 
 
 def of_run(result: Any, drawn: Any, written: Written, faults: Sequence[str], seconds: float) -> dict[str, Any]:
-    """A run, as the verbs run and resume print it, which took so many seconds; drawn: as in `of_energy`."""
+    """Describe a run for the verbs run and resume; seconds: time that it took; drawn: as in `of_energy`."""
     rate = result.members * result.provenance["steps"] / result.run_seconds if result.run_seconds else None
     return of_result(result) | {
         "energy": of_energy(drawn, result.members) if result.samples else None,
@@ -77,7 +77,7 @@ def of_run(result: Any, drawn: Any, written: Written, faults: Sequence[str], sec
 
 
 def of_files(written: Written, faults: Sequence[str] = ()) -> dict[str, Any]:
-    """The files of a verb."""
+    """List the files of a verb."""
     return {
         "files": [Path(path) for path in written.files],
         "faults": [*written.faults, *faults],
@@ -86,12 +86,12 @@ def of_files(written: Written, faults: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def of_prediction(prediction: Any) -> dict[str, Any]:
-    """A prediction of a run."""
+    """Describe a prediction of a run."""
     return {**vars(prediction), "seconds": prediction.seconds}
 
 
 def of_store(contents: dict[str, Any]) -> dict[str, Any]:
-    """Content of a store and the settings of its run."""
+    """Describe the content of a store and the settings of its run."""
     return {name: value for name, value in contents.items() if name != "provenance"} | {
         "settings": of_settings(contents["provenance"])
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Content of a folder that a verb wrote: for info, and for pictures that are drawn again."""
+"""Content of a folder that a verb wrote, for the verb info and for pictures that are drawn again."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_SAID = 20
 
 @dataclass(frozen=True)
 class Content:
-    """Numbers in a folder."""
+    """A run or study in a folder."""
 
     kind: str
     path: Path
@@ -46,7 +46,7 @@ class Content:
         return _study(self.kind).load(self.path)
 
     def understood(self) -> AbstractContextManager[None]:
-        """Turn what the numbers raise where they are shown or drawn into a fault of their file."""
+        """Turn errors that arise while the numbers are printed or drawn into faults of their file."""
         return corrupt_file_as_scene_error(self.path, "not what a verb wrote", "write it again, or see where by -v")
 
 
@@ -57,7 +57,7 @@ CLASSES = {"tradeoff": "Tradeoff", "stability": "StabilityMap", "rare": "RareEve
 
 
 def _study(kind: str) -> Any:
-    """The class of what a study found."""
+    """Find the class of a study's answer."""
     if kind == "sensitivity":
         from lgvi_warp.uncertainty.sensitivity.indices import Indices
 
@@ -77,7 +77,7 @@ def _study(kind: str) -> Any:
 
 
 def contents(folder: Path) -> list[Content]:
-    """Look for numbers in a folder."""
+    """Find the runs and studies in a folder."""
     from lgvi_warp.criteria.files import study_files
 
     patterns = {"result": "result*.npz", **study_files()}
@@ -99,7 +99,7 @@ def contents(folder: Path) -> list[Content]:
 
 
 def info_of_folder(chosen: argparse.Namespace, describe: Part = None) -> int:
-    """Print what a folder holds, and what is damaged of it; describe: says what a store holds."""
+    """Print the content and the damage of a folder; describe: function that describes a store."""
     parts = [_part(content, chosen, describe) for content in contents(chosen.dir)]
     others = [path for path in sorted(chosen.dir.glob("*")) if path.suffix in OTHERS and chosen.dir.suffix != ".zarr"]
     undamaged = all(document.get("complete", True) for document, _ in parts)
@@ -109,7 +109,7 @@ def info_of_folder(chosen: argparse.Namespace, describe: Part = None) -> int:
 
 
 def _part(content: Content, chosen: argparse.Namespace, describe: Part) -> tuple[dict[str, Any], Callable[[], str]]:
-    """The document on one content of a folder, and its text."""
+    """Make the document and the text about one run or study in a folder."""
     head = {"kind": content.kind, "path": content.path}
     if content.kind == "store":
         from lgvi_warp.store.state import state
@@ -131,7 +131,7 @@ def _part(content: Content, chosen: argparse.Namespace, describe: Part) -> tuple
 
 
 def store_lines(contents: dict[str, Any], chosen: argparse.Namespace) -> Iterator[str]:
-    """Say what a store holds."""
+    """Describe the content of a store in lines."""
     provenance = contents["provenance"]
     yield f"run         {contents['path']} ({contents['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
     yield members_line(contents["members"], provenance)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verbs that ask a function of the package: options, types and help are those of its signature and its docstring.
+"""Verbs that call a function of the package: options, types and help come from its signature and its docstring.
 
-Both are read from the source, so that no library loads before a verb runs. An option that is not given is not passed on:
-defaults have one home, the signature.
+Both are read from the source, so that no library is loaded before a verb runs. An omitted option is not passed to the
+function, so the signature alone defines the defaults.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ COMMA = re.compile(r",(?![^(\[]*[)\]])")
 
 
 class Form(NamedTuple):
-    """Form of an option's text; read raises ValueError; values of an option given several times are added up."""
+    """Form of an option's text; `read` raises ValueError; values of a repeated option are joined."""
 
     metavar: str
     read: Callable[[str], Any]
@@ -50,7 +50,7 @@ class Form(NamedTuple):
 
 
 def whole(text: str) -> int:
-    """A whole number, also as 1e6. Raises ValueError."""
+    """Read a whole number, also as 1e6. Raises ValueError."""
     number = float(text)
     if not number.is_integer():
         raise ValueError(text)
@@ -58,25 +58,25 @@ def whole(text: str) -> int:
 
 
 def value(text: str) -> Any:
-    """A number, true, false or none; what else, as text."""
+    """Read a number, true, false or none; anything else is a text."""
     with contextlib.suppress(ValueError):
         return float(text)
     return {"true": True, "false": False, "none": None}.get(text.strip().lower(), text)
 
 
 def bounds(text: str) -> Any:
-    """LOW:HIGH or LOW:HIGH:log as a tuple; else a value."""
+    """Read LOW:HIGH or LOW:HIGH:log as a tuple; anything else as by `value`."""
     ends = tuple(value(end) for end in text.split(":"))
     return ends if len(ends) > 1 and isinstance(ends[0], float) else value(text)
 
 
 def names(text: str) -> list[str]:
-    """Names between commas, those within brackets aside."""
+    """Split names at commas that are not within brackets."""
     return [name.strip() for name in COMMA.split(text)]
 
 
 def pairs(text: str, read: Callable[[str], Any] = bounds, several: bool = True) -> dict[str, Any]:
-    """NAME=VALUE, or several of them between commas, as a dict. Raises ValueError."""
+    """Read NAME=VALUE, or several of them between commas, as a dict. Raises ValueError."""
     table = {}
     for pair in COMMA.split(text) if several else [text]:
         name, _, content = (word.strip() for word in pair.partition("="))
@@ -107,7 +107,7 @@ FORMS = {
 
 
 def form_of(kind: str) -> Form | None:
-    """The form of what an annotation allows; None where no text of a command can be it."""
+    """Choose the form for an annotation; None if no text of a command can express it."""
     kinds = [word.strip() for word in alternatives(kind)]
     lists = [word.replace(" | Scene", "") for word in kinds if word.startswith("Sequence")]
     form = COUNTS if "tuple[int, int]" in kinds else FORMS.get((lists or kinds)[0])
@@ -118,7 +118,7 @@ def form_of(kind: str) -> Form | None:
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a function: its annotation, what its docstring says, and whether it has no default."""
+    """An argument of a function: its annotation, its text in the docstring, and whether it has no default."""
 
     name: str
     kind: str
@@ -127,16 +127,16 @@ class Argument:
 
     @property
     def dest(self) -> str:
-        """The name of its option in what was parsed."""
+        """Name of the argument's option in the parsed arguments."""
         return RUN.get(self.name, self.name)
 
     @property
     def option(self) -> str:
-        """Its option."""
+        """The argument's option."""
         return f"--{self.dest.replace('_', '-')}"
 
     def add(self, parser: Any, only: str, form: Form) -> None:
-        """Add its option to a parser; only: text on the function that alone has it."""
+        """Add the option of the argument to a parser; only: text that names the only function with this argument."""
         if self.name in RUN:
             add_shared(parser, self.option)
             return
@@ -155,7 +155,7 @@ class Argument:
 
 @functools.cache
 def described(place: str) -> tuple[str, dict[str, Argument]]:
-    """First sentence and arguments of a function, MODULE:NAME, whose options a command may have; all but the first."""
+    """Read the first sentence of a function, MODULE:NAME, and its arguments that can be options, except the first."""
     module, _, name = place.partition(":")
     source = file_text(PACKAGE.joinpath(*module.split(".")).with_suffix(".py"), "module")
     (text,) = re.findall(rf"(?ms)^def {name}\(.*?(?=^[\w@#]|\Z)", source)
@@ -179,11 +179,11 @@ def described(place: str) -> tuple[str, dict[str, Argument]]:
 
 @dataclass(frozen=True)
 class FunctionOptions:
-    """Options of a verb: the function of the package that answers it, MODULE:NAME, or one of several by --analysis.
+    """Options of a verb that calls a function of the package, MODULE:NAME, or one of several functions by --analysis.
 
     Attributes:
-        shared: options of the scene beside the functions' arguments.
-        forms: of arguments that are written in a way of their own.
+        shared: options of the scene in addition to the functions' arguments.
+        forms: forms of the arguments with a special syntax.
         only: names of the arguments that are options; default all.
     """
 
@@ -194,13 +194,13 @@ class FunctionOptions:
 
     @property
     def sentence(self) -> str:
-        """First sentence of the function, as the list of verbs says it."""
+        """First sentence of the function, for the list of verbs."""
         text, _ = described(self.places[0])
         return text[0].lower() + text[1:]
 
     @property
     def functions(self) -> dict[str, dict[str, Argument]]:
-        """Name of each function -> the arguments that are options."""
+        """Arguments that are options, by name of the function."""
         return {
             place.partition(":")[2]: {name: each for name, each in described(place)[1].items()
                                       if self.only is None or name in self.only}
@@ -208,11 +208,11 @@ class FunctionOptions:
         }  # fmt: skip
 
     def form(self, argument: Argument) -> Form:
-        """The form of an argument."""
+        """Choose the form of an argument."""
         return self.forms.get(argument.name) or form_of(argument.kind) or TEXT
 
     def add(self, parser: Any) -> None:
-        """Add the options to a parser, those without which nothing can be asked first."""
+        """Add the options to a parser, the required ones first."""
         functions = self.functions
         if len(functions) > 1:
             first = next(iter(functions))
@@ -226,7 +226,7 @@ class FunctionOptions:
         add_shared(parser, self.shared)
 
     def values_of(self, chosen: argparse.Namespace, function: str) -> dict[str, Any]:
-        """The arguments of a function that options give; they are taken from what was parsed. Raises SceneError."""
+        """Take the arguments of a function from its options and remove them from the parsed ones. Raises SceneError."""
         faults, values = Faults(), {}
         arguments = self.functions
         for other in arguments:
@@ -254,7 +254,7 @@ class FunctionOptions:
         return values
 
     def call_of(self, chosen: argparse.Namespace) -> tuple[Any, Callable[..., Any], dict[str, Any]]:
-        """The scene, the function, and the arguments that options give."""
+        """Make (the scene, the function, the arguments given by options)."""
         function = getattr(chosen, "analysis", None) or next(iter(self.functions))
         values = self.values_of(chosen, function)
         scene = load_scene(chosen)
@@ -271,18 +271,18 @@ def as_study(
     picture: bool = False, always: bool = True, above: Callable[[argparse.Namespace, Any, Path | None], str] | None = None,
     faults: Callable[[Any], list[str]] | None = None,
 ) -> Verb:  # fmt: skip
-    """A verb that asks a question and writes the answer's files.
+    """Make a verb that calls a function and writes the files of its answer.
 
-    help: In place of the function's first sentence. more: adds further options. about: from what was parsed, the scene and
-    the arguments to what is asked about, which may refuse them. picture: whether it has one, of its own name. always: whether
-    files are written without --out, too. above: text above the answer's, from the answer and the folder. faults: of an
-    answer.
+    help: Text instead of the function's first sentence. more: function that adds options. about: function of the parsed
+    arguments, the scene and the function's arguments that returns the function's first argument, or raises an error.
+    picture: whether the answer has a picture of the verb's name. always: whether files are written also without --out.
+    above: function that returns text to print above the answer. faults: function that lists faults of an answer.
     """
     options = FunctionOptions(places, shared, forms or {})
     stem = name.replace("-", "_")
 
     def arguments(parser: Any) -> None:
-        default = FOLDER.format(f"runs/NAME_{stem}") if always else FOLDER.format("none is written")
+        default = FOLDER.format(f"runs/NAME_{stem}") if always else FOLDER.format("no files are written")
         add_shared(parser, "scene --out", out=default)
         options.add(parser)
         more(parser)
@@ -318,7 +318,7 @@ def as_study(
 
 
 def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:
-    """Print a study's notes, its files and its report, whose last line is the answer, and say what failed."""
+    """Print a study's notes, files and report, whose last line is the answer, and report what failed."""
     tell(
         chosen,
         lambda: {"content": content} | documents.of_files(written),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Installed parts beside the package: libraries of its extras, kernels in Warp's cache, the viewer."""
+"""Installed components besides the package: libraries of its extras, kernels in Warp's cache, the viewer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _OF_DEVELOPERS = {"all", "test", "docs", "arm", "dev"}
 
 
 def missing_by_extra() -> dict[str, list[str]]:
-    """Libraries of each extra that are not installed; none: the extra is installed."""
+    """Missing libraries of each extra; an empty list means that the extra is installed."""
     needed: dict[str, list[str]] = {}
     for line in metadata.requires("lgvi-warp") or ():
         if found := re.match(r"([\w.-]+)(?:\[([\w,-]+)\])?.*extra == ['\"]([\w-]+)['\"]", line):
@@ -25,7 +25,7 @@ def missing_by_extra() -> dict[str, list[str]]:
 
 
 def _missing(extra: str, needed: dict[str, list[str]]) -> list[str]:
-    """The libraries of one extra, and of those that it names, that are not installed."""
+    """Missing libraries of one extra and of the extras that it includes."""
     missing: list[str] = []
     for name in needed.get(extra, ()):
         missing += _missing(name[1:-1], needed) if name.startswith("[") else [] if is_there(name) else [name]
@@ -33,7 +33,7 @@ def _missing(extra: str, needed: dict[str, list[str]]) -> list[str]:
 
 
 def is_there(library: str) -> bool:
-    """Whether a library is installed, by the name that pip knows."""
+    """Whether a library is installed, by its name for pip."""
     try:
         metadata.distribution(library)
     except metadata.PackageNotFoundError:
@@ -58,7 +58,7 @@ def kernel_cache() -> dict[str, Any]:
 
 
 def viewer() -> Path | None:
-    """Path of the viewer; None where it is not found."""
+    """Path of the viewer; None if it is not found."""
     from lgvi_warp.views.recording.viewer import program
 
     try:

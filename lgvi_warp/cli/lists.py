@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verbs list, new and schema: what a scene file may hold; and help."""
+"""The verbs list, new, schema, example and help: names, new scene files, and the format of scene files."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from lgvi_warp.scene.examples import PREFIX, example_files, example_title, locat
 
 # A scene to begin with; {} are filled by `new`.
 NEW_SCENE = """# {title}
-# lgvi-warp check {file} says whether it can run and what is odd; lgvi-warp run {file} runs it.
+# lgvi-warp check {file} validates the file and flags implausible values; lgvi-warp run {file} runs it.
 # SI units, angles in rad unless a key says degrees. Inertial axes: north, east, down; body axes: ahead, starboard, down.
 
 [vehicle]
-name = "{vehicle}"{pad}# lgvi-warp list vehicles; further keys replace single numbers of it, such as
+name = "{vehicle}"{pad}# lgvi-warp list vehicles; further keys replace its numbers, such as
 # buoyancy = {buoyancy}{pad_buoyancy}# N, the weight of the displaced water
 
 # [environment]
@@ -37,19 +37,19 @@ velocity = [1.0, 0.0, 0.0]               # m/s, body axes
 angular_velocity = [0.0, 0.0, 0.0]       # rad/s, body axes
 
 # Weight and buoyancy always act{terms}.
-# An entry with the type of one of these replaces it; lgvi-warp list terms names all.
+# An entry of the same type replaces one of these; lgvi-warp list terms lists all types.
 # [[terms]]
 # type = "current"
 # velocity = [0.2, 0.0, 0.0]             # m/s: north, east, down
 
-# What stops a vehicle: surface, floor, box or time.
+# Events that stop a vehicle: surface, floor, box or time.
 [[events]]
 type = "surface"
 [[events]]
 type = "floor"
 depth = 100.0                            # m
 
-# How many vehicles, and what differs between them: any number of this file.
+# Number of vehicles, and the numbers that vary between them: any number of this file.
 [ensemble]
 members = 100
 seed = 1
@@ -61,9 +61,9 @@ seed = 1
 duration = 60.0                          # s
 step = 0.01                              # s
 save_every = 0.5                         # s between samples
-# method = "psi_x"                       # lgvi-warp list methods; without one it is chosen by what acts
+# method = "psi_x"                       # lgvi-warp list methods; default: chosen by the forces
 
-# What is computed over the vehicles at each sample time, with intervals.
+# Statistics over the vehicles at each sample time, with confidence intervals.
 [[run.statistics]]
 type = "mean"
 of = "depth"
@@ -76,10 +76,10 @@ def new_arguments(verb: Any) -> None:
     """Add the arguments of the verb new."""
     verb.add_argument("scene", metavar="SCENE", type=Path, help="the new file")
     verb.add_argument("--vehicle", metavar="NAME", default="remus_100",
-                      help="vehicle, one that `list vehicles` names (default remus_100)")  # fmt: skip
+                      help="name of a vehicle from `list vehicles` (default remus_100)")  # fmt: skip
 
 
-@as_verb("new", "write a commented scene file to start from", new_arguments)
+@as_verb("new", "write a scene file with comments as a starting point", new_arguments)
 def new(chosen: argparse.Namespace) -> int:
     """Run the verb new: write a scene file with comments."""
     from lgvi_warp.vehicles.fossen import vehicle_tables
@@ -110,7 +110,7 @@ def list_arguments(verb: Any) -> None:
 
 @as_verb("list", "list the names of methods, vehicles, terms, or laws of controllers", list_arguments, reads=True)
 def list_names(chosen: argparse.Namespace) -> int:
-    """Run the verb list: names of methods, vehicles, terms, or parts of a controller."""
+    """Run the verb list: list the names of methods, vehicles, terms, or parts of a controller."""
     entries = {"methods": _methods, "vehicles": _vehicles, "terms": _terms, "laws": _laws}[chosen.of]()
     width = max(map(len, entries))
     tell(chosen, lambda: {"of": chosen.of, "names": [{"name": name, "text": text} for name, text in entries.items()]},
@@ -119,7 +119,7 @@ def list_names(chosen: argparse.Namespace) -> int:
 
 
 def _methods() -> dict[str, str]:
-    """Method -> its order and kind."""
+    """Describe each method: its order and kind."""
     from lgvi_warp.methods import method as methods
 
     tables: dict[str, Iterable[str]] = {"splitting": methods.PROGRAMS, "two parts, for weight alone": methods.TWO_PART,
@@ -132,7 +132,7 @@ def _methods() -> dict[str, str]:
 
 
 def _vehicles() -> dict[str, str]:
-    """Vehicle -> its title, and what its numbers lead to that few would expect."""
+    """Describe each vehicle: its title, and a remark on unexpected effects of its numbers."""
     from lgvi_warp.vehicles.fossen import vehicle_names, vehicle_tables
 
     sources = {name: vehicle_tables(name)["source"] for name in vehicle_names()}
@@ -140,7 +140,7 @@ def _vehicles() -> dict[str, str]:
 
 
 def _terms() -> dict[str, str]:
-    """Type of a term -> what it is."""
+    """Describe the type of each term."""
     from lgvi_warp.physics import terms
 
     implied = {term.type for term in terms.IMPLIED}
@@ -148,7 +148,7 @@ def _terms() -> dict[str, str]:
 
 
 def _laws() -> dict[str, str]:
-    """Type of a part of a controller -> its list in the scene file, and what it is."""
+    """Describe each part of a controller: its list in the scene file, and its function."""
     from lgvi_warp.control.base import SECTIONS
     from lgvi_warp.control.controller import Controller  # noqa: F401  (which makes every part known)
 
@@ -164,14 +164,12 @@ def _summary(kind: Any) -> str:
 
 def example_arguments(verb: Any) -> None:
     """Add the arguments of the verb example."""
-    verb.add_argument("name", metavar="NAME", nargs="?", help="the example to print; without one, all are listed")
+    verb.add_argument("name", metavar="NAME", nargs="?", help="the example to print (default: list all examples)")
 
 
-@as_verb(
-    "example", "list the scene and sweep files that come with the package, or print one", example_arguments, reads=True
-)
+@as_verb("example", "list the scene and sweep files of the package, or print one", example_arguments, reads=True)
 def example(chosen: argparse.Namespace) -> int:
-    """Run the verb example: list the files that come with the package, or print one as it is."""
+    """Run the verb example: list the files of the package, or print one unchanged."""
     if chosen.name is not None:
         text = file_text(located(f"{PREFIX}{chosen.name.removeprefix(PREFIX)}"), "scene file")
         if chosen.json:
@@ -197,12 +195,14 @@ def schema(chosen: argparse.Namespace) -> int:
 
 def help_arguments(verb: Any) -> None:
     """Add the arguments of the verb help."""
-    verb.add_argument("of", metavar="VERB", nargs="?", choices=tuple(verb.verbs), help="a verb")
+    verb.add_argument(
+        "of", metavar="VERB", nargs="?", choices=tuple(verb.verbs), help="name of a verb (default: list all verbs)"
+    )
 
 
-@as_verb("help", "print the options of a verb; without one, all verbs", help_arguments, reads=True)
+@as_verb("help", "print the options of a verb, or the list of verbs", help_arguments, reads=True)
 def show_help(chosen: argparse.Namespace) -> int:
-    """Run the verb help: print the options of a verb, or all verbs."""
+    """Run the verb help: print the options of a verb, or the list of verbs."""
     chosen.quiet = False
     text = (chosen.parser.verbs[chosen.of] if chosen.of else chosen.parser).format_help()
     tell(chosen, lambda: {"of": chosen.of, "text": text}, text.rstrip)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verbs info, without a folder about this machine, and bench."""
+"""The verbs bench, and info on a folder or on this machine."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def info_arguments(verb: Any) -> None:
 
 @as_verb(
     "info",
-    "describe a folder that a verb wrote; without one, this machine, versions and the core's peak speed",
+    "describe a folder that a verb wrote, or this machine: versions and the core's peak speed",
     info_arguments,
     reads=True,
 )
 def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_peak, describe: Part = None) -> int:
-    """Run the verb info: describe a stored run, or this machine."""
+    """Run the verb info: describe a folder, or this machine."""
     if chosen.dir is not None:
         return info_of_folder(chosen, describe)
     from lgvi_warp.cli import installed
@@ -56,7 +56,7 @@ def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_pe
 
 
 def machine_lines(document: dict[str, Any], quota: float | None, cores: int, physical: int | None) -> Iterator[str]:
-    """The document of info as lines of text, with what a container leaves of the machine.
+    """Lines of text for the document of info, with the limits of a container.
 
     quota: CPU time of the container [CPUs]; None without one. physical: memory of the machine [bytes]; None if unknown.
     """
@@ -89,7 +89,7 @@ def bench_arguments(verb: Any) -> None:
 
 
 @as_verb(
-    "bench", "measure the speed of the kernel on this machine, beside the core's peak", bench_arguments, reads=True
+    "bench", "measure the kernel's speed on this machine, compared with the core's peak", bench_arguments, reads=True
 )
 def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     """Run the verb bench: measure the kernel's speed on this machine."""

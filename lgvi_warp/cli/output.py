@@ -40,7 +40,7 @@ def painted(text: str, color: str) -> str:
 
 
 def say(chosen: argparse.Namespace, text: str) -> None:
-    """Print a text on stdout, its labels in colors, unless it is not wanted."""
+    """Print a text on stdout with colored labels, unless --quiet or --json is given."""
     if chosen.quiet or chosen.json or not text:
         return
     # Names and texts of a file may hold what a terminal obeys.
@@ -60,7 +60,7 @@ def tell(chosen: argparse.Namespace, document: Callable[[], dict[str, Any]], tex
 
 
 def as_json(value: Any) -> Any:
-    """Turn a value into what JSON holds: the same in plain types, None for numbers that are not finite."""
+    """Convert a value to JSON types; numbers that are not finite become None."""
     if isinstance(value, dict):
         return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, Path):
@@ -73,7 +73,7 @@ def as_json(value: Any) -> Any:
 
 
 def print_faults(faults: Iterable[str]) -> list[str]:
-    """Print faults on stderr, a line each; return them as a list."""
+    """Print faults on stderr, one per line; return them as a list."""
     faults = list(faults)
     name = painted("lgvi-warp:", RED) if colored(sys.stderr) else "lgvi-warp:"
     for fault in faults:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verbs that look at a folder again: plot draws its pictures, footprint says where the members of a run are."""
+"""The verbs that read a folder again: plot draws its pictures, footprint computes where the members of a run are."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from lgvi_warp.common.errors import SceneError
 
 def plot_arguments(verb: Any) -> None:
     """Add the arguments of the verb plot."""
-    verb.add_argument("dir", metavar="DIR", type=Path, help="a folder that run or a study wrote")
-    add_shared(verb, "--out", out="folder for the pictures, replaced if they exist (default: DIR)")
+    verb.add_argument("dir", metavar="DIR", type=Path, help="a folder written by run or a study")
+    add_shared(verb, "--out", out="folder for the pictures; existing files are replaced (default: DIR)")
 
 
-@as_verb("plot", "draw the pictures of a folder again, from the numbers in it", plot_arguments)
+@as_verb("plot", "draw the pictures in a folder again, from its saved numbers", plot_arguments)
 def plot(chosen: argparse.Namespace) -> int:
     """Run the verb plot: draw the pictures of a run or of studies from their numbers."""
     held, written = contents(chosen.dir), Written()
@@ -43,7 +43,7 @@ def plot(chosen: argparse.Namespace) -> int:
 
 
 def _beside(chosen: argparse.Namespace) -> Path:
-    """The folder for what a verb writes about another."""
+    """Make the folder for the output of a verb that reads another folder."""
     return writable(chosen.out or (chosen.dir.parent if chosen.dir.suffix == ".zarr" else chosen.dir))
 
 
@@ -73,14 +73,14 @@ FOOTPRINT = FunctionOptions(("uncertainty.footprint.footprint:footprint",), "")
 
 def footprint_arguments(verb: Any) -> None:
     """Add the arguments of the verb footprint."""
-    verb.add_argument("dir", metavar="DIR", type=Path, help="a folder that run wrote, or a store")
-    add_shared(verb, "--out", out="folder for the files, replaced if they exist (default: DIR)")
+    verb.add_argument("dir", metavar="DIR", type=Path, help="a folder written by run, or a store")
+    add_shared(verb, "--out", out="folder for the files; existing files are replaced (default: DIR)")
     FOOTPRINT.add(verb)
 
 
 @as_verb("footprint", FOOTPRINT.sentence, footprint_arguments)
 def footprint(chosen: argparse.Namespace) -> int:
-    """Run the verb footprint: where the members of a run are, as numbers, a picture, and a map where the origin is known."""
+    """Run the verb footprint: where members are, as numbers, a picture, and a map if the origin is known."""
     runs = [content for content in contents(chosen.dir) if content.kind in ("store", "result")]
     if len(runs) != 1:
         raise SceneError([f"{chosen.dir} holds {len(runs) or 'no'} runs. Give the folder of one run, or its store"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Show on stderr what a command does, and how far it is."""
+"""Show on stderr what a command is doing, and how far it has come."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def progress_bar(
 ) -> Iterator[Progress | None]:
     """Show progress on stderr inside the `with` block, unless quiet, and clear its line afterwards.
 
-    begin: What makes the progress of a stream and a phase; default None, `Progress`.
+    begin: Function of a stream and a phase that makes the progress; default None: `Progress`.
     """
     progress = None if quiet else (begin or Progress)(sys.stderr, phase)
     try:
@@ -27,5 +27,5 @@ def progress_bar(
 
 
 def part_of(progress: Progress | None, i: int, n: int) -> Callable[[float], None] | None:
-    """Turn the progress of the whole, if there is one, into that of its i-th part of n."""
+    """Turn the progress of the whole work, if any, into the progress of its i-th part of n."""
     return progress and (lambda part: progress((i + part) / n))

@@ -25,10 +25,10 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
            viewer: str | None = None, *, writer: Part = None, store: Part = None) -> list[str]:  # fmt: skip
     """Write the files of a finished run into a folder and print its summary.
 
-    begun: When the verb began [s], by time.perf_counter.
-    failures: Texts on what failed before; default none.
-    viewer: Address of a viewer that gets the recording too; default None.
-    writer, store: What writes the files, and opens the folder of a store; default None, `write` and `Folder`.
+    begun: Start time of the verb [s], by time.perf_counter.
+    failures: Texts on earlier failures; default none.
+    viewer: Address of a viewer that also receives the recording; default None.
+    writer, store: Functions that write the files and open the folder of a store; default None: `write` and `Folder`.
     Returns: The failures, and one text for each file that could not be written.
     """
     from lgvi_warp.store.folder import Folder
@@ -59,10 +59,10 @@ MOST_DRAWN = 30_000_000
 
 
 def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) -> Any:
-    """Select the members that the picture and the drift are made of; of a large store some, as `lw.select_members` does.
+    """Select the members for the picture and the drift: from a large store only some, as by `lw.select_members`.
 
-    limit: Most numbers of their samples; load: what takes members of a stored result into memory, default that of the store.
-    Returns: A result; without samples, the kept members; None without these, or where a field of the motion was not saved.
+    limit: Largest number of values in their samples; load: function that reads members of a stored result into memory.
+    Returns: A result; without samples, the kept members; None without these, or if a field of the motion was not saved.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept, limit=limit)
@@ -82,14 +82,14 @@ def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) ->
 
 
 def unsaved(result: Any) -> list[str]:
-    """Name the fields of the motion that a run did not save, though it has samples."""
+    """Name the fields of the motion that a run with samples did not save."""
     from lgvi_warp.physics.fields import FIELDS
 
     return [name for name in FIELDS if result.samples and name not in result.samples]
 
 
 def write(result: Any, drawn: Any, out: Path, viewer: str | None = None) -> Written:
-    """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side, as far as the run has them: see `pictures`."""
+    """Write result.npz, fleet.png, fleet.rrd and statistics.png in parallel, if the run has their data: see `pictures`."""
     written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
     writers |= pictures(result, drawn, viewer)
@@ -104,13 +104,13 @@ def write(result: Any, drawn: Any, out: Path, viewer: str | None = None) -> Writ
 
 
 def _draw(draw: Callable[..., Any], result: Any, path: Path) -> Path:
-    """Draw a picture of a result, and give its path."""
+    """Draw a picture of a result, and return its path."""
     draw(result, path=path)
     return path
 
 
 def _record(result: Any, viewer: str | None, path: Path) -> Path:
-    """Write the recording of a result, and send it to a viewer where there is one."""
+    """Write the recording of a result, and send it to the viewer, if one is given."""
     from lgvi_warp.views.recording.rerun import record
     from lgvi_warp.views.recording.viewer import answers
 
@@ -119,10 +119,10 @@ def _record(result: Any, viewer: str | None, path: Path) -> Path:
 
 
 def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Callable[[Path], Path]]:
-    """The pictures that a run has.
+    """Functions that draw the pictures of a run, by file name.
 
-    drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
-    viewer: Address of a viewer that gets the recording too; default None.
+    drawn: The members of the picture, from `shown_members`; None: no picture and no recording.
+    viewer: Address of a viewer that also receives the recording; default None.
     """
     from lgvi_warp import plots
     from lgvi_warp.views.plots.estimates import drawable
@@ -140,9 +140,9 @@ def summary(
 ) -> str:
     """Summarise a run in a few lines.
 
-    drawn: The members that the drift is taken of, from `shown_members`.
+    drawn: The members from which the drift is computed, from `shown_members`.
     seconds: Time that the verb took [s]; default 0, for a run that was not computed now.
-    limit: Most numbers of samples that are looked through.
+    limit: Largest number of values in the samples that are searched.
     """
     from lgvi_warp.common.status import Status
     from lgvi_warp.results.outcomes import outcome_text, outcomes
@@ -181,7 +181,7 @@ def summary(
 
 
 def look_lines(files: Sequence[Path]) -> list[str]:
-    """Say how to look at what a run wrote."""
+    """Say how to view the files of a run."""
     known = {path.name: path for path in files}
     ways = [f"rerun {known['fleet.rrd']}"] if "fleet.rrd" in known else []
     ways += [f"open {path}" for name, path in known.items() if name.endswith(".png")][:1]
@@ -210,7 +210,7 @@ INVARIANTS = {
 
 
 def energy_lines(result: Any, drawn: Any) -> list[str]:
-    """Line on the drift of conserved quantities, or on the change of energy where forces do work."""
+    """Write one line on the drift of conserved quantities, or on the change of energy if forces do work."""
     from lgvi_warp.physics import energy as invariants
     from lgvi_warp.views.choice import of_members
 
@@ -219,7 +219,7 @@ def energy_lines(result: Any, drawn: Any) -> list[str]:
 
 
 def drift_lines(drift: Mapping[str, float], conserved: Iterable[str], at_work: Iterable[str], whose: str) -> list[str]:
-    """Say how far conserved quantities drift, or through which terms the energy of whose members changes."""
+    """Describe the drift of conserved quantities, or the terms that change the energy; whose: words for the members."""
     if math.isnan(drift["energy"]):
         return []
     if "energy" not in conserved:
@@ -230,7 +230,7 @@ def drift_lines(drift: Mapping[str, float], conserved: Iterable[str], at_work: I
 
 
 def _warning_lines(result: Any) -> list[str]:
-    """Lines on warnings: members by warning, then the text of each and the member that had it first."""
+    """Lines on warnings: number of members by warning, then the text of each warning and its first member."""
     from lgvi_warp.common.status import Warnings
 
     counts = result.warnings.counts()
@@ -249,7 +249,7 @@ def _warning_lines(result: Any) -> list[str]:
 
 
 def _speed(result: Any, seconds: float) -> list[str]:
-    """Line on speed; none for a resumed run, only part of which was computed now."""
+    """Write one line on speed; none for a resumed run, only part of which was computed now."""
     if not result.run_seconds:
         return []
     rate = result.members * result.provenance["steps"] / result.run_seconds
@@ -261,7 +261,7 @@ def _speed(result: Any, seconds: float) -> list[str]:
 
 
 def members_line(members: int, provenance: dict[str, Any]) -> str:
-    """Say how many members were run, and how."""
+    """Say how many members were run, and how they were drawn."""
     name, chosen = provenance["method"]["name"], provenance["method"].get("chosen")
     step = f"step {provenance['step']:g} s, {provenance['steps']:,} steps"
     line = f"members     {members:,}, {name}, {provenance['dtype']}, {step}"
@@ -269,7 +269,7 @@ def members_line(members: int, provenance: dict[str, Any]) -> str:
 
 
 def controller_lines(scene: Mapping[str, Any]) -> list[str]:
-    """Say what a controller consists of."""
+    """List the parts of a controller."""
     section = scene.get("controller")
     if not section:
         return []

@@ -32,73 +32,73 @@ def run_arguments(verb: Any) -> None:
     fleet = verb.add_argument_group("scene and fleet")
     add_shared(fleet, "--duration --members --seed --set")
     fleet.add_argument("--start", metavar="DIR", type=Path,
-                       help="continue from the end of the run in this folder, store or result.npz")  # fmt: skip
+                       help="continue the run in this folder, store or result.npz from its end")  # fmt: skip
     _how(verb.add_argument_group("method, step and precision"))
     _solves(verb.add_argument_group("solvers and checks"))
     files = verb.add_argument_group("files")
-    add_shared(files, "--out --keep", out=FOLDER.format("runs/NAME of the scene"))
+    add_shared(files, "--out --keep", out=FOLDER.format("runs/NAME, with the name of the scene file"))
     _stored(files)
     live = verb.add_argument_group("live view")
     live.add_argument("--live", action="store_true",
-                      help="show members in the rerun viewer as they finish, then the whole run")  # fmt: skip
+                      help="show members in the rerun viewer as they finish, and the whole run at its end")  # fmt: skip
     live.add_argument("--viewer", metavar="ADDRESS",
-                      help="with --live: address of an open viewer (default: one on this machine, or a new one)")  # fmt: skip
+                      help="with --live: address of an open viewer (default: one on this machine, open or new)")  # fmt: skip
     machine = verb.add_argument_group("machine")
     add_shared(machine, EXECUTOR, threads=WORKERS)
     machine.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
-    machine.add_argument("--device", metavar="D", help="where kernels run: cpu (default), the only one")
+    machine.add_argument("--device", metavar="D", help="device that runs kernels: cpu (default) is the only one")
 
 
 def _how(group: Any) -> None:
-    """Add what chooses the method, the step and the precision of a run."""
+    """Add the options of the method, the step and the precision of a run."""
     add_shared(
         group,
         "--method --step --dtype",
-        method="rk4, rk8, rkw3, psi_s, psi_x ...: see list methods (default: the scene's, else chosen by what acts)",
-        dtype="float64, float32, or float32_compensated: sums of two float32",
+        method="rk4, rk8, rkw3, psi_s, psi_x ...: see `list methods` (default: the scene's, or chosen by its forces)",
+        dtype="float64, float32, or float32_compensated, which stores numbers as sums of two float32",
     )
     add = group.add_argument
     add("--error", metavar="E", type=float,
-        help="choose the cheapest method, step and precision that keep this error, and check it after the run")  # fmt: skip
-    add("--of", help=f"quantity that --error bounds (default: position [m]): {OF}")
+        help="choose the cheapest method, step and precision for this error, and check it after the run")  # fmt: skip
+    add("--of", help=f"quantity whose error --error limits (default: position [m]): {OF}")
     add(
         "--rtol",
         metavar="R",
-        help="relative error of each step; with --atol, for rk5, rk5_ck and rk8, which then choose their steps",
+        help="relative error of each step, together with --atol; rk5, rk5_ck and rk8 then choose their steps",
     )
-    add("--atol", metavar="A", help="absolute error of each step; with --rtol")
+    add("--atol", metavar="A", help="absolute error of each step, together with --rtol")
 
 
 def _solves(group: Any) -> None:
-    """Add what is solved and checked in each step of a run."""
+    """Add the options of the solvers and checks of a run."""
     add = group.add_argument
     add("--solver", help="solver of the implicit rotation, equation (24): quartic, cayley, newton or moser_veselov")
-    add("--iterations", metavar="N", help='iterations of every solve: a number, or "auto" (default: to the tolerance)')
-    add("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
-    add("--checks", help="none, safe (default: statuses) or all (also warnings that arise during the run)")
+    add("--iterations", metavar="N", help='iterations of every solve: a number, or "auto" (default: to convergence)')
+    add("--tolerance", metavar="T", help="relative residual above which a solve has not converged")
+    add("--checks", help="none, safe (default: a status for each member) or all (also warnings during the run)")
     add(
         "--on-failure",
-        help="a member that fails: freeze (default) stops it, raise ends with exit code 1, substep divides its step",
+        help="if a member fails: freeze (default) stops it, raise ends with exit code 1, substep divides its step",
     )
 
 
 def _stored(group: Any) -> None:
-    """Add what a run in a store takes."""
+    """Add the options of a run in a store."""
     add_shared(
         group,
         "--store --store-dtype",
-        store="npz (default): result.npz when the run ends; zarr: run.zarr block by block, which resume can continue",
-        store_dtype="float32: store samples of a float64 run in single precision, half the size",
+        store="npz (default): write result.npz at the end of the run; zarr: write run.zarr block by block, for resume",
+        store_dtype="float32 stores samples of a float64 run in single precision, at half the size",
     )
-    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only blocks A to B - 1, to be merged later "
-                       "(as many of them as there are)")  # fmt: skip
+    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only blocks A to B - 1, for the verb merge; "
+                       "B may be beyond the last block")  # fmt: skip
     existing = group.add_mutually_exclusive_group()
     add_shared(existing, "--overwrite")
     existing.add_argument("--resume", action="store_true",
-                          help="continue an existing run.zarr of the same run")  # fmt: skip
+                          help="complete an existing run.zarr of the same run")  # fmt: skip
 
 
-@as_verb("run", "run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary", run_arguments)
+@as_verb("run", "run a scene's ensemble; write result.npz, fleet.png, fleet.rrd and a summary", run_arguments)
 def run(
     chosen: argparse.Namespace, *, simulate: Part = None, finish: Callable[..., list[str]] = report,
     viewer: Part = None, live: Part = None, suggest: Part = None, verify: Part = None,
@@ -142,7 +142,7 @@ def run(
 
 
 def end_of_run(chosen: argparse.Namespace) -> Any:
-    """Read where the run of --start ended; None without one."""
+    """Read the final states of the run in --start; None without --start."""
     if chosen.start is None:
         return None
     if chosen.error is not None:
@@ -177,7 +177,7 @@ def live_address(scene: Any, chosen: argparse.Namespace, viewer: Part = None) ->
 
 
 def live_view(scene: Any, address: str | None, live: Part = None) -> Callable[[Any], None] | None:
-    """Open the recording of --live at the address of a viewer, and give what takes the members that are done."""
+    """Open the recording of --live at the address of a viewer; return the function that receives finished members."""
     if address is None:
         return None
     from lgvi_warp.views.recording.live import live as view
@@ -234,7 +234,7 @@ def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> 
 
 
 def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namespace, verify: Part = None) -> list[str]:
-    """Print the error of a run, measured by some members at half its step."""
+    """Print the error of a run, measured on some members at half its step."""
     from lgvi_warp.accuracy.suggest import verified
     from lgvi_warp.scene.ensemble import Ensemble
 
@@ -248,7 +248,7 @@ def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namesp
 
 
 def import_in_background(load: Callable[[str], Any] = importlib.import_module) -> threading.Thread:
-    """Load the plotting libraries in a thread while kernels run, which release the interpreter."""
+    """Load the plotting libraries in a thread while kernels run; kernels release the interpreter's lock."""
 
     def load_all() -> None:
         for name in ("matplotlib.figure", "matplotlib.backends.backend_agg", "rerun", "rerun.blueprint"):
@@ -265,12 +265,12 @@ def import_in_background(load: Callable[[str], Any] = importlib.import_module) -
 def resume_arguments(verb: Any) -> None:
     """Add the arguments of the verb resume."""
     add_shared(verb, f"dir {EXECUTOR}", threads=WORKERS)
-    verb.add_argument("--force", action="store_true", help="continue even on another machine or with other versions")
+    verb.add_argument("--force", action="store_true", help="resume even on another machine or with other versions")
 
 
-@as_verb("resume", "continue an interrupted run, and repair its damaged blocks", resume_arguments)
+@as_verb("resume", "complete an interrupted run, and repair its damaged blocks", resume_arguments)
 def resume(chosen: argparse.Namespace, *, simulate: Part = None, finish: Callable[..., list[str]] = report) -> int:
-    """Run the verb resume: finish a stored run that was stopped, and mend what is damaged of it.
+    """Run the verb resume: complete an interrupted stored run, and repair damaged blocks.
 
     Returns: The exit code: 1 if a file or every member failed, otherwise 0.
     """
@@ -294,18 +294,18 @@ def resume(chosen: argparse.Namespace, *, simulate: Part = None, finish: Callabl
 def predict_arguments(verb: Any) -> None:
     """Add the arguments of the verb predict."""
     names = f"{SCENE} --method --step --dtype --keep --threads --store --store-dtype"
-    add_shared(verb, names, out=FOLDER.format("runs/NAME of the scene"))
+    add_shared(verb, names, out=FOLDER.format("runs/NAME, with the name of the scene file"))
 
 
 @as_verb(
     "predict",
-    "predict time, memory and disk of a run, from a short run on this machine",
+    "predict time, memory and disk space of a run, from a short trial on this machine",
     predict_arguments,
     reads=True,
     aliases=("plan",),
 )
 def predict(chosen: argparse.Namespace, *, study: Part = None) -> int:
-    """Run the verb predict: the time, memory and disk that a run would take."""
+    """Run the verb predict: predict time, memory and disk space of a run."""
     from lgvi_warp.calls import predict as prediction
 
     scene = load_scene(chosen)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Changes of a scene by arguments, and the folder and store that they name."""
+"""Changes of a scene by arguments, and the folder and store given by arguments."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
         chosen: The command's parsed arguments.
 
     Returns:
-        Name, as "run.step" or "heading_pid.kp" -> its value as TOML text.
+        Value as TOML text by name, such as "run.step" or "heading_pid.kp".
 
     Raises:
-        SceneError: A --set has no name or no value, or sets what is set already.
+        SceneError: A --set has no name or no value, or sets a name that is already set.
     """
     changes: dict[str, Any] = {}
     faults = Faults()
@@ -88,12 +88,12 @@ def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:
 
 
 def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:
-    """Make the folder for the files before the run, since results that cannot be written would be lost."""
+    """Make the folder for the files before the run, since results would be lost if they could not be written."""
     return writable(out_of(chosen, suffix))
 
 
 def writable(out: Path) -> Path:
-    """Make a folder, where it is not there, and look whether it can be written."""
+    """Make a folder if it does not exist, and check that it is writable."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except FileExistsError:

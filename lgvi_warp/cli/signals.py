@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Signals that end the command from outside: Ctrl-C, SIGTERM, SIGHUP, and a terminal that is gone."""
+"""Signals that end the command from outside: Ctrl-C, SIGTERM, SIGHUP, and a closed terminal."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ GONE = {errno.EPIPE, errno.EIO, errno.ESHUTDOWN}
 
 
 class Ended(KeyboardInterrupt):
-    """An interrupt whose text says what is saved."""
+    """An interrupt with a text on the saved files."""
 
 
 class Signals:
     """A context in which the first signal raises KeyboardInterrupt, and the second ends the process at once.
 
-    A thread listens for the second one, since the main thread may be in a long call of native code. Ignored signals stay
-    ignored; previous handlers are restored at the end. Outside the main thread the context does nothing.
+    A thread waits for the second signal, since the main thread may be in a long call of native code. Ignored signals
+    stay ignored; previous handlers are restored at the end. Outside the main thread the context does nothing.
     """
 
     def __init__(self, what_is_left: Callable[[], str], *, end: Callable[[Signals], None] | None = None):
@@ -66,7 +66,7 @@ class Signals:
 
     @property
     def exit_code(self) -> int:
-        """128 plus the signal's number, as shells have it; that of Ctrl-C without a signal."""
+        """128 plus the signal's number, as in shells; without a signal, the number of Ctrl-C is used."""
         return 128 + (self.number or signal.SIGINT)
 
     @property
@@ -77,7 +77,7 @@ class Signals:
         return f"interrupted by {signal.Signals(self.number).name}"
 
     def _hear(self, number: int, frame: FrameType | None) -> None:
-        """Handle a signal in the main thread, as soon as that runs Python code."""
+        """Handle a signal in the main thread, at its next Python instruction."""
         if self.number is None:
             self.number = number
             raise KeyboardInterrupt
@@ -101,7 +101,7 @@ class Signals:
             os._exit(self.exit_code)
 
     def _again(self, lost: Any) -> None:
-        """Send an interrupt again a moment later that fell where no exception can be raised, as in a finaliser."""
+        """Send an interrupt again after a moment, if it arrived where no exception can be raised, as in a finaliser."""
         if isinstance(lost.exc_value, KeyboardInterrupt) and self.number is not None:
             number, self.number = self.number, None
             self._last += 1
@@ -111,7 +111,7 @@ class Signals:
 
 
 class Lasting:
-    """A stream that ignores a reader's disappearance, or is None from the start: a run goes on without its terminal."""
+    """A stream whose reader may disappear, or that may be None from the start: a run continues without its terminal."""
 
     # Whether texts are in colors: "auto", "always" or "never".
     color = "auto"
@@ -120,12 +120,12 @@ class Lasting:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write a text, unless the reader is gone."""
+        """Write a text, unless the reader has disappeared."""
         self._unless_gone(lambda stream: stream.write(text))
         return len(text)
 
     def flush(self) -> None:
-        """Flush the stream, unless the reader is gone."""
+        """Flush the stream, unless the reader has disappeared."""
         self._unless_gone(lambda stream: stream.flush())
 
     def isatty(self) -> bool:
@@ -156,7 +156,7 @@ class Streams:
 
     @staticmethod
     def color(choice: str) -> None:
-        """Choose whether texts are in colors."""
+        """Choose whether output is colored."""
         for stream in (sys.stdout, sys.stderr):
             stream.color = choice  # type: ignore[union-attr]
 

@@ -19,17 +19,17 @@ from lgvi_warp.common.files import place_of
 def merge_arguments(verb: Any) -> None:
     """Add the arguments of the verb merge."""
     verb.add_argument(
-        "dirs", metavar="DIR", type=Path, nargs="+", help="stores of run --blocks, or the folders that hold them"
+        "dirs", metavar="DIR", type=Path, nargs="+", help="stores from run --blocks, or folders that contain them"
     )
     verb.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
     add_shared(verb, "--overwrite")
 
 
-@as_verb("merge", "join runs of some blocks each (run --blocks) to one run", merge_arguments)
+@as_verb("merge", "merge stores with parts of a run (run --blocks) into one run", merge_arguments)
 def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
-    """Run the verb merge: put runs of some blocks each together.
+    """Run the verb merge: merge stores with parts of a run.
 
-    Returns: The exit code: 0 if the whole run is there, otherwise 1.
+    Returns: The exit code: 0 if the merged run is complete, otherwise 1.
     """
     from lgvi_warp.calls.merge import merge as put_together
 
@@ -51,23 +51,23 @@ def export_arguments(verb: Any) -> None:
     add_shared(
         verb,
         "dir",
-        dir="a store, a result.npz, a folder with one of the two, the footprint.json of a run, or a scene file",
+        dir="a store, a result.npz, a folder with one store or result.npz, the footprint.json of a run, or a scene file",
     )
     verb.add_argument(
         "--to",
         metavar="FILE",
         required=True,
-        help="file name ending in .csv, .parquet, .nc, .geojson, .kml or .mcap, or in .fmu for a scene; or netcdf or parquet, "
-        "for the whole store",
+        help="file name ending in .csv, .parquet, .nc, .geojson, .kml or .mcap; for a scene in .fmu; or the word netcdf or "
+        "parquet for the whole store",
     )
     verb.add_argument("--out", metavar="FILE", type=Path,
-                      help="with --to netcdf or --to parquet: the file (default: beside the run)")  # fmt: skip
+                      help="with --to netcdf or --to parquet: the file (default: next to the run)")  # fmt: skip
     verb.add_argument(
-        "--members", metavar="LIST", help="members to convert, as 3,17 or 0:100 (default: all that were kept)"
+        "--members", metavar="LIST", help="members to export, as 3,17 or 0:100 (default: all members with kept samples)"
     )
-    verb.add_argument("--origin", metavar="LAT,LON", help="origin of the axes [deg] (default: that of the scene)")
+    verb.add_argument("--origin", metavar="LAT,LON", help="origin of the axes [deg] (default: from the scene)")
     verb.add_argument(
-        "--start", metavar="DATE", help="date and time at t = 0, as 2026-06-01T00:00:00Z (default: the scene's)"
+        "--start", metavar="DATE", help="date and time at t = 0, as 2026-06-01T00:00:00Z (default: from the scene)"
     )
     verb.add_argument(
         "--inputs", choices=("commands", "set_points"), help="inputs of a .fmu (default: commands of the actuators)"
@@ -75,10 +75,10 @@ def export_arguments(verb: Any) -> None:
     verb.add_argument("--overwrite", action="store_true", help="replace an existing file")
 
 
-@as_verb("export", "convert a run to one file for other programs: table, NetCDF, map or MCAP; a scene to an FMU",
+@as_verb("export", "export a run to a table, NetCDF, a map or MCAP, or a scene to an FMU",
          export_arguments)  # fmt: skip
 def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
-    """Run the verb export: write a run, members of it, or a scene as one file of another program."""
+    """Run the verb export: write a run, members of it, or a scene to a file for another program."""
     from lgvi_warp.store.export import export as write_as
 
     settings = {"members": _members(chosen.members), "origin": _origin(chosen.origin), "start": chosen.start,
@@ -118,9 +118,9 @@ def _origin(text: str | None) -> list[float] | None:
 def report_arguments(verb: Any) -> None:
     """Add the arguments of the verb report."""
     verb.add_argument("dir", metavar="DIR", type=Path,
-                      help="folder that run, tradeoff, stability, sensitivity or sweep wrote")  # fmt: skip
+                      help="folder written by run, tradeoff, stability, sensitivity or sweep")  # fmt: skip
     verb.add_argument("--out", metavar="FILE", type=Path,
-                      help="the file, replaced if it exists (default: DIR/report.html)")  # fmt: skip
+                      help="the file; an existing one is replaced (default: DIR/report.html)")  # fmt: skip
     verb.add_argument("--open", action="store_true", help="open the file in the browser")
 
 

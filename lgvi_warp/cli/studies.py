@@ -21,7 +21,7 @@ from lgvi_warp.common.reading import file_json
 
 
 def _risk(text: str) -> Any:
-    """A risk as the command has it: mean, the level of a quantile, or cvar:0.05. Raises ValueError."""
+    """Parse a risk option: mean, the level of a quantile, or cvar:0.05. Raises ValueError."""
     from lgvi_warp.criteria.risk import CVaR
 
     kind, _, share = text.partition(":")
@@ -29,7 +29,7 @@ def _risk(text: str) -> Any:
 
 
 def _recipe(path: str) -> Any:
-    """The recipe of an answer, of its file."""
+    """Read the recipe in the file of an answer."""
     content = file_json(path)
     return content.get("recipe", content) if isinstance(content, dict) else content
 
@@ -40,7 +40,7 @@ RECIPE = Form("FILE", _recipe, remedy="give the estimate.json of an answer")
 
 
 def _unmeasured(answer: Any) -> list[str]:
-    """Faults of a trade-off: methods that were asked for and have no measurement."""
+    """Faults of a trade-off: requested methods without a measurement."""
     return [f"--methods {name} has no measurement: {why}" for name, why in answer.missing.items()]
 
 
@@ -53,7 +53,7 @@ sensitivity = as_study("sensitivity", "uncertainty.sensitivity.analyses:sobol", 
 
 
 def _with_bound(chosen: argparse.Namespace, scene: Any, values: dict[str, Any]) -> Any:
-    """The scene; in Python a quantity alone is an event above 0, which hardly anybody means who types it."""
+    """Refuse a quantity without a bound as --limit: in Python it means "above 0", which a command's user rarely wants."""
     from lgvi_warp.uncertainty.rare.event import condition_of, has_bound
 
     words = values["limit"].strip()
@@ -71,12 +71,12 @@ def _fleet_option(verb: Any) -> None:
     verb.add_argument(
         "--fleet",
         action="store_true",
-        help="derivatives of each member of [ensemble] (default: of the scene without its variation)",
+        help="compute derivatives for each member of [ensemble] (default: for the scene without variation)",
     )
 
 
 def _fleet(chosen: argparse.Namespace, scene: Any, values: dict[str, Any]) -> Any:
-    """The members of the scene, with --fleet."""
+    """The ensemble of the scene with --fleet, otherwise the scene."""
     from lgvi_warp.scene.ensemble import Ensemble
 
     return Ensemble.from_scene(scene) if chosen.fleet else scene
@@ -99,7 +99,7 @@ margins = as_study("margins", "robustness.linear.margins:margins", shared="--mem
 
 
 def run_again(chosen: argparse.Namespace, table: Path) -> str:
-    """The command that runs the member of a table again, with the settings of the arguments."""
+    """Command that runs the member of a table again, with the settings of the arguments."""
     # A path in a scene is relative to its file.
     member = {
         "sampling": f"{{table={{file={json.dumps(str(table.resolve()))}}}}}",
@@ -123,7 +123,7 @@ tune_gains = as_study("tune-gains", "robustness.search.tune:tune_gains", shared=
 
 
 def _start(chosen: argparse.Namespace, answer: Any, out: Path | None) -> str:
-    """The section [start] of a scene file that begins in a steady motion."""
+    """Write the section [start] of a scene file that begins in the steady motion."""
     return "\n".join(["[start]", *(f"{name} = {value}" for name, value in answer.start.to_dict().items()), ""])
 
 
@@ -136,8 +136,8 @@ def stability_arguments(verb: Any) -> None:
     """Add the arguments of the verb stability."""
     add_shared(verb, "scene --out", out=FOLDER.format("runs/NAME_stability"))
     names = ("omega", "mass", "drag", "all")
-    verb.add_argument("--grid", choices=names, help="in place of --x and --y: step against angular velocity, added-mass ratio "
-                      "or drag number, or all three")  # fmt: skip
+    verb.add_argument("--grid", choices=names, help="instead of --x and --y: step against angular velocity, added-mass ratio "
+                      "or drag number, or all three maps")  # fmt: skip
     STABILITY.add(verb)
 
 
@@ -145,7 +145,7 @@ def stability_arguments(verb: Any) -> None:
 def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -> int:
     """Run the verb stability: map where methods are accurate, bounded, flagged or fail.
 
-    Returns: The exit code: 1 if a file failed, otherwise 0. Raises Ended: interrupted after a map was finished.
+    Returns: The exit code: 1 if a file failed, otherwise 0. Raises Ended if interrupted after a map was finished.
     """
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
         fault = "names the same axes as --x and --y. Leave out --grid, or both of them"
@@ -186,20 +186,20 @@ def sweep_arguments(verb: Any) -> None:
     add_shared(
         verb,
         "--out",
-        out="folder for the files; cells that are finished there are not run again (default: runs/NAME_sweep)",
+        out="folder for the files; cells that are finished in it are not run again (default: runs/NAME_sweep)",
     )
     SWEEP.add(verb)
-    verb.add_argument("--plan", action="store_true", help="predict time and memory of the sweep, and run nothing")
-    verb.add_argument("--record", metavar="N", type=int, default=0, help="run the N worst members again into recordings "
+    verb.add_argument("--plan", action="store_true", help="predict time and memory of the sweep without running it")
+    verb.add_argument("--record", metavar="N", type=int, default=0, help="run the N worst members again and record them "
                       "(default 0)")  # fmt: skip
 
 
 @as_verb("sweep", SWEEP.sentence, sweep_arguments)
 def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = None, plan: Part = None) -> int:
-    """Run the verb sweep: cases of a closed loop on the same members, what holds and which is better.
+    """Run the verb sweep: run the cases of a closed loop on the same members, and compare them.
 
-    plan: From the setup and the threads to the text of --plan.
-    Returns: The exit code: 1 if all cells were refused, or all rare failures that were asked for, or a file failed, else 0.
+    plan: Function of the setup and the threads that returns the text of --plan.
+    Returns: The exit code: 1 if all cells or all requested rare failures were refused, or a file failed; else 0.
     """
     from lgvi_warp.robustness.sweeps.file import arguments_of_file
     from lgvi_warp.robustness.sweeps.rare_output import rare_refused
@@ -234,7 +234,7 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
 
 
 def record_worst(compared: Any, count: int, out: Path, written: Written, *, log: Part = None) -> None:
-    """Run the worst members again, those of each cell together, and write a recording of them."""
+    """Run the worst members again, cell by cell, and write a recording of each cell's members."""
     from lgvi_warp.views.recording.rerun import record
 
     write = log or record

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verb view: look at a run that is there."""
+"""The verb view: show an existing run."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def view_arguments(verb: Any) -> None:
     """Add the arguments of the verb view."""
     verb.add_argument("dir", metavar="DIR", type=Path, help="the folder of a run, a store, or a result.npz")
     verb.add_argument(
-        "--members", metavar="LIST", help="members to draw, as 3,17 (default: 1,000 that represent the fleet)"
+        "--members", metavar="LIST", help="members to draw, as 3,17 (default: 1,000 representative members)"
     )
-    verb.add_argument("--out", metavar="FILE", type=Path, help="write the recording to this file, and open no viewer")
-    movie = "write a moving picture there (.webp, .gif, .png), and open no viewer"
+    verb.add_argument("--out", metavar="FILE", type=Path, help="write the recording to this file, without a viewer")
+    movie = "write an animation to this file (.webp, .gif, .png), without a viewer"
     verb.add_argument("--movie", metavar="FILE", type=Path, help=movie)
 
 
@@ -63,7 +63,7 @@ def run_in(path: Path) -> Content:
 
 
 def indices(text: str | None) -> list[int] | None:
-    """Read the indices of members, as "3,17"; None for none."""
+    """Read the indices of members, as "3,17"; None without a text."""
     if text is None:
         return None
     words = [word.strip() for word in text.split(",")]

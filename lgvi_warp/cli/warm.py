@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verb warm: compile the kernels of a scene ahead."""
+"""The verb warm: compile the kernels of a scene before its runs."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from lgvi_warp.common import machine
 
 def warm_arguments(verb: Any) -> None:
     """Add the arguments of the verb warm."""
-    add_shared(verb, "scene --methods", methods="names, such as psi_s,rk4 (default: the scene's)")
-    names = SHARED["--methods"] | {"help": "float64, float32, float32_compensated (default: the scene's)"}
+    add_shared(verb, "scene --methods", methods="names of methods, such as psi_s,rk4 (default: the scene's method)")
+    names = SHARED["--methods"] | {"help": "any of float64, float32, float32_compensated (default: the scene's dtype)"}
     verb.add_argument("--dtypes", **names)
-    add_shared(verb, "--step --duration --set --threads", threads="processes (default: all cores)")
+    add_shared(verb, "--step --duration --set --threads", threads="number of processes (default: all cores)")
 
 
-@as_verb("warm", "compile the kernels of a scene ahead of its runs, several at a time", warm_arguments, reads=True)
+@as_verb("warm", "compile the kernels of a scene before its runs, several at a time", warm_arguments, reads=True)
 def warm(chosen: argparse.Namespace, *, compile_plans: Part = None) -> int:
-    """Run the verb warm: compile what runs of a scene need, and print how long each phase took."""
+    """Run the verb warm: compile the kernels for a scene's runs, and print the time of each phase."""
     from lgvi_warp.calls import warm as kernels
 
     begun = time.perf_counter()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write the files at a verb's end side by side, whole even at an interrupt, and collect what failed."""
+"""Write the files at the end of a verb in parallel, complete even after an interrupt, and collect failures."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Written:
     missing: dict[str, MissingExtra] = field(default_factory=dict)
 
     def take(self, path: Path, write: Callable[[], Path]) -> None:
-        """Write a file into a folder, or note why it was not written."""
+        """Write a file into a folder, or record why it was not written."""
         try:
             place_of(path, path.parent)
             self.files.append(write())
@@ -41,7 +41,7 @@ class Written:
             self.faults.append(f"{path} was not written: {error}")
 
     def draw(self, plot: Callable[..., Any], study: Any, path: Path) -> None:
-        """Draw a study's picture, or note why it was not drawn."""
+        """Draw a study's picture, or record why it was not drawn."""
 
         def drawn() -> Path:
             plot(study, path=path)
@@ -63,7 +63,7 @@ class Written:
 def side_by_side(
     writers: Mapping[Path, Callable[[Path], Path]], *, wait: Callable[..., Any] = wait
 ) -> dict[Path, Future[Path]]:
-    """Write files, each in a thread of its own."""
+    """Write files in parallel, each in its own thread."""
     if not writers:
         return {}
     pool = ThreadPoolExecutor(len(writers))

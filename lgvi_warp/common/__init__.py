@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts that know no vehicle: faults, statuses, durable files, files of unknown origin, random numbers and the machine."""
+"""Modules that do not depend on vehicles: faults, statuses, durable and untrusted files, random numbers, the machine."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments of public functions, read whatever the user gave: each returns what is meant, or refuses it by name."""
+"""Readers of arguments of public functions: each converts any value from a user, or refuses it by name."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PATH = "give a path, as text or pathlib.Path"
 
 
 def of_kind(key: str, value: Any, attributes: str, problem: str, remedy: str) -> Any:
-    """Read an object that the function looks into."""
+    """Check that an argument has the attributes that the function reads."""
     if isinstance(value, type) or not all(hasattr(value, name) for name in attributes.split()):
         raise refusal(key, value, f"is not {problem}", remedy)
     return value
@@ -72,7 +72,7 @@ def whole_number(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int
 
 
 def items_of(value: Any) -> list[Any] | None:
-    """Read a list, tuple, array, column, range or iterator as a list; None for a text, a mapping and what is no list."""
+    """Read a list, tuple, array, column, range or iterator as a list; None for a text, a mapping or anything else."""
     if isinstance(value, str | bytes | Mapping | Set):
         return None
     value = plain(value)
@@ -85,7 +85,7 @@ def items_of(value: Any) -> list[Any] | None:
 
 
 def listed(key: str, value: Any, problem: str) -> list[Any]:
-    """Read a list; one text alone stands for a list of it."""
+    """Read a list; a single text stands for a list of one text."""
     items = [str(value)] if isinstance(value, str) else items_of(value)
     if items is None:
         raise refusal(key, value, "is not a list", f"give a list of {problem}")
@@ -93,10 +93,10 @@ def listed(key: str, value: Any, problem: str) -> list[Any]:
 
 
 def members_of(key: str, value: Any, count: int | None = None) -> np.ndarray:
-    """Read which members are meant: their indices, int64 (m,), in the order given; one may come several times.
+    """Read a selection of members as indices, int64 (m,), in the given order; an index may occur several times.
 
-    Indices are whole numbers from 0. A mask has a truth value for each of `count` members; a slice is of these.
-    Raises an error that is a SceneError and an IndexError, also where no member is named.
+    Indices are whole numbers from 0. A mask has a truth value for each of `count` members; a slice selects among these.
+    Raises an error that is a SceneError and an IndexError, also if no member is selected.
     """
     if isinstance(value, range) and len(value):
         ends = np.array([value[0], value[-1]], dtype=object)
@@ -120,7 +120,7 @@ def members_of(key: str, value: Any, count: int | None = None) -> np.ndarray:
 
 
 def _indices(key: str, value: Any, count: int | None) -> np.ndarray:
-    """Read indices, or a mask, of members."""
+    """Read indices or a mask of members."""
     whose = (
         "is not a list of members",
         "give whole numbers from 0, a slice, or a mask with a truth value for each member",
@@ -173,14 +173,14 @@ def flag(key: str, value: Any) -> bool:
 
 
 def function_of(key: str, value: Any) -> Any:
-    """Read a function, or None for none."""
+    """Read a function, or None for no function."""
     if value is not None and not callable(value):
         raise refusal(key, value, "is not a function", "give a function, or leave it out")
     return value
 
 
 def names_of(key: str, value: Any) -> list[str]:
-    """Read a list of names; one name alone stands for a list of it."""
+    """Read a list of names; a single name stands for a list of one name."""
     names = listed(key, value, "names")
     for name in names:
         if not isinstance(name, str):
@@ -189,7 +189,7 @@ def names_of(key: str, value: Any) -> list[str]:
 
 
 def name_set(key: str, value: Any) -> set[str]:
-    """Read names whose order does not matter: a set, or the keys of a mapping, will do as well."""
+    """Read names whose order does not matter, also from a set or the keys of a mapping."""
     return set(names_of(key, list(value) if isinstance(value, Set | Mapping) else value))
 
 
@@ -201,7 +201,7 @@ MARK = "_is_explained"
 
 
 def explained(kind: Kind) -> Kind:
-    """Let the public methods that a class defines name an argument that does not fit; nothing is checked before an error."""
+    """Make errors in a class's public methods name the wrong argument. Arguments are checked only after an error."""
     # Readers refuse earlier where a user's argument comes in. This stays for some ninety methods, most of them of terms and
     # statistics that others override, which take arrays by fields: without it 43 % of their odd calls end in raw errors.
     for name, value in list(vars(kind).items()):
@@ -214,7 +214,7 @@ def explained(kind: Kind) -> Kind:
 
 
 def _explained(function: Callable[..., Any], bound: bool = False) -> Callable[..., Any]:
-    """The function, whose raw errors name an argument that does not fit; bound: the first argument is its object."""
+    """Wrap a function so that its raw errors name the wrong argument; bound: the first argument is the object itself."""
 
     @functools.wraps(function)
     def call(*args: Any, **settings: Any) -> Any:
@@ -234,7 +234,7 @@ def _explained(function: Callable[..., Any], bound: bool = False) -> Callable[..
 def _misfit(
     function: Callable[..., Any], bound: bool, args: tuple[Any, ...], settings: Mapping[str, Any], error: Exception
 ) -> SceneError | None:
-    """A refusal of the first argument that is not what the function says that it takes, or lacks a key; None for none."""
+    """Refuse the first argument that does not fit its annotation, or lacks a key; None if all fit."""
     signature = inspect.signature(function)
     try:
         given = list(signature.bind(*args, **settings).arguments.items())
@@ -262,18 +262,18 @@ def _misfit(
 
 
 def alternatives(words: str) -> list[str]:
-    """The parts of an annotation that "|" joins, outside of brackets."""
+    """Split an annotation at each "|" outside of brackets."""
     return re.split(r"\|(?![^\[]*\])", words)
 
 
 def _resolved(word: str, function: Callable[..., Any]) -> str:
-    """A part of an annotation; what it stands for where it is the name of another annotation."""
+    """Resolve a part of an annotation, if it is the name of another annotation."""
     known = function.__globals__.get(word)
     return str(known) if known is not None and not isinstance(known, type) and known is not Any else word
 
 
 def _fits(kind: str, value: Any) -> bool:
-    """Whether a value may be of a kind, by the first word of an annotation."""
+    """Whether a value may be of a kind, given by the first word of an annotation."""
     word = re.split(r"[\[\]( ]", kind.removeprefix("np.").removeprefix("typing.").removeprefix("collections.abc."))[0]
     if word in ("Any", "object", "Self", "TypeVar", ""):
         return True

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Limits that a container or a batch system sets for a process: Linux control groups, versions 2 and 1.
 
-A process's groups are named in /proc/self/cgroup, and their limits are in files below /sys/fs/cgroup. The limits of every
-parent group apply too. In a container the names may be those of the host, whose folders are missing: then the folders that
-exist count.
+A process's groups are named in /proc/self/cgroup, and their limits are in files below /sys/fs/cgroup. The limits of
+every parent group apply too. In a container the names may be those of the host, whose folders are missing; then only
+the existing folders are read.
 Source: Linux kernel, Documentation/admin-guide/cgroup-v2.rst and cgroup-v1/memory.rst, scheduler/sched-bwc.rst.
 """
 
@@ -18,22 +18,22 @@ ROOT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
 def cpu_quota(root: Path = ROOT, group_file: Path = OWN) -> float | None:
-    """The smallest quota of CPU time [CPUs] of this process's groups, as 1.5 for 150 ms in each 100 ms; None without one."""
+    """Smallest quota of CPU time [CPUs] of this process's groups, 1.5 for 150 ms in each 100 ms; None without a quota."""
     return _cpu_quota(root, group_file, int(time.monotonic()))
 
 
 @functools.lru_cache(maxsize=1)
 def _cpu_quota(root: Path, group_file: Path, second: int) -> float | None:
-    """The quota, read from its files at most once a second, since short runs ask for it many times in one."""
+    """The quota, read from its files at most once a second, since short runs need it many times a second."""
     quotas = [_v2_quota(folder) for folder in _folders(root, group_file, "")]
     quotas += [_v1_quota(folder) for folder in _folders(root, group_file, "cpu")]
     return min((quota for quota in quotas if quota is not None), default=None)
 
 
 def memory_limit(root: Path = ROOT, group_file: Path = OWN) -> int | None:
-    """The smallest limit of memory [bytes] of this process's groups; None without one.
+    """Smallest limit of memory [bytes] of this process's groups; None without a limit.
 
-    Version 1 expresses "none" by a number that no machine has.
+    Version 1 expresses "no limit" by an impossibly large number.
     """
     limits = [_number(folder / "memory.max") for folder in _folders(root, group_file, "")]
     for folder in _folders(root, group_file, "memory"):
@@ -56,7 +56,7 @@ def _folders(root: Path, group_file: Path, controller: str) -> Iterator[Path]:
 
 
 def _top(root: Path, names: str, controller: str) -> Path:
-    """Folder where a hierarchy is mounted: named by its controller or by all of them; "unified" for version 2 beside 1."""
+    """Folder where a hierarchy is mounted, named by one or all controllers; "unified" for version 2 beside version 1."""
     if controller:
         return next((root / name for name in (controller, names) if (root / name).is_dir()), root / controller)
     return root / "unified" if (root / "unified").is_dir() else root
@@ -88,7 +88,7 @@ def _number(path: Path) -> int | None:
 
 
 def _hierarchical(path: Path) -> int | None:
-    """The limit that version 1 computes from all parent groups, those of the host included."""
+    """The limit that version 1 computes from all parent groups, including those of the host."""
     for line in _text(path).splitlines():
         name, _, value = line.partition(" ")
         if name == "hierarchical_memory_limit" and value.isdigit():

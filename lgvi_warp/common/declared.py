@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fields of settings that say what they may hold; `read` reads them all. Those of terms that vary by member: `number`."""
+"""Fields of settings that declare their allowed values; `read` checks them. For numbers that vary by member: `number`."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from lgvi_warp.common.real_numbers import is_whole, settle, whole_remedy
 
 
 def declared(reader: Callable[..., Any], default: Any = dataclasses.MISSING, **arguments: Any) -> Any:
-    """Declare a field by how it is read, with more arguments of the reader; where None is its default, None is not read.
+    """Declare a field by its reader, with additional arguments of the reader. If its default is None, None is not read.
 
-    reader: Notes what is wrong with the value of a key, and returns what it means, as methods of `Faults` do.
+    reader: Function that adds a fault for a wrong value of a key, and returns the converted value, as methods of `Faults`.
     """
     return dataclasses.field(default=default, metadata={"reader": reader, "arguments": arguments})
 
@@ -29,7 +29,7 @@ word = functools.partial(declared, Faults.choice)
 
 
 def checked(good: Callable[[Any], bool], problem: str, remedy: str, default: Any = dataclasses.MISSING) -> Any:
-    """Declare a value that a condition lets through, and what a fault says of any other."""
+    """Declare a value by a condition, and the fault of a value that does not meet it."""
     return declared(_check, default, good=good, problem=problem, remedy=remedy)
 
 
@@ -58,7 +58,7 @@ def _declared_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
 
 
 def read(settings: Any, faults: Faults, *names: str) -> dict[str, Any]:
-    """Read declared fields of an object, all or those that are named, and note what is wrong; None after a fault."""
+    """Read declared fields of an object, all or the named ones, and add faults; a field with a fault becomes None."""
     values, known = {}, _declared_fields(type(settings))  # type: ignore[arg-type]  # a class is hashable
     settle(settings, *names)
     for name in names or known:
@@ -72,7 +72,7 @@ Settings = TypeVar("Settings")
 
 
 def from_table(kind: type[Settings], key: str, table: Any, example: str, **needed: str) -> Settings:
-    """Build settings from a table of a scene file, which needs some keys (with remedies); settings themselves are kept."""
+    """Build settings from a table of a scene file; needed: remedies by required key. Settings are returned unchanged."""
     if isinstance(table, kind):
         return table
     if not isinstance(table, Mapping):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fields of a dataclass whose values are made when they are first read."""
+"""Fields of a dataclass whose values are made at their first use."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 
 class Deferred:
-    """A field of a dataclass that takes a value, or a function without arguments that makes it at the first reading."""
+    """A field of a dataclass that holds a value, or a function without arguments that makes the value at its first use."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -27,7 +27,7 @@ class Deferred:
 
 
 class Once:
-    """A function without arguments that is called once; later calls get what it returned. It can be pickled where that can."""
+    """A function without arguments that runs once; later calls return its value. It can be pickled if its value can."""
 
     def __init__(self, function: Callable[[], Any]):
         self._function, self._values = function, list[Any]()

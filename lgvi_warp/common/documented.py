@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Classes of which `dir()`, and so tab completion, lists what their documentation lists."""
+"""Classes for which `dir()`, and so tab completion, lists only documented names."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ def documented_names(kind: type) -> set[str]:
 
 
 class _Names(ABCMeta):
-    """Metaclass for `dir()` of a class itself; of ABCMeta, so that a subclass may be abstract as well."""
+    """Metaclass for `dir()` of a class itself; derived from ABCMeta, so that a subclass may be abstract."""
 
     def __dir__(cls) -> list[str]:
         return _listed(cls, super().__dir__())
 
 
 class Documented(metaclass=_Names):
-    """Base class: `dir()` lists fields, documented names, and whatever a class outside the package defines.
+    """Base class: `dir()` lists fields, documented names, and all names that a class outside the package defines.
 
-    The other names are for authors of laws. A base class for authors, which has no word in scene files, lists those that its
-    own bases document, too.
+    The other names are for authors of laws. A base class for authors, which has no word in scene files, also lists the
+    names that its own base classes document.
     """
 
     def __dir__(self) -> list[str]:

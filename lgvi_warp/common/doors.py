@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lookup of names behind a door, a module that users import: a stub beside it lists them, each imported when it is used."""
+"""Lookup of names in a public module (a door): a stub file lists them, and each is imported at its first use."""
 
 import ast
 import sys
@@ -10,12 +10,12 @@ from typing import Any
 
 
 def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
-    """Values that a door assigns to `__all__`, `__getattr__` and `__dir__`.
+    """Make the values that a public module assigns to `__all__`, `__getattr__` and `__dir__`.
 
-    NumPy, SciPy and Warp take longer to import than a script may take that only asks for help or a version: so nothing is
-    imported before its name is used. `dir` lists, in addition, classes of installed extensions (lgvi_warp.common.extensions).
+    The import of NumPy, SciPy and Warp is too slow for a script that only prints help or a version. So no module is
+    imported before its name is used. `dir` also lists classes of installed extensions (lgvi_warp.common.extensions).
 
-    door: the module's name; the stub stands beside its file, with one line "from module import name as public_name" a name.
+    door: name of the public module; its stub has one line "from module import name as public_name" for each name.
     """
     module = sys.modules[door]
     stub = ast.parse(module.__loader__.get_data(f"{module.__file__}i"))  # type: ignore[union-attr]
@@ -59,7 +59,7 @@ def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[
 
 
 def behind_another(name: str, door: str) -> str:
-    """Suggest what other doors have by this name; "" where there is none, or this door has it."""
+    """Suggest other public modules that have this name; "" if there is none, or this module has it."""
     package = door.partition(".")[0]
     top = import_module(package).__all__
     # Who asks for a module of a room is not looking for a door.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faults of a scene, collected into one message: each with its key, its value and the remedy."""
+"""Faults of a scene, collected into one message: each with its key, its value and its remedy."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class SceneError(ValueError):
 
     Args:
         faults: One text per fault. Of more than 20, the first 20 are kept.
-        more: How many faults there are besides; default 0.
+        more: Number of further faults without a text; default 0.
 
     Attributes:
         faults: The texts, each on one line.
@@ -73,15 +73,15 @@ def refusal(key: str, value: Any, problem: str, remedy: str) -> SceneError:
 
 
 class NoSuchMembers(SceneError, IndexError):  # noqa: N818
-    """Members are named that a run or an ensemble does not have."""
+    """Raised for members that a run or an ensemble does not have."""
 
 
 class UnknownArgument(SceneError, TypeError):  # noqa: N818
-    """A function or a class is given a keyword that it does not know."""
+    """Raised for an unknown keyword argument of a function or a class."""
 
 
 class MembersFailed(RuntimeError):  # noqa: N818
-    """Members failed in a run with on_failure="raise"; nothing of the run is lost.
+    """Raised if members failed in a run with on_failure="raise"; the result of the run is kept.
 
     Args:
         text: The message.
@@ -109,11 +109,11 @@ class MembersFailed(RuntimeError):  # noqa: N818
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run in memory was interrupted; its finished members are not lost.
+    """Raised if a run in memory was interrupted; its finished members are kept.
 
     Args:
         text: The message.
-        result: The `Result` of the members that were finished, kept as an attribute.
+        result: The `Result` of the finished members, kept as an attribute.
     """
 
     def __init__(self, text: str, result: Any):
@@ -126,7 +126,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 class NothingToDraw(ValueError):  # noqa: N818
-    """A picture would be empty; the message says why."""
+    """Raised if a picture would be empty; the message says why."""
 
 
 # Whether the package is on the package index: as pyproject.toml says (tests/house/test_published.py).
@@ -139,14 +139,14 @@ def install(extra: str) -> str:
 
 
 class MissingExtra(ImportError):  # noqa: N818
-    """A library of one of the package's extras is not installed."""
+    """Raised if a library of one of the package's extras is not installed."""
 
     def __init__(self, purpose: str, library: str, extra: str):
         super().__init__(f"{purpose} need {library}: {install(extra)}", name=library)
         self.what, self.library, self.extra = purpose, library, extra
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle what the message is made of, so that another process can raise the same error."""
+        """Pickle the parts of the message, so that another process can raise the same error."""
         return type(self), (self.what, self.library, self.extra), vars(self)
 
 
@@ -165,13 +165,13 @@ def closest(word: Any, known: Iterable[str]) -> str:
 
 
 def among(value: Any, known: Iterable[Any]) -> bool:
-    """Tell whether a value is one of those known, whatever the user gave: arrays and tables too."""
+    """Tell whether a value, which may be of any type, is one of the known values."""
     kind = str if isinstance(value, np.str_) else type(value)
     return any(kind is type(k) and value == k for k in known)
 
 
 class _Brief(reprlib.Repr):
-    """repr() of a value of any size, no longer than a message shows: memory and time do not grow with the value."""
+    """repr() of a value, with bounded length, memory and time even for very large values."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -191,7 +191,7 @@ class _Brief(reprlib.Repr):
         return repr(x[: self.maxstring])
 
     def repr_int(self, x: int, level: int) -> str:
-        """Show a whole number, or its length: Python refuses to write one of several thousand digits."""
+        """Show a whole number, or only its number of digits: Python refuses to print thousands of digits."""
         digits = round(x.bit_length() * 0.30103)
         return repr(x) if x.bit_length() < 1000 else f"<a whole number of about {digits} digits>"
 
@@ -200,7 +200,7 @@ _brief = _Brief()
 
 
 def brief(value: Any) -> str:
-    """Show a value, an array too, on one line of a message: its repr, cut after 80 characters."""
+    """Show any value on one line of a message: its repr, cut after 80 characters."""
     if isinstance(value, np.ndarray):
         value = value[tuple(slice(LONGEST_VALUE) for _ in value.shape)].tolist()
     elif isinstance(value, np.generic):
@@ -210,26 +210,26 @@ def brief(value: Any) -> str:
 
 
 def cut(name: Any) -> str:
-    """Shorten a name for a message: a file may hold one of any length."""
+    """Shorten a name for a message, since a file may contain a name of any length."""
     text = name if isinstance(name, str) else brief(name)
     return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}..."
 
 
 def one_line(fault: str) -> str:
-    """Put a fault on one printable line of limited length.
+    """Convert a fault to one printable line of limited length.
 
-    A file may hold line ends, or control codes that a terminal would obey.
+    A file may contain line ends, or control codes that a terminal would execute.
     """
     return printable(fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}")
 
 
 def printable(text: str, kept: str = "") -> str:
-    """Show control characters, which a terminal would obey, as text."""
+    """Show control characters, which a terminal would execute, as text."""
     return text if text.isprintable() else "".join(c if c.isprintable() or c in kept else ascii(c)[1:-1] for c in text)
 
 
 def ragged(value: Any) -> bool:
-    """Tell whether nested lists differ in length, so that NumPy makes no array of them."""
+    """Tell whether nested lists have different lengths, so that NumPy makes no array of them."""
     try:
         np.asarray(value)
     except ValueError:
@@ -244,7 +244,7 @@ class Faults:
         self._prefix, self._found, self._more = prefix, list[str](), 0
 
     def add(self, key: str, value: Any, problem: str, remedy: str | Callable[[], str]) -> None:
-        """Note one fault, as "key = value is wrong in this way. The remedy"."""
+        """Add one fault, as the sentence "key = value problem. Remedy"."""
         if len(self._found) >= MOST_FAULTS:
             self._more += 1
             return
@@ -253,7 +253,7 @@ class Faults:
 
     @contextlib.contextmanager
     def including(self) -> Iterator[None]:
-        """Note the faults of a SceneError raised inside the `with` block, and go on after it."""
+        """Add the faults of a SceneError raised inside the `with` block, and continue after it."""
         try:
             yield
         except SceneError as error:
@@ -262,12 +262,12 @@ class Faults:
             self._more += error.more + len(error.faults[room:])
 
     def raise_if_any(self) -> None:
-        """Raise all noted faults at once."""
+        """Raise all collected faults at once."""
         if self._found:
             raise SceneError(self._found, self._more)
 
     def choice(self, key: str, value: Any, known: Iterable[Any]) -> bool:
-        """Check that a value is one of those allowed; note a fault otherwise."""
+        """Check that a value is allowed; add a fault otherwise."""
         # Of tables that extensions add to no list is made where the value is in them.
         looked_up = isinstance(known, Container) and not isinstance(known, Sequence)
         good = looked_up and isinstance(value, str) and value in known
@@ -277,7 +277,7 @@ class Faults:
         return good
 
     def keys(self, key: str, keys: Iterable[str], known: Iterable[str]) -> None:
-        """Check that every key is one of those allowed; note a fault for each other one."""
+        """Check that every key is allowed; add a fault for each other key."""
         known = list(known)
         for name in keys:
             if name not in known:
@@ -286,7 +286,7 @@ class Faults:
                 self.add(f"{key}.{name}" if key else name, value, "is an unknown key", remedy)
 
     def real(self, key: str, value: Any, remedy: str = "give numbers") -> np.ndarray | None:
-        """Read real numbers, which may be NaN, as a new float64 array; None after noting a fault."""
+        """Read real numbers, which may be NaN, as a new float64 array; None after adding a fault."""
         try:
             return real_numbers(value)
         except NotReal as error:
@@ -294,7 +294,7 @@ class Faults:
             return None
 
     def finite(self, key: str, value: Any, shape: tuple[int, ...] | None = None, unit: str = "") -> np.ndarray | None:
-        """Read finite numbers of a shape, or of any, as a read-only float64 array; None after noting a fault."""
+        """Read finite numbers, of a given shape or of any, as a read-only float64 array; None after adding a fault."""
         wanted = "a number" if shape == () else f"numbers of shape {shape}" if shape else "numbers"
         remedy = f"give {wanted}" + (f" [{unit}]" if unit else "")
         array = self.real(key, value, remedy)
@@ -312,7 +312,7 @@ class Faults:
     def number(
         self, key: str, value: Any, unit: str = "", least: float = -np.inf, most: float = np.inf
     ) -> float | None:
-        """Read one finite number from `least` to `most`; None after noting a fault."""
+        """Read one finite number from `least` to `most`; None after adding a fault."""
         array = self.finite(key, value, (), unit)
         if array is None:
             return None
@@ -324,7 +324,7 @@ class Faults:
         return None
 
     def positive(self, key: str, value: Any, unit: str = "s") -> float | None:
-        """Read one finite number above 0; None after noting a fault."""
+        """Read one finite number above 0; None after adding a fault."""
         if type(value) is float and 0.0 < value < math.inf:
             return value
         array = self.finite(key, value, (), unit)
@@ -334,7 +334,7 @@ class Faults:
         return None if array is None else float(array)
 
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
-        """Read a symmetric matrix, exactly so in float64, or the diagonal of a diagonal one; None after noting a fault."""
+        """Read an exactly symmetric float64 matrix, or the diagonal of a diagonal matrix; None after adding a fault."""
         value = plain(value)
         if holds_words(value):
             self.finite(key, value, (size,), unit)  # notes the fault
@@ -361,5 +361,5 @@ class Faults:
         return np.where(matrix == matrix.T, matrix, 0.5 * matrix + 0.5 * matrix.T)
 
     def __bool__(self) -> bool:
-        """Tell whether a fault was noted."""
+        """Tell whether a fault was added."""
         return bool(self._found)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Extensions: the folders of `lgvi_warp.extensions`, and installed packages with an entry point of this group.
 
-The core imports none of them by name. An extension is a module with a table `HOLDS`: {table: {word: place}}. A place is
-".module", ".module:name" or, of a file, "file.toml", each from the extension's own folder. Nothing else of an extension is
-imported before a word of it is looked up.
+The core imports no extension by name. An extension is a module with a table `HOLDS`: {table: {word: place}}. A place is
+".module", ".module:name" or, for a file, "file.toml", relative to the extension's own folder. Other modules of an
+extension are imported when one of its words is looked up.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ GROUP = "lgvi_warp.extensions"
 
 @functools.cache
 def built_in() -> tuple[ModuleType, ...]:
-    """The extensions that come with the package, in alphabetical order: its folders, whichever way it is installed."""
+    """The extensions of this package, in alphabetical order: its folders, for every kind of installation."""
     spec = find_spec(GROUP)
     places = spec.submodule_search_locations if spec else None
     return tuple(import_module(f"{GROUP}.{found.name}") for found in iter_modules(places or ()) if found.ispkg)
@@ -31,7 +31,7 @@ def built_in() -> tuple[ModuleType, ...]:
 
 @functools.cache
 def installed() -> tuple[ModuleType, ...]:
-    """The extensions of other packages. One that cannot be imported is left out, with a warning."""
+    """The extensions of other packages. If one cannot be imported, a warning is given and it is left out."""
     from importlib.metadata import entry_points  # loads slowly
 
     modules = []
@@ -45,24 +45,24 @@ def installed() -> tuple[ModuleType, ...]:
 
 
 def _holders(table: str) -> Iterator[tuple[ModuleType, dict[str, str]]]:
-    """Each extension with its part of a table, the built-in ones first; one that is being imported may have none yet."""
+    """Each extension with its part of a table, built-in ones first; an extension may have no table during its import."""
     for extensions in (built_in, installed):
         for module in extensions():
             yield module, getattr(module, "HOLDS", {}).get(table, {})
 
 
 def words(table: str) -> list[str]:
-    """The words of all extensions in a table."""
+    """List the words of all extensions in a table."""
     return list(dict.fromkeys(word for _, held in _holders(table) for word in held))
 
 
 def holder(table: str, word: str) -> tuple[ModuleType, str] | None:
-    """The extension that has a word in a table, the first of several, and the place there; None where none has it."""
+    """Find the first extension that has a word in a table, and the place of the word; None if no extension has it."""
     return next(((module, held[word]) for module, held in _holders(table) if word in held), None)
 
 
 def load(table: str, word: str) -> Any:
-    """Import what an extension has under a word: a module, or a name of one; None where no extension has the word."""
+    """Import the module, or its object, for a word of an extension; None if no extension has the word."""
     found = holder(table, word)
     if found is None:
         return None
@@ -72,6 +72,6 @@ def load(table: str, word: str) -> Any:
 
 
 def file(table: str, word: str) -> Path | None:
-    """The path of a file that an extension has under a word; None where no extension has the word."""
+    """Path of the file for a word of an extension; None if no extension has the word."""
     found = holder(table, word)
     return None if found is None else Path(str(resources.files(found[0].__name__) / found[1]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that outlive a crash: written whole, synced, and put into their place by a rename."""
+"""Files that survive a crash: written completely, synced, and moved to their place by a rename."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def checksum(data: Any, before: int = 0) -> int:
 
 @functools.cache
 def syncs() -> ThreadPoolExecutor:
-    """Threads that wait for the disk."""
+    """Thread pool for waits on the disk."""
     return ThreadPoolExecutor(SYNCS, thread_name_prefix="lgvi_warp_sync")
 
 
@@ -48,7 +48,7 @@ _room = threading.BoundedSemaphore(MOST_WAITING)
 
 
 def _renew() -> None:
-    """Start afresh in a child after a fork, where none of the threads exists."""
+    """Reset the state in a child after a fork, where none of the threads exists."""
     global _room
     syncs.cache_clear()
     _room = threading.BoundedSemaphore(MOST_WAITING)
@@ -70,7 +70,7 @@ def sync_file(beside: Path, target: Path) -> None:
 
 
 def _begun(descriptor: int, target: Path) -> Future[None]:
-    """Start to sync an open file; wait first where too many are waiting."""
+    """Start to sync an open file; wait first if too many syncs are pending."""
     _room.acquire()
     return syncs().submit(_sync_early, os.dup(descriptor), target)
 
@@ -85,7 +85,7 @@ def _sync_early(descriptor: int, target: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk; do nothing where the system cannot sync folders."""
+    """Wait until the names in a folder are on the disk; do nothing if the system cannot sync folders."""
     with contextlib.suppress(PermissionError):  # Windows opens no folders
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -95,9 +95,9 @@ def sync_folder(folder: Path) -> None:
 
 
 class Files:
-    """Files that appear together: `write` each, then `finish` all. `sums`: key of each file written -> [bytes, CRC-32C].
+    """Files that appear together: `write` each, then `finish` all. `sums`: [bytes, CRC-32C] by key of each written file.
 
-    Until then they lie beside their places under temporary names, so that existing files stay whole.
+    Before `finish` they have temporary names in the same folders, so that existing files stay intact.
     """
 
     def __init__(self, root: Path):
@@ -107,7 +107,7 @@ class Files:
         self.sums: dict[str, list[int]] = {}
 
     def write(self, key: str, data: Any, *, checked: bool = False) -> None:
-        """Write one file, and note its size and checksum; wait while many large files have not reached the disk."""
+        """Write one file, and record its size and checksum; wait while too much data has not reached the disk."""
         target = self._root / key
         beside = scratch.beside(target)
         view = memoryview(data).cast("B")
@@ -122,7 +122,7 @@ class Files:
         self.sums[key] = [len(view) + len(tail), checksum(tail, crc)]
 
     def sync(self) -> None:
-        """Start to sync the files whose sync has not begun."""
+        """Start to sync the files whose sync has not started."""
         self._waiting = [
             (beside, target, sync or syncs().submit(sync_file, beside, target))
             for beside, target, sync in self._waiting
@@ -140,20 +140,20 @@ class Files:
         return folders
 
     def finish(self) -> None:
-        """Sync the files, put them in their places, and sync their folders."""
+        """Sync the files, move them to their places, and sync their folders."""
         (error,) = finish_together([self])
         if error is not None:
             raise error
 
     def drop(self) -> None:
-        """Remove the files that are not finished."""
+        """Remove the unfinished files."""
         for beside, _, _ in self._waiting:
             beside.unlink(missing_ok=True)
         self._waiting.clear()
 
 
 def finish_together(several: Sequence[Files]) -> list[OSError | None]:
-    """Finish several sets of files, and sync each folder once: for each set None, or why it is not in its place."""
+    """Finish several sets of files, and sync each folder once; returns for each set None, or its error."""
     # Concurrent syncs share the file system's commits.
     for files in several:
         files.sync()
@@ -173,7 +173,7 @@ def finish_together(several: Sequence[Files]) -> list[OSError | None]:
 
 
 def write_all(file: Any, view: memoryview) -> None:
-    """Write every byte, however few the system takes at a time."""
+    """Write every byte, even if the system takes only few at a time."""
     while len(view):
         written = file.write(view)
         if not written:
@@ -182,7 +182,7 @@ def write_all(file: Any, view: memoryview) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write one file durably: it is there whole or not at all."""
+    """Write one file durably: it is complete or does not appear."""
     files = Files(path.parent)
     try:
         files.write(path.name, data)
@@ -193,7 +193,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def fault(root: Path, key: str, size: int, crc: int) -> str | None:
-    """State of a file by its size [bytes] and checksum: "is missing", "is torn" or "has changed"; None for one in order."""
+    """Check a file by its size [bytes] and checksum: "is missing", "is torn" or "has changed"; None if it is intact."""
     try:
         with safe_files.opened(root, key) as file:
             if os.fstat(file.fileno()).st_size != size:
@@ -204,7 +204,7 @@ def fault(root: Path, key: str, size: int, crc: int) -> str | None:
 
 
 def remove_unfinished(folders: Iterable[Path]) -> None:
-    """Remove unfinished files of writers that were killed."""
+    """Remove unfinished files of killed processes."""
     for folder in folders:
         for path in folder.glob(f"*{UNFINISHED}"):
             if scratch.is_unfinished(path.name) and not path.is_dir():
@@ -212,7 +212,7 @@ def remove_unfinished(folders: Iterable[Path]) -> None:
 
 
 def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = None) -> Path:
-    """Find where a file is to be written: a link that the user names is followed, and only a plain file is replaced.
+    """Find where a file is to be written: a link given by the user is followed, and only a plain file is replaced.
 
     root: Folder that it may not leave by a link, since its name is not the user's; default None, it may.
     """
@@ -226,10 +226,10 @@ def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None =
 
 @contextlib.contextmanager
 def placed(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = None) -> Iterator[Path]:
-    """Write a file under a temporary name, and put it in its place at the end of the `with` block.
+    """Write a file under a temporary name, and move it to its place at the end of the `with` block.
 
-    An existing file stays whole until then; after an error the new one is removed. Unfinished files of killed writers of the
-    same file are removed too. Every file that a user has goes through here.
+    An existing file stays intact until then; after an error the new one is removed. Unfinished files of killed
+    processes that wrote the same file are removed too. Every output file for a user is written by this function.
 
     root: Folder that it may not leave by a link, since its name is not the user's; default None, it may.
     """
@@ -251,24 +251,24 @@ def placed(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = N
 
 
 def new_text_file(beside: Path) -> TextIO:
-    """Open a text file in UTF-8 that is not there yet, such as the one that `placed` gives, to write it piece by piece."""
+    """Open a new text file in UTF-8, such as the one of `placed`, to write it part by part."""
     return beside.open("x", encoding="utf-8", newline="\n")
 
 
 def new_file(beside: Path) -> BinaryIO:
-    """Open a file that is not there yet, such as the one that `placed` gives, to write it piece by piece."""
+    """Open a new binary file, such as the one of `placed`, to write it part by part."""
     return beside.open("xb")
 
 
 def write_text(path: str | os.PathLike[str], text: str, root: str | os.PathLike[str] | None = None) -> Path:
-    """Write a text file in UTF-8; it is there whole or not at all."""
+    """Write a text file in UTF-8; it is complete or does not appear."""
     with placed(path, root) as beside, new_text_file(beside) as file:
         file.write(text)
     return Path(path)
 
 
 class PlacedFiles:
-    """Count of files that this process has put in place, and the last of them, for a process that is ended."""
+    """Number of files that this process has written, and the last of them, for the message of an ended process."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -285,7 +285,7 @@ WRITTEN = PlacedFiles()
 
 
 def put_folder(beside: Path, target: Path) -> None:
-    """Replace a folder by another; a crash leaves one of the two, whole."""
+    """Replace a folder by another; after a crash one of the two exists and is complete."""
     old = beside
     if not target.exists():
         beside.replace(target)
@@ -309,7 +309,7 @@ def exchanged(first: Path, second: Path) -> bool:
 
 
 def restored(target: Path) -> None:
-    """Put back a folder whose writer was killed while it replaced it."""
+    """Restore a folder whose writer was killed while it replaced the folder."""
     old = [path for path in scratch.left_behind(target) if path.suffix == scratch.OLD and not path.is_symlink()]
     if len(old) == 1 and not target.exists():
         old[0].replace(target)
@@ -318,7 +318,7 @@ def restored(target: Path) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path, wait: bool = False) -> Iterator[bool]:
-    """Hold a folder or file for this process alone."""
+    """Lock a folder or file for this process alone."""
     try:
         import fcntl
     except ImportError:

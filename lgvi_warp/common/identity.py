@@ -36,12 +36,12 @@ MADE_OF = ("__wrapped__", "py_func", "func", "cls")
 
 
 def identity(function: Any, version: Any = None) -> str:
-    """Tell which function, class or object something is, by what it would do.
+    """Identify a function, class or object by a hash of its behaviour.
 
-    Code, names and constants count, defaults, what closures hold and the globals that the code names, and all that these
-    lead to; arrays by their numbers. Names of files and places in them do not.
+    The hash includes code, names, constants, defaults, closure values, the globals that the code names, and all objects
+    that these refer to; arrays by their numbers. It does not include file names and line numbers.
 
-    version: what the user says it is, which is then believed; default None.
+    version: the user's own version of the object, used instead of a hash; default None.
     """
     if version is not None:
         return f"version {version}"
@@ -52,25 +52,25 @@ def identity(function: Any, version: Any = None) -> str:
 
 
 def check_version(faults: Faults, version: Any) -> None:
-    """Note a version that is neither a text nor a number.
+    """Add a fault for a version that is neither a text nor a number.
 
-    version: what the user gave; None for none.
+    version: the user's value; None for no version.
     """
     if version is not None and (isinstance(version, bool) or not isinstance(version, str | int | float)):
         faults.add("version", version, "is neither a text nor a number", 'give version="2"')
 
 
 def comparable(first: str, second: str) -> bool:
-    """Tell whether two identities can differ for one reason alone: that the functions do."""
+    """Tell whether a difference between two identities can only mean that the functions differ."""
     return UNKNOWN not in (first, second) and first.partition(" ")[0] == second.partition(" ")[0]
 
 
 class _NotToldError(Exception):
-    """Something is of a kind whose content cannot be read."""
+    """Raised for an object whose content cannot be read."""
 
 
 class _Reader:
-    """Hashes an object and all that it leads to. What was met before is given by its number, so circles end."""
+    """Hashes an object and all objects that it refers to. A repeated object is hashed as its number, so cycles end."""
 
     def __init__(self) -> None:
         self._hash = hashlib.sha256()
@@ -96,7 +96,7 @@ class _Reader:
             self._value(value)
 
     def _value(self, value: Any) -> None:
-        """Any object."""
+        """Read any object."""
         kind = type(value)
         if kind in _PLAIN:
             self._word(kind.__name__, _PLAIN[kind](value))
@@ -116,7 +116,7 @@ class _Reader:
             self._object(value)
 
     def _object(self, value: Any) -> None:
-        """An object that is met for the first time, and may lead to itself."""
+        """Read an object at its first occurrence; it may refer to itself."""
         place = _place(value)
         if place is not None:
             self._word("known", *place)
@@ -165,7 +165,7 @@ class _Reader:
             self._imported(name, names)
 
     def _named(self, name: str, value: Any, names: set[str]) -> None:
-        """Object behind a global name of a function; of a user's module, only the attributes that the function reads."""
+        """Read the object of a global name in a function; of a user's module, only the attributes that are used."""
         self._word(name)
         if isinstance(value, types.ModuleType):
             self._module(value, names)
@@ -173,7 +173,7 @@ class _Reader:
             self._value(value)
 
     def _imported(self, name: str, names: set[str]) -> None:
-        """A module that a function imports as it runs."""
+        """Read a module that a function imports when it runs."""
         if name not in sys.modules:
             if name.partition(".")[0] not in sys.stdlib_module_names:
                 raise _NotToldError
@@ -203,7 +203,7 @@ class _Reader:
                 self._value(item)
 
     def _instance(self, value: Any) -> None:
-        """An object by its class and what it holds; of a library's, what it would be pickled as."""
+        """Read an object by its class and its content; an object of a library, by its pickled form."""
         kind = type(value)
         made_of = next((item for item in (getattr(value, name, None) for name in MADE_OF) if item is not None), None)
         if _place(kind) is not None and isinstance(made_of, types.FunctionType | type):
@@ -231,7 +231,7 @@ class _Reader:
                   if isinstance(parts, tuple) else (parts,))  # fmt: skip
 
     def _held_module(self, module: types.ModuleType) -> None:
-        """A module that no function names, so that what is used of it is not known."""
+        """Read a module that is not named in a function, so that its used attributes are unknown."""
         if not is_library(module.__name__):
             raise _NotToldError
         self._module(module, set())
@@ -245,7 +245,7 @@ def _number(value: float | complex) -> str:
 
 
 def _names(code: types.CodeType) -> tuple[set[str], set[str], set[str]]:
-    """All names in code and in what it defines; those of them that are globals; and the modules that it imports."""
+    """Collect from code and nested code: all names, the global names among them, and the imported modules."""
     names, global_names, imported = set(code.co_names), set[str](), set[str]()
     for step in dis.get_instructions(code):
         if step.opname == "IMPORT_NAME":
@@ -260,7 +260,7 @@ def _names(code: types.CodeType) -> tuple[set[str], set[str], set[str]]:
 
 
 def _place(value: Any) -> tuple[str, str, str] | None:
-    """Place of an object in a library: (module, name, edition); None for what is the user's, or cannot be found so."""
+    """Find an object in a library: (module, name, edition); None for a user's object, or one not found by its name."""
     module, name = getattr(value, "__module__", None), getattr(value, "__qualname__", None)
     if isinstance(value, np.ufunc):
         name = value.__name__
@@ -275,7 +275,7 @@ def _place(value: Any) -> tuple[str, str, str] | None:
 
 
 def is_library(module: str) -> bool:
-    """Tell whether a module is one of Python's, or is installed, and so is known by its name and edition."""
+    """Tell whether a module belongs to Python or to an installed package, so that its name and version identify it."""
     top = module.partition(".")[0]
     file = getattr(sys.modules.get(top), "__file__", None)
     if top in sys.stdlib_module_names:
@@ -285,7 +285,7 @@ def is_library(module: str) -> bool:
 
 @functools.cache
 def _edition(module: str) -> str:
-    """Version of a library and a hash of the module's file; "" for those whose versions are compared elsewhere."""
+    """Version of a library and a hash of the module's file; "" for a library whose version is compared elsewhere."""
     top = module.partition(".")[0]
     if top in KNOWN or top in sys.stdlib_module_names:
         return ""
@@ -295,7 +295,7 @@ def _edition(module: str) -> str:
 
 
 def _slots(kind: type) -> list[str]:
-    """Names of the slots of a class and of those that it comes from."""
+    """Names of the slots of a class and of its base classes."""
     return [name for base in kind.__mro__ for name, item in vars(base).items()
             if isinstance(item, types.MemberDescriptorType) and _place(base) is None]  # fmt: skip
 

@@ -16,16 +16,16 @@ DRAWS = ("chain", "draw")
 
 
 def is_labelled(value: Any) -> bool:
-    """Tell whether a value has named columns, whose order then does not matter."""
+    """Tell whether a value has named columns, so that their order does not matter."""
     return _labels(value) is not None
 
 
 def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
     """Read the columns of a labelled value.
 
-    value: A mapping, a data frame (pandas, polars, pyarrow, or another with `columns` and table[name]), a structured array, an
-        xarray Dataset (of a posterior by chain and draw, all chains one after the other), or a DataArray with labels along its
-        second dimension.
+    value: A mapping, a data frame (pandas, polars, pyarrow, or another with `columns` and table[name]), a structured
+        array, an xarray Dataset (a posterior with chains and draws is flattened, one chain after the other), or a
+        DataArray with labels along its second dimension.
     """
     labels = _labels(value)
     if labels is None or not labels:
@@ -45,7 +45,7 @@ def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
 
 
 def match(faults: Faults, key: str, labels: Sequence[str], wanted: Sequence[str]) -> bool:
-    """Compare labels with those that are wanted, in any order; note a fault for each missing or unknown one."""
+    """Compare labels with the expected labels, in any order; add a fault for each missing or unknown label."""
     missing = [name for name in wanted if name not in labels]
     for label in labels:
         if label not in wanted:
@@ -65,7 +65,7 @@ def _labels(value: Any) -> list[Any] | None:
 
 
 def _labelled_dimension(value: Any) -> str | None:
-    """Name of an xarray DataArray's second dimension, where its coordinate holds texts."""
+    """Name of an xarray DataArray's second dimension, if its coordinate consists of texts."""
     dims = getattr(value, "dims", ())
     if not hasattr(value, "coords") or not isinstance(dims, tuple) or len(dims) != 2 or dims[1] not in value.coords:
         return None
@@ -88,7 +88,7 @@ def _read(value: Any, labels: Sequence[str]) -> dict[str, Any]:
 
 
 def _members_first(columns: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Variables of a Dataset, with the dimension that all of them share first."""
+    """Variables of a Dataset, with their common dimension first."""
     dims = [column.dims for column in columns.values()]
     shared = [dim for dim in dims[0] if all(dim in dims_of_column for dims_of_column in dims)]
     if len(shared) != 1:
@@ -97,5 +97,5 @@ def _members_first(columns: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _plain(column: Any) -> Any:
-    """A frame's column as an array; anything else unchanged."""
+    """Convert a frame's column to an array; return anything else unchanged."""
     return np.asarray(column) if hasattr(column, "__array__") or hasattr(column, "__array_interface__") else column

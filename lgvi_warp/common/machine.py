@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Capabilities of this machine: SIMD width, threads and memory; and the software's versions for provenance."""
+"""Capabilities of this machine (SIMD width, threads, memory), and the software's versions for provenance."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def simd() -> str:
 
 
 def register_width(dtype: str, extension: str | None = None) -> int:
-    """Vehicles of which one number each fills a SIMD register; extension: as in `simd`, by default of this machine."""
+    """Number of vehicles for which one number each fills a SIMD register; extension: as in `simd`, default this one."""
     return REGISTER_BYTES[extension or simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 
@@ -48,7 +48,7 @@ def thread_count() -> int:
 
 
 def threads_of(cores: int, quota: float | None) -> int:
-    """Threads that a quota of CPU time keeps busy; quota: [CPUs], None without one."""
+    """Number of threads that a quota of CPU time keeps busy; quota: [CPUs], None without a quota."""
     return cores if quota is None else max(1, min(cores, math.ceil(quota)))
 
 
@@ -64,7 +64,7 @@ def cpu_name() -> str:
 
 
 def physical_memory() -> int | None:
-    """Memory of the machine [bytes]; None where the system does not tell."""
+    """Memory of the machine [bytes]; None if unknown."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
@@ -77,12 +77,12 @@ def memory_bytes() -> int | None:
 
 
 def least_known(*sizes: int | None) -> int | None:
-    """The least of the sizes that are known; None if none is."""
+    """Smallest of the known sizes; None if no size is known."""
     return min((size for size in sizes if size is not None), default=None)
 
 
 def resident() -> int:
-    """Resident memory of this process [bytes]; 0 where the system does not tell."""
+    """Resident memory of this process [bytes]; 0 if unknown."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):
@@ -90,13 +90,13 @@ def resident() -> int:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the software that a result depends on."""
+    """Versions of the software on which a result depends."""
     return dict(_versions())
 
 
 @functools.cache
 def _versions() -> tuple[tuple[str, str], ...]:
-    """Read once: the modules of a process do not change, and reading takes milliseconds."""
+    """Read the versions once: the modules of a process do not change, and reading takes milliseconds."""
     from importlib import metadata
 
     names = ("lgvi-warp", "warp-lang", "numpy", "scipy")
@@ -104,7 +104,7 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 
 def kind() -> dict[str, str]:
-    """Processor, SIMD extension and versions: where they agree, the same inputs give the same bits."""
+    """Processor, SIMD extension and versions: if these are equal, the same inputs give the same bits."""
     return {"cpu": cpu_name(), "simd": simd()} | {name: v for name, v in versions().items() if name != "python"}
 
 
@@ -114,8 +114,8 @@ def describe() -> dict[str, Any]:
 
 
 def thread_seconds() -> float:
-    """The CPU time of this thread [s], which other programs do not add to, and in which kernels on the CPU run.
+    """CPU time of this thread [s], which includes kernels on the CPU but no other programs.
 
-    Windows counts it in ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
+    Windows counts it in ticks of 16 ms, too coarse for a launch; time.perf_counter is used there.
     """
     return time.perf_counter() if os.name == "nt" else time.thread_time()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names that a scene gives to terms and events: each becomes part of a folder's name in a store, on any file system."""
+"""Names of terms and events in a scene: each becomes part of a folder's name in a store, on any file system."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RULE = "give letters, digits, _, - and points"
 
 
 def wrong_with(name: str) -> tuple[str, str] | None:
-    """(problem, remedy) for a name of a term or an event; None for a good one."""
+    """Check the name of a term or an event: (problem, remedy), or None for a good name."""
     if not name:
         return "is empty", RULE
     bad = next((character for character in name if not (character.isalnum() or character in BESIDE)), None)
@@ -40,12 +40,12 @@ def shown_character(character: str) -> str:
 
 
 def folded(name: str) -> str:
-    """Normalise a name as file systems do that ignore case, or that write accents in two ways."""
+    """Normalise a name as file systems do that ignore case, or that encode accents in two ways."""
     return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
 
 
 def alike(names: Iterable[str]) -> list[tuple[str, str]]:
-    """Pairs (earlier, later), in their order, of different names that some file system cannot tell apart."""
+    """Pairs (earlier, later), in their order, of different names that some file system cannot distinguish."""
     first: dict[str, str] = {}
     pairs: list[tuple[str, str]] = []
     for name in names:

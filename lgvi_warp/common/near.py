@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Functions and classes that refuse an unknown keyword with the nearest known one; without NumPy, for the doors."""
+"""Functions and classes that refuse an unknown keyword and suggest the nearest known one; NumPy is not imported."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ ELSEWHERE = {
 
 
 def near_names(*takers: Callable[..., Any]) -> Callable[[F], F]:
-    """Decorate a function so that it refuses an unknown keyword with the nearest known one.
+    """Decorator: the function refuses an unknown keyword and suggests the nearest known one.
 
-    takers: Functions that its `**settings` go to.
+    takers: Functions that receive its `**settings`.
     """
 
     def decorate(call: F) -> F:
@@ -50,7 +50,7 @@ def near_names(*takers: Callable[..., Any]) -> Callable[[F], F]:
 
 
 def near_keywords(kind: type) -> None:
-    """Let a public class refuse an unknown keyword with the nearest known one, as functions do; once, at first use."""
+    """Make a public class refuse an unknown keyword with the nearest known one, as functions do; once, at first use."""
     init = kind.__init__  # type: ignore[misc]
     # One that Python's own classes have takes no keywords by name: of an enumeration, or where a tuple has names.
     if not hasattr(init, "__code__") or getattr(init, MARK, None) is kind or (names := arguments_of(init)) is None:
@@ -69,7 +69,7 @@ def near_keywords(kind: type) -> None:
 
 
 def arguments_of(*functions: Any) -> tuple[str, ...] | None:
-    """The keywords of functions, the first of which hands its own `**settings` on; None where the last takes any."""
+    """Keywords of functions, the first of which passes its `**settings` on; None if the last one takes any keyword."""
     names = dict[str, None]()
     for function in functions:
         while hasattr(function, "__wrapped__"):
@@ -81,7 +81,7 @@ def arguments_of(*functions: Any) -> tuple[str, ...] | None:
 
 
 def refuse_unknown(call: Any, settings: Iterable[str], names: Iterable[str] | None) -> None:
-    """Raise the SceneError of the first unknown keyword, which is a TypeError, too."""
+    """Raise a SceneError, which is also a TypeError, for the first unknown keyword."""
     from lgvi_warp.common.errors import UnknownArgument
     from lgvi_warp.common.nearest import nearest
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The known name that is nearest to a word, whatever its case; without NumPy, for the doors."""
+"""The known name that is nearest to a word, independent of case; NumPy is not imported."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SHORTEST, MOST = 3, 6
 
 
 def meant(word: str, names: tuple[str, ...]) -> str:
-    """Suggest all names that a word ends, where these are few, or the one that is nearest; "" for none."""
+    """Suggest all names that end with a word, if they are few, or else the nearest name; "" if there is none."""
     text = word.casefold()
     ends = [name for name in names if name.casefold().endswith(f".{text}")]
     if len(text) >= SHORTEST and not any(name.casefold() == text for name in names):
@@ -22,7 +22,7 @@ def meant(word: str, names: tuple[str, ...]) -> str:
 # A file may have the same fault in thousands of tables, of which few are told.
 @functools.lru_cache(maxsize=64)
 def nearest(word: str, names: tuple[str, ...]) -> str | None:
-    """Find the name that a word ends, that differs in case alone, that is spelt alike, or that has the word in it."""
+    """Find a name that ends with the word, differs only in case, has a similar spelling, or contains the word."""
     import difflib  # loads slowly
 
     folded = {name.casefold(): name for name in reversed(names)}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read arrays in .npy form, one after another in a file or in an .npz archive, of a file of unknown origin; and write such.
+"""Reader of arrays in .npy format, in a sequence or in an .npz archive, from untrusted files; and a writer.
 
-NumPy's own reader allocates what a header promises before it checks that the file holds it; here the file's size bounds
+NumPy's own reader allocates the size in a header before it checks the size of the file. Here the file's size bounds
 every array. Only numbers, truth values and texts are read: nothing is unpickled.
 """
 
@@ -56,7 +56,7 @@ def read(file: Any, bytes_left: int) -> np.ndarray:
 
 
 def _described(file: Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """(shape, whether columns come first, type) of an array, from its header. Raises ValueError."""
+    """Read (shape, whether in column-major order, type) of an array from its header. Raises ValueError."""
     try:
         if np.lib.format.read_magic(file) != (1, 0):
             raise ValueError("is an array in another version of NumPy's format than runs write")
@@ -74,7 +74,7 @@ def text(arrays: Iterator[np.ndarray]) -> str:
 
 
 class _Careful(io.BufferedReader):
-    """A file that limits the bytes of one read: a damaged .npz may promise an endless list of files."""
+    """A file that limits the bytes of one read: a damaged .npz may claim an endless list of files."""
 
     most = MOST_LIST
 
@@ -87,7 +87,7 @@ class _Careful(io.BufferedReader):
 
 
 def of_npz(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Read all arrays of an .npz file, each once, and no more than the file has room for."""
+    """Read all arrays of an .npz file, each once, and at most as many bytes as the file can contain."""
     with reading.opened(path, "NumPy file") as raw:
         try:
             with _Careful(raw) as file, zipfile.ZipFile(file) as archive:  # type: ignore[arg-type]
@@ -99,7 +99,7 @@ def of_npz(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
 def write_npz(
     path: str | os.PathLike[str], arrays: Mapping[str, Any], root: str | os.PathLike[str] | None = None
 ) -> Path:
-    """Write arrays to an .npz file; it is there whole or not at all, and the same arrays give the same bytes."""
+    """Write arrays to an .npz file. It is complete or does not appear, and the same arrays give the same bytes."""
     with durable.placed(path, root) as beside, beside.open("xb") as file:
         np.savez(file, **arrays)
     return Path(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Durations of the phases of a kernel's first use."""
+"""Durations of the phases at a kernel's first use."""
 
 from typing import NamedTuple
 
@@ -8,9 +8,9 @@ class Phases(NamedTuple):
     """Wall time until a kernel is ready [s].
 
     Attributes:
-        source: its C++ is written (for a kernel of the cache: its hash); processes that compile the same one are waited for.
-        clang: Clang compiles it; 0 for a kernel of the cache.
-        load: its code is linked, and checked or put into the cache.
+        source: to write its C++, or to compute its hash if it is cached, and to wait for processes that compile it too.
+        clang: to compile it by Clang; 0 if it is cached.
+        load: to link its code, and to check it or save it in the cache.
     """
 
     source: float = 0.0

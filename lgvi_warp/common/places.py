@@ -21,23 +21,24 @@ OTHER_SIDE = 20_003_931.0
 
 @dataclass(frozen=True)
 class LocalPlane:
-    """The plane that touches the Earth (WGS 84) at an origin, azimuthal equidistant: distance and bearing from it are exact.
+    """Plane that touches the Earth (WGS 84) at an origin, azimuthal equidistant: distance and bearing from it are exact.
 
-    A distance d away from the origin, lengths across the bearing are too long by d^2 / (6 R^2): 4 parts in a million at 30 km.
+    At a distance d from the origin, lengths across the bearing are too long by d^2 / (6 R^2): 4 parts in a million at
+    30 km.
     """
 
     latitude: float
     longitude: float
 
     def local(self, latitude: Any, longitude: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Metres to the north and to the east of the origin, of latitudes and longitudes [deg], 0 to 360 too."""
+        """Convert latitudes and longitudes [deg], -180 to 360, to metres to the north and to the east of the origin."""
         east, north = self._projection(np.asarray(longitude, float), np.asarray(latitude, float))
         return np.asarray(north), np.asarray(east)
 
     def geodetic(self, north: Any, east: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Latitudes and longitudes [deg], -180 to 180, of metres to the north and to the east of the origin.
+        """Convert metres to the north and to the east of the origin to latitudes and longitudes [deg], -180 to 180.
 
-        NaN for what is no place: numbers that are not finite, or beyond the other side of the Earth.
+        The result is NaN for numbers that are not finite, or beyond the opposite point of the Earth.
         """
         north, east = np.asarray(north, float), np.asarray(east, float)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -46,12 +47,12 @@ class LocalPlane:
         return np.where(on_earth, latitude, np.nan), np.where(on_earth, longitude, np.nan)
 
     def positions(self, places: Any) -> np.ndarray:
-        """Positions (..., 3) north, east, down [m] of places (..., 3): latitude, longitude [deg], depth [m]."""
+        """Convert places (..., 3), latitude, longitude [deg], depth [m], to positions (..., 3) north, east, down [m]."""
         places = np.asarray(places, float)
         return np.stack([*self.local(places[..., 0], places[..., 1]), places[..., 2]], axis=-1)
 
     def places(self, positions: Any) -> np.ndarray:
-        """Places (..., 3), latitude, longitude [deg], depth [m], of positions (..., 3) north, east, down [m]."""
+        """Convert positions (..., 3) north, east, down [m] to places (..., 3), latitude, longitude [deg], depth [m]."""
         positions = np.asarray(positions, float)
         return np.stack([*self.geodetic(positions[..., 0], positions[..., 1]), positions[..., 2]], axis=-1)
 
@@ -70,7 +71,7 @@ class LocalPlane:
 
 
 def check_places(faults: Faults, key: str, places: np.ndarray) -> None:
-    """Note latitudes and longitudes (..., 2 or more) [deg] that are on no map."""
+    """Add a fault for latitudes and longitudes (..., 2 or more) [deg] outside their range."""
     bounds = (("latitude", 90.0, 90.0), ("longitude", 180.0, 360.0))
     for (word, low, high), values in zip(bounds, np.moveaxis(places, -1, 0), strict=False):
         wrong = (values < -low) | (values > high)
@@ -82,5 +83,5 @@ def check_places(faults: Faults, key: str, places: np.ndarray) -> None:
 
 
 def too_long(distance: Any) -> Any:
-    """By which part lengths across the bearing are too long at a distance [m] from the origin: d^2 / (6 R^2)."""
+    """Relative error d^2 / (6 R^2) by which lengths across the bearing are too long at a distance [m] from the origin."""
     return np.square(distance) / (6.0 * RADIUS**2)

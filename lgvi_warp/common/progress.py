@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Show how far a long call is: in place on a terminal and in a notebook, elsewhere a line every ten seconds."""
+"""Progress of a long call: shown in place on a terminal and in a notebook, elsewhere as a line every ten seconds."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ LONG = 10.0
 
 
 class Progress:
-    """Shows what is done now, the fraction done and the time left: in place on a terminal, elsewhere a line every ten seconds.
+    """Shows the current phase, the finished fraction and the time left: in place, or as a line every ten seconds.
 
     Args:
-        stream: Where to write.
-        phase: What is done until the first fraction above 0; default "compiling".
-        in_place: Whether to write over the line before; default None: on a terminal.
-        clock: The time now [s].
-        interval: Least time between two lines [s]; default None, 0.1 in place and 10 otherwise.
+        stream: Stream for the output.
+        phase: Name of the work before the first fraction above 0; default "compiling".
+        in_place: Whether to overwrite the previous line; default None: on a terminal.
+        clock: Function that returns the time [s].
+        interval: Shortest time between two lines [s]; default None: 0.1 in place and 10 otherwise.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Progress:
         threading.Thread(target=self._tick, name="progress", daemon=True).start()
 
     def __call__(self, fraction: float) -> None:
-        """Show the fraction done, at most once per interval."""
+        """Show the finished fraction, at most once per interval."""
         now = self._clock()
         with self._lock:
             if self._first == 0.0 < fraction:
@@ -80,7 +80,7 @@ class Progress:
         self._length = len(text)
 
     def _tick(self) -> None:
-        """Show what takes long without a fraction."""
+        """Show a phase that takes long without a fraction."""
         while not self._closed.wait(TICK):
             with self._lock, contextlib.suppress(OSError, ValueError):
                 now = self._clock()
@@ -104,21 +104,21 @@ class NotebookBar:
         self._lock = threading.Lock()
 
     def __call__(self, fraction: float) -> None:
-        """Show the fraction done."""
+        """Show the finished fraction."""
         with self._lock:
             if fraction > 0.0 == self._bar.n:
                 self._bar.set_description_str("running")
             self._bar.update(fraction - self._bar.n)
 
     def close(self) -> None:
-        """Leave the bar as it is."""
+        """Leave the bar unchanged."""
         self._bar.close()
 
 
 def bar(
     *, modules: Mapping[str, Any] = sys.modules, load: Callable[[str], Any] = import_module
 ) -> Progress | NotebookBar:
-    """Begin to show the progress of a call: a bar of tqdm in a notebook that has it, otherwise `Progress` on stderr."""
+    """Start the display of a call's progress: a bar of tqdm in a notebook that has it, otherwise `Progress` on stderr."""
     notebook = "ipykernel" in modules
     if notebook:
         with contextlib.suppress(ImportError):
@@ -127,10 +127,10 @@ def bar(
 
 
 def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
-    """Let `progress=True` of a function show its progress, and refuse unknown keywords with the nearest; a decorator.
+    """Decorator: `progress=True` shows the function's progress, and unknown keywords are refused with the nearest one.
 
-    Returns: The same function, which takes True (a bar on a terminal or in a notebook, lines elsewhere) and False (nothing)
-        too.
+    Returns: The same function, which also takes True (a bar on a terminal or in a notebook, lines elsewhere) and False
+        (nothing).
     """
     names = arguments_of(call)
     known = None if names is None else frozenset(names)
@@ -156,7 +156,7 @@ def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
 
 
 class LateBar:
-    """A bar that begins where a call turns out to take long: from its pace, or where that long is over."""
+    """A bar that appears if a call takes long: predicted from its pace, or after some time."""
 
     def __init__(
         self, begin: Callable[[], Progress | NotebookBar] = bar, clock: Callable[[], float] = time.perf_counter
@@ -165,7 +165,7 @@ class LateBar:
         self._bar: Progress | NotebookBar | None = None
 
     def __call__(self, fraction: float) -> None:
-        """Take the fraction done; show it where the whole takes long."""
+        """Take the finished fraction; show it if the whole call takes long."""
         passed = self._clock() - self._start
         if self._bar is None and passed > 1.0 and passed > LONG * fraction:
             self._bar = self._begin()
@@ -173,15 +173,15 @@ class LateBar:
             self._bar(fraction)
 
     def close(self) -> None:
-        """End the bar, if it began."""
+        """End the bar, if it was shown."""
         if self._bar is not None:
             self._bar.close()
 
 
 def shows_if_long(call: Callable[P, R]) -> Callable[P, R]:
-    """Let a function show its progress on a terminal where it takes long and nobody says otherwise; a decorator.
+    """Decorator: a function shows its progress on a terminal if it takes long and `progress` is None.
 
-    Returns: The same function, for which `progress=None` is that.
+    Returns: The same function, with this meaning of `progress=None`.
     """
 
     @functools.wraps(call)
@@ -198,9 +198,9 @@ def shows_if_long(call: Callable[P, R]) -> Callable[P, R]:
 
 
 def callback(progress: Callable[[float], None] | bool | None) -> Callable[[float], None] | None:
-    """The function to call with fractions, of what a function with `shows_progress` got.
+    """Convert the `progress` argument of a function with `shows_progress` to a function of the fraction.
 
     progress: The function, False or None.
-    Returns: The function; None for none.
+    Returns: The function; None without progress.
     """
     return progress if callable(progress) else None

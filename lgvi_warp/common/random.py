@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random numbers by counter: each member's depend on the seed, its index and a name only."""
+"""Counter-based random numbers: each member's numbers depend only on the seed, its index and a name."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def _philox_key(seed: int, name: str) -> np.ndarray:
 
 
 def uniforms(seed: int, name: str, first: int, count: int, components: int) -> np.ndarray:
-    """Uniform random numbers of neighbouring members in (0, 1), float64, (count, components).
+    """Uniform random numbers of consecutive members in (0, 1), float64, (count, components).
 
-    They depend on the seed, the member's index and the name only: Philox counters, a fixed number for each member.
+    They depend only on the seed, the member's index and the name: Philox counters, a fixed number per member.
     """
     counters = -(-components // 4)
     generator = np.random.Philox(key=_philox_key(int(seed), name))
@@ -43,7 +43,7 @@ def uniforms(seed: int, name: str, first: int, count: int, components: int) -> n
 
 
 def uniforms_of(seed: int, name: str, members: np.ndarray, components: int) -> np.ndarray:
-    """Uniform numbers like `uniforms`, (n, components), of members (n,) in any order; neighbours are drawn together."""
+    """Uniform numbers like `uniforms`, (n, components), for members (n,) in any order; neighbours are drawn at once."""
     first, count = int(members[0]), len(members)
     if count == 1 or np.all(np.diff(members) == 1):
         return uniforms(seed, name, first, count, components)

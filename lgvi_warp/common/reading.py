@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read any file of a user's: regular files only, of bounded size, so that reading ends.
+"""Reader for any file of a user: only regular files of bounded size, so that reading ends.
 
-A path that the user names may be a link. What is found in a folder goes through `safe_files.inside` first.
+A path that the user names may be a link. A file found in a folder is checked by `safe_files.inside` first.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ OTHER_PATHS = "give the path of a file, or its text"
 
 
 class UnreadableError(ValueError):
-    """A file is not read."""
+    """Raised if a file cannot be read."""
 
     def __init__(self, problem: str, remedy: str):
         super().__init__(f"{problem}. {capital(remedy)}")
         self.what, self.remedy = problem, remedy
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle what the message is made of, so that another process can raise the same error."""
+        """Pickle the parts of the message, so that another process can raise the same error."""
         return type(self), (self.what, self.remedy), vars(self)
 
 
@@ -68,7 +68,7 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
 
 
 def _first(file: BinaryIO, most: int) -> bytes:
-    """Read so many bytes at most of an open file."""
+    """Read at most this many bytes of an open file."""
     with io.BufferedReader(file) as buffered:  # type: ignore[type-var]
         return buffered.read(most)
 
@@ -84,7 +84,7 @@ def _refuse(stat: os.stat_result, kind: str) -> None:
 
 
 def _smaller(kind: str) -> str:
-    """The remedy for a file that is too large."""
+    """Remedy for a file that is too large."""
     if kind == "CSV file":
         return "leave out columns or members, or give the numbers as arrays: lw.designs.Table({name: array})"
     if kind == "scene file":
@@ -124,7 +124,7 @@ def file_json(path: str | os.PathLike[str]) -> Any:
 
 @contextlib.contextmanager
 def corrupt_file_as_scene_error(path: str | os.PathLike[str], otherwise: str, remedy: str) -> Iterator[None]:
-    """Turn what the content of a file raises in the `with` block into a fault of the file."""
+    """Turn errors caused by a file's content in the `with` block into a fault of the file."""
     name, before = str(path_of("path", path)), of_a_file.set(True)
     try:
         yield
@@ -144,5 +144,5 @@ def corrupt_file_as_scene_error(path: str | os.PathLike[str], otherwise: str, re
 
 
 def _name(path: str | os.PathLike[str]) -> str:
-    """A path as a message shows it; the repr of anything else."""
+    """Show a path in a message; the repr of anything else."""
     return str(path) if isinstance(path, str | Path) else repr(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read a user's numbers as an array; refuse what is masked, labelled or not real."""
+"""Reader of a user's numbers as an array; masked, labelled and non-real values are refused."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_ENTRIES = 10_000_000
 
 
 class NotReal(ValueError):  # noqa: N818
-    """A value is no array of real numbers; the remedy is by default "give numbers"."""
+    """Raised for a value that is not an array of real numbers; the default remedy is "give numbers"."""
 
     def __init__(self, problem: str, remedy: str | None = None):
         super().__init__(problem)
@@ -50,7 +50,7 @@ def real_numbers(value: Any) -> np.ndarray:
 def plain(value: Any) -> Any:
     """Read an iterator, a range and a data frame's column as a list or array, and NumPy's texts as texts.
 
-    Any other value is returned as it is. What is read from an iterator must be kept, since it can be read once.
+    Any other value is returned unchanged. Keep the list from an iterator, since an iterator can be read only once.
     """
     if isinstance(value, np.str_):
         return str(value)
@@ -72,7 +72,7 @@ def plain(value: Any) -> Any:
 
 
 def settle(settings: Any, *names: str) -> None:
-    """Replace what fields of a dataclass hold, all or those that are named, by what `plain` reads of it."""
+    """Convert the values of a dataclass's fields, all or the named ones, by `plain`."""
     for name in names or [item.name for item in dataclasses.fields(settings) if item.init]:
         value = getattr(settings, name)
         read = plain(value)
@@ -81,7 +81,7 @@ def settle(settings: Any, *names: str) -> None:
 
 
 def settles_first(kind: type) -> None:
-    """Let a class read what its fields hold before its own checks."""
+    """Decorator: a class converts the values of its fields before its own checks."""
     own = vars(kind).get("__post_init__")
     if own is not None:
 
@@ -94,9 +94,9 @@ def settles_first(kind: type) -> None:
 
 
 def answered(who: str, values: Any) -> np.ndarray:
-    """Read numbers that steer, of a user's function or agent; nothing of them is left out or turned into numbers.
+    """Read control values from a user's function or agent; no value is omitted or converted silently.
 
-    Returns: float64, of the values' shape; an array of float64 itself.
+    Returns: float64, in the shape of the values; a float64 array is returned itself.
     """
     if type(values) is np.ndarray and values.dtype.kind in "iuf":
         return values.astype(np.float64, copy=False)
@@ -122,27 +122,27 @@ def real_results(values: Any) -> np.ndarray:
 
 
 def holds_words(value: Any) -> bool:
-    """Tell whether a truth value or a text hides among numbers.
+    """Tell whether there is a truth value or a text among numbers.
 
-    [true, 1.0] would pass for [1.0, 1.0], and NumPy turns one long text among many numbers into as many long texts.
+    NumPy would read [true, 1.0] as [1.0, 1.0], and one long text among many numbers as many long texts.
     """
     return any(_is_word(leaf) for leaf in _parts(value))
 
 
 def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
-    """Tell whether a value is a whole number within bounds; true and false are none."""
+    """Tell whether a value is a whole number within bounds; truth values are not."""
     return isinstance(value, Integral) and not isinstance(value, bool) and least <= int(value) <= most
 
 
 def whole_remedy(value: Any, remedy: str) -> str:
-    """Replacement for a value that is no whole number: of 1e4, which Python and TOML read as a float, 10000."""
+    """Suggest a whole number for a value that is none: 10000 for 1e4, which Python and TOML read as a float."""
     if isinstance(value, float | np.floating) and math.isfinite(value) and value == round(value):
         return f"write {round(value)}, since a number with a point or an exponent is not a whole number here"
     return remedy
 
 
 def column_names(value: Any) -> list[Any] | None:
-    """Column names of a table such as pandas.DataFrame or polars.DataFrame; None for a value without them."""
+    """Column names of a table such as pandas.DataFrame or polars.DataFrame; None for a value without columns."""
     for name in ("column_names", "columns"):  # pyarrow's `columns` are the columns themselves
         names = getattr(value, name, None)
         if names is not None and not callable(names) and not isinstance(names, str):
@@ -158,7 +158,7 @@ DEEPEST = 64
 
 
 def _parts(value: Any, depth: int = 0) -> Iterator[Any]:
-    """Items of nested lists, a text for those nested too deep; the value itself if it is no list."""
+    """Items of nested lists, or a text for lists that are nested too deeply; the value itself if it is no list."""
     if depth > DEEPEST:
         yield "too deep"
     elif isinstance(value, list | tuple):
@@ -176,7 +176,7 @@ def _is_word(part: Any) -> bool:
 
 
 def _check(part: Any) -> None:
-    """Refuse what NumPy would convert silently."""
+    """Refuse a value that NumPy would convert silently."""
     if _is_word(part):
         raise NotReal("is not numeric")
     if isinstance(part, np.ma.MaskedArray) and np.ma.is_masked(part):
@@ -189,7 +189,7 @@ def _check(part: Any) -> None:
 
 
 def _masked(part: np.ma.MaskedArray) -> tuple[str, str]:
-    """(problem, remedy) for an array of which numbers are masked."""
+    """Make (problem, remedy) for an array with masked numbers."""
     mask = np.ma.getmaskarray(part)
     if mask.dtype.names:
         return "has masked numbers", "leave out what is masked, or give numbers for it"

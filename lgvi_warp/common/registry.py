@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of classes by the word that a scene file gives them. Each class adds itself when it is made.
+"""Tables of classes by their word in scene files. Each class adds itself when it is defined.
 
-Words that the core does not know are looked up among those of extensions.
+Words that the core does not know are looked up in extensions.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import Any
 
 
 class Kinds(MutableMapping[str, Any]):
-    """Classes by their word. Those of a package are imported when their word is looked up: a scene names few of them.
+    """Classes by their word. A module of the package is imported when its word is looked up: a scene uses few of them.
 
-    modules: modules of the package, and the words of the classes that each defines. They come first in lists. For a word
-        that is not among them, nor among those of extensions, all modules are imported.
-    package: "" for a table that others fill.
-    table: the name of this table in an extension's `HOLDS`; empty, the default, for one that extensions add nothing to.
+    modules: modules of the package, and the words of the classes that each defines. They come first in lists. For a
+        word that neither these modules nor extensions have, all modules are imported.
+    package: package of the modules; "" for a table without such modules.
+    table: name of this table in an extension's `HOLDS`; default "": extensions cannot add to the table.
     """
 
     def __init__(self, package: str, modules: Mapping[str, Sequence[str]], table: str = ""):
@@ -28,7 +28,7 @@ class Kinds(MutableMapping[str, Any]):
         self.loaded, self._all = dict[str, Any](), not package
 
     def _import(self, word: object) -> None:
-        """Import the module of a word; of one that no table of modules has, all modules."""
+        """Import the module of a word; if no module is known for it, all modules."""
         if not isinstance(word, str) or word in self.loaded:
             return
         if word in self.homes:
@@ -73,14 +73,14 @@ class Kinds(MutableMapping[str, Any]):
 
 
 def _extensions() -> ModuleType:
-    """Lookup of words in extensions: loaded for a word that the core does not know."""
+    """Lookup of words in extensions, loaded for a word that the core does not know."""
     return import_module("lgvi_warp.common.extensions")
 
 
 def add(known: MutableMapping[str, Any], kind: type, attribute: str = "type") -> bool:
-    """Make a class known by its word, unless another class has that word.
+    """Register a class by its word, unless another class has that word.
 
-    A class of the same module and name replaces the former one: it is the same class, made again in a notebook.
+    A class of the same module and name replaces the former one: it is the same class, defined again in a notebook.
     """
     word = vars(kind).get(attribute)
     if not word:
@@ -92,6 +92,6 @@ def add(known: MutableMapping[str, Any], kind: type, attribute: str = "type") ->
 
 
 def load_modules(package: ModuleType) -> None:
-    """Import every module of a package and of its inner folders, so that all its classes are known."""
+    """Import every module of a package and of its subpackages, so that all its classes are registered."""
     for module in walk_packages(package.__path__, f"{package.__name__}."):
         import_module(module.name)

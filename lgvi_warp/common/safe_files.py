@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files below a folder of unknown origin: no link out of it is followed, and only plain files are opened.
+"""Files in a folder of unknown origin: no link out of it is followed, and only plain files are opened.
 
-In a store there are no links at all: each folder on the way is opened relative to its parent, so that a link placed there
-meanwhile is not followed either.
+A store contains no links at all: each folder of a path is opened relative to its parent, so that a link that is placed
+there during the access is not followed either.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _FOLDER = getattr(os, "O_DIRECTORY", 0) | os.O_RDONLY | _PLAIN
 
 
 def refused(path: Path, problem: str) -> SceneError:
-    """Make the error for a file that a store never holds."""
+    """Make the error for a kind of file that a store never contains."""
     remedy = "take it away, and what it leads to is left alone" if problem == "is a link" else "take it away"
     return SceneError([sentences(path, f"{problem}, where a run has plain files and folders only", remedy)])
 
@@ -44,12 +44,12 @@ KINDS = {
 
 
 def kind(mode: int) -> str:
-    """Say what a file is that is not a plain one."""
+    """Name the kind of a file that is not a plain file."""
     return "" if stat.S_ISREG(mode) else KINDS.get(stat.S_IFMT(mode), "is not a plain file")
 
 
 def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
-    """Find a file that lies in a folder, or will, where its links lead; one that leads out of the folder is refused."""
+    """Resolve a file in a folder with its links, whether it exists or not; a file outside the folder is refused."""
     home, path = (Path(os.path.realpath(place)) for place in (root, Path(root) / name))
     if not path.is_relative_to(home):
         remedy = "put a copy in its place, or name that file yourself"
@@ -59,7 +59,7 @@ def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
 
 @contextlib.contextmanager
 def named(path: Path) -> Iterator[None]:
-    """Give an OSError raised inside the `with` block the name of this file."""
+    """Add the name of this file to an OSError raised inside the `with` block."""
     try:
         yield
     except OSError as error:
@@ -71,7 +71,7 @@ def named(path: Path) -> Iterator[None]:
 def folder(root: Path, inner: Path) -> Iterator[int | None]:
     """Open a folder below a root, without following links; the root itself may be one.
 
-    Yields: A descriptor; None on a system without descriptors of folders.
+    Yields: A file descriptor; None on a system without descriptors for folders.
     """
     steps = inner.relative_to(root).parts
     if not BY_DESCRIPTOR:
@@ -89,7 +89,7 @@ def folder(root: Path, inner: Path) -> Iterator[int | None]:
 
 
 def _entered(descriptor: int, step: str, path: Path) -> int:
-    """Open a folder within an open one, and close the outer one. Raises SceneError for a link."""
+    """Open a folder within an open folder, and close the outer one. Raises SceneError for a link."""
     try:
         inner = os.open(step, _FOLDER, dir_fd=descriptor)
     except OSError as error:
@@ -127,7 +127,7 @@ def _check_file(mode: int, path: Path) -> None:
 
 
 def read(root: Path, key: str, most: int) -> bytes:
-    """Read a plain file below a root of at most so many bytes."""
+    """Read a plain file below a root, of at most this many bytes."""
     with opened(root, key) as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
@@ -209,7 +209,7 @@ def size_below(root: Path) -> int:
 
 
 def refuse_links(root: Path) -> None:
-    """Refuse a folder that holds anything but plain files and folders."""
+    """Refuse a folder that contains anything but plain files and folders."""
     for name, entry in entries(root):
         if not entry.is_dir(follow_symlinks=False):
             _check_file(entry.stat(follow_symlinks=False).st_mode, root / name)

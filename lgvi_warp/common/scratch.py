@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Temporary names of files and folders that are being written: each names its process, and no two are the same."""
+"""Temporary names of files and folders that are being written: each contains its process, and all are different."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def is_alive(pid: int) -> bool:
 
 
 def of_target(name: str, target: str) -> re.Match[str] | None:
-    """A match with "host", "space" and "pid" of the writer in a temporary name; None for any other name."""
+    """Match a temporary name, with "host", "space" and "pid" of the writer; None for any other name."""
     head, ending = f"{target}.", os.path.splitext(name)[1]
     if not name.startswith(head) or ending not in (UNFINISHED, NEW, OLD):
         return None
@@ -54,13 +54,13 @@ def of_target(name: str, target: str) -> re.Match[str] | None:
 
 
 def is_unfinished(name: str) -> bool:
-    """Tell whether a name is that of an unfinished file."""
+    """Tell whether a name is the temporary name of an unfinished file."""
     head, ending = os.path.splitext(name)
     return ending == UNFINISHED and any(MARK.fullmatch(head[dot.end() :]) for dot in re.finditer(r"(?<!^)\.", head))
 
 
 def left_behind(target: Path) -> list[Path]:
-    """Find what dead writers of this machine left of a target."""
+    """Find the unfinished files of a target that ended processes of this machine left."""
     try:
         names = os.listdir(target.parent)
     except OSError:
@@ -74,10 +74,10 @@ def left_behind(target: Path) -> list[Path]:
 
 
 def sweep(target: Path) -> None:
-    """Remove unfinished files that dead writers left of a target; folders stay, since their use is unknown here.
+    """Remove the unfinished files of a target that ended processes left; folders stay, since their use is unknown here.
 
     Args:
-        target: Path of the file that they wrote.
+        target: Path of the final file.
     """
     for path in left_behind(target):
         with contextlib.suppress(OSError):
@@ -86,6 +86,6 @@ def sweep(target: Path) -> None:
 
 
 def remove_folder(path: Path) -> None:
-    """Remove a folder with all its content; a missing one is no error, and a link is not followed."""
+    """Remove a folder with all its content. A missing folder is no error, and a link is not followed."""
     with contextlib.suppress(FileNotFoundError):
         shutil.rmtree(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sentences of messages: what is wrong with a key, and the remedy."""
+"""Sentences of messages: the problem of a key, and the remedy."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ WORD = re.compile(r"[a-z]+(?=[ ,:]|$)")
 
 
 def sentences(subject: object, problem: str, remedy: str) -> str:
-    """Say what is wrong with a subject, and the remedy: "vehicle.mass = -1.0 is not positive. Give a number above 0 [kg]"."""
+    """Write a problem of a subject with its remedy: "vehicle.mass = -1.0 is not positive. Give a number above 0 [kg]"."""
     colon = "" if problem.partition(" ")[0].rstrip(",") in PREDICATES else ":"
     return f"{subject}{colon} {problem}. {capital(remedy)}"
 
 
 def capital(text: str) -> str:
-    """Begin a text as a sentence, unless it begins with a name of the program, such as save=... or lw.solve."""
+    """Begin a text with a capital letter, unless it begins with a name of the program, such as save=... or lw.solve."""
     return text[:1].upper() + text[1:] if WORD.match(text) else text
 
 
 def with_stop(text: str) -> str:
-    """End the last sentence of a text, unless a command or a name in quotes ends it, which is copied from there."""
+    """End a text with a full stop, unless it ends with a command or a quoted name, which users copy."""
     return text if text.endswith((".", "?", "!", "'", '"', "`")) else f"{text}."

@@ -21,7 +21,7 @@ ON_FAILURE = ("freeze", "raise", "substep")
 class Status(IntEnum):
     """Outcome of one member: OK, the reason of its failure, or the event that stopped it.
 
-    A member that failed stays at its last good state; no other member is affected. Codes from 16 on are events.
+    A failed member stays at its last good state, and other members are not affected. Codes from 16 on are events.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -55,12 +55,12 @@ class Status(IntEnum):
 
     @property
     def stopped(self) -> bool:
-        """Whether an event of the scene stopped the member, which is no failure."""
+        """Whether an event of the scene stopped the member; this is not a failure."""
         return self >= Status.SURFACE
 
     @property
     def text(self) -> str:
-        """Problem and remedy."""
+        """Problem and remedy in words."""
         return _TEXT[self]
 
 
@@ -97,7 +97,7 @@ _TEXT = {
 
 
 class StatusArray(np.ndarray):
-    """Status codes of all members, uint8, shape (n,); compares with members of `Status`."""
+    """Status codes of all members, uint8, shape (n,), which can be compared with members of `Status`."""
 
     @property
     def failed(self) -> np.ndarray:
@@ -120,7 +120,7 @@ class StatusArray(np.ndarray):
     def counts(self) -> dict[str, int]:
         """Count members by outcome.
 
-        Returns: Name of the status in lower case -> number of members, in the order of the codes; only those that occur.
+        Returns: Number of members by name of the status in lower case, in the order of the codes; only those that occur.
         """
         values, numbers = np.unique(np.asarray(self), return_counts=True)
         return {Status(v).name.lower(): int(n) for v, n in zip(values, numbers, strict=True)}
@@ -155,17 +155,17 @@ class Warnings(IntFlag):
 
     @classmethod
     def _missing_(cls, value: object) -> Any:
-        """Take NumPy's whole numbers as well: those of result.warnings."""
+        """Accept NumPy's whole numbers too, as in result.warnings."""
         return cls(int(value)) if isinstance(value, np.integer) else super()._missing_(value)
 
     @property
     def text(self) -> str:
-        """Observation and remedy, in one sentence for each warning set."""
+        """Observation and remedy, in one sentence for each warning bit."""
         return "; ".join(_WARNING_TEXT[warning] for warning in Warnings if warning in self)
 
     @property
     def value_name(self) -> str:
-        """Formula of the number in `result.warning_value`, for the most serious warning set."""
+        """Formula of the number in `result.warning_value`, for the most serious warning bit."""
         return _WARNING_VALUE[Warnings(1 << (int(self).bit_length() - 1))] if self else ""
 
 
@@ -220,13 +220,13 @@ OK, FIRST_EVENT, LAST_EVENT = int(Status.OK), int(Status.SURFACE), int(max(Statu
 
 
 def stopped(status: Any) -> np.ndarray:
-    """Mask (n,) of the members that an event of the scene stopped, which is no failure, by codes of `Status` (n,)."""
+    """Mask (n,) of the members that an event of the scene stopped (no failure), from codes of `Status` (n,)."""
     codes = np.asarray(status)
     return np.asarray((codes >= FIRST_EVENT) & (codes <= LAST_EVENT))
 
 
 def failed(status: Any) -> np.ndarray:
-    """Mask (n,) of the members that neither reached the end nor were stopped by an event, by codes of `Status` (n,)."""
+    """Mask (n,) of the members that neither reached the end nor were stopped by an event, from codes of `Status` (n,)."""
     codes = np.asarray(status)
     return np.asarray((codes != OK) & ~stopped(codes))
 
@@ -237,8 +237,8 @@ class WarningArray(np.ndarray):
     def counts(self) -> dict[str, int]:
         """Count members by warning.
 
-        Returns: Name of the warning in lower case -> number of members, the most serious last; only those that occur. A member
-            counts once for each of its warnings.
+        Returns: Number of members by name of the warning in lower case, the most serious last; only those that occur. A
+            member counts once for each of its warnings.
         """
         bits = np.asarray(self)
         numbers = {warning.name.lower(): int(np.count_nonzero(bits & warning)) for warning in Warnings if warning.name}
@@ -271,7 +271,7 @@ def under_way(result: Any) -> np.ndarray:
 
 
 def stop_time(result: Any) -> np.ndarray:
-    """Stop time of each member (n,) [s]: at its event, or its last good state where it failed; inf if it ran to the end."""
+    """Stop time of each member (n,) [s]: its event, or its last good state before a failure; inf if it ran to the end."""
     return np.where(np.asarray(result.status) != Status.OK, np.asarray(result.failure_time), np.inf)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Short texts and tables of objects, for a prompt and for notebooks."""
+"""Short texts and tables that describe objects, for a prompt and for notebooks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Rows = Sequence[tuple[str, str]]
 
 
 class Summarized:
-    """An object that shows itself as a title and rows of (label, text)."""
+    """An object that is displayed as a title and rows of (label, text)."""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -46,14 +46,14 @@ class Summarized:
 
 
 def as_table(title: str, rows: Rows) -> str:
-    """Write a title and rows of (label, text), one a line."""
+    """Write a title and rows of (label, text), one per line."""
     rows = _fewer(rows)
     width = max((len(label) for label, _ in rows), default=0)
     return "\n".join([_cut(title), *(_cut(f"  {label:<{width}}  {text}") for label, text in rows)])
 
 
 def _fewer(rows: Rows) -> Rows:
-    """The first rows, and how many more there are."""
+    """The first rows, and the number of omitted ones."""
     if len(rows) < LINES:
         return rows
     return [*rows[: LINES - 2], ("...", f"and {len(rows) - LINES + 2:,} more")]
@@ -78,12 +78,12 @@ def counted(counts: dict[str, int]) -> str:
 
 
 def plural(count: int, noun: str) -> str:
-    """Write how many there are of a thing."""
+    """Write a count with its noun."""
     return f"{count:,} {noun}{'s' * (count != 1)}"
 
 
 def percent(value: float, digits: int = 4) -> str:
-    """Write a fraction in percent; only none is 0 and only all is 100."""
+    """Write a fraction in percent; only exactly 0 is written as 0, and only exactly 1 as 100."""
     text = f"{100.0 * value:.{digits}g}"
     return (
         text if digits == 17 or float(text) not in (0.0, 100.0) or value in (0.0, 1.0) else percent(value, digits + 1)
@@ -91,7 +91,7 @@ def percent(value: float, digits: int = 4) -> str:
 
 
 def few_digits(value: Any, unit: str = "", digits: int = 6) -> str:
-    """Write a number or an array in a few digits of each entry; a matrix by its diagonal or its shape."""
+    """Write a number or an array with a few digits per entry; a matrix by its diagonal or its shape."""
     array = np.asarray(value, dtype=np.float64)
     after = f" {unit}" if unit not in ("", "1") else ""
     if array.ndim == 2 and array.shape[0] == array.shape[1] and not np.any(array - np.diag(np.diag(array))):
@@ -104,7 +104,7 @@ def few_digits(value: Any, unit: str = "", digits: int = 6) -> str:
 
 
 def curves(time: np.ndarray, values: np.ndarray, marked: np.ndarray, label: str) -> str:
-    """Draw curves (k, n) over times (k,) as SVG, those marked (n,) in a second colour; larger values stand lower."""
+    """Draw curves (k, n) over times (k,) as SVG, the marked ones (n,) in a second colour; the value axis points down."""
     width, height, margin = 260.0, 90.0, 6.0
     finite = np.isfinite(values)
     if len(time) < 2 or not finite.any():

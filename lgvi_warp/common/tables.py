@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Write records as tables for other programs."""
+"""Tables of records for other programs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FORMULAS = ("=", "+", "-", "@", "\t", "\r", "\n")
 def write_csv(
     rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str], root: str | os.PathLike[str] | None = None
 ) -> Path:
-    """Write records to a CSV file; it is there whole or not at all."""
+    """Write records to a CSV file; it is complete or does not appear."""
     names = list(dict.fromkeys(key for row in rows for key in row))
     with durable.placed(path, root) as beside, beside.open("x", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
@@ -30,7 +30,7 @@ def write_csv(
 
 
 def cell(value: Any) -> Any:
-    """A cell of a table: no text in it is a formula for a spreadsheet, or a control character."""
+    """Make a cell of a table: a text cannot be a formula for a spreadsheet, and has no control characters."""
     if not isinstance(value, str):
         return value
     text = printable(value)
@@ -38,7 +38,7 @@ def cell(value: Any) -> Any:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number, which a sign may begin."""
+    """Whether a text is a number, with or without a sign."""
     try:
         float(text)
     except ValueError:
@@ -47,6 +47,6 @@ def is_number(text: str) -> bool:
 
 
 def markdown(text: str) -> str:
-    """A text of lines without control characters, of which nothing but a mark that begins a line is Markdown."""
+    """Escape a text for Markdown: no control characters, and no Markdown except marks at the beginning of a line."""
     lines = [re.fullmatch(r"(#+ |- |\d+\. )?(.*)", printable(line)) for line in text.split("\n")]
     return "\n".join((found[1] or "") + re.sub(r"[\\`*<>\[\]|~]", r"\\\g<0>", found[2]) for found in lines if found)

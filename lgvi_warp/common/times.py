@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times as whole numbers of steps: decimals as they were meant, ratios within round-off."""
+"""Times as whole numbers of steps: decimals are read exactly, ratios within round-off."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ MOST_SHORTENING = 20
 
 
 def exact(x: float) -> Fraction:
-    """Read the number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself."""
+    """Find the intended number: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself."""
     simple = Fraction(repr(float(x))).limit_denominator(10**6)
     return simple if abs(float(simple) - x) <= 1e-15 * abs(x) else Fraction(f"{x:.15g}")
 
 
 def of_step(h: float) -> Fraction:
-    """Read a step [s] as the number that was meant, or, where that has other bits, as it stands."""
+    """Find the intended number of a step [s], or its exact binary value if the intended number has other bits."""
     meant = exact(h)
     return meant if float(meant) == h else Fraction(float(h))
 
 
 def whole_steps(time: float, h: float) -> int | None:
-    """Count the steps of h [s] in a time [s]; None where it is no whole number within round-off."""
+    """Count the steps of h [s] in a time [s]; None if it is no whole number within round-off."""
     ratio = float(time) / float(h)
     steps = round(ratio) if math.isfinite(ratio) else 0
     return steps if abs(ratio - steps) <= slack(ratio, time, h) else None
 
 
 def slack(ratio: float, *numbers: float) -> float:
-    """Bound the round-off of a ratio of times, of which some may come from float32."""
+    """Bound the round-off of a ratio of times, some of which may come from float32."""
     single = any(_of_float32(x) != x for x in numbers)
     return min(0.25, ROUND_OFF + abs(ratio) * (SINGLE if single else DOUBLE))
 
 
 def rows_at(times: np.ndarray, time: float) -> np.ndarray:
-    """Find a time [s] among others (k,), within round-off: its indices, none or one."""
+    """Find a time [s] among others (k,), within round-off; returns an index or none."""
     size = max(1.0, abs(float(time)), float(times[-1]) if len(times) else 0.0)
     return np.flatnonzero(np.abs(times - time) <= size * max(ROUND_OFF, slack(1.0, time) - ROUND_OFF))
 
@@ -69,10 +69,10 @@ def longest_step(times: Sequence[float]) -> Fraction:
 def meeting(h: float, end: float, times: Sequence[float]) -> tuple[Fraction, Fraction, list[Fraction]]:
     """Choose a step [s] of at most h that divides an end and more times.
 
-    Read are decimals as they stand, decimals of float32, whole numbers of steps, and parts of the end: the first of them
-    by which the step is the one asked for counts, else the first that shortens it little.
+    The times are read in four ways: as decimals, as decimals of float32, as whole numbers of steps, and as parts of the
+    end. The first way that keeps the requested step is used, or else the first that shortens it little.
 
-    Returns: The step, the one asked for and the times, with the end first, as they were read.
+    Returns: The step, the requested step, and the times with the end first, as they were read.
     """
     found, every = [], [float(end), *map(float, times)]
     decimals = [exact(t) for t in (float(h), *every)]
@@ -89,20 +89,20 @@ def meeting(h: float, end: float, times: Sequence[float]) -> tuple[Fraction, Fra
 
 
 def _of_float32(x: float) -> float:
-    """Read the shortest decimal of a number of float32; any other number as it is."""
+    """Read the shortest decimal of a float32 number; return any other number unchanged."""
     with np.errstate(over="ignore"):
         single = np.float32(x)
     return float(str(single)) if float(single) == x else float(x)
 
 
 def _as_float32(h: float, times: Sequence[float]) -> list[Fraction] | None:
-    """Read what float32 has rounded as the shortest decimals; None where there is none of it."""
+    """Read numbers that were rounded to float32 as their shortest decimals; None if there is no such number."""
     shortest = [_of_float32(t) for t in (h, *times)]
     return None if shortest == [h, *times] else [exact(t) for t in shortest]
 
 
 def _in_steps(h: float, times: Sequence[float]) -> list[Fraction] | None:
-    """Read times as whole numbers of steps; None where one is none. The step keeps its bits where it meets the end."""
+    """Read times as whole numbers of steps; None if one is not. The step keeps its bits if it divides the end."""
     counts = [whole_steps(t, h) for t in times]
     if not counts[0] or any(not count if t else False for count, t in zip(counts, times, strict=True)):
         return None
@@ -113,7 +113,7 @@ def _in_steps(h: float, times: Sequence[float]) -> list[Fraction] | None:
 
 
 def _as_parts(h: float, times: Sequence[float]) -> list[Fraction] | None:
-    """Read times as parts of the end; None where one is none."""
+    """Read times as fractions of the end; None if one is not."""
     end, ratio = times[0], times[0] / h
     finest = int(min(2.0**31, MOST_SHORTENING * ratio)) + 1
     parts = [Fraction(t / end).limit_denominator(finest) for t in times]

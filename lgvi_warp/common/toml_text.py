@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read TOML of unknown origin: texts nested deeper or larger than any scene are refused, in bounded time."""
+"""Reader of untrusted TOML: texts that are deeper or larger than any scene are refused, in bounded time."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _deep(name: str) -> str:
 
 
 def _check(content: dict[str, Any], name: str) -> None:
-    """Refuse what no scene holds, layer by layer: no recursion, however deep the content is."""
+    """Refuse content that no scene has, layer by layer, without recursion for content of any depth."""
     faults = Faults()
     layer: list[tuple[str, Any]] = [("", content)]
     for _ in range(DEEPEST):
@@ -69,7 +69,7 @@ def _check(content: dict[str, Any], name: str) -> None:
 
 
 def _note(faults: Faults, at: str, value: Any, following: list[tuple[str, Any]]) -> None:
-    """Note what is wrong with a value; a table or list is kept for the next layer."""
+    """Add faults of a value; a table or list is kept for the next layer."""
     if isinstance(value, dict | list):
         following.append((at, value))
     elif isinstance(value, str) and len(value) > LONGEST_TEXT:

@@ -22,7 +22,7 @@ from lgvi_warp.common.sentences import capital
 
 @contextlib.contextmanager
 def _native_stderr_closed() -> Iterator[None]:
-    """Discard what native code writes to file descriptor 2."""
+    """Discard the output of native code to file descriptor 2."""
     if sys.stderr is not None:
         sys.stderr.flush()
     try:
@@ -60,10 +60,10 @@ if hasattr(os, "register_at_fork"):
 
 
 def start() -> None:
-    """Initialise Warp once, without its banner and its remark that there is no GPU driver.
+    """Initialise Warp once, without its banner and its message that there is no GPU driver.
 
-    A banner that the user asked for is shown. Native code writes the remark to the file descriptor itself, whatever Warp's
-    log level, so it is caught there.
+    A banner that the user enabled is shown. Native code writes the message to the file descriptor itself, at any log
+    level of Warp, so it is discarded there.
     """
     # Two threads that redirect stderr at once would leave it closed.
     with build_lock:
@@ -87,7 +87,7 @@ def start_once() -> None:
 
 
 def unusable(cache: str | os.PathLike[str], error: OSError) -> OSError:
-    """Explain an error of the kernel cache, with its remedy."""
+    """Explain an error of the kernel cache, with a remedy."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     problem = "has no room for a new kernel" if full else "cannot be written"
     remedy = f"{'make room, or ' if full else ''}set WARP_CACHE_PATH to another folder"
@@ -100,7 +100,7 @@ def header_folders() -> dict[int, Any]:
 
 
 def header_folder() -> Path | None:
-    """The folder of this thread's precompiled header; None where Warp keeps it elsewhere."""
+    """Folder of this thread's precompiled header; None if Warp stores it elsewhere."""
     folder = getattr(context.runtime, "get_clang_pch_dir", lambda: None)()
     return None if folder is None else Path(folder)
 
@@ -113,7 +113,7 @@ def end() -> None:
 
 
 def _forget() -> None:
-    """Forget the temporary folders in a child after a fork: they belong to the parent."""
+    """Forget the temporary folders in a child after a fork, since they belong to the parent."""
     for folder in header_folders().values():
         folder._finalizer.detach()
     header_folders().clear()

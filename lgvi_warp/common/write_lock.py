@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A lock beside a file or folder: one writer at a time, from its first look at the target to its end.
+"""A lock for a file or folder: only one process writes to it at a time.
 
-The lock is the system's own on an open file (flock), which ends with the process in any case; the file names its holder
-for a writer that is refused. Lock libraries keep the file, or do not name the holder.
+The lock is a lock of the system on an open file (flock), which always ends with the process. The file names its holder,
+for the message to a refused process. Lock libraries keep the file, or do not name the holder.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _held: set[int] = set()
 
 
 def _close_inherited() -> None:
-    """Close inherited descriptors in a child after a fork: they must not outlive the holder's."""
+    """Close inherited descriptors in a child after a fork, so that they do not outlive those of the holder."""
     for descriptor in _held:
         with contextlib.suppress(OSError):
             os.close(descriptor)
@@ -47,7 +47,7 @@ def lock_file(target: Path) -> Path:
 
 @contextlib.contextmanager
 def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
-    """Keep other writers out of a file or folder inside the `with` block; its parent folder is made."""
+    """Keep other processes from writing to a file or folder inside the `with` block; its parent folder is made."""
     path = lock_file(target)
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, holder = _taken(path, target, wait), os.getpid()
@@ -61,7 +61,7 @@ def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
 
 
 def writer_of(target: Path) -> str | None:
-    """Name who is writing into a file or folder, as its lock says; None where nobody is. Nothing is locked by asking."""
+    """Name the process that writes to a file or folder, from its lock; None if there is none. This takes no lock."""
     try:
         flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
         descriptor = os.open(lock_file(target), flags | getattr(os, "O_CLOEXEC", 0))
@@ -97,7 +97,7 @@ def _taken(path: Path, target: Path, wait: bool) -> int:
 
 
 def _opened(path: Path) -> int:
-    """Open the lock's file, created if missing. Raises SceneError where another file has its name."""
+    """Open the lock's file, and create it if missing. Raises SceneError if another file has its name."""
     try:
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
         descriptor = os.open(path, flags | getattr(os, "O_CLOEXEC", 0), 0o666)
@@ -116,7 +116,7 @@ def _no_lock(path: Path) -> SceneError:
 
 
 def _locked(descriptor: int, wait: bool) -> bool:
-    """Lock an open file; False where another process has it. Without locks: whether the process it names has ended."""
+    """Lock an open file; False if another process holds it. On systems without locks: whether that process has ended."""
     try:
         import fcntl
 
@@ -142,7 +142,7 @@ def _is_still(path: Path, descriptor: int) -> bool:
 
 
 def _holder(descriptor: int) -> dict[str, Any] | None:
-    """Content of the lock's file, empty if it was just created; None if it is no lock's file."""
+    """Content of the lock's file, empty if it was just created; None if it is another kind of file."""
     os.lseek(descriptor, 0, os.SEEK_SET)
     text = os.read(descriptor, 1000)
     try:
@@ -153,7 +153,7 @@ def _holder(descriptor: int) -> dict[str, Any] | None:
 
 
 def _holder_text(descriptor: int) -> str:
-    """Name the holder in words."""
+    """Describe the holder in words."""
     for _ in range(10):
         holder = _holder(descriptor)
         if holder:
@@ -163,7 +163,7 @@ def _holder_text(descriptor: int) -> str:
 
 
 def _write_holder(descriptor: int) -> None:
-    """Write the holder into the file. On a full disk the lock holds without it."""
+    """Write the holder into the file. On a full disk the lock works without it."""
     holder = {"pid": os.getpid(), "host": scratch.host(), "since": time.strftime("%Y-%m-%d %H:%M:%S")}
     with contextlib.suppress(OSError):
         os.ftruncate(descriptor, 0)
@@ -172,7 +172,7 @@ def _write_holder(descriptor: int) -> None:
 
 
 def _release(path: Path, descriptor: int) -> None:
-    """Remove the file while it is locked, so that nobody else's is removed, then unlock it."""
+    """Remove the file while it is locked, so that no other lock is removed, then unlock it."""
     kept = False
     with contextlib.suppress(OSError):
         if kept := _is_still(path, descriptor):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read YAML of unknown origin: no objects, no bombs of aliases, and no number that two versions of YAML read differently."""
+"""Reader of untrusted YAML: no objects, no alias bombs, and no number that two versions of YAML read differently."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def parsed(text: str) -> Any:
 
 
 def _depth(text: str) -> int:
-    """Largest depth of open brackets in a text, those in words included: PyYAML's time grows with it."""
+    """Largest depth of open brackets in a text, including those in words: the time of PyYAML grows with it."""
     depth = deepest = 0
     for bracket in re.finditer(r"[\[\]{}]", text):
         depth += 1 if bracket[0] in "[{" else -1
@@ -61,7 +61,7 @@ def _depth(text: str) -> int:
 
 @functools.cache
 def _loader(yaml: Any) -> Any:
-    """PyYAML's safe loader in Python: the one in C recurses as deep as the text is nested, and crashes."""
+    """PyYAML's safe loader in Python. The loader in C recurses as deeply as the text is nested, and crashes."""
 
     class Loader(yaml.SafeLoader):
         """PyYAML's safe loader that also reads numbers such as 1e3, as YAML 1.2 does."""
@@ -71,7 +71,7 @@ def _loader(yaml: Any) -> Any:
 
 
 def _look(yaml: Any, faults: Faults, root: Any) -> None:
-    """Note everything refused in a tree of nodes, before any object is constructed from it."""
+    """Add faults for everything that is refused in a tree of nodes, before any object is constructed from it."""
     sizes: dict[int, int] = {}
     _size(yaml, root, sizes, set())
     if sizes[id(root)] > MOST_VALUES:
@@ -97,7 +97,7 @@ def _look(yaml: Any, faults: Faults, root: Any) -> None:
 
 
 def _size(yaml: Any, node: Any, sizes: dict[int, int], above: set[int]) -> int:
-    """Number of values of a node, aliases written out. Raises SceneError where a node contains itself."""
+    """Number of values of a node, with aliases expanded. Raises SceneError if a node contains itself."""
     if id(node) in above:
         raise SceneError([f"YAML: {_line(node)} contains itself through an alias. Write it out"])
     if id(node) not in sizes:
@@ -113,7 +113,7 @@ def _size(yaml: Any, node: Any, sizes: dict[int, int], above: set[int]) -> int:
 
 
 def _check_keys(yaml: Any, faults: Faults, node: Any) -> None:
-    """Note keys that are no texts, and doubled ones, of which PyYAML keeps the last."""
+    """Add faults for keys that are not texts, and for repeated keys, of which PyYAML keeps the last."""
     first: dict[str, Any] = {}
     for key, _ in node.value:
         if not isinstance(key, yaml.ScalarNode):
@@ -127,7 +127,7 @@ def _check_keys(yaml: Any, faults: Faults, node: Any) -> None:
 
 
 def _check_scalar(faults: Faults, node: Any) -> None:
-    """Note a number that versions of YAML read differently."""
+    """Add a fault for a number that versions of YAML read differently."""
     number = node.style is None and node.tag.endswith((":int", ":float"))
     text = node.value
     if number and OCTAL.fullmatch(text):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kernel's arrays of structs and of lanes, written through NumPy; what all members share is written only once."""
+"""The kernel's arrays of structs and of lanes, written through NumPy; numbers that all members share are written once."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from lgvi_warp.physics.terms.base import Packed
 
 
 def put(target: np.ndarray, column: Any) -> None:
-    """Write one number of each member into lanes; lanes beyond the last member get the last member's.
+    """Write one number of each member into lanes; lanes beyond the last member get the last member's number.
 
-    target: (packets, width), or (1, width) for a number that members share. column: a number, or an array (1,) or (m,).
+    target: (packets, width), or (1, width) for a shared number. column: a number, or an array (1,) or (m,).
     """
     if np.ndim(column) == 0 or len(column) == 1:
         target[...] = column
@@ -30,7 +30,7 @@ def put(target: np.ndarray, column: Any) -> None:
 
 
 def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
-    """Write rows (1 or m, d) of members into lanes (packets or 1, d, width); those beyond the last member get its rows."""
+    """Write rows (1 or m, d) of members into lanes (packets or 1, d, width); lanes beyond the last member get its rows."""
     packets, d, width = target.shape
     if len(rows) == 1:
         target[...] = rows[:, :, None]
@@ -43,7 +43,7 @@ def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
 
 
 class Writing(NamedTuple):
-    """Way of writing members' numbers into lanes: by `put`, and as `put_rows`."""
+    """Functions that write members' numbers into lanes: like `put`, and like `put_rows`."""
 
     put: Callable[[np.ndarray, Any], None]
     put_rows: Callable[[np.ndarray, np.ndarray], None]
@@ -55,8 +55,8 @@ PLAIN = Writing(put, put_rows)
 def fill(target: np.ndarray, value: Any, put: Callable[[np.ndarray, Any], None] = put) -> None:
     """Write the numbers of members into a field (packets or 1,) of a structured array.
 
-    value: a number, whole numbers (m,), numbers (1 or m,), vectors (1 or m, 3), matrices (1 or m, 3, 3), a pair of diagonal
-        and off-diagonal of symmetric matrices, or a mapping of these by name.
+    value: a number, whole numbers (m,), numbers (1 or m,), vectors (1 or m, 3), matrices (1 or m, 3, 3), a pair of
+        diagonal and off-diagonal of symmetric matrices, or a mapping of these by name.
     """
     names = target.dtype.names or ()
     if isinstance(value, dict):
@@ -76,7 +76,7 @@ def fill(target: np.ndarray, value: Any, put: Callable[[np.ndarray, Any], None] 
 
 
 def longest(value: Any) -> int:
-    """The leading dimension of what `fill` writes."""
+    """Leading dimension of a value for `fill`."""
     if isinstance(value, dict):
         return max(map(longest, value.values()), default=1)
     if isinstance(value, tuple):
@@ -85,9 +85,9 @@ def longest(value: Any) -> int:
 
 
 class Structs:
-    """A Warp array of structs whose fields are written through NumPy, those that all members share only once.
+    """A Warp array of structs whose fields are written through NumPy; fields that all members share are written only once.
 
-    array: of one struct, or of one a packet where a number varies; None before `write`. view: the same memory in NumPy.
+    array: one struct, or one per packet if a number varies; None before `write`. view: the same memory in NumPy.
     """
 
     def __init__(self, struct: Any, dtype: np.dtype, writing: Writing = PLAIN):
@@ -98,7 +98,7 @@ class Structs:
         self._written: Any = None
 
     def forget(self) -> None:
-        """Write everything anew at the next `write`, into an array of its own."""
+        """Make the next `write` write everything into a new array."""
         self.view = np.empty(0, self._dtype)
 
     def write(self, packets: int, parts: list[tuple[tuple[str, ...], Any, bool]]) -> None:
@@ -132,7 +132,7 @@ def _at(target: np.ndarray, path: tuple[str, ...]) -> np.ndarray:
 
 
 class Lanes:
-    """A Warp array (packets, rows) of lanes, or of single numbers, written through its view (packets, rows, width or 1)."""
+    """A Warp array (packets, rows) of lanes or of single numbers, written through a view (packets, rows, width or 1)."""
 
     def __init__(self, packets: int, rows: int, Lane: Any):
         self.array: Any = wp.zeros((packets, rows), dtype=Lane, device="cpu")
@@ -149,20 +149,20 @@ FIELDS = ("own", "bounds")
 
 
 class Group(NamedTuple):
-    """Packed numbers of several terms; whether all members share them, and whether earlier calls brought the same."""
+    """Packed numbers of several terms, whether all members share them, and whether they equal those of earlier calls."""
 
     packed: Sequence[Packed]
     shared: Sequence[bool]
 
 
 class LawArrays:
-    """The numbers of a kernel's laws: their structs, their rows of a table, and what they remember.
+    """The numbers of a kernel's laws: their structs, their rows of a table, and their memory.
 
     kinds: for each group of laws (terms, a controller's parts, events) Warp's struct of its numbers, and its NumPy type.
-    memory: what laws and method remember from step to step; the second half is a backup.
-    places: where in table and memory each law's rows lie; none before `write`.
-    remembered: rows of the memory that each law has, without those in which it works. scratch: the first row of the method's.
-    account: the first row of the memory of the law that keeps the account of the energy used; -1 where none does.
+    memory: memory of laws and method from step to step; the second half is a backup.
+    places: positions of each law's rows in table and memory; empty before `write`.
+    remembered: memory rows of each law, without its scratch rows. scratch: the first of the method's own rows.
+    account: the first memory row of the law that accounts for the energy used; -1 if there is none.
     """
 
     table: Lanes
@@ -192,7 +192,7 @@ class LawArrays:
         self._written: dict[int, bytes | None] = {}
 
     def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0, account: int | None = None) -> None:
-        """Write what the terms packed, and the parts of a controller; account: the number of the law that keeps it."""
+        """Write the packed numbers of terms and of a controller's parts; account: number of the law of the energy used."""
         laws = [law for group in groups for law in group.packed]
         rows = [row_parts(law) for law in laws]
         widths = [[part.shape[1] for part in parts] for parts in rows]
@@ -220,7 +220,7 @@ class LawArrays:
         self.write_memory()
 
     def _place(self, laws: Sequence[Packed], bus: int, account: int | None) -> None:
-        """Give each law its rows of table and memory."""
+        """Assign rows of table and memory to each law."""
         row, memory = 1, bus
         self.account = -1 if account is None else bus + sum(map(memory_rows, laws[:account]))
         self.places, self.remembered = [], []
@@ -247,7 +247,7 @@ class LawArrays:
         self._rows, self.scratch = row, memory
 
     def _write_table(self, parts_of_laws: Sequence[Sequence[np.ndarray]], shared: Sequence[bool], moved: bool) -> None:
-        """Write the laws' rows; the first row of the table is none's. Rows that members share are written when they change."""
+        """Write the laws' rows; the table's first row belongs to no law. Shared rows are written when they change."""
         count = self._packets if any(len(part) > 1 for parts in parts_of_laws for part in parts) else 1
         if moved or len(self.table.view) != count:
             # A vector of rows that members share is one load of four: one row more than there are.
@@ -263,7 +263,7 @@ class LawArrays:
                     self._written[at] = bits
 
     def write_memory(self) -> None:
-        """Write anew what laws remember at the start, and zeros into all other rows of the memory."""
+        """Write the initial memory of the laws, and zeros into all other rows of the memory."""
         view = self.memory.view
         if not view.size:
             return
@@ -275,7 +275,7 @@ class LawArrays:
 
 
 def _bounded(dtype: np.dtype) -> list[tuple[str, ...]]:
-    """Names of the bounds beside the numbers of each law of a struct, in order."""
+    """Names of the bounds next to the numbers of each law in a struct, in order."""
     names: list[tuple[str, ...]] = []
     while "own" in (dtype.names or ()):
         first_law = dtype["own"]
@@ -285,32 +285,32 @@ def _bounded(dtype: np.dtype) -> list[tuple[str, ...]]:
 
 
 def memory_rows(law: Packed) -> int:
-    """Rows of the memory that a law has, its scratch rows among them."""
+    """Number of a law's rows in the memory, including its scratch rows."""
     return memory_count(law) + law.work
 
 
 def memory_count(law: Packed) -> int:
-    """Rows of the memory in which a law remembers something."""
+    """Number of memory rows in which a law stores data."""
     return 0 if law.memory is None else law.memory.shape[1]
 
 
 def row_parts(law: Packed) -> tuple[np.ndarray, ...]:
-    """A law's rows of the table as arrays (1 or n, rows) side by side, given normals last; none for a law without."""
+    """Rows of a law in the table as arrays (1 or n, rows) side by side, given normals last; empty without rows."""
     rows = law.rows if isinstance(law.rows, tuple) else () if law.rows is None else (law.rows,)
     return rows if law.normals is None else (*rows, law.normals)
 
 
 def row_count(law: Packed) -> int:
-    """Rows of the table that a law has."""
+    """Number of a law's rows in the table."""
     return sum(part.shape[1] for part in row_parts(law))
 
 
 def _nested(
     group: Group, bounded: Sequence[tuple[str, ...]], places: Sequence[tuple[dict[str, Any], tuple[int, ...]]]
 ) -> list[tuple[tuple[str, ...], Any, bool]]:
-    """The numbers of a group as parts of the kernel's struct, which holds those of the first law, and the rest.
+    """Numbers of a group as parts of the kernel's struct, which contains those of the first law, and the rest.
 
-    bounded: as in `_bounded`. places: for each law where its rows are, as fields of its own, and its bounds.
+    bounded: as in `_bounded`. places: for each law the fields with the positions of its rows, and its bounds.
     """
     parts: list[tuple[tuple[str, ...], Any, bool]] = []
     each = zip(group.packed, group.shared, bounded, places, strict=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Blocks: runs of consecutive members, the unit of work of executors and stores."""
+"""Blocks: groups of consecutive members, the unit of work of executors and stores."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Block:
-    """A run of consecutive members, the unit of work: from `first` to before `stop`."""
+    """A group of consecutive members, the unit of work: from `first` to `stop` - 1."""
 
     first: int
     stop: int
@@ -20,7 +20,7 @@ class Block:
 
 
 def block_size(members: int) -> int:
-    """Members of a block, a power of two from 256 to 4096, by their number alone: no bit or file depends on the machine."""
+    """Members of a block, a power of two from 256 to 4096, from their number alone, so that bits and files are portable."""
     size = 256
     while size < 4096 and size * 64 <= members:
         size *= 2
@@ -32,9 +32,9 @@ FEW_MEMBERS, FEW_STEPS = 2_000, 1_000_000
 
 
 def default_threads(members: int, steps: int, cores: int) -> int:
-    """Threads of a run that names no number: one for few members of a short run, else all cores.
+    """Default number of threads of a run: one for few members of a short run, else all cores.
 
-    A block costs about a millisecond beside its kernel, and so does a second thread.
+    A block costs about a millisecond in addition to its kernel, and so does a second thread.
     """
     return 1 if members < FEW_MEMBERS and members * steps < FEW_STEPS else cores
 
@@ -44,10 +44,10 @@ WORTHWHILE = 4_000_000
 
 
 def shares(members: int, threads: int, steps: int) -> int:
-    """Number of members of a block of a run whose bits and files do not depend on blocks.
+    """Members of a block, for runs whose bits and files do not depend on blocks.
 
-    Fewer blocks cost less. Some for each thread keep all threads at work until the end, and blocks of long runs are small, so
-    that an interrupt leaves as many finished members as it can.
+    Fewer blocks cost less. Several blocks per thread keep all threads busy until the end. Long runs have small blocks,
+    so that many members are finished at an interrupt.
     """
     wanted = min(-(-members // (4 * threads if threads > 1 else 1)), -(-WORTHWHILE // steps))
     return min(16_384, -(-wanted // 256) * 256)
@@ -62,8 +62,8 @@ def blocks(members: int, size: int | None = None) -> list[Block]:
 def parts(members: int, steps: int, threads: int, apart: bool, gathered: bool = False) -> list[Block]:
     """The blocks of a run.
 
-    apart: whether each block matters: where a run may end after any, in a store, and where others than threads run them.
-    gathered: whether statistics are gathered, of each block apart: then several blocks may run as one.
+    apart: whether each block must run alone: if a run may end after any block, in a store, or outside of threads.
+    gathered: whether statistics are gathered for each block; then several blocks may run as one.
     """
     if apart:
         return blocks(members)

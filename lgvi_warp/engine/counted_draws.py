@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The standard normals that counters give to members, with the bits that a kernel would draw on its way."""
+"""Standard normals that counters give to members, with the same bits as in a kernel's run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ AT_ONCE = 1_000_000
 
 
 def dtype_of(layout: DrawLayout, real: Any) -> Any:
-    """The type of NumPy that holds the counters' normals without loss: the kernel's, or float64 of what the host draws."""
+    """NumPy type that holds the normals without loss: the kernel's type, or float64 for draws on the host."""
     of_host = any(entry.source.at_start for entry in layout)
     return np.float64 if of_host or real == wp.float64 else np.float32
 
@@ -59,7 +59,7 @@ def _of_stream(entry: NoiseDraws, seed: int, members: np.ndarray, width: int, re
 
 @functools.cache
 def _kernel(width: int, real: Any) -> Any:
-    """The kernel that draws, loaded, and compiled first if Warp's cache has none."""
+    """The kernel that draws, loaded, and compiled first if Warp's cache does not have it."""
     with build_lock:
         kernel = make_counted_draws(width, real)
         kernel_cache.load(kernel.module)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Continuation of a run: state that its packets leave and that the next run's packets take."""
+"""Continuation of a run: the state that its packets leave and that the packets of the next run take."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ BESIDE: dict[str, Any] = dict(
 
 
 def settings_of(plan: Plan) -> dict[str, Any]:
-    """Settings on which states and memory of a plan's packets depend, beside the members' numbers."""
+    """Settings that determine states and memory of a plan's packets, in addition to the members' numbers."""
     spec: Spec = plan.spec
     control = spec.control
     parts = list(spec._replace(**BESIDE))
@@ -46,22 +46,22 @@ def settings_of(plan: Plan) -> dict[str, Any]:
 
 
 def known_settings(plan: Plan) -> dict[str, Any]:
-    """Settings on which states and memory of a plan's runs depend; computed once."""
+    """Settings that determine states and memory of a plan's runs; computed once."""
     settings: dict[str, Any] = plan.shared("settings of states", {}, lambda numbers: settings_of(plan))
     return settings
 
 
 def _named(value: Any) -> Any:
-    """A part of a Spec with names in place of modules, whose text would have the place of their files."""
+    """Replace modules in a part of a Spec by names, since a module's text would contain the path of its file."""
     if isinstance(value, tuple | list):
         return tuple(_named(entry) for entry in value)
     return getattr(value, "__name__", value)
 
 
 def beginning(plan: Plan) -> int:
-    """Kind of beginning of a plan's first launch (see lgvi_kernels.advance.beginning).
+    """Kind of start of a plan's first launch (see lgvi_kernels.advance.beginning).
 
-    Members go on exactly where neither their numbers nor what decides their states is another; else from their states.
+    Members continue exactly if their numbers and the settings of their states are unchanged; otherwise from their states.
     """
     final = plan.ensemble.final
     if final is None:
@@ -71,7 +71,7 @@ def beginning(plan: Plan) -> int:
 
 
 def recalls(plan: Plan) -> bool:
-    """Whether members go on from a tick of which the run before noted all that this one gathers."""
+    """Whether members continue from a tick at which the previous run saved all signals that this run gathers."""
     final, launches = plan.ensemble.final, plan.launches
     if final is None or not launches.is_tick(plan.grid.first) or "noted" not in final.lanes:
         return False
@@ -79,7 +79,7 @@ def recalls(plan: Plan) -> bool:
 
 
 def _same_numbers(plan: Plan, final: Final) -> bool:
-    """Whether the members have the parameters that they had."""
+    """Whether the members have the same parameters as in the previous run."""
     now = plan.ensemble.parameters(0, plan.ensemble.members)
     if now.keys() != final.parameters.keys():
         return False
@@ -91,9 +91,9 @@ def _same_numbers(plan: Plan, final: Final) -> bool:
 
 
 def begun(plan: Plan) -> Plan:
-    """The plan with how it begins settled: from t = 0, or from where its members ended in another run.
+    """Decide the start of a plan: at t = 0, or from the final states of another run.
 
-    Raises SceneError where that run did not keep what is needed.
+    Raises SceneError if that run did not keep the required data.
     """
     final, faults = plan.ensemble.final, Faults("start.")
     if final is None:
@@ -119,7 +119,7 @@ def begun(plan: Plan) -> Plan:
 
 
 def _of_same_members(plan: Plan, final: Final) -> Plan:
-    """The plan, with a message where its members are others than those whose end it is, or in another order."""
+    """Add a message to the plan if its members differ from those of the continued run, or in order."""
     now = plan.ensemble.indices
     if np.array_equal(now, final.indices) or "indices" in plan.ensemble.explicit():  # given: noise that is meant
         return plan
@@ -132,7 +132,7 @@ def _of_same_members(plan: Plan, final: Final) -> Plan:
 
 
 def left_by(packets: Packets) -> dict[str, np.ndarray]:
-    """Rows (m, rows) by name of what a block's packets hold at the end of a run."""
+    """Final rows (m, rows) of a block's packets, by name."""
     laws, m = packets.laws, packets.members.count
     memory, half = laws.memory.view, laws.memory.view.shape[1] // 2
     rows = {"state": _by_member(packets.state_lanes.view, m)}
@@ -156,7 +156,7 @@ def left_by(packets: Packets) -> dict[str, np.ndarray]:
 
 
 def places_of(packets: Packets) -> dict[str, slice]:
-    """Rows of each law, part and event in the memory of some packets; "signals" are of the controller."""
+    """Rows of each law, part and event in the memory of some packets; "signals" belong to the controller."""
     choice, laws = packets.plan.kernel_choice, packets.laws
     kinds = ("law", choice.laws), ("part", choice.parts_of_control), ("event", choice.events)
     names = [name_of(kind, term) for kind, each in kinds for term, _ in each]
@@ -165,7 +165,7 @@ def places_of(packets: Packets) -> dict[str, slice]:
 
 
 def take(packets: Packets, final: Final) -> None:
-    """Put what members ended with into their packets, which hold those members from their starts on."""
+    """Write the final states of another run into the packets of its members, which are at their starts."""
     exact, memory = packets.plan.launches.goes_on_exactly, packets.laws.memory.view
     half = memory.shape[1] // 2
     lanes = _in_steps(final, packets.plan)
@@ -185,7 +185,7 @@ def take(packets: Packets, final: Final) -> None:
 
 
 def _in_steps(final: Final, plan: Plan) -> Mapping[str, np.ndarray]:
-    """The rows of an end, of which some count steps from t = 0: as the plan counts them, whose step or time may be another."""
+    """Convert rows that count steps from t = 0 to the steps of the plan, whose step or time may be different."""
     ratio = final.step / plan.grid.h
     shift = plan.grid.first - final.steps * ratio
     if ratio == 1.0 and shift == 0.0:
@@ -214,20 +214,20 @@ ENDED = ("status", "failed_step", "failed_size", "still", "substeps")
 
 
 def start_warnings(final: Final, members: int) -> tuple[np.ndarray, np.ndarray]:
-    """The warnings that the start of a run gave, whose end this is: (bits, value)."""
+    """Warnings at the start of the run with these final states: (bits, value)."""
     if "start_warnings" not in final.lanes:
         return np.zeros(members, np.uint16), np.zeros(0)
     return final.lanes["start_warnings"][:, 0].astype(np.uint16), final.lanes["start_values"][:, 0]
 
 
 def _by_member(view: np.ndarray, members: int) -> np.ndarray:
-    """Rows (members, rows) of lanes (packets, rows, width), a copy."""
+    """Copy lanes (packets, rows, width) to rows by member (members, rows)."""
     packets, rows, width = view.shape
     return np.array(view.transpose(0, 2, 1), order="C").reshape(packets * width, rows)[:members]
 
 
 def joined(parts: Mapping[int, Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """The rows of blocks, by their first member, one after the other; those that are shorter, or absent, end in zeros."""
+    """Join the rows of blocks, given by their first member; shorter or missing rows are filled with zeros."""
     ordered = [parts[first] for first in sorted(parts)]
     if len(ordered) == 1:
         return dict(ordered[0])

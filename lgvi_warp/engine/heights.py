@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The heights of members above the mean surface, in scenes that have no term or event for it.
+"""The heights of members above the mean surface, in scenes without a term or event for it.
 
-Depths are looked at in samples, at the end of a run and, in waves, between launches: the kernel has no code for it.
+Depths are checked on the host, in samples, at the end of a run and, in waves, between launches.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LOOKS, FEWEST = 8.0, 8
 
 
 def time_between_looks(scene: SceneLike) -> float | None:
-    """Time [s] between two looks at the depth in waves; None where no waves are, or the surface is known."""
+    """Time [s] between two checks of the depth in waves; None without waves, or if the scene has a surface."""
     periods = wave_periods(scene)
     if not periods or ends_at_the_surface(scene) or floats(scene):
         return None
@@ -30,7 +30,7 @@ def time_between_looks(scene: SceneLike) -> float | None:
 
 
 class Heights:
-    """The greatest height of each member above the surface so far [m], and the steps made when it first was too high."""
+    """Greatest height of each member above the surface so far [m], and the number of steps when it was first too high."""
 
     def __init__(self, scene: SceneLike, depth: np.ndarray, parameters: Numbers):
         self._open = not (ends_at_the_surface(scene) or floats(scene))
@@ -42,7 +42,7 @@ class Heights:
         self._height, self._step = np.full(len(depth), -np.inf), np.zeros(len(depth), np.int64)
 
     def look(self, depth: np.ndarray, steps: np.ndarray) -> None:
-        """Look at depths (k, m) [m] after so many steps (k,); most often a comparison of the least suffices."""
+        """Check depths (k, m) [m] after these steps (k,); most often one comparison of the smallest depth is enough."""
         if not self._open or depth.size == 0 or depth.min() >= -self._limit.min():
             return
         high = (depth < -self._limit) & ~self._above
@@ -60,19 +60,19 @@ class Heights:
         return warned, np.where(most, self._step, step), np.where(most, self._height, value)
 
     def left(self) -> np.ndarray:
-        """Rows (m, 3) from which a run goes on exactly; none where no member was above the surface."""
+        """Rows (m, 3) for an exact continuation of the run; empty if no member was above the surface."""
         rows = np.stack([np.maximum(self._height, 0.0), self._step, self._above], axis=1)
         return rows if rows.any() else rows[:0]
 
     def take(self, rows: np.ndarray | None) -> None:
-        """Go on from what another run left; None: nothing."""
+        """Continue with the rows of another run; None: no rows."""
         count = len(self._above)
         height, step, above = np.zeros((3, count)) if rows is None else rows.T
         self._height, self._step, self._above = height, step.astype(np.int64), above != 0.0
 
 
 def of_states(packets: Any) -> np.ndarray:
-    """The depths (1, m) [m] of the user's origin, by the states between two launches."""
+    """Depths (1, m) [m] of the user's origin, from the states between two launches."""
     lanes, frame = packets.state_lanes.view[:, 6:12, : packets.plan.spec.width], packets.frame
     rows = lanes.transpose(0, 2, 1).reshape(-1, 6)[: packets.members.count]
     depth = rows[:, 5]

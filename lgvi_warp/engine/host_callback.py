@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The exchange with a function of the host at a controller's ticks: what it is told, and its answer."""
+"""Exchange with a Python function at a controller's ticks: its inputs, and its answer."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from lgvi_warp.engine.packets import Packets
 
 @dataclass(frozen=True)
 class CallbackInput:
-    """Measured or wanted values of m members at a tick.
+    """Measured or reference values of m members at a tick.
 
     Args:
         position: Positions (m, 3) [m], inertial axes.
         attitude: Attitudes (m, 3, 3), body to inertial axes.
-        velocity: Velocities (m, 3) [m/s]: measured over ground in body axes; wanted in inertial axes.
+        velocity: Velocities (m, 3) [m/s]: measured over ground in body axes, or reference in inertial axes.
         angular_velocity: Angular velocities (m, 3) [rad/s], body axes.
         heading: Headings (m,) [rad].
-        water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None, the default, in wanted values.
-        speed: Wanted speed ahead (m,) [m/s]; None, the default, in measured values.
-        angular_acceleration: Wanted angular accelerations (m, 3) [rad/s^2], axes of the wanted attitude; None, the default,
-            in measured values.
+        water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None (default) in reference values.
+        speed: Reference speed ahead (m,) [m/s]; None (default) in measured values.
+        angular_acceleration: Reference angular accelerations (m, 3) [rad/s^2], axes of the reference attitude; None
+            (default) in measured values.
     """
 
     position: np.ndarray
@@ -44,9 +44,9 @@ class CallbackInput:
 
 
 def last_tick(packets: Packets, members: np.ndarray | None = None) -> tuple[CallbackInput, CallbackInput]:
-    """Measured and wanted values at the last tick: (measured, wanted), copies.
+    """Copies of the values at the last tick: (measured, reference).
 
-    members: which of their members (m,); None (default) for all.
+    members: indices of the members in the packets (m,); None (default) for all.
     """
     y, r = (_numbers(packets, packets.plan.layout.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
@@ -69,7 +69,7 @@ def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.
 
 
 def write_answer(packets: Packets, values: np.ndarray) -> None:
-    """Write the host's answer to the last tick: demands (m, 6), or commands (m, channels)."""
+    """Write the function's answer to the last tick: demands (m, 6), or commands (m, channels)."""
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
     view, first = packets.laws.memory.view, controller.bus.answer

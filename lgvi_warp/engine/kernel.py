@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kernel of a run: made when it is first asked for, since many plans are never run, and loaded once a process."""
+"""The kernel of a run: made at its first use, since many plans are never run, and loaded once per process."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from lgvi_warp.engine.kernel_choice import KernelChoice, is_built_in
 
 
 class Kernel:
-    """A kernel and its types; phases: how long `load` took, zeros where this process had loaded the kernel."""
+    """A kernel and its types; phases: durations of `load`, zeros if this process had already loaded the kernel."""
 
     def __init__(self, spec: Spec, choice: KernelChoice):
         self._spec, self._choice = spec, choice
@@ -30,22 +30,22 @@ class Kernel:
 
     @functools.cached_property
     def advance(self) -> Advance:
-        """Kernel function that launches call."""
+        """The kernel function for launches."""
         with build_lock, self._laws_compile():
             return make_advance(self._spec)
 
     @property
     def hash(self) -> str:
-        """Its hash in Warp's cache, of its source, its constants and the compiler's options, in hexadecimal digits."""
+        """Hash in Warp's cache, of source, constants and compiler options, in hexadecimal digits."""
         return str(self.advance.kernel.module.get_module_hash().hex())
 
     @property
     def dtypes(self) -> tuple[np.dtype, ...]:
-        """NumPy dtypes of the structs Inertia, Params, Events and Limits, and of Loop where there is a controller."""
+        """NumPy dtypes of the structs Inertia, Params, Events and Limits, and of Loop with a controller."""
         return _dtypes(self.advance)
 
     def load(self) -> None:
-        """Load it, and compile it first if Warp's cache has none."""
+        """Load the kernel, and compile it first if Warp's cache does not have it."""
         start = time.perf_counter()
         module = self.advance.kernel.module
         if module in kernel_cache.loaded:
@@ -80,7 +80,7 @@ class Kernel:
 
 @functools.lru_cache(maxsize=256)
 def _dtypes(advance: Advance) -> tuple[np.dtype, ...]:
-    """Kept by kernel, since plans of one kernel are many and Warp takes long to tell."""
+    """Types of a kernel, cached, since many plans share a kernel and Warp takes long to compute them."""
     types = advance.types
     kinds = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
     return tuple(np.dtype(kind.numpy_dtype()) for kind in kinds)

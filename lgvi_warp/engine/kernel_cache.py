@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kernels from Warp's cache: compiled once for all processes, and loaded only as they were compiled.
+"""Kernels in Warp's cache: compiled once for all processes, and loaded only if their checksums match.
 
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o          code of one kind of processor
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o.sha256   checksums of that file and of its .meta, written last
@@ -7,8 +7,8 @@
     CACHE/lgvi_warp_locks/                       locks held while a kernel is compiled
     CACHE/lgvi_warp_scratch_RANDOM/              a kernel being compiled, locked by the process that compiles it
 
-Damaged code would crash the process, so nothing is loaded whose checksums do not match. LLVM aborts the process when it
-cannot write, so free room is checked before it begins.
+Damaged code would crash the process, so code is loaded only if its checksums match. LLVM aborts the process if it
+cannot write, so free disk space is checked before it starts.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ loaded: weakref.WeakSet[Any] = weakref.WeakSet()
 
 
 def load(module: Any, *, compiled_by: Callable[..., tuple[float, float]] | None = None) -> Phases:
-    """Load a kernel's code, compiling it where the cache has none that is whole."""
+    """Load a kernel's code, and compile it first if the cache has no undamaged code."""
     warp_setup.start()
     with build_lock:
         if module in loaded:
@@ -73,7 +73,7 @@ def load(module: Any, *, compiled_by: Callable[..., tuple[float, float]] | None 
 
 @contextlib.contextmanager
 def one_at_a_time(kernel: str) -> Iterator[None]:
-    """Let one process compile a kernel while others that want the same one wait for what it puts into the cache.
+    """Let one process compile a kernel while other processes that need it wait for the result in the cache.
 
     Kernels whose hashes begin with the same two digits share a lock, so that there are at most 256 files to lock.
     """
@@ -89,7 +89,7 @@ def one_at_a_time(kernel: str) -> Iterator[None]:
 
 
 def is_whole(code: Path) -> bool:
-    """Whether a kernel's code, and all files that its checksums name, are as they were compiled."""
+    """Whether a kernel's code, and all files named in its checksums, are unchanged."""
     try:
         sums = json.loads(code.with_name(code.name + SUMS).read_bytes())
         return code.name in sums and all(_sha256(code.with_name(name)) == value for name, value in sums.items())
@@ -104,7 +104,7 @@ def _sha256(path: Path) -> str:
 def compile_module(module: Any, cache: Path, code: Path) -> tuple[float, float]:
     """Compile and load a kernel in a scratch folder, then put its files into the cache, checksums last.
 
-    Returns: When its source and its code were written, as time.time() counts [s].
+    Returns: Times at which its source and its code were written, as of time.time() [s].
     """
     try:
         sweep(cache, code.parent)
@@ -132,7 +132,7 @@ def compile_module(module: Any, cache: Path, code: Path) -> tuple[float, float]:
 
 
 def _move(compiled: Path, code: Path) -> None:
-    """Move a compiled kernel's files into the cache; files already there are damaged, or for other processors."""
+    """Move a compiled kernel's files into the cache; existing files are damaged, or for other processors."""
     names = [code.name, *(path.name for path in compiled.glob("*.meta"))]
     (compiled / (code.name + SUMS)).write_text(json.dumps({name: _sha256(compiled / name) for name in names}))
     if code.parent.exists() and not code.parent.is_dir():
@@ -146,7 +146,7 @@ def _move(compiled: Path, code: Path) -> None:
 
 @contextlib.contextmanager
 def scratch_folder(cache: Path) -> Iterator[Path]:
-    """A folder of this process's own, which `sweep` leaves alone while it lives."""
+    """A temporary folder of this process, which `sweep` does not remove while the process lives."""
     with contextlib.ExitStack() as stack:
         with one_at_a_time(SCRATCH):
             path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=cache))
@@ -157,7 +157,7 @@ def scratch_folder(cache: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _clang_headers(scratch: Path) -> Iterator[None]:
-    """Let Clang keep its precompiled header in the scratch folder where the system's temporary folder has no room."""
+    """Make Clang store its precompiled header in the scratch folder if the system's temporary folder is full."""
     folders, thread = warp_setup.header_folders(), threading.get_ident()
     if thread in folders or temporary_room():
         yield
@@ -172,9 +172,9 @@ def _clang_headers(scratch: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def kept_header(cache: Path, scratch: Path) -> Iterator[None]:
-    """Give this thread the precompiled header of an earlier process, or keep the one that Clang writes now.
+    """Give this thread the precompiled header of an earlier process, or save the one that Clang writes now.
 
-    Clang needs longer for it than for a plain kernel, and Warp makes it anew in every process.
+    Clang needs longer for it than for a plain kernel, and Warp would make it again in every process.
     """
     folder = warp_setup.header_folder()
     if folder is None:
@@ -202,7 +202,7 @@ def kept_header(cache: Path, scratch: Path) -> Iterator[None]:
 
 @functools.cache
 def header_key() -> str:
-    """Key of a precompiled header: the processor, and Warp's own headers as they were."""
+    """Key of a precompiled header: the processor, and the content of Warp's own headers."""
     native = Path(wp.__file__).parent / "native"
     files = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in sorted(native.glob("*.h"))]
     content = json.dumps([wp.get_cpu_kernel_cache_key(), str(native), files])
@@ -211,9 +211,9 @@ def header_key() -> str:
 
 @contextlib.contextmanager
 def private_gradients() -> Iterator[None]:
-    """Let Clang leave out the functions for gradients that Warp writes for each struct.
+    """Make Clang omit the gradient functions that Warp writes for each struct.
 
-    No kernel here calls them, but other files could, unless they are static; they would take up to two fifths of the time.
+    No kernel here calls them. Clang omits them if they are static; otherwise they take up to two fifths of its time.
     """
     template = codegen.struct_template
     visible = "CUDA_CALLABLE void adj_atomic_add("
@@ -225,7 +225,7 @@ def private_gradients() -> Iterator[None]:
 
 
 def temporary_room() -> bool:
-    """Whether the system's folder for temporary files has room for a precompiled header."""
+    """Whether the system's folder for temporary files has space for a precompiled header."""
     try:
         seek_room(Path(tempfile.gettempdir()))
     except OSError:
@@ -236,9 +236,9 @@ def temporary_room() -> bool:
 def seek_room(
     folder: Path, wanted: int = ROOM_BYTES, *, system: Any = os, write: Callable[..., None] = durable.write_all
 ) -> None:
-    """Check by trial that a folder has room for some bytes and files: nothing else reveals quotas and limits.
+    """Check by a trial that a folder has space for some bytes and files, since quotas and limits cannot be read.
 
-    system: what tells of files, as the module os does.
+    system: module with the functions of os that report on files.
     """
     if hasattr(system, "statvfs"):
         room = system.statvfs(folder)
@@ -255,9 +255,10 @@ def seek_room(
 
 
 def sweep(cache: Path, folder: Path) -> None:
-    """Remove what killed processes left in the cache: their scratch folders, and Warp's unfinished folders.
+    """Remove the remains of killed processes from the cache: their scratch folders, and Warp's unfinished folders.
 
-    The latter if they are old, or of the kernel whose folder is given, which this process alone may compile.
+    Unfinished folders are removed if they are old, or belong to the kernel of `folder`, which only this process may
+    compile.
     """
     with one_at_a_time(SCRATCH):
         for path in cache.glob(f"{SCRATCH}*"):
@@ -277,7 +278,7 @@ def _is_old(path: Path) -> bool:
 
 
 def _is_abandoned(path: Path) -> bool:
-    """Whether no process holds a scratch folder; False also where the file system knows no locks."""
+    """Whether no process uses a scratch folder; False also if the file system has no locks."""
     try:
         import fcntl
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kernel's contents: the laws that act and how each enters, and the method's program for them.
+"""The kernel's contents: the laws that act and their form, and the method's program for them.
 
-Decided once for a run from a survey of all members; the members' own numbers come later, block by block.
+They are chosen once for a run from a survey of all members; the members' own numbers follow later, block by block.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ class KernelChoice:
 
     @property
     def account(self) -> int | None:
-        """The number of the law that keeps the account of the energy used; None where none does."""
+        """Number of the law that accounts for the energy used; None if there is none."""
         return next((i for i, (term, _) in enumerate(self.laws) if term.accounts), None)
 
     @property
     def has_callback(self) -> bool:
-        """Whether a function of the host answers each tick."""
+        """Whether a Python function answers each tick."""
         return self.controller is not None and self.controller.callback is not None
 
 
@@ -73,9 +73,9 @@ def choose_kernel(
     checks: str = "safe",
     user_axes: bool = False,
 ) -> KernelChoice:
-    """Choose what the kernel of a run must contain.
+    """Choose the contents of a run's kernel.
 
-    built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
+    built_in: function of (folder, name) that returns built-in device code of the folder "laws" or "stops", or None.
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
@@ -161,9 +161,10 @@ def choose_kernel(
 def _merged_program(
     method: Method, program: Program, acting: list[tuple[Term, Any]], coupled: bool, halved: bool, states_read: bool
 ) -> tuple[tuple[str, float] | None, Program]:
-    """The sub-map that opens a step and merges with the end of the previous one, None for none, and those of a stage.
+    """The sub-map that opens a step and merges with the end of the previous one (None for none), and those of a stage.
 
-    halved: K, with drag or water, is symmetric but no flow: each half has its own. states_read: those between two steps.
+    halved: K with drag or water is symmetric but no flow, so each half has its own K. states_read: whether states
+        between two steps are read.
     """
     if method.two_part:
         # B merges with that of the next step exactly, A up to the order of the method.
@@ -183,7 +184,7 @@ def _merged_program(
 
 
 def _controller(ensemble: Ensemble, facts: Survey) -> Controller | None:
-    """The scene's controller, with a delay where some member has one."""
+    """The scene's controller, with a delay if a member has one."""
     controller: Controller | None = ensemble.scene.controller
     if controller is None or controller.bus is None:
         return None
@@ -198,14 +199,14 @@ def _steady(module: Any) -> bool:
 
 
 def resists(module: Any) -> bool:
-    """Whether a law's force depends on the velocities, so that a splitting makes it by a step of its own."""
+    """Whether a law's force depends on the velocities, so that a splitting applies it in a step of its own."""
     return hasattr(module, "damping") or hasattr(module, "seeing")
 
 
 def _conservative(facts: Survey, acting: list[tuple[Term, Any]]) -> bool:
-    """Whether no law creates energy, and the device code of each potential computes it.
+    """Whether no law creates energy, and the device code of each potential computes its energy.
 
-    Kinetic energy is that relative to the water.
+    The kinetic energy is relative to the water.
     """
     anchored = any(term.anchored for term, _ in acting)
     for term, module in acting:
@@ -228,7 +229,7 @@ MOST_BACKWARD_DRAG = 0.5
 
 
 def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method, h: float) -> None:
-    """Refuse drag too strong for the backward stages of a composition with steps h [s], judged by the members' starts."""
+    """Refuse drag that is too strong for the backward stages of a composition with steps h [s], at the members' starts."""
     if not choice.drag:
         return
     back = -h * min(0.0, *method.stages)
@@ -258,7 +259,7 @@ suitable: set[tuple[type, str]] = set()
 
 
 def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) -> Any:
-    """The module of a term's device code, checked for what a kernel needs of it; built_in: as in `choose_kernel`."""
+    """Load the module of a term's device code, and check what a kernel needs of it; built_in: as in `choose_kernel`."""
     folder, roles = _folder_and_roles(term)
     page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
     module = built_in(folder, device) if isinstance(device, str) else device
@@ -298,14 +299,14 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
 
 
 def _below(term: Term, module: Any, built_in: Callable[[str, str], Any]) -> Any:
-    """The device code of a term below the surface of its scene; a sensor reads its height itself."""
+    """Device code of a term that acts below the scene's surface; a sensor reads its height itself."""
     if term.surface_level is None or isinstance(term, Part):
         return module
     return built_in("laws", term.surface_level.device).in_tide(module)
 
 
 def with_tables(part: Any, module: Any) -> Any:
-    """The device code of a part with the tables that its numbers may be, of code without them."""
+    """Device code of a part whose numbers may be tables, made from code without tables."""
     tables = getattr(part, "gain_tables", None)
     if not tables:
         return module
@@ -316,7 +317,7 @@ def with_tables(part: Any, module: Any) -> Any:
 
 @functools.cache
 def _tabled(module: Any, lanes: Any, fields: tuple[tuple[str, int, str], ...]) -> Any:
-    """The module of `with_tables`, cached, since the device code of a kernel is its key. lanes: see `Term.lanes`."""
+    """The module of `with_tables`, cached, since device code is part of a kernel's key. lanes: see `Term.lanes`."""
     # Where a scene has tables, here: other runs do without this code.
     from lgvi_kernels.laws.control.gain_table import tabled
     from lgvi_kernels.maps.compose import numbers_struct
@@ -333,15 +334,15 @@ def _folder_and_roles(term: Term) -> tuple[str, Sequence[str]]:
 
 
 def is_built_in(module: Any) -> bool:
-    """Whether device code is one of the package's own."""
+    """Whether device code belongs to this package."""
     return str(getattr(module, "__name__", "")).startswith(("lgvi_kernels.", "lgvi_warp."))
 
 
 def declared(term: Term, module: Any, given: bool = False) -> tuple[tuple[str, Any], ...]:
-    """The fields (name, kind) of a term's device struct that do not follow from its module.
+    """Fields (name, kind) of a term's device struct that its module does not define.
 
-    Its numbers, unless the module defines `params`, and a noisy term's key (see lgvi_kernels.maps.compose). given: as of
-    KernelChoice.
+    They are its numbers, unless the module defines `params`, and a noisy term's key (see lgvi_kernels.maps.compose).
+    given: as in KernelChoice.
     """
     numbers = (getattr(module, "params", None) is None and term.lanes()) or ()
     if term.driver is not None:
@@ -352,22 +353,22 @@ def declared(term: Term, module: Any, given: bool = False) -> tuple[tuple[str, A
 
 
 def seeing_roles(module: Any) -> tuple[str, ...]:
-    """The functions that a law makes which looks at the water."""
+    """Names of the functions that a law with access to the water makes."""
     return tuple(_functions_of(module.seeing)) if hasattr(module, "seeing") else ()
 
 
 @functools.cache
 def _functions_of(seeing: Callable[[Any], Any]) -> Any:
-    """Functions of a law that looks at the water; cached, since each plan needs them."""
+    """Functions of a law with access to the water; cached, since each plan needs them."""
     return seeing(_no_water)
 
 
 def _no_water(view: Any, point: Any, sea: Any) -> Any:
-    """Stands for the water while functions are looked at that will not be called."""
+    """Placeholder for the water while functions are inspected and not called."""
 
 
 def _check_seeing(faults: Faults, term: Term, functions: Any, page: str) -> None:
-    """Add a fault unless a law that looks at the water makes the functions that the kernel asks for."""
+    """Add a fault unless a law with access to the water makes the functions that the kernel needs."""
     if not isinstance(functions, dict) or "load" not in functions or set(functions) - set(SEEING):
         faults.add(f"{term.key}.seeing", functions, "is not a dict with load, and push if you like", page)
         return
@@ -376,7 +377,7 @@ def _check_seeing(faults: Faults, term: Term, functions: Any, page: str) -> None
 
 
 def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None:
-    """Add a fault unless a role is a Warp function of as many arguments as the kernel passes."""
+    """Add a fault unless a role is a Warp function with as many arguments as the kernel passes."""
     function = getattr(module, role, None)
     if function is not None:
         arguments = ARGUMENTS.get(role, "view, p" if role == "distance" else "w, view, p")
@@ -424,14 +425,14 @@ def _acting(
 
 
 def _flow(acting: list[tuple[Term, Any]]) -> str:
-    """Motion of the water: the most general FLOW of the laws."""
+    """Kind of the water's motion: the most general FLOW of the laws."""
     return max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
 
 
 def _check(
     method: Method, facts: Survey, *, dense: bool, flow: str, memory: bool, acting: list[tuple[Term, Any]]
 ) -> None:
-    """Raise SceneError, with the reason, where the method cannot do what the scene asks."""
+    """Raise SceneError, with the reason, if the method does not support the scene."""
     faults = Faults()
     if facts.residual_coupling > UNCOUPLED:
         k = f"coupling norm up to {facts.residual_coupling:.3g} at the best origin"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Spec of a run's kernel: all that decides its source, from the laws that act, the method and the settings."""
+"""The Spec of a run's kernel: everything that determines its source, from laws, method and settings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COMPENSATED = "float32_compensated"
 def spec_of(
     choice: KernelChoice, method: Method, layout: SampleLayout, width: int, dtype: str, checks: str, on_failure: str
 ) -> Spec:
-    """The Spec of a run's kernel, but for whether members share rows, which is known once they are packed."""
+    """Make the Spec of a run's kernel, except whether members share rows, which is known after packing."""
     checked = checks != "none"
     back = min(0.0, *method.stages) < 0.0 and bool(choice.drag) and method.tableau is None
     return Spec(
@@ -61,7 +61,7 @@ def spec_of(
 
 
 def with_tangents(spec: Spec, tangents: int) -> Spec:
-    """The Spec whose numbers carry slopes; a lane is then one of two vehicles or more."""
+    """The Spec of numbers that carry slopes; its lane is then one of two vehicles or more."""
     return spec._replace(tangents=tangents, width=max(2, spec.width))
 
 
@@ -71,7 +71,7 @@ def lengths_of(method: Method, choice: KernelChoice) -> tuple[tuple[float, ...],
 
 
 def kind_of(method: Method, choice: KernelChoice) -> str:
-    """The kind of kernel for which a width is chosen, one of widths.KINDS."""
+    """Kind of kernel for which a width is chosen, one of widths.KINDS."""
     if "dense" in choice.parts:
         return "dense"
     if method.tableau or method.gauss:

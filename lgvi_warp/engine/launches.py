@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launches of a run: which steps each makes, and which samples and ticks fall due in it."""
+"""The launches of a run: the steps of each launch, and its samples and ticks."""
 
 from __future__ import annotations
 
@@ -41,20 +41,20 @@ class Launches:
 
     @property
     def goes_on(self) -> bool:
-        """Whether members go on from where another run ended; the tick there was its last one."""
+        """Whether members continue from the end of another run; its last tick was the tick at this time."""
         return self.begins != STARTS
 
     @property
     def goes_on_exactly(self) -> bool:
-        """Whether they do so with the states that the kernel had, and so with the bits of one run."""
+        """Whether members continue with the kernel's own states, and so with the bits of one run."""
         return self.begins == GOES_ON
 
     def beginning(self, k0: int) -> int:
-        """Kind of beginning of the launch of the steps from k0 on."""
+        """Kind of start of the launch of the steps from k0 on."""
         return self.begins if k0 == self.grid.first else 0
 
     def looks_at(self, k: int) -> bool:
-        """Whether the depth of the members is looked at after k steps, whatever the launches are."""
+        """Whether the depth of the members is checked after k steps, independent of the launches."""
         return k == self.grid.last or (self.looks is not None and k % self.looks == 0)
 
     def is_tick(self, k: int) -> bool:
@@ -63,7 +63,7 @@ class Launches:
 
     @functools.cached_property
     def gathered(self) -> TimeGrid | None:
-        """The controller's ticks, where samples are taken at all of them; None without a controller or without `ticks`."""
+        """The controller's ticks, if samples are taken at all of them; None without a controller or without `ticks`."""
         if not self.ticks or self.every is None:
             return None
         return self.grid.ticks(self.every, self.goes_on and not self.recalls)
@@ -72,7 +72,7 @@ class Launches:
     def times(self) -> tuple[Any, Any, Any]:
         """Kernel arguments that all blocks share: (stage_h, lead_h, sample_step).
 
-        Lengths of stages and leads [s], and the numbers of steps after which samples are due.
+        They are the lengths of stages and leads [s], and the numbers of steps after which samples are due.
         """
         stages, leads = (np.array(fractions) * self.grid.h for fractions in self.lengths)
         due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
@@ -88,12 +88,12 @@ class Launches:
         return int(steps.searchsorted(k0, side="right")), int(steps.searchsorted(k1, side="right"))
 
     def tick_bytes(self, count: int) -> int:
-        """Memory of what is gathered at a tick of a block of so many members, in whole packets [bytes]."""
+        """Memory of the data gathered at one tick, for a block of this many members in whole packets [bytes]."""
         return self.bytes_at_tick * -(-count // self.width) * self.width
 
     @functools.cached_property
     def first_tick(self) -> int:
-        """The number of the first tick that the kernel gathers, which a function of the host may answer in this run alone."""
+        """Number of the first tick that the kernel gathers. A Python function may answer a tick only in its own run."""
         if self.every is None:
             return 0
         if self.has_callback or self.recalls or not self.goes_on:
@@ -101,22 +101,22 @@ class Launches:
         return self.grid.first // self.every + 1
 
     def slot_of(self, tick: int, slots: int) -> int:
-        """Slot in which the kernel gathers a tick of `gathered`, counted from its first one."""
+        """Slot in which the kernel stores a tick of `gathered`, counted from its first tick."""
         assert self.gathered is not None
         assert self.every is not None
         return int(self.gathered.sample_steps[tick] // self.every - self.first_tick) % slots
 
     def ticks_held(self, count: int) -> int:
-        """Number of ticks of a block of so many members that are gathered at once; 0 where none are."""
+        """Number of ticks that a block of this many members gathers at once; 0 if it gathers none."""
         if self.gathered is None:
             return 0
         return max(2, min(GATHERED_BYTES // max(1, self.tick_bytes(count)), len(self.gathered.times)))
 
     def ticks_of(self, k0: int, k1: int) -> slice:
-        """Ticks that are gathered once the launch of steps k0 to k1 has ended.
+        """Ticks whose data are complete after the launch of steps k0 to k1.
 
-        Those after step k0, with that of the start, and no later than k1. Where a function of the host answers, a tick ends in
-        the next launch: those from step k0 on and before step k1, with that of the end.
+        These are the ticks after step k0, or at the start, and no later than k1. If a Python function answers, a tick
+        ends in the next launch: these are the ticks from step k0 on and before step k1, or at the end.
         """
         assert self.gathered is not None
         starts = k0 == self.grid.first and (self.recalls or not self.goes_on)
@@ -127,7 +127,7 @@ class Launches:
         return slice(int(first), int(stop))
 
     def segments(self, count: int) -> Iterator[tuple[int, int]]:
-        """The launches (k0, k1) of a block of so many members, each short enough to be interrupted, with few samples."""
+        """The launches (k0, k1) of a block of this many members, each short enough for interrupts, with few samples."""
         if self.has_callback:
             yield from self._periods()
             return
@@ -149,7 +149,7 @@ class Launches:
             k = k1
 
     def _periods(self) -> Iterator[tuple[int, int]]:
-        """The launches where a function of the host answers each tick: one a period."""
+        """The launches if a Python function answers each tick: one per period."""
         assert self.every is not None
         k = self.grid.first
         while k < self.grid.last:

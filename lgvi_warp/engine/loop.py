@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The loop of a run: blocks through an executor, or from a store, and their results to the keepers in block order."""
+"""The loop of a run: blocks run by an executor or are read from a store; keepers receive results in block order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lgvi_warp.engine.work import Work, in_order
 
 
 class RunProgress:
-    """The fraction [1] of a run's vehicle-steps made so far, reported from any thread at each advance."""
+    """Fraction [1] of a run's vehicle-steps made so far, reported from any thread at each advance."""
 
     def __init__(self, total: int, report: Callable[[float], None] | None):
         self._total, self._report, self._lock = total, report, threading.Lock()
@@ -23,7 +23,7 @@ class RunProgress:
         self._sum = 0
 
     def at(self, block: Block, vehicle_steps: int) -> None:
-        """Note how far a block is; one that runs again starts from zero."""
+        """Record the progress of a block; a block that runs again starts from zero."""
         if self._report is None:
             return
         with self._lock:
@@ -34,7 +34,7 @@ class RunProgress:
 
 @dataclass
 class Merged:
-    """Count of members that the keepers have received: up to where merging has begun, and where it is complete."""
+    """Number of members that the keepers have received: up to the block being merged, and completely merged."""
 
     begun: int = 0
     done: int = 0
@@ -50,11 +50,11 @@ def run_blocks(
     merged: Merged | None = None,
     after: Callable[[Block], None] | None = None,
 ) -> int:
-    """Run blocks and merge their results into the keepers, in block order; returns how many members were merged.
+    """Run blocks and merge their results into the keepers, in block order; returns the number of merged members.
 
-    remaining: blocks that the store does not hold yet; None (default) for all.
-    enough: asked after each block, with the members so far, whether the run may end; later blocks are then dropped.
-    after: called with each block when it is merged.
+    remaining: blocks that the store does not have yet; None (default) for all.
+    enough: function of the members so far, called after each block: whether the run may end; later blocks are then dropped.
+    after: function that is called with each merged block.
     """
     fresh = set(remaining or ())
     merged = merged or Merged()
@@ -83,7 +83,7 @@ def _in_turn(
     executor: Executor,
     advanced: Callable[[Block, int], None],
 ) -> Generator[tuple[Block, Any], None, None]:
-    """Blocks and their results in order, from the store or as they run; nothing runs before it is needed."""
+    """Blocks and their results in order, from the store or from the executor; no block runs before it is needed."""
     wanted = {block.first for block in remaining}
     with contextlib.ExitStack() as stack:
         fresh: Iterator[tuple[Block, Any]] | None = None

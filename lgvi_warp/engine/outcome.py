@@ -26,12 +26,12 @@ class MemberStatus:
     event: np.ndarray  # (m,), number of the event that stopped the member, counted from 1; 0 for none
 
     def at(self, members: slice) -> MemberStatus:
-        """The outcome of some members, views."""
+        """The outcome of some members, as views."""
         return MemberStatus(*(getattr(self, field.name)[members] for field in fields(self)))
 
     @classmethod
     def clear(cls, members: int, paces: int) -> MemberStatus:
-        """The outcome of members that reached the end without a fault; paces: columns of `chosen`."""
+        """The outcome of members that reached the end without a fault; paces: number of columns of `chosen`."""
         steps, values = (lambda: np.zeros(members, np.int64)), (lambda: np.zeros(members))
         return cls(
             status=np.zeros(members, np.uint8),
@@ -46,7 +46,7 @@ class MemberStatus:
         )
 
     def end_time(self, plan: Plan) -> np.ndarray:
-        """The time (m,) [s] at which each member ended: at its event, at its failure, or at the end of the run."""
+        """Time (m,) [s] at which each member ended: its event, its failure, or the end of the run."""
         # An event's size is the part of its step that was made before it.
         fraction = np.where(self.event != 0, self.failed_size, 0.0)
         return np.where(self.status != 0, (self.failed_step + fraction) * plan.grid.h, plan.grid.times[-1])

@@ -49,8 +49,8 @@ ENDS = ("status", "failed_step", "failed_size")
 class Packets:
     """The members of one block packed into lanes, ready to launch.
 
-    count: number of packets. frame: axes and origins that the kernel works in.
-    scale: (1 or m,) [kg m^2], what momenta are divided by in the kernel; 1 for methods that need none.
+    count: number of packets. frame: axes and origins of the kernel.
+    scale: (1 or m,) [kg m^2], divisor of momenta in the kernel; 1 for methods without scaling.
     state_lanes: states, (packets, fields of a state). laws: numbers of laws, of a controller's parts and of events.
     """
 
@@ -79,7 +79,7 @@ class Packets:
 
     @classmethod
     def of(cls, plan: Plan, members: Members) -> Packets:
-        """Packets of these members: those of a finished block, if there are any of this size, or new ones."""
+        """Packets of these members: reused from a finished block of this size, or new."""
         for _ in range(len(plan.free_packets)):
             try:
                 packets = plan.free_packets.pop()
@@ -92,7 +92,7 @@ class Packets:
         return cls(plan, members)
 
     def _values(self, lanes: np.ndarray) -> np.ndarray:
-        """The numbers of members in lanes (..., numbers of a lane), without slopes; of plain lanes all there are."""
+        """Numbers of members in lanes (..., numbers of a lane), without slopes; of plain lanes, all numbers."""
         return lanes if self.slopes is None else lanes[..., : self.plan.spec.width]
 
     # The same memory as NumPy has it, by member: asking an array for it takes longer than what is done with it.
@@ -109,36 +109,36 @@ class Packets:
         return self._values(self.noted["failed_size"]).reshape(-1)
 
     def serve(self, plan: Plan) -> None:
-        """Take another plan with the same kernel, which may begin at another step."""
+        """Take another plan with the same kernel, which may start at another step."""
         if plan.launches is not self.plan.launches:
             self._launch = None
             self._place_ticks(plan)
         self.plan = plan
 
     def _place_ticks(self, plan: Plan) -> None:
-        """Tell the kernel at which step members start, and which tick is the first that it gathers."""
+        """Set the step at which members start, and the first tick that the kernel gathers."""
         if self._controlled:
             self.monitor.start = -1 if plan.launches.goes_on else plan.grid.first
             self.monitor.first_tick = plan.launches.first_tick
 
     def _place_account(self) -> None:
-        """Tell the kernel where in the memory the energy used is, and which rows it saves with a sample."""
+        """Set the memory row of the energy used, and the rows that the kernel saves with a sample."""
         if self.laws.account >= 0 and self.plan.spec.accounted and self.monitor.account != self.laws.account:
             self.monitor.account = self.laws.account
             self.monitor.signals = self._signal_rows(self.laws.account)
             self._launch = None
 
     def _signal_rows(self, account: int = 0) -> Any:
-        """Rows of the memory that are saved with each sample, a Warp array; account: that of the energy used."""
+        """Rows of the memory that are saved with each sample, a Warp array; account: row of the energy used."""
         rows = [account if row == ACCOUNT_ROW else row for row in self.plan.layout.signal_rows]
         return wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
 
     def leave(self) -> None:
-        """Leave these packets to the next block; nothing of them may be used any more."""
+        """Leave these packets to the next block; they must not be used afterwards."""
         self.plan.free_packets.append(self)
 
     def refill(self, members: Members) -> None:
-        """Take other members in place of these, from their starts on."""
+        """Replace the members by other members at their starts."""
         plan, self.members = self.plan, members
         packing = self._packed(members)
         each = {"law": packing.laws(), "part": packing.control(), "event": packing.events()}
@@ -165,7 +165,7 @@ class Packets:
                 self.heights.take(members.final.lanes.get(going_on.HEIGHTS))
 
     def _write_packed(self, packing: Packing, by_kind: Mapping[str, list[Packed]]) -> None:
-        """Write the numbers of laws, parts and events, by kind, the inertia and the limits that are watched."""
+        """Write the numbers of laws, parts and events, by kind, the inertia and the limits for warnings."""
         plan, shared, before = self.plan, self.plan.shared.keeps, [] if self._launch is None else self._arrays()
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
         groups = [Group(packed, [shared((kind, i)) for i in range(len(packed))]) for kind, packed in by_kind.items()]
@@ -188,7 +188,7 @@ class Packets:
             self._launch = None
 
     def _packed(self, members: Members) -> Packing:
-        """The packing of members, of their copies too where numbers carry slopes; frame, scale and water are the members'."""
+        """Packing of members, and of their copies if numbers carry slopes; frame, scale and water are the members'."""
         if self.slopes is None or members.shifted is None:
             packing = Packing(self.plan, members)
             self.frame, self.scale, self._packing = packing.frame, packing.scale, packing
@@ -210,7 +210,7 @@ class Packets:
         return self.laws.memory.array
 
     def _arrays(self) -> list[Any]:
-        """The kernel's arrays that `refill` may replace, its first arguments in front."""
+        """The kernel's arrays that `refill` may replace, its first arguments first."""
         laws, limits = self.laws, self._limits.array
         params, *loop, events = (structs.array for structs in laws.structs)
         return [self.inertia.array, params, events, laws.table.array, self.memory, limits, *loop]
@@ -224,12 +224,12 @@ class Packets:
 
     @property
     def bus_rows(self) -> int:
-        """Rows of the memory, the first ones, that are the controller's: its commands and what its ticks noted."""
+        """Number of the controller's rows, the first ones of the memory: commands and saved signals of ticks."""
         return self._bus()[0]
 
     @property
     def warned_at_start(self) -> tuple[np.ndarray, np.ndarray]:
-        """(bits, value) of the warnings at the start; no value where there are none."""
+        """(bits, value) of the warnings at the start; NaN as the value without a warning."""
         if self._warned is None:
             self._warned = self._warned_at_start()
         return self._warned
@@ -244,14 +244,14 @@ class Packets:
         return self._heights
 
     def look_at_depth(self, k: int, when: slice, position: np.ndarray | None) -> None:
-        """Look at the depth in samples (samples, m, 3) [m] of the launch up to step k, and at its end where that is due."""
+        """Check the depth in samples (samples, m, 3) [m] of the launch up to step k, and at its end if a check is due."""
         if position is not None:
             self.heights.look(position[..., 2], self.plan.grid.sample_steps[when])
         if self.plan.launches.looks_at(k):
             self.heights.look(of_surface.of_states(self), np.array([k]))
 
     def _bus(self) -> tuple[int, int]:
-        """Rows of the controller's bus, and the first of those where frozen lanes keep their signals."""
+        """Number of rows of the controller's bus, and the first row in which frozen lanes keep their signals."""
         controller = self.plan.kernel_choice.controller
         if controller is None:
             return len(self.plan.layout.signal_rows), 0
@@ -259,7 +259,7 @@ class Packets:
         return kept + len(self.plan.layout.signal_rows), kept
 
     def _monitor(self) -> Any:
-        """The arrays where the kernel notes what it saw at intervals."""
+        """The arrays in which the kernel records its checks at intervals."""
         plan, monitor = self.plan, self.plan.kernel.advance.types.Monitor()
         Lane, Ints = plan.kernel.advance.types.Lane, int_lane(plan.spec.lanes)
         if plan.spec.warning_rows:
@@ -303,13 +303,13 @@ class Packets:
         return fields
 
     def advance(self, k0: int, k1: int) -> np.ndarray:
-        """Make the steps k0 to k1; a copy of the samples due in them, (samples, count * width, numbers of a sample)."""
+        """Make the steps k0 to k1; returns a copy of their samples, (samples, count * width, numbers of a sample)."""
         return by_members(self._values(self.launch(k0, k1)))
 
     def raw_slopes(self, k0: int, k1: int) -> tuple[np.ndarray, list[np.ndarray], list[Any]]:
-        """The samples that the last launch wrote in these steps, and, by each number, their slopes and those of the frame.
+        """The samples that the last launch wrote in these steps, and their slopes and the frame's, by each number.
 
-        Returns: (samples, members, numbers of a sample), as many slopes of that shape, and slopes of the frame's Q and origin.
+        Returns: samples (samples, members, numbers), their slopes by each number, and slopes of the frame's Q and origin.
         """
         assert self.slopes is not None
         s0, s1 = self.plan.launches.samples_due(k0, k1)
@@ -318,7 +318,7 @@ class Packets:
         return by_members(self._values(lanes))[:, :m], each, slopes_of_frame(self.slopes, self._packing.frame)
 
     def slopes_of_start(self, names: Sequence[str]) -> list[dict[str, np.ndarray]]:
-        """The slopes, by each number, of the motion (1, m, ...) at the start."""
+        """Slopes of the motion (1, m, ...) at the start, by each number."""
         shifted = self.members.shifted
         assert self.slopes is not None
         assert shifted is not None
@@ -326,7 +326,7 @@ class Packets:
         return [{name: slopes[name][i][None] for name in names} for i in range(self.plan.spec.tangents)]
 
     def slopes_of_first_signals(self) -> list[np.ndarray]:
-        """The slopes, by each number, of the signals at the start, (1, m, numbers of the signals)."""
+        """Slopes of the signals at the start, (1, m, numbers of the signals), by each number."""
         assert self.slopes is not None
         rows, m = self.monitor.first_signals.numpy()[:, : len(self.plan.layout.signal_rows)], self.members.count
         return [by_members(rows[:, None, :, place])[:, :m] for place in self.slopes.places()]
@@ -357,7 +357,7 @@ class Packets:
         return self._launched_samples(s1 - s0)
 
     def _launched_samples(self, count: int) -> np.ndarray:
-        """So many samples of the last launch, (packets, samples, numbers of a sample, numbers of a lane)."""
+        """This many samples of the last launch, (packets, samples, numbers of a sample, numbers of a lane)."""
         numbers = sum(self.plan.layout.sizes.values())
         return self._samples[:, : count * numbers].reshape(self.count, count, numbers, self.plan.spec.lanes)
 
@@ -384,7 +384,7 @@ class Packets:
         return by_tick.transpose(0, 2, 1)
 
     def first_signals(self) -> np.ndarray:
-        """The signals at t = 0 once the first launch has made them, (1, count * width, numbers of the signals), a copy."""
+        """Copy of the signals at t = 0 after the first launch, (1, count * width, numbers of the signals)."""
         rows = self._values(self.monitor.first_signals.numpy()[:, : len(self.plan.layout.signal_rows)])
         packets, numbers, width = rows.shape
         return rows.transpose(0, 2, 1).reshape(1, packets * width, numbers).copy()
@@ -419,9 +419,9 @@ class Packets:
         return not self._status.any()
 
     def ended(self) -> tuple[np.ndarray, np.ndarray]:
-        """Status (m,) of each member, and the last step (m,) of those it made itself.
+        """Status (m,) of each member, and the last step (m,) that it made.
 
-        After that step a member that ended keeps its state.
+        After this step an ended member keeps its state.
         """
         outcome = self.outcome(warned=False)
         return outcome.status, outcome.failed_step
@@ -431,14 +431,14 @@ class Packets:
         return np.asarray(self._values(lanes.numpy()).reshape(-1)[: self.members.count].astype(kind))
 
     def _warnings(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(bits, step, value) of the warnings at the start and of those the kernel noted.
+        """(bits, step, value) of the warnings at the start and of the warnings from the kernel.
 
-        Step and value are those of the more serious of the two; of two equals, those of the start.
+        Step and value belong to the more serious warning; if both are equal, to the warning at the start.
         """
         return self.heights.added(*self._of_steps())
 
     def _of_steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same of the warnings about the step."""
+        """(bits, step, value) of the warnings about the step."""
         bits, value = self.warned_at_start
         step = np.zeros(len(bits), np.int64)
         value = value if len(value) else np.full(len(bits), np.nan)
@@ -456,7 +456,7 @@ class Packets:
     def _with_counted(
         self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same with warnings of the members at whose ticks iterations had not converged, or whose filter diverged."""
+        """Add warnings of members with ticks whose iterations did not converge, or whose filter diverged."""
         controller, m = self.plan.kernel_choice.controller, len(bits)
         if controller is None or self.plan.checks == "none":
             return bits, step, value
@@ -474,7 +474,7 @@ class Packets:
         return bits, step, value
 
     def _warned_at_start(self) -> tuple[np.ndarray, np.ndarray]:
-        """(bits, value) of the warnings at the start; no value where there are none."""
+        """(bits, value) of the warnings at the start; NaN as the value without a warning."""
         plan, members, peaks = self.plan, self.members, self.state_lanes.peaks
         among = frozenset[Warnings]()
         if plan.checks != "none":
@@ -492,7 +492,7 @@ class Packets:
     def _with_departed(
         self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same with a warning of the members whose last attitude is no rotation: some end between two ticks."""
+        """Add a warning of members whose last attitude is no rotation: some members end between two ticks."""
         size = departure(self._values(self.state_lanes.view[:, :9]))[: len(bits)]
         warning = np.uint16(Warnings.ORTHOGONALITY)
         over = size > orthogonality_limit(self.plan)

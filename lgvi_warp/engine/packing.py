@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers of a block's members as the kernel takes them: inertia, laws, events and state, one member a lane.
+"""The numbers of a block's members in the kernel's form: inertia, laws, events and state, one member per lane.
 
-What all members share is computed and written once for a run; each block, or call, brings what varies alone.
+Numbers that all members share are computed and written once for a run; each block or call writes only varied numbers.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Packing:
     """Numbers of some members in the kernel's frame and units.
 
     U: (1 or m, 3, 3), matrix of the turns of psi_x; zero for other methods.
-    scale: (1 or m,) [kg m^2], what momenta are divided by in the kernel; 1 for methods that need none.
+    scale: (1 or m,) [kg m^2], divisor of momenta in the kernel; 1 for methods without scaling.
     """
 
     def __init__(self, plan: Plan, members: Members):
@@ -139,7 +139,7 @@ class Packing:
         return packed
 
     def _with_rows(self, term: Term, numbers: Any, packed: Packed) -> Packed:
-        """Packed numbers of a term, with its rows of the surface and of the normals that the call gives."""
+        """Packed numbers of a term, with the rows of its surface and of given normals."""
         packed = with_level(term, packed, numbers)
         if self.members.given is None or self.members.given.rows(term.key) is None:
             return packed  # and stays shared, if it was
@@ -163,7 +163,7 @@ class Packing:
         return [self._shared((kind, i), functools.partial(pack, term)) for i, term in enumerate(terms)]
 
     def scratch(self, laws: Sequence[Packed], bus: int = 0) -> int:
-        """Rows of the memory that the method keeps for itself."""
+        """Number of memory rows for the method itself."""
         spec = self.plan.spec
         if spec.memory and spec.explicit is not None and spec.explicit.goes_back:
             return bus + sum(memory_rows(law) for law in laws)
@@ -190,7 +190,7 @@ class Packing:
 
     @functools.cached_property
     def water(self) -> np.ndarray | None:
-        """R^T u (m, 3) [m/s]: velocity of the water in the user's body axes where each member starts; None for none."""
+        """R^T u (m, 3) [m/s]: velocity of the water in the user's body axes at each start; None without water motion."""
         m = self.members
         total: Any = None
         for term, _ in self.plan.kernel_choice.laws:
@@ -209,9 +209,9 @@ LARGE_TABLE = 16_384
 
 @np.errstate(invalid="ignore", over="ignore")
 def rows_shared(plan: Plan) -> bool:
-    """Whether all members share the rows of the laws, of the controller's parts and of the events, and these are many.
+    """Whether all members share the rows of laws, controller parts and events, and these rows are many.
 
-    Few rows have a copy for each lane, whoever shares them: so one kernel serves scenes in which other numbers vary.
+    Few rows are copied for each lane even if shared, so that one kernel serves scenes in which other numbers vary.
     """
     if plan.kernel_choice.given:  # rows that members own
         return False
@@ -225,22 +225,22 @@ def rows_shared(plan: Plan) -> bool:
 
 
 def name_of(kind: str, term: Term) -> str:
-    """The name by which the end of a run knows what a law, a part of the controller or an event remembers."""
+    """Name of the memory of a law, a controller part or an event in the final states of a run."""
     return f"{MEMORY}{kind} {term.key} {type(term).__name__}"
 
 
 def remembered_by(kind: str, term: Term, final: Final | None) -> np.ndarray | None:
-    """Memory of a law, part or event from the continued run, (m, rows); None for none."""
+    """Memory of a law, part or event from the continued run, (m, rows); None without one."""
     return None if final is None else final.lanes.get(name_of(kind, term))
 
 
 def _once(values: np.ndarray) -> np.ndarray:
-    """Values (m, ...) of members, as one entry where they are one value repeated without copies."""
+    """Reduce values (m, ...) of members to one entry if they are one value repeated without copies."""
     return values[:1] if values.strides[0] == 0 else values
 
 
 def _diagonal_mass(frame: Frame) -> np.ndarray | None:
-    """Diagonals (n, 3) of the mass matrices, if momenta are products of these and velocities alone; else None."""
+    """Diagonals (n, 3) of the mass matrices, if momenta are their products with velocities alone; else None."""
     return None if frame.whole is not None or np.any(frame.E) else frame.mass_diagonal
 
 
@@ -251,7 +251,7 @@ def _inertia_of_state(numbers: Any) -> np.ndarray:
 
 
 def _water(numbers: Any, frame: Frame) -> Fields:
-    """Masses on which accelerating water acts: displaced mass minus dry mass, and its lever."""
+    """Masses on which accelerating water acts: displaced mass minus dry mass, and its lever arm."""
     displaced, dry = vehicle.displaced_mass(numbers), vehicle.dry_mass(numbers)
     center = numbers["vehicle.center_of_buoyancy"]
     lever = displaced[:, None] * center - (dry[:, None] * vehicle.center_of_mass(numbers))
@@ -260,7 +260,7 @@ def _water(numbers: Any, frame: Frame) -> Fields:
 
 
 def _shear(numbers: Any, frame: Frame, full: bool, lever: bool) -> Fields:
-    """Masses on which water that varies in space acts: the body's own mass and the added mass, about the user's origin."""
+    """Masses on which spatially varying water acts: the body's own mass and the added mass, about the user's origin."""
     dry, added = vehicle.dry_mass(numbers), vehicle.added_blocks(numbers)
     M = symmetric(inertia.in_axes(frame.Q, added.M))
     fields: Fields = {"dry": dry, "added": M if full else M[0]}
@@ -271,6 +271,6 @@ def _shear(numbers: Any, frame: Frame, full: bool, lever: bool) -> Fields:
 
 
 def symmetric(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Symmetric matrices (n, 3, 3) as the kernel takes them: diagonal (n, 3), and entries 23, 31, 12 (n, 3)."""
+    """Symmetric matrices (n, 3, 3) in the kernel's form: diagonal (n, 3), and entries 23, 31, 12 (n, 3)."""
     off = np.stack([matrix[:, 1, 2], matrix[:, 2, 0], matrix[:, 0, 1]], axis=1)
     return np.einsum("nii->ni", matrix), off

@@ -14,9 +14,9 @@ ROUNDS, LOOPS = 5, 1_000_000
 
 
 def fma_peak(dtype: str = "float64", width: int | None = None) -> float:
-    """Measure how many fused multiply-adds one core makes per second.
+    """Measure the number of fused multiply-adds that one core makes per second.
 
-    width: lanes of a packet; None (default) for what suits this machine's registers.
+    width: lanes of a packet; None (default): the width that suits this machine's registers.
     Returns: Fused multiply-adds per second of one core [1/s].
     """
     import warp as wp

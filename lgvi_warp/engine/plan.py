@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plan of a run: the kernel that holds only what the scene needs, the launches that make up the run, and its samples."""
+"""The plan of a run: the kernel with only the code that the scene needs, the launches of the run, and its samples."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 
 
 class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the scene)
-    """Raised when a member beyond those that were looked at needs another kernel."""
+    """Raised if a member outside the survey needs another kernel."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All that is decided before a run; `choose_plan` makes it."""
+    """All decisions before a run; `choose_plan` makes it."""
 
     ensemble: Ensemble
     method: Method
@@ -68,11 +68,11 @@ class Plan:
 
     @property
     def phases(self) -> Phases:
-        """Duration of `compile`, by phase; zeros where this process had loaded the kernel."""
+        """Duration of `compile`, by phase; zeros if this process had already loaded the kernel."""
         return self.kernel.phases
 
     def compile(self) -> float:
-        """Load the kernel, and that which packs states, compiled first if Warp's cache has none; how long it took [s]."""
+        """Load the kernel and the kernel that packs states, or compile them first; returns the time [s]."""
         start = time.perf_counter()
         self.kernel.load()
         kernel_for(self.spec, self.ensemble.members)
@@ -80,11 +80,11 @@ class Plan:
         return time.perf_counter() - start
 
     def replanned(self, **changes: Any) -> Plan:
-        """Plan the run from the beginning with other settings, those of `choose_plan`, and the same width."""
+        """Plan the run again with other settings of `choose_plan`, and the same width."""
         return choose_plan(**{**self._settings(), **changes})
 
     def of_width(self, width: int, source: str) -> Plan:
-        """The same plan with packets of another width. source: what says so (see widths.Width)."""
+        """The same plan with packets of another width. source: reason of the width (see widths.Width)."""
         if width == self.spec.width:
             return replace(self, width_source=source)
         return choose_plan(**(self._settings() | {"width": width}), width_source=source)
@@ -96,21 +96,21 @@ class Plan:
         return settings | {"width": self.spec.width, "survey_all": self.surveyed_all}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
+        """Pickle only the settings: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
         if self.parent:
             # Made anew from these members alone, the plan might choose another kernel.
             return Plan.subplan, self.parent
         return functools.partial(choose_plan, **self._settings(), width_source=self.width_source), ()
 
     def for_members(self, ensemble: Ensemble) -> Plan:
-        """The same plan, with the same kernel, for other members of the scene, of which the survey of this one holds."""
+        """The same plan, with the same kernel, for other members of the scene to which the survey of this plan applies."""
         check_backward_drag(ensemble, self.kernel_choice, self.method, self.grid.h)
         plan = object.__new__(Plan)  # in a fourth of the time of `replace`
         vars(plan).update(vars(self), ensemble=ensemble)
         return plan
 
     def from_time(self, ensemble: Ensemble) -> Plan:
-        """The same plan, with the same kernel and as many steps, for members that start, or go on, at another time."""
+        """The same plan, with the same kernel and as many steps, for members that start or continue at another time."""
         grid = self.grid.shifted(ensemble.start_time)
         check_noise_steps(self.kernel_choice, grid)
         check_times(self.kernel_choice, grid)
@@ -123,9 +123,9 @@ class Plan:
     def subplan(self, indices: Sequence[int], fields: Sequence[str], grid: TimeGrid | None = None) -> Plan:
         """The plan for some of the members, with all choices made for the whole ensemble.
 
-        The members' bits are therefore those of the whole run, unless steps are adaptive (see `with_neighbours`).
+        The members therefore have the same bits as in the whole run, unless steps are adaptive (see `with_neighbours`).
 
-        grid: other steps and samples, of this process alone; default None: those of the plan.
+        grid: other steps and samples, for this process alone; default None: those of the plan.
         """
         grid = grid or self.grid
         layout = replace(self.layout, fields=ordered(fields))
@@ -142,9 +142,9 @@ class Plan:
         )
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
-        """The members whose run gives these members (m,) the bits of the whole run, in rising order.
+        """Members that must run together so that these members (m,) have the bits of the whole run, in increasing order.
 
-        Adaptive steps are chosen for a whole packet, so a member's bits depend on the others of its packet.
+        Adaptive steps are chosen for a whole packet, so a member's bits depend on the other members of its packet.
         """
         if not self.method.adaptive:
             return indices
@@ -153,14 +153,14 @@ class Plan:
         return lanes[lanes < self.ensemble.members]
 
     def check_block(self, block: Block, members: Members) -> None:
-        """Look at members that were not looked at before the run; raise NotSurveyed where the kernel lacks something."""
+        """Check members that were not surveyed before the run; raise NotSurveyed if the kernel does not suit them."""
         self.ensemble.check_block(block.first, block.stop, members.parameters)
         unseen = not self.surveyed_all and block.stop > SURVEYED and self.parent is None
         if unseen and not self.serves(self.ensemble, block, members):
             raise NotSurveyed(f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not")
 
     def serves(self, ensemble: Ensemble, block: Block, members: Members) -> bool:
-        """Whether the kernel has all that some members of the same scene need."""
+        """Whether the kernel suits some members of the same scene."""
         return self.facts.covers(survey_of(members.parameters, ensemble, self.method, self.shared, block))
 
 
@@ -178,11 +178,11 @@ def choose_plan(
     read_at_ticks: Mapping[str, tuple[int, ...]] | None = None,
     width_source: str = "asked for",
 ) -> Plan:
-    """Decide all that is decided before a run; raise SceneError where the settings, the method and the scene disagree.
+    """Make all decisions before a run; raise SceneError if the settings, the method and the scene do not fit together.
 
-    width: members of a packet, one a lane; None for what suits this machine's registers.
-    survey_all: choose the kernel by all members, or by the first SURVEYED. Then a run looks at the others as it comes to them,
-        and begins anew, with all members looked at, if any of them needs more.
+    width: members of a packet, one per lane; None: the width that suits this machine's registers.
+    survey_all: whether the kernel is chosen from all members, or from the first SURVEYED. In the second case the run checks
+        the others when it reaches them, and starts again, with all members surveyed, if one needs another kernel.
     """
     faults, scene = Faults(), ensemble.scene
     check_settings(faults, scene, method, dtype, width, checks, on_failure)
@@ -246,7 +246,7 @@ def _shared(ensemble: Ensemble, user_axes: bool) -> SharedResultsCache:
 
 
 def _adds_forces(method: Method) -> bool:
-    """Whether a method adds the forces of damping, and forms no matrix."""
+    """Whether a method adds the forces of damping and forms no matrix."""
     return method.tableau is not None and not method.linearly_implicit
 
 

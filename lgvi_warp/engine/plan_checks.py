@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Refusals before a run begins: settings that do not go together, and steps that do not suit what acts."""
+"""Refusals before a run: settings that are not compatible, and steps that do not suit the forces."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SOLVING = {"D", "W", "A", "Phi", "Phi*"}
 def check_settings(
     faults: Faults, scene: SceneLike, method: Method, dtype: str, width: int | None, checks: str, on_failure: str
 ) -> None:
-    """Refuse values that are not known, or that the scene, the method or another setting does not allow."""
+    """Refuse values that are unknown, or that the scene, the method or another setting does not allow."""
     faults.choice("dtype", dtype, DTYPES)
     faults.choice("checks", checks, CHECKS)
     faults.choice("on_failure", on_failure, ON_FAILURE)
@@ -41,7 +41,7 @@ def check_settings(
 
 
 def check_substep(choice: KernelChoice, method: Method) -> None:
-    """Refuse to divide the steps of a method or of laws that cannot be divided, with the reason."""
+    """Refuse substeps for a method or for laws that do not support them, with the reason."""
     faults, name = Faults(), method.name
     if choice.controller is not None:
         why = "remembers what a step that is made again would change"
@@ -62,7 +62,7 @@ def check_substep(choice: KernelChoice, method: Method) -> None:
 
 
 def check_noise_steps(choice: KernelChoice, grid: TimeGrid) -> None:
-    """Refuse a step that is no whole multiple of a term's noise_step, and name the nearest one that is."""
+    """Refuse a step that is no whole multiple of a term's noise_step, and suggest the nearest one that is."""
     faults, h = Faults(), grid.h
     # All samples are whole multiples of this one.
     spacing = h * float(np.gcd.reduce(grid.sample_steps))
@@ -86,7 +86,7 @@ def check_noise_steps(choice: KernelChoice, grid: TimeGrid) -> None:
 
 
 def check_times(choice: KernelChoice, grid: TimeGrid) -> None:
-    """Refuse a run at times of which a term knows nothing."""
+    """Refuse a run at times for which a term has no data."""
     faults = Faults()
     for term, _ in choice.laws:
         term.check_times(faults, float(grid.times[0]), float(grid.times[-1]))
@@ -94,9 +94,9 @@ def check_times(choice: KernelChoice, grid: TimeGrid) -> None:
 
 
 def check_ticks(choice: KernelChoice, grid: TimeGrid, goes_on: bool = False) -> None:
-    """Refuse a period or a delay of the controller that is no whole number of steps, and a start between two ticks.
+    """Refuse a controller's period or delay that is no whole number of steps, and a start between two ticks.
 
-    goes_on: members bring the commands of their last tick.
+    goes_on: whether members have the commands of their last tick, from a continued run.
     """
     faults, controller = Faults(), choice.controller
     if controller is not None:

@@ -22,10 +22,10 @@ ACCOUNT_ROW = -1
 
 @dataclass(frozen=True, eq=False)
 class SampleLayout:
-    """Place of each number of a sample.
+    """Position of each number in a sample.
 
-    fields: in the order in which they are saved. compensated: a position is two sums.
-    read_at_ticks: field of the motion -> which of its numbers statistics read at ticks, () for all; None: all of all fields.
+    fields: in the order in which they are saved. compensated: whether a position consists of two numbers.
+    read_at_ticks: numbers that statistics read at ticks by field of the motion, () for all; None: all of all fields.
     """
 
     choice: KernelChoice
@@ -45,9 +45,9 @@ class SampleLayout:
 
     @functools.cached_property
     def sizes(self) -> dict[str, int]:
-        """Fields that the kernel writes of a sample: those kept, and those from which the host computes others.
+        """Numbers per sample that the kernel writes, by field: of saved fields, and of fields from which others follow.
 
-        Returns: Field -> numbers per sample, as written; a compensated position is b, then b_low. Signals come last.
+        Returns: Numbers per sample by field, in order; a compensated position is b, then b_low. Signals come last.
         """
         needed = {*self.fields, *(("position",) if NAVIGATION_ERROR in self.fields else ())}
         if self.choice.moved:
@@ -60,36 +60,36 @@ class SampleLayout:
 
     @functools.cached_property
     def tick_fields(self) -> dict[str, int]:
-        """Count of numbers of each field that the kernel gathers at a tick, in the user's axes.
+        """Number of values of each field that the kernel gathers at a tick, in the user's axes.
 
-        Of signals all, as in samples.
+        All values of a signal are gathered, as in samples.
         """
         entries = self.tick_entries
         return {name: len(entries.get(name, ())) or size for name, size in self.sizes.items() if self._reads(name)}
 
     @functools.cached_property
     def tick_entries(self) -> dict[str, tuple[int, ...]]:
-        """Fields of the motion of which some numbers alone are gathered at ticks: field -> these, counted from 0."""
+        """For fields of the motion that are gathered only partly at ticks: indices of the gathered numbers by field."""
         entries = {name: numbers for name, numbers in (self.read_at_ticks or {}).items() if numbers}
         if self.compensated or NAVIGATION_ERROR in self.fields:  # a place is a pair of sums, or taken off whole
             entries.pop("position", None)
         return entries
 
     def _reads(self, name: str) -> bool:
-        """Whether a field is gathered at ticks: a signal always, the motion where a statistic or the host reads it."""
+        """Whether a field is gathered at ticks: a signal always, the motion if a statistic or Python function reads it."""
         if name == "position" and NAVIGATION_ERROR in self.fields:
             return True
         return name in self.fields and (name in SIGNALS or self.read_at_ticks is None or name in self.read_at_ticks)
 
     @property
     def noted_bits(self) -> int:
-        """Bits of the signals that ticks note (see noting.py): those saved, and all where the host controls."""
+        """Bits of the signals that ticks record (see noting.py): the saved ones, and all if a Python function controls."""
         noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
         return sum({bit(signal.group, signal.row) for signal in noted}) | ASKED_NOTES * self.choice.has_callback
 
     @functools.cached_property
     def noted_rows(self) -> dict[str, range]:
-        """Rows of the memory in which ticks note something, by its name in NOTED."""
+        """Rows of the memory that ticks write, by their name in NOTED."""
         controller = self.choice.controller
         if controller is None:
             return {}
@@ -98,7 +98,7 @@ class SampleLayout:
 
     @functools.cached_property
     def signal_rows(self) -> tuple[int, ...]:
-        """Rows of the memory that are saved with each sample: those of each signal in turn."""
+        """Rows of the memory that are saved with each sample, for one signal after the other."""
         controller = self.choice.controller
         bus: Any = None if controller is None else controller.bus
         noted = {name: rows.start for name, rows in self.noted_rows.items()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared results: those that follow from numbers of which none varies, computed once for a run."""
+"""Shared results: results of numbers that do not vary between members, computed once for a run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ GIVEN = "given"
 
 
 class TrackedParameters(dict[str, np.ndarray]):
-    """Numbers by name, which note the `names` that were read."""
+    """Numbers by name; the object records the `names` that were read."""
 
     def __init__(self, numbers: Mapping[str, np.ndarray]):
         super().__init__(numbers)
@@ -35,7 +35,7 @@ class TrackedParameters(dict[str, np.ndarray]):
         return super().__getitem__(name)
 
     def get(self, name: str, default: Any = None) -> Any:
-        """Return a number, or the default where there is none of this name."""
+        """Return a number, or the default if there is none of this name."""
         self.names.add(name)
         return super().get(name, default)
 
@@ -53,27 +53,27 @@ class TrackedParameters(dict[str, np.ndarray]):
         return other | dict(self)
 
     def copy(self) -> dict[str, np.ndarray]:
-        """Return all names with their numbers in a dict, each noted."""
+        """Return all names with their numbers in a dict, and record each."""
         return dict(self)
 
     def keys(self) -> Any:
-        """Return all names, each noted."""
+        """Return all names, and record each."""
         self._all()
         return super().keys()
 
     def values(self) -> Any:
-        """Return all numbers, each noted."""
+        """Return all numbers, and record each."""
         self._all()
         return super().values()
 
     def items(self) -> Any:
-        """Return all names with their numbers, each noted."""
+        """Return all names with their numbers, and record each."""
         self._all()
         return super().items()
 
 
 class TrackedContext(PackingContext):
-    """A packing context that notes when the frame, members or the seed are read; parameters are `TrackedParameters`."""
+    """A packing context that records reads of the frame, the members or the seed; parameters are `TrackedParameters`."""
 
     def __getattribute__(self, name: str) -> Any:
         value = super().__getattribute__(name)
@@ -86,12 +86,12 @@ class TrackedContext(PackingContext):
 
 
 def context(numbers: Mapping[str, np.ndarray], *run: Any) -> PackingContext:
-    """A packing context for a computation that `SharedResultsCache` may watch."""
+    """A packing context for a computation that `SharedResultsCache` may observe."""
     return (TrackedContext if isinstance(numbers, TrackedParameters) else PackingContext)(numbers, *run)
 
 
 class _Last(NamedTuple):
-    """Numbers of some members as they were given, completed by their frame, and results that follow from these alone."""
+    """Given numbers of some members, completed by their frame, and results that follow from these alone."""
 
     given: Mapping[str, np.ndarray]
     numbers: Mapping[str, Any]
@@ -113,13 +113,14 @@ def _known_of(scene: Any) -> dict[Any, tuple[dict[Any, Any], dict[Any, bool]]]:
 
 @dataclass
 class SharedResultsCache:
-    """Results computed once, as far as they follow from numbers that vary from no member to another.
+    """Results that are computed once if they depend only on numbers that all members share.
 
-    What a computation reads is seen when it runs first, so nothing has to list it. Which numbers it reads must depend on
-    numbers that it read before only, as is so for any function of them.
+    The cache records the numbers that a computation reads at its first run, so no list is needed. The choice of numbers
+    that it reads may depend only on numbers that it has read before, which holds for any function of them.
 
-    user_axes: whether the kernel's axes and origin are the user's. An explicit method adds forces there, where a drag matrix
-        keeps its zeros; other axes are better where a method multiplies matrices, and where nothing depends on velocities.
+    user_axes: whether the kernel's axes and origin are the user's. An explicit method adds forces in these axes, where
+        a drag matrix keeps its zeros. Other axes are better if a method multiplies matrices, or nothing depends on
+        velocities.
     """
 
     varied: set[str]
@@ -132,9 +133,9 @@ class SharedResultsCache:
 
     @contextlib.contextmanager
     def continued(self, scene: Any, names: Iterable[str], settings: Any) -> Iterator[None]:
-        """Begin with results of an earlier run of the same scene, varied names and settings, and keep those after it.
+        """Start with results of an earlier run with the same scene, varied names and settings, and keep them afterwards.
 
-        settings: all that results follow from beside the scene's numbers.
+        settings: everything that results depend on in addition to the scene's numbers.
         """
         known, place = _known_of(scene), (frozenset(names), settings)
         kept, varying = known.get(place, ({}, {}))
@@ -146,7 +147,7 @@ class SharedResultsCache:
         known[place] = dict(self._kept), dict(self._varying)
 
     def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
-        """A result from memory, or computed."""
+        """Return a result from the cache, or compute it."""
         if key in self._kept:
             return self._kept[key]
         last = self._last
@@ -167,17 +168,17 @@ class SharedResultsCache:
         return value
 
     def completed(self, numbers: Mapping[str, np.ndarray]) -> Any:
-        """The completed numbers that `remember` was given for these members; None for other members."""
+        """Completed numbers that `remember` stored for these members; None for other members."""
         last = self._last
         if last is None or any(numbers.get(name) is not last.given.get(name) for name in self.varied):
             return None
         return last.numbers
 
     def remember(self, parameters: Mapping[str, np.ndarray], numbers: Mapping[str, Any]) -> None:
-        """Keep what follows from the numbers of some members until others come: a run looks at them more than once."""
+        """Store results for the numbers of some members until other members follow: a run reads them more than once."""
         few = all(len(parameters[name]) <= AT_ONCE for name in self.varied if name in parameters)
         self._last = _Last(parameters, numbers, {}) if few else None
 
     def keeps(self, key: Any) -> bool:
-        """Whether a computation that ran is shared by all members."""
+        """Whether the result of a computation that ran is shared by all members."""
         return key in self._kept

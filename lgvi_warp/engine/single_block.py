@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run of few members, in one block and in the thread that asks: no executor, no keepers, the same bits."""
+"""A run of few members as one block in the calling thread: no executor, no keepers, the same bits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Rows = dict[str, np.ndarray]
 
 
 def fits(plan: Plan, blocks: Sequence[Block]) -> bool:
-    """Whether a run can be made so: in one block, without a function of the host and without what is gathered at ticks."""
+    """Whether a run can be made in one block, without a Python function and without data gathered at ticks."""
     return len(blocks) == 1 and not (
         plan.spec.tangents or plan.launches.has_callback or plan.launches.gathered or plan.layout.signals
     )
@@ -29,10 +29,10 @@ def fits(plan: Plan, blocks: Sequence[Block]) -> bool:
 def run_single_block(
     plan: Plan, names: Sequence[str], warned: bool, advanced: Callable[[Block, int], None], final: bool = False
 ) -> tuple[dict[str, np.ndarray], MemberStatus, Rows]:
-    """Advance all members; their samples (k, n, ...) by field, their outcome, and what their packets leave.
+    """Advance all members; returns their samples (k, n, ...) by field, their outcome, and the final rows of packets.
 
-    names: of the samples to keep. warned: whether warnings are looked for. advanced: called with the steps of vehicles so far.
-    final: whether what the packets leave is wanted; else none of it is returned.
+    names: of the samples to keep. warned: whether warnings are evaluated. advanced: called with the vehicle-steps so far.
+    final: whether to return the final rows of the packets; otherwise they are empty.
     """
     samples, packets = _advanced(plan, names, advanced, warned)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -43,7 +43,7 @@ def run_single_block(
 
 
 def run_for_samples(plan: Plan) -> tuple[dict[str, np.ndarray], np.ndarray | None]:
-    """Advance all members; their samples, and their status (n,), None where all reached the end."""
+    """Advance all members; returns their samples, and their status (n,), or None if all reached the end."""
     samples, packets = _advanced(plan, plan.fields, lambda block, steps: None, False)
     status = None if packets.untroubled else packets.outcome(warned=False).status
     packets.leave()
@@ -53,7 +53,7 @@ def run_for_samples(plan: Plan) -> tuple[dict[str, np.ndarray], np.ndarray | Non
 def _advanced(
     plan: Plan, names: Sequence[str], advanced: Callable[[Block, int], None], warned: bool
 ) -> tuple[dict[str, np.ndarray], Packets]:
-    """Samples of all members, and their packets at the end."""
+    """Advance all members; returns their samples, and their packets at the end."""
     n = plan.ensemble.members
     block = Block(0, n)
     # As in `run_block`.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The states of a block's members in lanes: written by a kernel where that pays, else by its twin, with the same bits."""
+"""The states of a block's members in lanes: written by a kernel if that is faster, else in NumPy with the same bits."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ FEW = 256
 class StateLanes(Lanes):
     """The states of a block's members, (packets, fields of a state) of lanes.
 
-    kernel: as in `kernel_for`. peaks: per packet and lane, what of the starts is looked at for warnings (see PEAKS);
-        None where the twin wrote the states.
+    kernel: as in `kernel_for`. peaks: numbers of the starts for warnings, per packet and lane (see PEAKS); None if
+        NumPy wrote the states.
     """
 
     def __init__(self, spec: Spec, packets: int, kernel: Any = None, writing: Writing = PLAIN):
@@ -41,7 +41,7 @@ class StateLanes(Lanes):
         self.peaks: np.ndarray | None = None
 
     def _record(self, kernel: Any, packets: int) -> None:
-        """Record a launch of the kernel, which reads anew where each kind of numbers lies."""
+        """Record a launch of the kernel; at each launch it reads the addresses of all numbers again."""
         places = wp.zeros((len(PLACES), 3), dtype=wp.int64, device="cpu")
         peaks = wp.zeros((packets, PEAKS), dtype=lane(self._spec.width, wp.float64), device="cpu")
         inputs = [places, self.array, peaks]
@@ -53,7 +53,7 @@ class StateLanes(Lanes):
         self._places, self.peaks = places.numpy(), peaks.numpy().reshape(packets, PEAKS, self._spec.width)
 
     def write(self, starts: Starts, members: int) -> None:
-        """Write the states of some members; lanes beyond the last of them get its own."""
+        """Write the states of some members; lanes beyond the last member get its state."""
         first, self._starts, self._members = self._starts is None, starts, members
         if self._kernel is None or (first and members < FEW):
             self._put_rows(self.view, self.rows())
@@ -69,13 +69,13 @@ class StateLanes(Lanes):
         self._launch.launch()
 
     def rows(self) -> np.ndarray:
-        """The states that were written last, (members, fields of a state), before any step."""
+        """The last written states, (members, fields of a state), before any step."""
         rows = np.empty((self._members, self._spec.state_fields))
         write_rows(self._starts, rows, self._spec.compensated)
         return rows
 
     def momenta(self) -> np.ndarray:
-        """The momenta p of the states that were written last, (1 or members, 3)."""
+        """The momenta p of the last written states, (1 or members, 3)."""
         return momenta(self._starts)[1]
 
 
@@ -83,7 +83,7 @@ _loaded: set[tuple[int, Any]] = set()
 
 
 def kernel_for(spec: Spec, members: int) -> Any:
-    """The kernel that packs the states of a run of so many members; None where its twin should."""
+    """The kernel that packs the states of a run of this many members; None if NumPy should do it."""
     if spec.tangents or ((spec.width, spec.real) not in _loaded and members < MANY):
         return None
     with contextlib.suppress(OSError):  # a cache that cannot be written, and has no such kernel
@@ -93,7 +93,7 @@ def kernel_for(spec: Spec, members: int) -> Any:
 
 @functools.cache
 def kernel_of(width: int, real: Any) -> Any:
-    """The kernel that packs states, loaded, and compiled first if Warp's cache has none."""
+    """The kernel that packs states, loaded, and compiled first if Warp's cache does not have it."""
     with build_lock:
         kernel = make_pack_states(width, real)
         kernel_cache.load(kernel.module)
@@ -102,10 +102,7 @@ def kernel_of(width: int, real: Any) -> Any:
 
 
 def _place(values: np.ndarray | None) -> tuple[tuple[int, int, int], Any]:
-    """Memory layout of numbers: address, and the bytes from member to member and from number to number.
-
-    And what lies there.
-    """
+    """Memory layout of numbers: address, and the strides in bytes between members and between numbers; and the array."""
     if values is None:
         return (0, 0, 0), None
     if values.dtype != np.float64:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The states at which members start, in the axes, about the origin and in the units of the kernel that advances them.
+"""The initial states of members, in the axes, about the origin and in the units of the kernel.
 
-The order of every sum is written out: lgvi_kernels/packing/states.py has it too, and so the same bits.
+The order of every sum is written out. lgvi_kernels/packing/states.py uses the same order, and so gives the same bits.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ NUMBERS = 18
 class Starts(NamedTuple):
     """Numbers from which the states of m members are built, each (1 or m, ...).
 
-    Attitude (3, 3), position (3,) [m], velocity (3,) [m/s] and angular velocity (3,) [rad/s] as the user gives them.
-    water: (3,) [m/s], its velocity in the user's body axes; None where it rests.
-    axes, origin: of the kernel in the user's, (3, 3) and (3,) [m]; None where they are the user's.
-    mass, moments: (3,) [kg] and (3,) [kg m2] in the kernel's axes, where momenta are products of these and velocities alone.
-    inertia: (6, 6), where they are not; else None.
-    scale: () [kg m2], what momenta are divided by. inertial: whether the state holds R p in place of p.
+    Attitude (3, 3), position (3,) [m], velocity (3,) [m/s] and angular velocity (3,) [rad/s] in the user's axes.
+    water: (3,) [m/s], velocity of the water in the user's body axes; None if it rests.
+    axes, origin: the kernel's, in the user's axes, (3, 3) and (3,) [m]; None if they are the user's.
+    mass, moments: (3,) [kg] and (3,) [kg m2] in the kernel's axes, if momenta are their products with velocities alone.
+    inertia: (6, 6) in other cases; else None.
+    scale: () [kg m2], divisor of momenta. inertial: whether the state contains R p instead of p.
     """
 
     attitude: np.ndarray
@@ -59,7 +59,7 @@ def into(axes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def _summed(terms: np.ndarray) -> np.ndarray:
-    """The sum over the last dimension, from the first term to the last."""
+    """Sum over the last dimension, from the first term to the last."""
     total = terms[..., 0] + terms[..., 1]
     for i in range(2, terms.shape[-1]):
         total += terms[..., i]
@@ -67,7 +67,7 @@ def _summed(terms: np.ndarray) -> np.ndarray:
 
 
 def momenta(starts: Starts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Attitudes (1 or m, 3, 3) and momenta p and pi (1 or m, 3), scaled, as states have them."""
+    """Attitudes (1 or m, 3, 3) and scaled momenta p and pi (1 or m, 3), in the form of states."""
     R, nu, Om = starts.attitude, starts.velocity, starts.angular_velocity
     if starts.origin is not None:
         nu = nu + notation.cross(Om, starts.origin)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Warnings about the step: which the kernel watches for, their limits, and those that a member's start gives."""
+"""Warnings about the step: those that the kernel checks, their limits, and those at a member's start."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Watched(Protocol):
 
     @property
     def dtype(self) -> str:
-        """The kernel's numbers, such as "float64"."""
+        """The kernel's number type, such as "float64"."""
 
     @property
     def kernel_choice(self) -> Any:
@@ -43,7 +43,7 @@ class Watched(Protocol):
 
     @property
     def spec(self) -> Any:
-        """All that decides the kernel's source (see `Spec`)."""
+        """Everything that determines the kernel's source (see `Spec`)."""
 
 
 # h w above which an oscillation is coarsely resolved, h being the length of the longest stage [1].
@@ -75,9 +75,10 @@ ENERGY = 0.5
 
 
 def watched(method: Method, choice: Any, dtype: str, checks: str) -> tuple[str, ...]:
-    """The warnings that the kernel looks for, as names of rows of lgvi_kernels.advance.monitor, the least serious first.
+    """Warnings that the kernel checks, as names of rows of lgvi_kernels.advance.monitor, the least serious first.
 
-    With checks="all" those that method and scene can give; with "safe" that of the attitude, where the method lets it depart.
+    With checks="all": all that are possible with method and scene. With "safe": the attitude, if the method can let it
+    drift.
     """
     if checks != "all":
         return ("orthogonality",) * (checks == "safe" and leaves_rotations(method))
@@ -92,18 +93,18 @@ def watched(method: Method, choice: Any, dtype: str, checks: str) -> tuple[str, 
 
 
 def _dragged(choice: Any) -> bool:
-    """Whether a law takes speed from the vehicle."""
+    """Whether a law reduces the speed of the vehicle."""
     return bool(choice.drag) or any(resists(module) for _, module in choice.laws)
 
 
 def _split(plan: Watched) -> bool:
-    """Whether the method makes drag by a sub-map of its own, exact or implicit, beside those of the motion."""
+    """Whether the method applies drag by its own sub-map, exact or implicit, separate from the motion."""
     return plan.method.tableau is None and plan.kernel_choice.averages is None
 
 
 @np.errstate(over="ignore", invalid="ignore")
 def _drag_number(plan: Watched, members: Members, water: np.ndarray | None) -> np.ndarray:
-    """h (l + 2 q|v|) / I, (m,), the largest of all axes, where the members start; of the terms that tell how they brake."""
+    """h (l + 2 q|v|) / I, (m,), the largest of all axes, at the members' starts, for terms whose damping is known."""
     p, velocity = members.parameters, members.velocity if water is None else members.velocity - water
     twist = np.concatenate(np.broadcast_arrays(velocity, members.angular_velocity), axis=1)
     total = np.zeros((1, 6))
@@ -117,12 +118,12 @@ def _drag_number(plan: Watched, members: Members, water: np.ndarray | None) -> n
 
 
 def leaves_rotations(method: Method) -> bool:
-    """Tell whether a method adds rates to R, whose rows then depart from a rotation's by its own error."""
+    """Tell whether a method adds rates to R, so that R departs from a rotation by the method's error."""
     return method.tableau is not None and KINDS.get(method.name, "vector") == "vector"
 
 
 def departure(rows: np.ndarray) -> np.ndarray:
-    """Distance of matrices, rows (packets, 9, width), from rotations: the largest entry of |R R^T - I|, (packets * width,)."""
+    """Distance of matrices, rows (packets, 9, width), from rotations: largest entry of |R R^T - I|, (packets * width,)."""
     # Members side by side: a sum over three numbers of each would take many times as long.
     R = rows.transpose(1, 0, 2).reshape(3, 3, -1)
     largest = np.zeros(R.shape[2])
@@ -137,14 +138,14 @@ def departure(rows: np.ndarray) -> np.ndarray:
 
 
 def orthogonality_limit(plan: Watched) -> float:
-    """The largest |R^T R - I| that gives no warning."""
+    """Largest |R^T R - I| without a warning."""
     if leaves_rotations(plan.method):
         return ORTHOGONAL_TO_ERROR
     return ORTHOGONAL["float64" if plan.dtype == "float64" else "float32"]
 
 
 def row_limits(plan: Watched) -> dict[str, float]:
-    """The limit of each watched row."""
+    """Limit of each checked row."""
     method = plan.method
     known = {
         "precision": PRECISION,
@@ -159,7 +160,7 @@ def row_limits(plan: Watched) -> dict[str, float]:
 
 
 def munk_factor(frame: Frame) -> np.ndarray:
-    """Squared frequency of the fastest oscillation that the Munk moment causes, per |p|^2, (1 or n,) [1/(kg^2 m^2)]."""
+    """Squared frequency of the fastest oscillation of the Munk moment, per |p|^2, (1 or n,) [1/(kg^2 m^2)]."""
     M = np.linalg.eigvalsh(frame.M) if np.any(frame.M[:, ~np.eye(3, dtype=bool)]) else np.einsum("nii->ni", frame.M)
     return np.asarray((1.0 / M.min(axis=1) - 1.0 / M.max(axis=1)) / frame.J.min(axis=1))
 
@@ -176,11 +177,11 @@ def at_start(
     water: np.ndarray | None,
     among: Collection[Warnings] = AT_START,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The warnings that follow from the members' numbers and starts.
+    """Warnings that follow from the members' numbers and starts.
 
-    momentum: (m, 3) [N s], relative to the water. water: (m, 3) [m/s], its velocity in body axes; None where it rests.
-    among: the warnings that are possible.
-    Returns: (bits, value), both (m,): bits of `Warnings`, and the value of the most serious one; NaN for none.
+    momentum: (m, 3) [N s], relative to the water. water: (m, 3) [m/s], its velocity in body axes; None if it rests.
+    among: the possible warnings.
+    Returns: (bits, value), both (m,): bits of `Warnings`, and the value of the most serious one; NaN without a warning.
     """
     m, h, method = members.count, plan.grid.h, plan.method
     bits, value = np.zeros(m, np.uint16), np.full(m, np.nan)
@@ -227,9 +228,10 @@ BELOW = 1.0 - 1e-9
 
 
 def possible(plan: Watched, members: Members, frame: Frame, peaks: np.ndarray) -> frozenset[Warnings]:
-    """The warnings at the start that bounds on all members together do not rule out; `at_start` decides which are given.
+    """Warnings at the start that bounds over all members do not exclude; `at_start` decides on them.
 
-    peaks: (4,), the largest of what the kernel notes when it packs the starts (see lgvi_kernels.packing.states.PEAKS).
+    peaks: (4,), largest values that the kernel records when it packs the starts (see
+        lgvi_kernels.packing.states.PEAKS).
     """
     h, method, p = plan.grid.h, plan.method, members.parameters
     momentum, rate, time, speed = np.sqrt(peaks)
@@ -251,7 +253,7 @@ def possible(plan: Watched, members: Members, frame: Frame, peaks: np.ndarray) -
 
 
 def _most_munk(frame: Frame) -> float:
-    """A bound on `munk_factor` of all members."""
+    """Upper bound of `munk_factor` over all members."""
     if len(frame.M) == 1:
         return float((munk_factor(frame) * frame.J.min(axis=1)).max() / frame.J.min())
     M = frame.mass_diagonal
@@ -259,7 +261,7 @@ def _most_munk(frame: Frame) -> float:
 
 
 def _longest_arm(p: Numbers, frame: Frame) -> float:
-    """A bound on the moment of weight and buoyancy about the balance of the frame, of all members [N m]."""
+    """Upper bound of the moment of weight and buoyancy about the frame's balance point, over all members [N m]."""
 
     def most(values: np.ndarray) -> float:
         return float(np.sqrt(np.einsum("ni,ni->n", values, values).max()) if values.ndim > 1 else np.abs(values).max())
@@ -271,7 +273,7 @@ def _longest_arm(p: Numbers, frame: Frame) -> float:
 
 
 def _most_drag(plan: Watched, p: Numbers, speed: float, rate: float) -> float:
-    """A bound on `_drag_number` of all members at speeds and rates up to these [m/s, rad/s]; infinite where none is known."""
+    """Upper bound of `_drag_number` over all members at speeds and rates up to these [m/s, rad/s]; infinite if unknown."""
     speeds, total = np.array([[speed] * 3 + [rate] * 3]), np.zeros(6)
     density = p["environment.water_density"].max(keepdims=True)
     for term, _ in plan.kernel_choice.laws:
@@ -292,11 +294,11 @@ def _most_drag(plan: Watched, p: Numbers, speed: float, rate: float) -> float:
 
 
 def _largest_sizes(values: np.ndarray) -> np.ndarray:
-    """The largest size of each number (n, ...) among all members."""
+    """Largest magnitude of each number (n, ...) among all members."""
     largest, least = (notation.reduced(operation, values) for operation in (np.maximum, np.minimum))
     return np.asarray(np.maximum(largest, -least))
 
 
 def _size(vectors: np.ndarray) -> np.ndarray:
-    """Lengths of (n, 3)."""
+    """Lengths of vectors (n, 3)."""
     return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))

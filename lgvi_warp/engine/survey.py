@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A survey of all members: what their numbers require of a kernel, read in slices so that memory use stays small."""
+"""A survey of all members: the kernel features that their numbers require, read in slices to limit memory."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ COUPLINGS = ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))
 
 
 def shape_of_mass(M: np.ndarray) -> str:
-    """The simplest shape that fits every mass matrix (n, 3, 3) [kg]."""
+    """Simplest shape that fits every mass matrix (n, 3, 3) [kg]."""
     diagonal = np.einsum("nii->ni", M)
     if notation.only_diagonal(M) is None:
         off = notation.off_diagonal(M)
@@ -46,10 +46,10 @@ def shape_of_mass(M: np.ndarray) -> str:
 
 
 def frame_of(method: Method, parameters: Parameters, user_axes: bool = False) -> tuple[Frame, np.ndarray, np.ndarray]:
-    """The axes and origins that a method works in. user_axes: whether they are the user's (see SharedResultsCache).
+    """Axes and origins of a method. user_axes: whether they are the user's (see SharedResultsCache).
 
-    Returns: (frame, U, coupling): U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling norm (n,)
-        that is left in this frame and that the method cannot treat.
+    Returns: (frame, U, coupling): U (n, 3, 3) of the turns of psi_x, zero for other methods; and the norm (n,) of the
+        coupling that remains in this frame and that the method does not support.
     """
     return _frame_of(method, user_axes, vehicle.inertia_blocks(parameters))
 
@@ -70,7 +70,7 @@ def _frame_of(method: Method, user_axes: bool, body: inertia.Blocks) -> tuple[Fr
 
 
 def _explicit_frame(body: inertia.Blocks) -> Frame:
-    """The frame about the origin where E is symmetric, with E set to zero for members without coupling."""
+    """Frame about the origin at which E is symmetric, with E set to zero for members without coupling."""
     frame = inertia.symmetric_frame(body)
     coupling = inertia.uncoupled_frame(body)[1]
     E = np.where(coupling[:, None, None] > UNCOUPLED, frame.E, 0.0)
@@ -79,7 +79,7 @@ def _explicit_frame(body: inertia.Blocks) -> Frame:
 
 @dataclass(frozen=True)
 class Survey:
-    """Features of at least one member, and the largest values."""
+    """Features that at least one member has, and the largest values."""
 
     turned: bool  # axes other than the user's, or forces about another origin (see `PackingContext.aligned`)
     bent: bool  # drag acts and has no exact flow along the kernel's axes
@@ -105,12 +105,12 @@ class Survey:
 
     @property
     def decisive(self) -> tuple[Any, ...]:
-        """All that decides what a kernel must contain: surveys that agree in it lead to one kernel."""
+        """Everything that determines a kernel's contents: surveys that are equal in it lead to one kernel."""
         facts = vars(self) | {"odd": None, "residual_coupling": self.residual_coupling > UNCOUPLED}
         return tuple(facts.values())
 
     def covers(self, other: Survey) -> bool:
-        """Whether a kernel chosen by this survey serves the members of the other, too."""
+        """Whether a kernel chosen by this survey also serves the members of the other survey."""
         return self.joined(other).decisive == self.decisive
 
     def joined(self, other: Survey) -> Survey:
@@ -126,7 +126,7 @@ def survey(
     odd: bool = True,
     most: int | None = None,
 ) -> Survey:
-    """Look at the first `most` members (None: all), or at one where no number of vehicle, water or laws varies."""
+    """Survey the first `most` members (None: all), or one member if no number of vehicle, water or laws varies."""
     known = SharedResultsCache({*ensemble.varied_names, MEMBERS}) if shared is None else shared
 
     def look(first: int, stop: int) -> Survey:
@@ -141,7 +141,7 @@ def survey(
 
 
 class _Asked(NamedTuple):
-    """A survey, and its questions whose answers may vary, each with its answer: (key, function of numbers, answer)."""
+    """A survey, and its questions whose answers may vary: (key, function of numbers, answer)."""
 
     scene: Any
     method: Method
@@ -150,7 +150,7 @@ class _Asked(NamedTuple):
 
 
 def _again(ensemble: Ensemble, method: Method, shared: SharedResultsCache, count: int) -> Survey | None:
-    """The survey that was made before, if these members answer all that may vary as those did; else None."""
+    """Earlier survey, if these members give the same answers to all questions that may vary; else None."""
     last = shared.surveyed
     if last is None or last.scene is not ensemble.scene or last.method is not method:
         return None
@@ -164,12 +164,12 @@ def _again(ensemble: Ensemble, method: Method, shared: SharedResultsCache, count
 def survey_of(
     parameters: Parameters, ensemble: Ensemble, method: Method, shared: SharedResultsCache, block: Block
 ) -> Survey:
-    """Look at the members of one block, whose parameters are drawn already."""
+    """Survey the members of one block, whose parameters are already drawn."""
     return _survey_of_slice(parameters, ensemble, method, shared, False, block.first, block.stop)
 
 
 def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -> dict[str, Any]:
-    """Parameters with the frame of `frame_of` under the name FRAME, and under AXES the same but any mass matrix in it."""
+    """Parameters with the frame of `frame_of` under FRAME; under AXES the same frame without its mass matrix."""
     completed: dict[str, Any] | None = shared.completed(parameters)
     if completed is not None:
         return completed
@@ -199,7 +199,7 @@ def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -
 
 
 def _mass_in_axes(numbers: Any) -> np.ndarray:
-    """Mass matrices (n, 3, 3) in the kernel's axes, of a vehicle whose mass does not turn them."""
+    """Mass matrices (n, 3, 3) in the kernel's axes, for a vehicle whose mass does not change these axes."""
     axes, matrices = numbers[AXES][0], vehicle.mass_matrix(numbers)
     return inertia.in_axes(axes.Q, matrices) if axes.turned else matrices
 
@@ -282,7 +282,7 @@ def _survey_of_slice(
 
 
 def _entries_beside(frame: Frame) -> frozenset[tuple[int, int]]:
-    """Entries (i, j) of the inverse of a whole inertia, beside its diagonal, that are not zero for some member."""
+    """Off-diagonal entries (i, j) of the inverse of a whole inertia that are not zero for some member."""
     if frame.whole is None:
         return frozenset()
     size = np.sqrt(np.abs(np.einsum("nii->ni", frame.inverse)))

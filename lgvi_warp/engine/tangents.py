@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run whose numbers carry slopes: what the kernel gets of members and their shifted copies, and what it gives back.
+"""Runs whose numbers carry slopes: packing of members and their shifted copies, and slopes of the samples.
 
-All that is packed is packed for members and copies alike, at once; the differences of each number go beside it into its lanes.
+Members and copies are packed together; the differences of each number are written next to the number in its lanes.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ SMOOTH, ROUND_OFF = 1e-7, 64.0 * 2.0**-52
 
 
 class Slopes:
-    """The slopes of what is packed of some members, by each number.
+    """Slopes of the packed numbers of some members, by each number.
 
-    moved: whether anything of what was packed depends on a number.
+    moved: whether any packed number depends on the number, for each number.
     """
 
     def __init__(self, plan: Plan):
@@ -45,16 +45,16 @@ class Slopes:
         self._steps: np.ndarray = np.empty((0, len(self._targets)))
 
     def begin(self, shifted: Shifted) -> None:
-        """Take the members whose numbers come next."""
+        """Start with the members whose numbers follow."""
         self._steps = shifted.steps
 
     @property
     def writing(self) -> Writing:
-        """Way of writing numbers and their slopes into dual lanes."""
+        """Functions that write numbers and their slopes into dual lanes."""
         return Writing(self._put, self._put_rows)
 
     def of(self, numbers: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Numbers (m, ...) of members, and their slopes, out of those (m times copies, ...) with the copies."""
+        """Numbers (m, ...) of members and their slopes, from numbers (m times copies, ...) with the copies."""
         by_member = numbers.reshape(len(self._steps), self._repeats, *numbers.shape[1:])
         values = by_member[:, 0]
         return values, [self._slope(by_member, values, i) for i in range(len(self._targets))]
@@ -83,7 +83,7 @@ class Slopes:
         return refusal("tangents", self._targets[i].label, problem, "leave it out, or change it a little")
 
     def check_moved(self) -> None:
-        """Refuse a number on which nothing depends that the kernel computes with."""
+        """Refuse a number on which no number of the kernel depends."""
         for target, moved in zip(self._targets, self.moved, strict=True):
             if not moved:
                 problem = "changes nothing that a run computes with, or in whole steps alone"
@@ -159,12 +159,12 @@ class CopiesPacking(Packing):
         return Frame(**own)
 
     def of_members(self, values: np.ndarray) -> np.ndarray:
-        """Values of the members themselves, out of those of members and copies."""
+        """Values of the members themselves, from values of members and copies."""
         return values if len(values) == 1 else values[:: self._repeats]
 
 
 def slopes_of_frame(slopes: Slopes, frame: Frame) -> list[tuple[np.ndarray, np.ndarray]]:
-    """The slopes of the axes Q and of the origin of a frame of members and copies, by each number."""
+    """Slopes of the axes Q and of the origin of a frame of members and copies, by each number."""
     each = [slopes.of(v)[1] if len(v) > 1 else None for v in (frame.Q, frame.origin)]
     still = np.zeros((1, 3, 3)), np.zeros((1, 3))
     count = len(slopes.moved)
@@ -174,7 +174,7 @@ def slopes_of_frame(slopes: Slopes, frame: Frame) -> list[tuple[np.ndarray, np.n
 
 
 class Jacobians:
-    """A keeper of the slopes of every sample, by name (k times, n members, ..., numbers)."""
+    """Keeper of the slopes of every sample, by name (k times, n members, ..., numbers)."""
 
     def __init__(self, plan: Plan):
         self.fields = {
@@ -189,7 +189,7 @@ class Jacobians:
         return _BlockJacobians({name: values[:, block.first : block.stop] for name, values in self.fields.items()})
 
     def merge(self, block: Any, part: Any) -> None:
-        """Nothing: threads of this process write into their places."""
+        """Do nothing: threads of this process write into their places."""
 
 
 @dataclasses.dataclass
@@ -206,4 +206,4 @@ class _BlockJacobians:
                 place[when, ..., i] = by_name[name]
 
     def close(self, outcome: Any) -> None:
-        """Nothing is left to do."""
+        """Do nothing at the end."""

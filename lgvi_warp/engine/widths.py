@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Number of vehicles in a packet: by a table for each kind of processor, or as it was measured on this machine.
+"""Number of vehicles in a packet: from a table for each kind of processor, or as measured on this machine.
 
-What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> HASHES -> hash
-of a kernel -> its width.
+Measured widths are stored next to Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> HASHES
+-> hash of a kernel -> its width.
 """
 
 from __future__ import annotations
@@ -45,25 +45,25 @@ MOST_HASHES = 1_000
 
 
 class Width(NamedTuple):
-    """Vehicles in a packet, and what says so: "asked for", "measured", or "table" and the kind of processor."""
+    """Vehicles in a packet, and the reason: "asked for", "measured", or "table" and the kind of processor."""
 
     lanes: int
     source: str
 
 
 def parts(kernel: str) -> tuple[str, str]:
-    """Split one of KERNELS into kind, "plain" where it makes no difference, and dtype."""
+    """Split one of KERNELS into kind ("plain" if kinds make no difference) and dtype."""
     kind, _, dtype = kernel.rpartition(" ")
     return kind or "plain", dtype
 
 
 def kernel_kind(kind: str, dtype: str) -> str:
-    """Name what a width is chosen for."""
+    """Name the kind and dtype for which a width is chosen."""
     return dtype if dtype == "float32_compensated" else f"{kind} {dtype}"
 
 
 def of_table(kind: str, dtype: str, *, cpu: str | None = None, simd: str | None = None) -> Width:
-    """Look up the width of a kernel for this kind of processor, or another one's name and SIMD extension."""
+    """Look up the width of a kernel for this processor, or for another name and SIMD extension."""
     simd = simd or machine.simd()
     processor = f"Intel, {simd}" if "Intel" in (cpu or machine.cpu_name()) else simd
     processor = processor if processor in REGISTERS else simd
@@ -72,7 +72,7 @@ def of_table(kind: str, dtype: str, *, cpu: str | None = None, simd: str | None 
 
 
 def path() -> Path:
-    """Place of the file of measured widths."""
+    """Path of the file of measured widths."""
     return _path(os.environ.get("WARP_CACHE_PATH"))
 
 
@@ -84,18 +84,18 @@ def _path(folder: str | None) -> Path:
 
 
 def measured() -> dict[str, int]:
-    """Read the widths that were measured for single kernels on this machine, by the kernel's hash."""
+    """Read the widths that were measured for kernels on this machine, by the kernel's hash."""
     return read_hashes(path())
 
 
 @functools.cache
 def read_hashes(file: Path) -> dict[str, int]:
-    """Read the widths of single kernels in a file once in a process."""
+    """Read the widths of kernels in a file once per process."""
     return {name: width for name, width in _hashes(_content(file)).items() if type(width) is int and width in WIDTHS}
 
 
 def keep_measured(kernel: str, width: int) -> None:
-    """Keep the width of one kernel, given by its hash, for this machine and these versions, beside those of others."""
+    """Save the width of one kernel, given by its hash, for this machine and these versions; other entries are kept."""
     file = path()
     file.parent.mkdir(parents=True, exist_ok=True)
     with files.locked(file.parent, wait=True):
@@ -114,7 +114,7 @@ def _hashes(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def this_machine() -> str:
-    """Name this machine and the versions with which widths are measured."""
+    """Name this machine and the versions for which widths are measured."""
     versions = machine.versions()
     return f"{machine.cpu_name()}, {machine.simd()}, lgvi-warp {versions['lgvi-warp']}, Warp {versions['warp-lang']}"
 

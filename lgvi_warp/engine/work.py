@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The work on one block: advance its members through all steps and hand their samples to the keepers."""
+"""The work on one block: advance its members through all steps and pass their samples to the keepers."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ Ends = Callable[[], tuple[np.ndarray, np.ndarray]]
 class Work:
     """Work of an executor on each block: advance it, and write it to the store if there is one.
 
-    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted; one that
-    the store holds is not run again. A copy in another process returns once its block is durable; the run waits for its own.
-    What is wrong with a block's members is returned as an exception, which the run raises when that block's turn comes: with
-    `until` it may end before, and how far threads are ahead must not matter.
+    It can be pickled. A call with a block returns the closing value of each keeper, or None if the block was halted. A
+    block in the store is not run again. A copy in another process returns when its block is durable; the run waits for
+    its own. A fault of a block's members is returned as an exception, which the run raises at that block's turn. With
+    `until` the run may end earlier, and the result must not depend on how far threads are ahead.
     """
 
     plan: Plan
@@ -56,9 +56,9 @@ class Work:
         halted: Callable[[], bool] = lambda: False,
         advanced: Callable[[int], None] = lambda vehicle_steps: None,
     ) -> tuple[Any, ...] | Exception | None:
-        """Advance one block, or take it from the store: what `Work` says, or a SceneError or NotSurveyed of its members.
+        """Advance one block, or read it from the store: returns the value described in `Work`, or an error of its members.
 
-        halted: asked before each launch whether to give up. advanced: called with the vehicle-steps of this block so far.
+        halted: called before each launch: whether to stop. advanced: called with the vehicle-steps of this block so far.
         """
         from lgvi_warp.engine.plan import NotSurveyed
 
@@ -98,9 +98,9 @@ def run_block(
     advanced: Callable[[int], None] = lambda vehicle_steps: None,
     warned: bool = True,
 ) -> tuple[Any, ...] | None:
-    """Advance a block through all steps; what each keeper closed with, None if the block was halted before the end.
+    """Advance a block through all steps; returns each keeper's closing value, or None if the block was halted.
 
-    halted: asked before each launch whether to give up. advanced: called with the vehicle-steps since the last call.
+    halted: called before each launch: whether to stop. advanced: called with the vehicle-steps since the last call.
     """
     from lgvi_warp.engine.host_callback import call_host
     from lgvi_warp.engine.packets import Packets
@@ -182,7 +182,7 @@ def run_block(
 
 
 def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.ndarray]:
-    """The samples (1, m, ...) at t = 0 by field, in the dtype of those that follow."""
+    """Samples (1, m, ...) at t = 0 by field, in the dtype of the later samples."""
     real = np.dtype(DTYPES[plan.dtype])
     types = {"position": np.dtype(np.float64)} if plan.spec.compensated else {}
     motion = (name for name in plan.fields if name not in SIGNALS)
@@ -195,7 +195,7 @@ def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.nda
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:
-    """Put blocks that finish in any order into their own order."""
+    """Sort blocks that finish in any order into their own order."""
     waiting: dict[int, Any] = {}
     position = 0
     for block, value in done:
@@ -230,7 +230,7 @@ def unpacked(
 
 
 def less_truth(samples: dict[str, np.ndarray], position: Any) -> dict[str, np.ndarray]:
-    """The samples, or their slopes; the navigation error among them, written as the measured position, less the true one."""
+    """Convert the navigation error in samples or slopes from the measured position to its difference from the truth."""
     if NAVIGATION_ERROR in samples:
         measured = samples[NAVIGATION_ERROR]
         samples[NAVIGATION_ERROR] = (measured - position).astype(measured.dtype)
@@ -243,7 +243,7 @@ def divided(
     table: Mapping[str, Field],
     entries: Mapping[str, Sequence[int]] = MappingProxyType({}),
 ) -> dict[str, np.ndarray]:
-    """Raw samples (samples, members, numbers) by field, in the axes that they are in; views where no pairs are summed."""
+    """Raw samples (samples, members, numbers) by field, in their own axes; views where no pairs are summed."""
     samples: dict[str, np.ndarray] = {}
     column = 0
     for name, size in fields.items():
@@ -269,9 +269,9 @@ def slopes_of_samples(
     turn: Any,
     table: Mapping[str, Field],
 ) -> dict[str, np.ndarray]:
-    """The slopes of `unpacked` by one number, in the user's axes, from his origin.
+    """Slopes of `unpacked` by one number, in the user's axes and from the user's origin.
 
-    raw, raw_slope: (samples, members, numbers) in the kernel's. turn: slopes of the frame's Q and origin, (1 or m, ...).
+    raw, raw_slope: (samples, members, numbers) in the kernel's axes. turn: slopes of the frame's Q and origin.
     """
     slopes = divided(fields, raw_slope, table)
     values = divided(fields, raw, table)
@@ -296,7 +296,7 @@ def slopes_of_samples(
 
 
 def slopes_at_start(packets: Packets, fields: Sequence[str]) -> list[dict[str, np.ndarray]]:
-    """The slopes, by each number, of the samples (1, m, ...) at the start."""
+    """Slopes, by each number, of the samples (1, m, ...) at the start."""
     layout = packets.plan.layout
     each = packets.slopes_of_start([name for name in fields if name not in SIGNALS])
     if not layout.signals:
@@ -308,7 +308,7 @@ def slopes_at_start(packets: Packets, fields: Sequence[str]) -> list[dict[str, n
 
 
 def slopes_in_advance(packets: Packets, k0: int, k1: int) -> list[dict[str, np.ndarray]]:
-    """The slopes, by each number, of the samples that the last launch wrote in these steps, in the user's axes."""
+    """Slopes, by each number, of the samples that the last launch wrote in these steps, in the user's axes."""
     layout = packets.plan.layout
     raw, each, turns = packets.raw_slopes(k0, k1)
     pairs = zip(each, turns, strict=True)
@@ -316,7 +316,7 @@ def slopes_in_advance(packets: Packets, k0: int, k1: int) -> list[dict[str, np.n
 
 
 def samples_of(plan: Plan, grid: TimeGrid, when: slice, fields: Mapping[str, np.ndarray], ends: Ends) -> Fields:
-    """Fields (times, members, ...) of a block with the times, steps and terms that belong to them."""
+    """Fields (times, members, ...) of a block with their times, steps and terms."""
     scene = plan.ensemble.scene
     times = grid.times[when], grid.sample_steps[when]
     return Fields(fields, *times, scene.terms, ends, scene.controller, scene.events)

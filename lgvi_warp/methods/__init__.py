@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Time integration, as data: programs of sub-maps, tableaux, the time grid and stable steps."""
+"""Time integration methods as data: programs of sub-maps, tableaux, the time grid and stable steps."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gauss collocation of s stages, order 2s: Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.3."""
+"""Gauss collocation with s stages, order 2s: Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.3."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Gauss = tuple[Matrix, tuple[float, ...], tuple[float, ...], Matrix]
 def gauss(s: int) -> Gauss:
     """Gauss collocation with s stages: a (s, s), b (s,), c (s,), and the matrix (s, s) that extrapolates its slopes.
 
-    With l_j = b_j sum_k (2k + 1) P_k(x_j) P_k, x = 2c - 1, of the Legendre polynomials P_k, a_ij is the integral of l_j
-    up to c_i, and the extrapolation its value at 1 + c_i. Source: Hairer, Lubich & Wanner, II.1.3.
+    Let l_j = b_j sum_k (2k + 1) P_k(x_j) P_k with x = 2c - 1 and the Legendre polynomials P_k. Then a_ij is the
+    integral of l_j up to c_i, and the extrapolation uses l_j(1 + c_i). Source: Hairer, Lubich & Wanner, II.1.3.
     """
     x, w = legendre.leggauss(s)
     b, c, P = 0.5 * w, 0.5 * (x + 1.0), legendre.legvander(x, s)

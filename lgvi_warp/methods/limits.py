@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Largest stable step of each method: limits of stability measured by method, or computed.
+"""Largest stable step of each method, measured or computed.
 
-Limits are in h times the angular frequency of an oscillation (`python -m benchmarks table warning_limits` writes them): the
-fastest one whose amplitude stays bounded, for the Munk moment with M = (1, 100, 100) and 0.3 rad, and for the restoring
-moment of a sphere and 0.3 rad.
+A limit is the largest h w for which an oscillation of angular frequency w keeps a bounded amplitude. It is measured at
+an amplitude of 0.3 rad, for the Munk moment with M = (1, 100, 100) and for the restoring moment of a sphere. `python -m
+benchmarks table warning_limits` writes the table.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ RESTORING = {method: float(restoring) for method, _, restoring in _ROWS}
 
 
 def longest_stage(method: Method) -> float:
-    """Length of a method's longest stage, forward or backward."""
+    """Length of a method's longest stage, forward or backward, in steps."""
     return max(abs(length) for length in method.lengths(None)[0])
 
 
 def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
-    """Largest stable h w [rad] of a method for an oscillation of angular frequency w; inf where a status reports the failure.
+    """Largest stable h w [rad] of a method for an oscillation of angular frequency w; inf if a status reports the failure.
 
-    It is measured; of a composition that was not, it is that of its base divided by the longest stage.
+    It is measured. For a composition without a measurement it is the limit of the base method divided by the longest stage.
     """
     if method.gauss or method.adaptive:
         # A status reports where the iteration of the stages, or the step control, fails.
@@ -58,7 +58,7 @@ def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
 
 
 def rotation_limit(method: Method) -> float:
-    """Largest h |Omega| [rad] of a method; inf for one whose status reports a step that is too large."""
+    """Largest h |Omega| [rad] of a method; inf if a status of the method reports a step that is too large."""
     if method.adaptive:
         return np.inf
     if method.turns:
@@ -67,7 +67,7 @@ def rotation_limit(method: Method) -> float:
 
 
 def too_large(method: Method) -> str:
-    """Say what reached its limit where a method's step is too large, and below what the step has to stay."""
+    """Say which quantity reached its limit when a method's step is too large, and the limit for the step."""
     reached = "half the angle of a turn" if method.turns else "|J^-1 a|"
     head = f"the step is too large: {reached} reached 1{'' if method.turns else ', where equation (24) may have no solution'}"
     if method.two_part:
@@ -79,7 +79,7 @@ def too_large(method: Method) -> str:
 
 
 def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
-    """R(z) (n,) of an explicit method at numbers z (n,): one step of y' = (z/h) y from y = 1."""
+    """R(z) (n,) of an explicit method at numbers z (n,): the result of one step of y' = (z/h) y from y = 1."""
     s = len(tableau.b)
     slopes: list[np.ndarray] = []
     for i in range(s):
@@ -88,14 +88,14 @@ def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
 
 
 def first_unstable(numbers: np.ndarray, growth: np.ndarray) -> float:
-    """The largest number h w (n,), rising by STEP [rad], up to which a motion with this growth (n,) in a step stays small."""
+    """Largest h w [rad] up to which the growth factors (n,) of a step stay small; numbers: h w (n,), rising by STEP."""
     beyond = growth > 1.0 + GROWTH
     return float(numbers[np.argmax(beyond)] - STEP) if beyond.any() else math.inf
 
 
 @functools.cache
 def spin_limit(name: str) -> float:
-    """Largest h |Omega| [rad] of a steady spin by an explicit method: where its polynomial grows at i h |Omega|."""
+    """Largest h |Omega| [rad] of a steady spin for an explicit method: beyond it the polynomial grows at i h |Omega|."""
     tableau = Method(name).tableau
     assert tableau is not None
     numbers = np.arange(STEP, MOST, STEP)
@@ -104,9 +104,9 @@ def spin_limit(name: str) -> float:
 
 @functools.cache
 def drag_limit(name: str) -> float:
-    """The largest h (l + 2 q |v|) / I, beyond which explicit drag grows.
+    """Largest stable h (l + 2 q |v|) / I of explicit drag.
 
-    A composition is refused where a stage that goes backward would meet a drag number above 0.5.
+    A composition is refused if a backward stage would have a drag number above 0.5.
     """
     method = Method(name)
     if method.linearly_implicit:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Methods as data: a program of sub-maps with coefficients, composed with itself by stage coefficients.
 
-Sub-maps (mathematics in the README's table): T and K the flows of kinetic energy p.M^-1 p / 2 and of the potential, D the
-discrete Moser-Veselov rotation of equation (24), Ab and Ap the two halves of T. The leftmost is applied first.
+Sub-maps (mathematics in the README's table): T and K are the flows of the kinetic energy p.M^-1 p / 2 and of the potential,
+D is the discrete Moser-Veselov rotation of equation (24), Ab and Ap are the two halves of T. The leftmost is applied first.
 """
 
 from __future__ import annotations
@@ -149,35 +149,37 @@ _BETWEEN = "is not between 0 and 1"
 
 @dataclass(frozen=True)
 class Method(Summarized, Documented):
-    """An integration method by name, and how it solves its implicit equations.
+    """An integration method by name, and the solver of its implicit equations.
 
     Args:
         name: One of
 
             * "phi", "phi_adjoint", "psi": the maps of Nordkvist & Sanyal 2010;
             * "psi_s" (default), "psi_1", "psi_x", "psi_x8", "psi_w": symmetric splittings of order 2;
-            * a composition of a symmetric method: "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)" and so on, or
-              "bm4(psi_x)", "bm6(psi_x)" of its two halves;
-            * "rkn4_6", "rkn6_11", "rkn6_14": two parts, for weight and restoring moment;
-            * "gauss4" to "gauss12": Gauss collocation by fixed-point iteration, for forces of position and time;
-            * explicit methods: "rk4", "rk5" (Dormand & Prince), "rk5_ck" (Cash & Karp), "rk8" (DOP853's) with R as two
-              rows; "cg3" (Crouch & Grossman) and "rkmk4" (Munthe-Kaas) on the rotation group;
+            * a composition of a symmetric method: "tj4(psi_s)", "su4(psi_s)", "kl6(psi_1)", "kl8(psi_s)" and so on; or
+              of the two halves of its step: "bm4(psi_x)", "bm6(psi_x)";
+            * "rkn4_6", "rkn6_11", "rkn6_14": splittings into two parts, for weight and restoring moment;
+            * "gauss4" to "gauss12": Gauss collocation with fixed-point iteration, for forces that depend on position
+              and time;
+            * explicit Runge-Kutta methods that store R as two rows: "rk4", "rk5" (Dormand & Prince), "rk5_ck" (Cash &
+              Karp), "rk8" (of DOP853); explicit methods on the rotation group: "cg3" (Crouch & Grossman), "rkmk4"
+              (Munthe-Kaas);
             * "rkw3": linearly implicit in the damping, for strong damping and steady motion; without damping it is "rk4".
-        solver: Solver of equation (24): "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or
-            "moser_veselov" (explicit).
-        iterations: Newton steps, or fixed-point iterations, of every solve, 0 to 100. None (default) iterates each vehicle
-            to the tolerance. "auto" determines before the run how many suffice for every member's start at twice the step;
-            a solve that needs more later gives its member the status NOT_CONVERGED.
+        solver: Solver of equation (24) of that paper: "quartic" (default), "cayley", "newton" (on the exponential map,
+            as in the paper) or "moser_veselov" (explicit).
+        iterations: Newton steps, or fixed-point iterations, of every solve, 0 to 100. None (default) iterates each
+            vehicle to the tolerance. "auto" determines before the run the number that suffices for every member's start
+            at twice the step. A solve that needs more iterations later gives its member the status NOT_CONVERGED.
         tolerance: Relative residual of equation (24) above which a solve has not converged, between 0 and 1. Default:
             1e-14 in float64 and 1e-6 in float32; 1e-12 and 1e-5 for a fixed number of iterations.
-        alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; default 0.5.
-            It acts in phi, phi_adjoint and psi only.
-        beta: The same for nonconservative torques, equation (16).
-        rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8; default None, a fixed step. The error estimated
-            for each step stays below atol + rtol |y|, in the mean square over y = (b, R, p, pi), momenta divided by the
-            largest J. The vehicle with the largest error sets the step of its packet. The run's `h` is then the longest
-            step, and the grid of samples, events and statuses.
-        atol: Absolute tolerance of the step control; give both or none.
+        alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; default
+            0.5. It is used in phi, phi_adjoint and psi only.
+        beta: The same weight for nonconservative torques, equation (16).
+        rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8; default None, a fixed step. The estimated
+            error of each step stays below atol + rtol |y|, in the mean square over y = (b, R, p, pi), with momenta
+            divided by the largest J. The vehicle with the largest error sets the step of its packet. The run's `h` is
+            then the longest step, and samples, events and statuses are taken at multiples of `h`.
+        atol: Absolute tolerance of the step control; give both tolerances or none.
         reason: Reason of an automatic choice, for the summary and the provenance. Default "".
 
     Attributes:
@@ -228,14 +230,14 @@ class Method(Summarized, Documented):
         faults.raise_if_any()
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """Order, symmetry and the settings that are not the defaults."""
+        """Order, symmetry and the settings that differ from their defaults."""
         rows = [("order", str(self.order))]
         rows += [(item.name, str(getattr(self, item.name))) for item in fields(self)[1:]
                  if getattr(self, item.name) != item.default]  # fmt: skip
         return f"Method {self.name}", rows
 
     def _check_steps(self, faults: Faults) -> None:
-        """Note a fault unless both tolerances or none are set, and for a method that estimates no error."""
+        """Add a fault if only one of the two tolerances is set, or if the method has no error estimate."""
         tolerances = {name: value for name in ("rtol", "atol") if (value := getattr(self, name)) is not None}
         if len(tolerances) == 1:
             faults.add(*tolerances.popitem(), "is given alone", "give both rtol and atol, or none for a fixed step")
@@ -245,7 +247,7 @@ class Method(Summarized, Documented):
 
     @property
     def base(self) -> str:
-        """Name of the method that is composed; without a composition, of this one."""
+        """Name of the base method of a composition; otherwise the name of this method."""
         return parted(str(self.name))[0]
 
     @property
@@ -277,7 +279,7 @@ class Method(Summarized, Documented):
 
     @property
     def linearly_implicit(self) -> bool:
-        """Whether damping enters the stages by a matrix."""
+        """Whether the method treats damping implicitly, by a matrix in its stages."""
         return self.name in LINEARLY_IMPLICIT
 
     @property
@@ -287,14 +289,14 @@ class Method(Summarized, Documented):
 
     @property
     def turns(self) -> bool:
-        """Whether it turns about the axes one after another, instead of solving equation (24)."""
+        """Whether the method rotates about the body axes one after another, instead of solving equation (24)."""
         return any(letter[0] == "R" for letter, _ in self.program)
 
     @property
     def stages(self) -> tuple[float, ...]:
         """The stage coefficients g_i: one step is the program over g_1 h, then over g_2 h, and so on.
 
-        For two halves, or two parts, the coefficients of both alternate.
+        For a method of two halves or two parts, their coefficients alternate.
         """
         composition = parted(str(self.name))[1]
         if self.two_part:
@@ -309,12 +311,12 @@ class Method(Summarized, Documented):
     def lengths(self, lead: float | None) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Lengths of the stages and of the lead, in steps.
 
-        The lead is a flow that opens and closes the program (see `merged`). Halves and parts have two lengths per stage;
-        where one of two parts leads, the stages have the lengths of the other. Psi_h is its halves over h/2: a half over
-        a is given as 2 a.
+        The lead is a flow that opens and closes the program (see `merged`). Halves and parts have two lengths per
+        stage. If the lead is one of two parts, the stages have the lengths of the other part. Psi_h consists of two
+        halves over h/2: a half over the length a is listed as 2 a.
 
         Args:
-            lead: Coefficient of the lead; None without one.
+            lead: Coefficient of the lead; None without a lead.
 
         Returns:
             (lengths of the stages; lengths of the lead after each stage and, as the last number, before the first stage).
@@ -386,13 +388,13 @@ class Method(Summarized, Documented):
 
 @functools.cache
 def parted(name: str) -> tuple[str, str | None]:
-    """Divide the name of a method into that which is composed, and the composition; None where there is none."""
+    """Split the name of a method into its base method and its composition; the composition is None if there is none."""
     match = re.fullmatch(r"(\w+)\((\w+)\)", name)
     return (match[2], match[1]) if match else (name, None)
 
 
 def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
-    """(lead, maps): half the flow that both opens and closes the program, joined with that of the next step; and the rest."""
+    """Return (lead, maps): the flow that opens and closes the program, and the rest. Leads of two steps are joined."""
     first, last = program[0], program[-1]
     if len(program) > 1 and first == last and first[0] in FLOWS:
         return first, program[1:-1]
@@ -400,7 +402,7 @@ def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
 
 
 def palindrome_of_parts(printed: tuple[float, ...]) -> tuple[float, ...]:
-    """Complete the printed coefficients of a splitting into two parts, of which each sums to one."""
+    """Complete the printed coefficients of a splitting into two parts; the coefficients of each part sum to one."""
     c, n = list(printed), len(printed)
     c.append(0.5 - sum(c[n % 2 :: 2]))
     c.append(1.0 - 2.0 * sum(c[(n + 1) % 2 :: 2]))
@@ -422,7 +424,7 @@ def divided(program: Program) -> Program:
 
 
 def with_hops(program: Program) -> Program:
-    """Insert the translations between the three axes' origins: with coupled inertia each turn is made about its own."""
+    """Insert the translations between the origins of the three axes: with coupled inertia each axis has its own origin."""
     hopped: list[tuple[str, float]] = []
     current_axis = 1
     for letter, coefficient in program:
@@ -443,7 +445,7 @@ def middle_axis(program: Program) -> int:
 
 
 def simplified(program: Program, isotropic: bool) -> Program:
-    """Remove the Munk moment where M = m I: it is zero, and computing it would only add round-off."""
+    """Remove the Munk moment if M = m I: it is zero then, and computing it would only add round-off."""
     if not isotropic:
         return program
     return tuple(("Ab" if letter == "T" else letter, c) for letter, c in program if letter != "Ap")

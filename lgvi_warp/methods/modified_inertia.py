@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The series of the modified inertia of the preprocessed discrete Moser-Veselov rotation, order 8, by the moments of inertia.
+"""Series of the modified inertia for the preprocessed discrete Moser-Veselov rotation of order 8.
 
-J~^-1 = (1 + s) J^-1 + d I: s and d are polynomials in N = h^2 |pi|^2 / 2 and H = h^2 pi.J^-1 pi / 2, whose coefficients are
-symmetric functions of the moments. Hairer & Vilmart (2006), J. Phys. A 39, 13225.
+J~^-1 = (1 + s) J^-1 + d I, where s and d are polynomials in N = h^2 |pi|^2 / 2 and H = h^2 pi.J^-1 pi / 2. Their
+coefficients are symmetric functions of the moments of inertia. Hairer & Vilmart (2006), J. Phys. A 39, 13225.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 
 def fields(J: np.ndarray) -> dict[str, Any]:
-    """The kernel's "inverse_J" (n, 3), and series "shrink" and "shift" {"c1": (n,), ...}, of moments J (n, 3) [kg m^2]."""
+    """Make the kernel's "inverse_J" (n, 3) and series "shrink" and "shift" {"c1": (n,), ...} from J (n, 3) [kg m^2]."""
     shrink, shift = series(J)
     return {
         "inverse_J": 1.0 / J,
@@ -23,9 +23,9 @@ def fields(J: np.ndarray) -> dict[str, Any]:
 
 
 def series(J: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Coefficients of the polynomials s and d of principal moments J (n, 3) [kg m^2], by Hairer & Vilmart (2006).
+    """Coefficients of the polynomials s and d for principal moments J (n, 3) [kg m^2], after Hairer & Vilmart (2006).
 
-    Returns: (those of s, of d), nine arrays (n,) each, of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3.
+    Returns: (coefficients of s, of d), nine arrays (n,) each, in the order N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3.
     """
     e = J.prod(axis=1)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times of samples, and the uniform grid of steps that meets every sample time."""
+"""Times of samples, and the uniform grid of steps that contains every sample time."""
 
 from __future__ import annotations
 
@@ -20,19 +20,18 @@ MOST_SAMPLES = 10_000_000
 
 @dataclass(frozen=True)
 class SaveAt:
-    """Samples that a run keeps; the start and the end are always kept.
+    """Samples that a run keeps. The start and the end are always kept.
 
     Args:
-        every: Interval of samples [s], from the start on; default None, the end only.
-        at: Rising times of samples [s], >= 0, in any sequence; default None. Give `every` or `at`, not both. Each time must
-            be a whole number of steps, to within 1e-9 of a step, or to the precision of float32 for times in float32.
-        fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. A field that is left out
-            takes no memory. In a scene with a controller also its signals: "command", "actuator", "demand", "unmet",
-            "exerted", "measured_..." and "reference_..." (see lw.Result); in one with a term `lw.terms.EnergyUse` also
-            "energy_used".
-        final: Whether to keep `result.final`, from which a run can be continued: the states at the end, and the memory of
-            forces, actuators and controllers. Default: True if the samples of all members are kept and there are fewer than
-            100,000.
+        every: Interval between samples [s], counted from the start; default None: only the start and the end are kept.
+        at: Increasing times of samples [s], >= 0; default None. Give `every` or `at`, not both. Each time must be a
+            whole number of steps, to within 1e-9 of a step, or to the precision of float32 for times in float32.
+        fields: Any of "position", "attitude", "velocity", "angular_velocity"; default all four. An omitted field takes
+            no memory. With a controller also its signals: "command", "actuator", "demand", "unmet", "exerted",
+            "measured_..." and "reference_..." (see lw.Result). With a term `lw.terms.EnergyUse` also "energy_used".
+        final: Whether to keep `result.final`, from which a run can be continued: the states at the end, and the memory
+            of forces, actuators and controllers. Default: True if the samples of all members are kept and there are
+            fewer than 100,000 members.
 
     Raises:
         SceneError: A setting is wrong; the message names every fault.
@@ -71,11 +70,11 @@ class SaveAt:
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """Uniform steps of h [s] from the start to the end of a run, and those after which a sample is kept.
+    """Uniform steps of h [s] from the start to the end of a run, and the steps after which a sample is kept.
 
-    sample_steps: Numbers of steps from t = 0 to each sample, int64, (k,); the first is 0, unless the run starts later.
-    times: Those of the samples, (k,) [s].
-    asked: The step that was asked for [s], where it was shortened; else None.
+    sample_steps: Number of steps from t = 0 to each sample, int64, (k,); the first is 0, unless the run starts later.
+    times: Times of the samples, (k,) [s].
+    asked: The requested step [s] if it was shortened; else None.
     """
 
     h: float
@@ -100,7 +99,7 @@ class TimeGrid:
         return int(self.sample_steps[-1])
 
     def shifted(self, t0: float) -> TimeGrid:
-        """The same steps and samples from another start t0 [s] on, a whole number of steps from t = 0."""
+        """The same steps and samples, moved to another start t0 [s], a whole number of steps from t = 0."""
         step, first, faults = of_step(self.h), whole_steps(t0, self.h), Faults()
         if first is None or first < 0:
             near = max(0, round(t0 / self.h)) * self.h
@@ -113,14 +112,14 @@ class TimeGrid:
         return TimeGrid(self.h, steps, times, self.messages, self.asked)
 
     def ticks(self, every: int, goes_on: bool = False) -> TimeGrid:
-        """The same steps with samples at the ticks of a controller alone; where the run goes on, the first one was made."""
+        """The same steps with samples only at the ticks of a controller; a continued run leaves out its first tick."""
         first = self.first + 1 if goes_on else self.first
         step, steps = of_step(self.h), np.arange(-(-first // every) * every, self.last + 1, every)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
         return TimeGrid(self.h, steps, times, self.messages, self.asked)
 
     def telling(self, *messages: str) -> TimeGrid:
-        """The same steps and samples with more messages."""
+        """The same steps and samples with additional messages."""
         return replace(self, messages=(*self.messages, *messages))
 
 
@@ -166,6 +165,6 @@ def time_grid(h: float, t1: float, save: SaveAt, t0: float = 0.0) -> TimeGrid:
 
 
 def divisors(count: int) -> list[int]:
-    """The whole numbers that divide a whole number."""
+    """List the divisors of a whole number."""
     small = [k for k in range(1, math.isqrt(count) + 1) if count % k == 0]
     return sorted({*small, *(count // k for k in small)})

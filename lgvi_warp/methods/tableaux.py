@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runge-Kutta methods as data, explicit and linearly implicit, for the kernels and for their twin.
+"""Runge-Kutta methods as data, explicit and linearly implicit, for the kernels and for their NumPy twin.
 
-k_i = f(t + c_i h, y + h sum_j a_ij k_j), y <- y + h sum_i b_i k_i; an error estimate is h sum_i e_i k_i. A linearly implicit
-method adds h A sum_j g_ij k_j to k_i, with a matrix A near df/dy.
+k_i = f(t + c_i h, y + h sum_j a_ij k_j), y <- y + h sum_i b_i k_i; an error estimate is h sum_i e_i k_i. A linearly
+implicit method adds h A sum_j g_ij k_j to k_i, where the matrix A approximates df/dy.
 """
 
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ Row = tuple[float, ...]
 class Tableau:
     """Coefficients of a Runge-Kutta method with s stages: weights b (s,), nodes c (s,).
 
-    errors: Rows e of error estimates, (s,), or (s + 1,) with the slope at the new state last; default none.
-    implicit: Matrix g of a linearly implicit method; row i holds its i + 1 numbers, the last of which is the same in all rows.
+    errors: Coefficients e of each error estimate, (s,), or (s + 1,) with the slope at the new state last; default none.
+    implicit: Matrix g of a linearly implicit method: row i has i + 1 numbers; the last number is the same in all rows.
     """
 
     order: int

@@ -40,7 +40,7 @@ def advance(
     stages: Sequence[float] = (1.0,),
     solve: Solver = newton,
 ) -> State:
-    """The state after so many steps."""
+    """The state after this many steps."""
     for _ in range(steps):
         x = step(replace(x, t=x.step * h), body, program, h, stages, solve)
         x = replace(x, step=x.step + 1)
@@ -75,7 +75,7 @@ def arrival(
     stages: Sequence[float] = (1.0,),
     solve: Solver = newton,
 ) -> tuple[State, float]:
-    """The state where a step from x comes to a distance of 0, and the part of h until then; distance: positive at x alone."""
+    """State where a step from x reaches distance 0, and the part of h until then; distance: positive at x alone."""
     start = replace(x, t=x.step * h)
 
     def after(part: float) -> State:

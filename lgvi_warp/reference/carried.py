@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inertia that laws change in time: the momenta (P; Pi) of vehicle and what moves in it, and the velocities that they mean.
+"""Inertia that laws change in time: momenta (P; Pi) of the vehicle and of moving masses in it, and their velocities.
 
-Lagrange's equations on SE(3) for T = (I6 + D(t)) v.v / 2 + w(t).v, v = (nu; Om): the momenta dT/dv = (I6 + D) v + w turn with
-the body as those of a rigid one do. Between steps a state has I6 v, as without such laws.
+Lagrange's equations on SE(3) for T = (I6 + D(t)) v.v / 2 + w(t).v, v = (nu; Om): the momenta dT/dv = (I6 + D) v + w
+turn with the body like those of a rigid body. Between steps a state contains I6 v, as without such laws.
 """
 
 from dataclasses import replace
@@ -15,7 +15,7 @@ from lgvi_warp.reference.terms import Law
 
 
 def changes(body: Body) -> bool:
-    """Whether some law changes the inertia."""
+    """Whether a law changes the inertia."""
     return any(type(law).carried is not Law.carried for law in body.terms)
 
 
@@ -35,7 +35,7 @@ def velocities(x: State, body: Body, h: float) -> Array:
 
 
 def boarded(x: State, body: Body, h: float) -> State:
-    """The state with (P; Pi) where a step of h begins, and what laws remember of that step.
+    """The state with (P; Pi) at the start of a step of h, and the memory of laws for that step.
 
     docs/theory/coupled.md, (X19).
     """
@@ -49,7 +49,7 @@ def boarded(x: State, body: Body, h: float) -> State:
 
 
 def landed(x: State, body: Body, h: float) -> State:
-    """The state with I6 (nu; Om) where a step ends. docs/theory/coupled.md, (X19)."""
+    """The state with I6 (nu; Om) at the end of a step. docs/theory/coupled.md, (X19)."""
     if not changes(body):
         return x
     P = body.I6 @ velocities(x, body, h)

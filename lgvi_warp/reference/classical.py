@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The classical integrators that the paper compares with, on the continuous equations of its section II."""
+"""The classical integrators of the paper's comparison, on the continuous equations of its section II."""
 
 import math
 from collections.abc import Sequence
@@ -48,7 +48,7 @@ def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motio
 
     docs/theory/runge_kutta.md, (K14).
 
-    b moves by the same screws. Returns b, R, nu, Om at k + 1.
+    b moves along the same screws. Returns b, R, nu, Om at k + 1.
     """
     stages: list[Stage] = []
     for row in CG3_A:
@@ -61,7 +61,7 @@ def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motio
 def crouch_grossman_row(
     b: Array, R: Array, nu: Array, Om: Array, h: float, row: Sequence[float], stages: list[Stage]
 ) -> Motion:
-    """From the state at k along the frozen twists of the stages so far, with the weights of one row of the tableau."""
+    """Move from the state at k along the frozen twists of the stages so far, weighted by one row of the tableau."""
     for weight, (nui, Omi, nu_rate, Om_rate) in zip(row, stages, strict=True):
         b, R = along_screw(b, R, h * weight * nui, h * weight * Omi)
         nu, Om = nu + h * weight * nu_rate, Om + h * weight * Om_rate

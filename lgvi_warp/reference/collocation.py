@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gauss collocation, order 2s with s stages, on y = (b, the rows of R, p, pi), of one vehicle with all its laws.
 
-Symmetric; every quadratic invariant is kept to round-off: R^T R, R p without forces, and so on. Symplectic in canonical
-variables, which (R, p, pi) are not: here to the method's order only.
+It is symmetric and keeps every quadratic invariant to round-off: R^T R, R p without forces, and so on. It is symplectic
+in canonical variables. (R, p, pi) are not canonical, so here it is symplectic to the method's order only.
 Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.3, IV.2.1, VIII.6 (iteration, compensated sums).
 """
 
@@ -20,12 +20,12 @@ MOST_ITERATIONS = 100
 
 
 class NotConverged(ValueError):  # noqa: N818
-    """The iteration for the stages does not contract."""
+    """Raised if the iteration for the stages does not converge."""
 
 
 @dataclass(frozen=True)
 class Gauss:
-    """a (s, s), b (s,), c (s,); ahead (s, s): stages of a step, extrapolated from those of the step before."""
+    """a (s, s), b (s,), c (s,); ahead (s, s): matrix that extrapolates the stages of a step from the previous step."""
 
     a: Array
     b: Array
@@ -39,7 +39,7 @@ def polynomials(x: Array, degree: int) -> Array:
 
 
 def gauss(s: int) -> Gauss:
-    """The method of s stages. With l_j = b_j sum_k (2k + 1) P_k(x_j) P_k, x = 2c - 1, a_ij is its integral to c_i.
+    """The method of s stages. a_ij: integral to c_i of b_j sum_k (2k + 1) P_k(x_j) P_k, x = 2c - 1.
 
     docs/theory/runge_kutta.md, (K17).
     """
@@ -58,7 +58,7 @@ def pack(x: State) -> Array:
 
 
 def unpack(y: Array, x: State, t: float) -> State:
-    """The state with y (18,), see `pack`, at t, the rest as in x."""
+    """The state of y (18,), see `pack`, at t; other entries as in x."""
     return replace(x, b=y[:3], R=y[3:12].reshape(3, 3), p=y[12:15], pi=y[15:], t=t)
 
 
@@ -73,7 +73,7 @@ def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tup
 
     docs/theory/runge_kutta.md, (K18).
 
-    The iteration ends where the change is round-off or no longer falls. Raises NotConverged.
+    The iteration ends when the change is round-off or no longer falls. Raises NotConverged.
     """
     y, smallest = pack(x), np.inf
     for iteration in range(1, MOST_ITERATIONS + 1):
@@ -87,11 +87,11 @@ def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tup
 
 
 def advance(x: State, body: Body, h: float, steps: int, s: int = 3) -> tuple[State, int]:
-    """The state after so many steps of h [s], and the evaluations of the right-hand side. Raises NotConverged.
+    """The state after this many steps of h [s], and the number of evaluations of the right-hand side. Raises NotConverged.
 
     docs/theory/runge_kutta.md, (K18).
 
-    Each step starts from the stages of the one before, extrapolated; the sum y + h sum b_i K_i is compensated.
+    Each step starts from the extrapolated stages of the previous step; the sum y + h sum b_i K_i is compensated.
     """
     method, evaluations = gauss(s), 0
     K: Array = np.zeros((s, 18))

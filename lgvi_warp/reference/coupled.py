@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The step for a full 6x6 inertia, of one vehicle, in the symbols of docs/explain/coupled_inertia.md.
 
-I6 = [[M, C], [C^T, J]] at the user's origin O in the user's axes; E = M^-1 C, Js = J - C^T M^-1 C, and
-H = p.M^-1 p / 2 + (pi - E^T p).Js^-1 (pi - E^T p) / 2 + U. The turns want Js diagonal, ascending, and E upper
-triangular (scheme X, no solve) or symmetric (scheme W, one 3-dimensional solve): axes Q and another origin.
+I6 = [[M, C], [C^T, J]] at the user's origin O in the user's axes; E = M^-1 C, Js = J - C^T M^-1 C, and H = p.M^-1 p / 2 +
+(pi - E^T p).Js^-1 (pi - E^T p) / 2 + U. The turns need a diagonal, ascending Js, and an E that is upper triangular (scheme
+X, no solve) or symmetric (scheme W, one 3-dimensional solve). Axes Q and another origin achieve this.
 """
 
 import math
@@ -55,10 +55,10 @@ class Direction:
 
 @dataclass(frozen=True)
 class Reduced:
-    """The inertia in the axes Q at the origin o_1: what ReducedX and ReducedW share.
+    """The inertia in the axes Q at the origin o_1: the common part of ReducedX and ReducedW.
 
-    Q (3, 3) to the user's axes, det +1; M (3, 3) [kg]; A = M^-1 [1/kg]; Js (3,) ascending [kg m2]; E (3, 3) [m];
-    o (n, 3) the origins o_1, .. o_n in the user's axes [m].
+    Q (3, 3), rotation to the user's axes; M (3, 3) [kg]; A = M^-1 [1/kg]; Js (3,) ascending [kg m2]; E (3, 3) [m];
+    o (n, 3), the origins o_1, .. o_n in the user's axes [m].
     """
 
     Q: Array
@@ -74,18 +74,18 @@ class Reduced:
         return self.A @ p - self.E @ Om, Om
 
     def to_reduced(self, b: Array, R: Array, nu: Array, Om: Array) -> CoupledState:
-        """The state of the user's b (3,) [m], R (3, 3), nu (3,) [m/s], Om (3,) [rad/s]."""
+        """The state for the user's b (3,) [m], R (3, 3), nu (3,) [m/s], Om (3,) [rad/s]."""
         Om_1, nu_1 = self.Q.T @ Om, self.Q.T @ (nu + cross(Om, self.o[0]))
         p = self.M @ (nu_1 + self.E @ Om_1)
         return CoupledState(b + R @ self.o[0], R @ self.Q, p, self.Js * Om_1 + self.E.T @ p)
 
     def momenta_about_user(self, x: CoupledState, i: int) -> tuple[Array, Array, Array, Array]:
-        """b, R, p, pi at the user's origin, in the user's axes, of a state told at o_i."""
+        """b, R, p, pi at the user's origin, in the user's axes, from a state at o_i."""
         R, p = x.R @ self.Q.T, self.Q @ x.p
         return x.b - R @ self.o[i - 1], R, p, self.Q @ x.pi + cross(self.o[i - 1], p)
 
     def momenta_about(self, i: int, b: Array, R: Array, p: Array, pi: Array) -> CoupledState:
-        """And back: the state told at o_i.
+        """Inverse of `momenta_about_user`: the state at o_i.
 
         b, R: Position (3,) [m] of the user's origin; attitude (3, 3) of the user's axes.
         p, pi: Momentum (3,) [N s], the user's axes; angular momentum (3,) [N m s] about the user's origin.
@@ -102,7 +102,7 @@ class Reduced:
 
 @dataclass(frozen=True)
 class ReducedX(Reduced):
-    """For scheme X: E = U upper triangular, pitches k_i = U_ii [m]; a (3, 3): the rows are the lines a_i [m]."""
+    """Inertia for scheme X: E = U upper triangular, pitches k_i = U_ii [m]; a (3, 3): its rows are the lines a_i [m]."""
 
     a: Array
 
@@ -114,7 +114,7 @@ class ReducedX(Reduced):
 
 @dataclass(frozen=True)
 class ReducedW(Reduced):
-    """For scheme W: E = S symmetric; one origin."""
+    """Inertia for scheme W: E = S symmetric; one origin."""
 
     @property
     def S(self) -> Array:
@@ -147,7 +147,7 @@ def shift(I6: Array, d: Array) -> Array:
 
 
 def turn(I6: Array, Q: Array) -> Array:
-    """I6 in the axes that are the columns of Q: X' = Q^T X Q for every block."""
+    """I6 in axes that are the columns of Q: X' = Q^T X Q for every block."""
     M, C, J = (Q.T @ X @ Q for X in blocks(I6))
     return np.block([[M, C], [C.T, J]])
 
@@ -160,7 +160,7 @@ def coupling(I6: Array) -> float:
 
 
 def removable(I6: Array) -> Array | None:
-    """The shift d (3,) [m] of the origin that makes C zero: d = -vee(E), where C M is skew; None where it is not.
+    """The shift d (3,) [m] of the origin that makes C zero: d = -vee(E), if C M is skew; else None.
 
     docs/theory/coupled.md, (X5).
     """
@@ -206,7 +206,7 @@ def reduce_w(I6: Array) -> ReducedW:
 
 
 def slide(x: CoupledState, n: Array) -> CoupledState:
-    """b += R n, pi += p x n, n (3,) [m] in the body's axes: it moves the body, or the origin within the body.
+    """b += R n, pi += p x n, n (3,) [m] in the body's axes: moves the body, or the origin within the body.
 
     docs/theory/coupled.md, (X9).
     """
@@ -231,12 +231,12 @@ def T(x: CoupledState, body: Reduced, h: float) -> CoupledState:
 
 
 def R_i(x: CoupledState, body: ReducedX, i: int, h: float) -> CoupledState:
-    """The screw of (pi_i - k_i p_i)^2 / (2 Js_i), standing at o_i, i = 1, 2, 3: slide by sl e_i, turn by cay(t e_i).
+    """The screw of (pi_i - k_i p_i)^2 / (2 Js_i) at o_i, i = 1, 2, 3: slide by sl e_i, turn by cay(t e_i).
 
     docs/theory/coupled.md, (X9).
 
     y^3/3 makes t1 = tan(y) to order 4. Symplectic, since the angle 2 atan(t1) + 2 atan(t2) and the slide are the
-    derivatives of one function of (p_i, pi_i). Infinite where t1 t2 = 1: a turn by pi in one step.
+    derivatives of one function of (p_i, pi_i). The result is infinite if t1 t2 = 1: a turn by pi in one step.
     """
     i, j, k = i - 1, i % 3, (i + 1) % 3
     g, pitch = 0.5 * h / body.Js[i], body.E[i, i]
@@ -249,7 +249,7 @@ def R_i(x: CoupledState, body: ReducedX, i: int, h: float) -> CoupledState:
 
 
 def hop(x: CoupledState, body: ReducedX, i: int, j: int) -> CoupledState:
-    """The same state told at o_j instead of o_i (1, 2, 3): b += R d, pi -= d x p, d = a_j - a_i.
+    """The same state at o_j instead of o_i (1, 2, 3): b += R d, pi -= d x p, d = a_j - a_i.
 
     docs/theory/coupled.md, (X8), (X11).
     """
@@ -257,7 +257,7 @@ def hop(x: CoupledState, body: ReducedX, i: int, j: int) -> CoupledState:
 
 
 def K(x: CoupledState, body: Reduced, h: float, wrench: Wrench, i: int = 1) -> CoupledState:
-    """The potential's kick, standing at o_i: p += h f', pi += h m' with f' = Q^T f, m' = Q^T (m - o_i x f)."""
+    """The potential's kick at o_i: p += h f', pi += h m' with f' = Q^T f, m' = Q^T (m - o_i x f)."""
     R = x.R @ body.Q.T
     f, m = wrench(x.b - R @ body.o[i - 1], R)
     return replace(x, p=x.p + h * body.Q.T @ f, pi=x.pi + h * body.Q.T @ (m - cross(body.o[i - 1], f)))
@@ -319,7 +319,7 @@ def w_parameter(a: Array, P: Array, Js: Array, S: Array, newtons: int | None) ->
 
 
 def settled(value: Callable[[Array], Array], newton: Callable[[Array], Array], c: Array, scale: float) -> Array:
-    """Newton steps from c until |value| is below SETTLED scale or stagnates; raises NoSolution if it stays above RESIDUAL."""
+    """Newton steps from c until |value| is below SETTLED scale or stagnates; NoSolution if it stays above RESIDUAL."""
     rho = norm(value(c))
     for _ in range(MOST_ITERATIONS):
         if rho <= SETTLED * scale:
@@ -339,7 +339,7 @@ def W(x: CoupledState, body: ReducedW, h: float, newtons: int | None = None) -> 
 
     docs/theory/coupled.md, (X13), (X14).
 
-    Y = -vee(F Sd - Sd F^T); b += R Y, pi -= Y x p; R <- R F, p <- F^T p, pi <- F^T pi. newtons: so many Newton steps
+    Y = -vee(F Sd - Sd F^T); b += R Y, pi -= Y x p; R <- R F, p <- F^T p, pi <- F^T pi. newtons: number of Newton steps
     from the guess, or None for round-off. Raises NoSolution (a ValueError).
     """
     P = h * x.p
@@ -349,7 +349,7 @@ def W(x: CoupledState, body: ReducedW, h: float, newtons: int | None = None) -> 
 
 
 def drag(x: CoupledState, body: Reduced, h: float, z: Direction) -> CoupledState:
-    """The exact flow of one direction: w+ = w e^-y / (1 + h L q |w| (1 - e^-y)/y), y = h L l, L = z.I^-1 z.
+    """The exact flow of drag in one direction: w+ = w e^-y / (1 + h L q |w| (1 - e^-y)/y), y = h L l, L = z.I^-1 z.
 
     docs/theory/coupled.md, (X18).
     """
@@ -378,7 +378,7 @@ def E_adjoint(x: CoupledState, body: Reduced, h: float, directions: Sequence[Dir
 
 
 def mirrored(half: Program) -> Program:
-    """The half, K, and the half reversed: a symmetric program."""
+    """The half, K, and the reversed half: a symmetric program."""
     return (*half, ("K", 1.0), *reversed(half))
 
 
@@ -393,7 +393,7 @@ PROGRAMS: dict[str, Program] = {
 
 
 def reduce(I6: Array, program: str) -> ReducedX | ReducedW:
-    """The reduction that the program of that name needs."""
+    """The reduction for the program of this name."""
     return reduce_w(I6) if program.endswith("w") else reduce_x(I6)
 
 
@@ -406,7 +406,7 @@ def step(
     newtons: int | None = None,
     kick: Kick | None = None,
 ) -> CoupledState:
-    """One step of h from o_1 to o_1: a turn R_i is entered by the hop to o_i; kick: instead of K, user's frame.
+    """One step of h from o_1 to o_1. A hop to o_i precedes a turn R_i; kick: replaces K, in the user's frame.
 
     docs/theory/coupled.md, (X12), (X17).
     """

@@ -14,7 +14,7 @@ def energy(x: State, body: Body) -> float:
 
 
 def linear_momentum(x: State) -> Array:
-    """R p in inertial axes [N s]: conserved by every sub-map but K. docs/theory/splitting.md, (S12)."""
+    """R p in inertial axes [N s]: conserved by every sub-map except K. docs/theory/splitting.md, (S12)."""
     return x.R @ x.p
 
 

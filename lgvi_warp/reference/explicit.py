@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Explicit Runge-Kutta methods on y = (b, two rows of R, p, pi), of one vehicle, with all its laws.
 
-The middle row of R is the cross product of the others. What a law remembers is known at every stage if it depends on the
-time and itself alone (`Law.follow`); of other laws it is advanced by half a step before and after, as in K, to order 2.
+The middle row of R is the cross product of the others. The memory of a law is known at every stage if it depends on time
+and itself alone (`Law.follow`). The memory of other laws is advanced by half a step before and after, as in K, to order 2.
 """
 
 import math
@@ -32,7 +32,7 @@ Row = tuple[float, ...]
 
 
 class Tableau(Protocol):
-    """Content of lgvi_warp.methods.tableaux: a, b, c; rows of error estimates, which go as h to the power `estimate`."""
+    """Coefficients of lgvi_warp.methods.tableaux: a, b, c; rows of error estimates, which are of order h^`estimate`."""
 
     @property
     def a(self) -> tuple[Row, ...]:
@@ -48,11 +48,11 @@ class Tableau(Protocol):
 
     @property
     def errors(self) -> tuple[Row, ...]:
-        """(stages,), or one longer, with f(y) at the end."""
+        """Weights of an error estimate (stages,), or one more, with f(y) at the end."""
 
     @property
     def estimate(self) -> int:
-        """Power of h with which the estimate of the error falls."""
+        """Power of h in the error estimate."""
 
 
 # step(x, body, h) -> the state h [s] later.
@@ -75,7 +75,7 @@ def pack(x: State) -> Array:
 
 
 def unpack(y: Array, x: State, t: float) -> State:
-    """The state with y (15,), see `pack`, at t, the rest as in x. docs/theory/runge_kutta.md, (K4)."""
+    """The state of y (15,), see `pack`, at t; other entries as in x. docs/theory/runge_kutta.md, (K4)."""
     first, last = y[3:6], y[6:9]
     return replace(x, b=y[:3], R=np.array([first, cross(last, first), last]), p=y[9:12], pi=y[12:], t=t)
 
@@ -91,7 +91,7 @@ def wrench(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array,
 
 
 def at(x: State, origin: Array) -> State:
-    """The same motion with b [m] and pi [N m s] taken at a point (3,) [m] of the body, from where they were, body axes."""
+    """The same motion with b [m] and pi [N m s] at another point of the body, (3,) [m] from the old one, body axes."""
     return replace(x, b=x.b + x.R @ origin, pi=x.pi - cross(origin, x.p))
 
 
@@ -100,7 +100,7 @@ def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[A
 
     docs/theory/integrator.md, (1), (I1); docs/theory/runge_kutta.md, (K1); docs/theory/water.md, (W1).
 
-    b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; some laws look at the step h.
+    b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; some laws depend on the step h.
     """
     x = at(x, -origin)
     nu, Om = np.split(velocities(x, body, h), 2)
@@ -119,7 +119,7 @@ def rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
 def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
     """Memory of laws, half a step of h [s] later; x.t is the step's start, or its end in the second half.
 
-    That of laws whose memory is known at every stage stays as it is: see `followed`.
+    Memory that is known at every stage is not changed: see `followed`.
     """
     if not any(memory.size for memory in x.memory):
         return x
@@ -129,14 +129,14 @@ def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
 
 
 def follows(law: Law) -> bool:
-    """Whether what a law remembers depends on the time and itself alone."""
+    """Whether the memory of a law depends on time and itself alone."""
     return type(law).follow is not Law.follow
 
 
 def followed(x: State, body: Body, h: float) -> State:
-    """The same state with what laws remember at x.t, from what they remembered h before.
+    """The same state with the memory of laws at x.t, from their memory at a time h earlier.
 
-    Raises ValueError for h < 0, which a stage of cg3 asks for: what a law remembers does not say how it came about.
+    Raises ValueError for h < 0, which a stage of cg3 needs: memory cannot be followed backwards.
     """
     if h == 0.0 or not any(memory.size and follows(law) for law, memory in zip(body.terms, x.memory, strict=False)):
         return x
@@ -152,7 +152,7 @@ def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USE
 
 
 def stages_and_powers(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> tuple[Array, Array]:
-    """The same, and the power that is taken at each stage, (stages,) [W]. docs/theory/runge_kutta.md, (K2)."""
+    """Stages as in `stages`, and the power at each stage, (stages,) [W]. docs/theory/runge_kutta.md, (K2)."""
     y, K, watts = pack(x), np.zeros((len(tableau.b), 15)), np.zeros(len(tableau.b))
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
         stage = followed(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, c * h)
@@ -179,7 +179,7 @@ def stepper(tableau: Tableau, origin: Array = USER) -> Step:
 
 
 def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
-    """The state after so many steps, each made by step(x, body, h)."""
+    """The state after this many steps, each made by step(x, body, h)."""
     for _ in range(steps):
         x = step(replace(x, t=x.step * h), body, h)
         x = replace(x, step=x.step + 1, t=(x.step + 1) * h)
@@ -187,11 +187,11 @@ def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
 
 
 def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int, origin: Array = USER) -> State:
-    """The state after so many steps of h [s] where forces never change in inertial axes: then R p = P + t F is known.
+    """The state after this many steps of h [s] if forces are constant in inertial axes: then R p = P + t F is known.
 
     docs/theory/runge_kutta.md, (K6).
 
-    y = (b, two rows of R, pi), (12,), of which p = R^T (R p) at every stage.
+    y = (b, two rows of R, pi), (12,); p = R^T (R p) at every stage.
     """
     x = at(x, origin)
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi])), 2)
@@ -215,11 +215,11 @@ def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int,
 
 
 def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
-    """The error of a step over the tolerance, HNW (4.11); with two estimates, HNW II.10: e5^2 / sqrt(e5^2 + e3^2 / 100).
+    """Error of a step divided by the tolerance, HNW (4.11); with two estimates, HNW II.10: e5^2 / sqrt(e5^2 + e3^2 / 100).
 
     docs/theory/runge_kutta.md, (K7).
 
-    K: Rates (stages, 15), with the rate at the end where the tableau asks for it.
+    K: Rates (stages, 15), with the rate at the end of the step if the tableau needs it.
     """
     norms = [float(np.mean((h * np.array(e) @ K / scale) ** 2)) for e in tableau.errors]
     if len(norms) == 1:
@@ -229,7 +229,7 @@ def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
 
 
 def next_factor(tableau: Tableau, error: float, before: float) -> float:
-    """PI control, h <- h factor; error and before: those of this step and of the last accepted.
+    """PI control, h <- h factor; error and before: errors of this step and of the last accepted step.
 
     docs/theory/runge_kutta.md, (K8).
     """
@@ -239,7 +239,7 @@ def next_factor(tableau: Tableau, error: float, before: float) -> float:
 
 
 def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol: float | Array) -> tuple[State, float]:
-    """The state h [s] later and its error over the tolerance atol + rtol max(|y_k|, |y_k+1|)."""
+    """The state h [s] later, and its error divided by the tolerance atol + rtol max(|y_k|, |y_k+1|)."""
     x = remembered_half(x, body, h, second=False)
     K, y = stages(x, body, h, tableau), pack(x)
     y_k1 = y + h * np.array(tableau.b) @ K
@@ -251,7 +251,7 @@ def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol:
 
 
 def first_step(x: State, body: Body, tableau: Tableau, rtol: float, atol: float | Array) -> float:
-    """HNW II.4, a starting step: an explicit Euler step of h0 = 0.01 |y| / |f| estimates the second derivative."""
+    """Starting step of HNW II.4: an explicit Euler step of h0 = 0.01 |y| / |f| estimates the second derivative."""
     y, f = pack(x), rates(x, body, 1.0)
     scale = atol + rtol * np.abs(y)
     d0, d1 = (math.sqrt(np.mean((v / scale) ** 2)) for v in (y, f))
@@ -270,9 +270,9 @@ def adaptive(
     tableau: Tableau,
     h: float | None = None,
 ) -> list[State]:
-    """The states at rising times, on which steps are shortened to end; h: the first step, None (default) for `first_step`.
+    """The states at increasing times, at which shortened steps end; h: first step, None (default) for `first_step`.
 
-    Every state's `step` counts the accepted steps. Raises ValueError where the step becomes too small.
+    Every state's `step` counts the accepted steps. Raises ValueError if the step becomes too small.
     """
     h = first_step(x, body, tableau, rtol, atol) if h is None else h
     states, before = [], 1e-4

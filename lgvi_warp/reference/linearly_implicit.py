@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Linearly implicit Runge-Kutta methods on the same y as the explicit ones: damping decays, however strong it is.
+"""Linearly implicit Runge-Kutta methods on the same y as the explicit ones: damping of any strength decays.
 
-k_i = f(y_i) + h A (g_i1 k_1 + ... + g_ii k_i). Of df/dy the matrix A has only what damping does to the momenta: what it leaves
-out costs accuracy, no order.
+k_i = f(y_i) + h A (g_i1 k_1 + ... + g_ii k_i). The matrix A is the part of df/dy for the effect of damping on the
+momenta. The omitted parts reduce the accuracy, not the order.
 """
 
 from typing import Protocol
@@ -19,11 +19,11 @@ class Implicit(Tableau, Protocol):
 
     @property
     def implicit(self) -> tuple[tuple[float, ...], ...]:
-        """Row i has i + 1 numbers, the last of which is the same in all rows."""
+        """Matrix g: row i has i + 1 numbers, the last of which is the same in all rows."""
 
 
 def slope(x: State, body: Body, h: float) -> Array:
-    """D(s nu) (6, 6), near the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D.
+    """D(s nu) (6, 6), an approximation of the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D.
 
     docs/theory/runge_kutta.md, (K16).
     """

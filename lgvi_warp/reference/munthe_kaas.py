@@ -12,7 +12,7 @@ from lgvi_warp.reference.submaps import Body, State
 
 
 def algebra_rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
-    """(Om; b', p', pi') (12,), an element of so(3) x R^9: R' = R hat(Om); x has its b and pi at origin."""
+    """(Om; b', p', pi') (12,), an element of so(3) x R^9: R' = R hat(Om); x has b and pi at `origin`."""
     Om = np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi]))[3:]
     b, _, p, pi = derivatives(x, body, h, origin)
     return np.concatenate([Om, b, p, pi])
@@ -32,7 +32,7 @@ def act(x: State, u: Array, t: float) -> State:
 
 
 def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
-    """Munthe-Kaas & Owren (1999): order 4 with two commutators; R turns about origin.
+    """Munthe-Kaas & Owren (1999): order 4 with two commutators; R turns about `origin`.
 
     docs/theory/runge_kutta.md, (K10).
 
@@ -52,7 +52,7 @@ def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
 
 
 def cg3(x: State, body: Body, h: float, origin: Array = USER) -> State:
-    """Crouch & Grossman (1993), order 3, with any laws: classical.cg3 is the paper's, on SE(3) x R^6. origin: as above.
+    """Crouch & Grossman (1993), order 3, with any laws, about `origin`; classical.cg3: the paper's, on SE(3) x R^6.
 
     docs/theory/runge_kutta.md, (K12).
     """

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Splitting into two parts, one of them the free rotation, for conservative laws with U = U_b(b) + U_R(R).
+"""Splitting into two parts, one of which is the free rotation, for conservative laws with U = U_b(b) + U_R(R).
 
-H = A + B, A = pi.J^-1 pi / 2 + U_b(b), B = p.M^-1 p / 2 + U_R(R). Rotation and the kick of U_b commute (one changes R, p,
-pi by F, the other the spatial momentum R p), and so do T and the kick of U_R (neither changes R or R p): with an accurate
-rotation both flows are exact. B depends on R and on the conserved R p alone and A is quadratic in pi, hence
-[B, [B, [B, A]]] = 0 as long as U_b is at most quadratic: Runge-Kutta-Nystroem coefficients keep their order.
+H = A + B, A = pi.J^-1 pi / 2 + U_b(b), B = p.M^-1 p / 2 + U_R(R). Rotation and the kick of U_b commute (one changes R,
+p, pi by F, the other the spatial momentum R p). T and the kick of U_R commute too (neither changes R or R p). With an
+accurate rotation both flows are therefore exact. B depends only on R and on the conserved R p, and A is quadratic in
+pi. So [B, [B, [B, A]]] = 0 if U_b is at most quadratic, and Runge-Kutta-Nystroem coefficients keep their order.
 """
 
 import math
@@ -22,7 +22,7 @@ Program = Sequence[tuple[str, float]]
 
 
 def splitting(first: str, *half: float) -> Program:
-    """A palindrome that begins with `first`; the printed coefficients of its half lack the last but one and the middle one."""
+    """Complete half of a palindrome that begins with `first`: its last but one and its middle coefficient are computed."""
     parts, c = (first, "A" if first == "B" else "B"), list(half)
     n = len(c)
     c.append(0.5 - sum(c[n % 2 :: 2]))
@@ -55,11 +55,12 @@ def modified_inertia(pi: Array, J: Array, h: float, order: int = 10) -> Array:
 
     docs/theory/splitting.md, (S11).
 
-    J~^-1 = (1 + s) J^-1 + d I, where s and d are polynomials in h^2 |pi|^2 / 2 and h^2 pi.J^-1 pi / 2, which the rotation
-    conserves.
+    J~^-1 = (1 + s) J^-1 + d I, where s and d are polynomials in h^2 |pi|^2 / 2 and h^2 pi.J^-1 pi / 2, which the
+    rotation conserves.
 
     Hairer & Vilmart (2006), J. Phys. A 39, 13225, whose coefficients are symmetric functions of the moments J. Since J~
-    depends on pi, the rotation is symplectic to that order only, where D of equation (24) is so exactly. Raises NoSolution.
+    depends on pi, the rotation is symplectic to that order only, while D of equation (24) is exactly symplectic. Raises
+    NoSolution.
     """
     moments, axes = np.linalg.eigh(J)
     N, H = 0.5 * h * h * pi @ pi, 0.5 * h * h * pi @ np.linalg.solve(J, pi)
@@ -130,7 +131,7 @@ def coefficients(moments: Array) -> list[tuple[list[float], list[float]]]:
 
 
 def D(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) -> State:
-    """The free rotation to that order: equation (24) with J~ instead of J, then R <- R F, p <- F^T p, pi <- F^T pi."""
+    """The free rotation to this order: equation (24) with J~ instead of J, then R <- R F, p <- F^T p, pi <- F^T pi."""
     F = solve(h * x.pi, modified_inertia(x.pi, body.J, h, order))
     return replace(x, R=x.R @ F, p=F.T @ x.p, pi=F.T @ x.pi)
 

@@ -3,8 +3,8 @@
 
 phi, phi_adjoint, psi: conservative. Phi, Phi_adjoint: with the nonconservative phi and tau of (15), (16).
 
-State b, R, nu, Om; `body` holds M, J and the laws. F_k belongs to Phi, and G = F_{k+1}^T to its adjoint, where the
-printed text needs parentheses: the whole bracket is turned by F_{k+1}, not its first term only.
+The state is b, R, nu, Om; `body` has M, J and the laws. F_k belongs to Phi, and G = F_{k+1}^T to its adjoint. The
+printed text of the adjoint needs parentheses: F_{k+1} turns the whole bracket, not only its first term.
 """
 
 from dataclasses import replace
@@ -157,12 +157,12 @@ def velocities(x: State, body: Body) -> tuple[Array, Array]:
 
 
 def drift(x: State, body: Body, h: float) -> Array:
-    """h u: how far the water carries the vehicle."""
+    """h u: displacement of the vehicle by the water."""
     return h * water(look(x, body, h), body).velocity
 
 
 def Phi(x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0.5, beta: float = 0.5) -> State:
-    """Phi_h with (15), (16): (10)-(14) in the order they appear. What laws remember is advanced first."""
+    """Phi_h with (15), (16): (10)-(14) in their order. The memory of laws is advanced first."""
     x = at_time(remembered_over(at_time(x, x.t + 0.5 * h), body, h), x.t)
     nu, Om = velocities(x, body)
     old = forces(x, body, h, nu, Om)
@@ -180,7 +180,7 @@ def Phi_adjoint(x: State, body: Body, h: float, solve: Solver = newton, alpha: f
 
     docs/theory/integrator.md, (I8).
 
-    Raises NoSolution where it does not settle.
+    Raises NoSolution if the iteration does not converge.
     """
     nu, Om = velocities(x, body)
     f, m = body.wrench(x.b, x.R, look(x, body, h), potential=True)
@@ -210,7 +210,7 @@ def at_time(x: State, t: float) -> State:
 
 
 def remembered_over(x: State, body: Body, h: float) -> State:
-    """Memory of laws, over all of h; x.t is the middle of it."""
+    """Memory of laws after all of h; x.t is the middle of this time."""
     return remembered(remembered(x, body, h, second=False), body, h, second=True)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random numbers from counters: Philox4x32-10, Salmon, Moraes, Dror & Shaw 2011, and Box & Muller 1958.
 
-A number is a function of its key and counter, nothing is carried along: any member, step and channel can be drawn alone,
-in any order, on any machine.
+A number is a function of its key and counter, without a state. So any member, step and channel can be drawn alone, in
+any order, on any machine.
 """
 
 from typing import Any
@@ -41,7 +41,7 @@ def box_muller(words: NDArray[np.uint32]) -> NDArray[np.float64]:
 def normals(
     seed0: ArrayLike, seed1: ArrayLike, member: ArrayLike, step: ArrayLike, channel: ArrayLike
 ) -> NDArray[np.float64]:
-    """Four independent standard normals, shape (..., 4), of whole numbers of 32 bits that are broadcast together."""
+    """Four independent standard normals, shape (..., 4), from 32-bit whole numbers that are broadcast together."""
     numbers = [np.asarray(x, dtype=np.int64) & WORD for x in (member, step, channel, 0, seed0, seed1)]
     *counter, seed0, seed1 = np.broadcast_arrays(*numbers)
     words = philox4x32(np.stack(counter, axis=-1), np.stack([seed0, seed1], axis=-1))
@@ -49,10 +49,10 @@ def normals(
 
 
 def draws_of_step(law: Any, view: Any, stream: int = 0) -> NDArray[np.float64]:
-    """Three standard normals of each draw of a step, shape (r, 3): step k has the draws k r to k r + r - 1.
+    """Three standard normals for each draw of a step, shape (r, 3): step k has the draws k r to k r + r - 1.
 
-    law: Its key (seed0, seed1 and channel) and `noise_step` [s], the time between two draws, or None for the step.
-    view: Its member, step and h [s].
+    law: has the key (seed0, seed1 and channel) and `noise_step` [s], the time between two draws, or None for the step.
+    view: has member, step and h [s].
     """
     count = 1 if law.noise_step is None else round(view.h / law.noise_step)
     draws = view.step * count + np.arange(count)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Equation (24) by an algebraic Riccati equation and the matrix sign function: to compare with the other solvers.
+"""Equation (24) solved by an algebraic Riccati equation and the matrix sign function, for comparison with other solvers.
 
-J. R. Cardoso & F. Silva Leite (2003), The Moser-Veselov equation, Linear Algebra and its Applications 360: F Jd = A + S with
-A = hat(a)/2 and a symmetric S, S^2 + S A - A S = A^2 + Jd^2. `rotation.riccati` takes eigenvectors instead.
+J. R. Cardoso & F. Silva Leite (2003), The Moser-Veselov equation, Linear Algebra and its Applications 360: F Jd = A + S
+with A = hat(a)/2 and a symmetric S, S^2 + S A - A S = A^2 + Jd^2. `rotation.riccati` takes eigenvectors instead.
 """
 
 import numpy as np
@@ -40,7 +40,7 @@ def sign(a: Array, J: Array, iterations: int | None = None) -> Array:
 
     docs/theory/rotation.md, (R15).
 
-    a (3,), J (3, 3) [kg m2]. iterations means nothing here. Raises NoSolution where the step is too large or Jd singular.
+    a (3,), J (3, 3) [kg m2]. `iterations` is not used. Raises NoSolution if the step is too large or Jd is singular.
     """
     Jd = modified_inertia(J)
     if not np.linalg.cond(Jd) < 1.0 / SINGULAR:
@@ -51,5 +51,5 @@ def sign(a: Array, J: Array, iterations: int | None = None) -> Array:
 
 
 def quality(F: Array, a: Array, J: Array) -> tuple[float, float]:
-    """Relative residual of equation (24), and the largest entry of F^T F - I."""
+    """Relative residual of equation (24), and the largest entry of |F^T F - I|."""
     return residual(F, a, J), float(np.abs(F.T @ F - np.eye(3)).max())

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Equation (24), Nordkvist & Sanyal 2010: F in SO(3) nearest I with F Jd - Jd F^T = hat(a), Jd = tr(J)/2 I - J.
 
-Five solvers. `newton` is the paper's; `moser_veselov` the explicit solution it quotes; `riccati` that of its [19];
-`cayley` and `quartic` go beyond it. J is any symmetric positive definite matrix: where a derivation wants it diagonal,
-the axes are turned and turned back.
+There are five solvers. `newton` is the paper's, `moser_veselov` is the explicit solution that it quotes, and `riccati`
+is the solution of its reference [19]; `cayley` and `quartic` are not in the paper. J is any symmetric positive definite
+matrix. If a derivation needs a diagonal J, the axes are turned before and turned back afterwards.
 """
 
 import math
@@ -29,7 +29,7 @@ LOST_DIGITS = 1e-4
 
 
 class NoSolution(ValueError):  # noqa: N818
-    """Equation (24) has no solution, or this solver does not find it."""
+    """Raised if equation (24) has no solution, or the solver does not find it."""
 
 
 def hat(a: Array) -> Array:
@@ -84,7 +84,7 @@ def modified_inertia(J: Array) -> Array:
 
 
 def residual(F: Array, a: Array, J: Array) -> float:
-    """|F Jd - Jd F^T - hat(a)| / |a|, equation (24) as a number; not divided where a = 0.
+    """|F Jd - Jd F^T - hat(a)| / |a|, the residual of equation (24); not divided if a = 0.
 
     docs/theory/rotation.md, (24).
     """
@@ -93,7 +93,7 @@ def residual(F: Array, a: Array, J: Array) -> float:
 
 
 def in_principal_axes(solve: Callable[[Array, Array, int | None], Array]) -> Callable[..., Array]:
-    """A solver for diagonal J, given as its three numbers, made one for any symmetric J (3, 3)."""
+    """Make a solver for any symmetric J (3, 3) from a solver for diagonal J, given as its three numbers."""
 
     def solve_any(a: Array, J: Array, iterations: int | None = None) -> Array:
         if J[0, 1] == J[0, 2] == J[1, 2] == 0.0:
@@ -108,10 +108,10 @@ def in_principal_axes(solve: Callable[[Array, Array, int | None], Array]) -> Cal
 
 
 def iterate(value: Function, differential: Function, x: Array, a: Array, iterations: int | None) -> Array:
-    """Newton steps on value(x) = 0: so many, or until the residual, scaled by |a|, no longer shrinks.
+    """Newton steps on value(x) = 0: this many, or (None) until the residual, divided by |a|, no longer falls.
 
-    A test against round-off alone would never end: near |J^-1 a| = 1 the residual stagnates above it. Raises NoSolution
-    if it stays large; LinAlgError (a ValueError) if a fixed count meets a singular differential, beyond that bound.
+    A test against round-off alone would never end, since the residual stagnates above round-off near |J^-1 a| = 1. Raises
+    NoSolution if it stays large, and LinAlgError (a ValueError) if the differential is singular in a fixed number of steps.
     """
     if iterations is not None:
         for _ in range(iterations):
@@ -153,7 +153,7 @@ def newton(a: Array, J: Array, iterations: int | None = None) -> Array:
 
 
 def newton_differential(f: Array, J: Array) -> Array:
-    """The differential as printed in section III-G, with the series of its two quotients for small |f|.
+    """The differential printed in section III-G, with series of its two quotients for small |f|.
 
     docs/theory/rotation.md, (R3).
     """
@@ -211,11 +211,11 @@ def quartic_coefficients(a: Array, J: Array) -> tuple[float, float, float, float
 
 
 def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
-    """The smallest root by Newton steps from q0 / q1, the root of q's linear part; None: until they no longer climb.
+    """The smallest root by Newton steps from q0 / q1, the root of q's linear part; None: until the steps no longer rise.
 
     docs/theory/rotation.md, (R9).
 
-    q is convex and falls up to that root, so every step from its near side stays there, until round-off.
+    q is convex and falls up to this root, so Newton steps from below stay below it, until round-off.
     """
     q0, q1, q2, d1 = quartic_coefficients(a, J)
     s = q0 / q1
@@ -229,7 +229,7 @@ def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
 
 
 def quartic_parameter(a: Array, J: Array, s: float) -> Array:
-    """c = n / det for the diagonal J (3,) and the root s; for any s, G(c) = (a.c - s) c: the residual for free.
+    """c = n / det for the diagonal J (3,) and the root s. For any s, G(c) = (a.c - s) c: the residual at no cost.
 
     docs/theory/rotation.md, (R7).
     """
@@ -245,7 +245,7 @@ def quartic(a: Array, J: Array, iterations: int | None = None) -> Array:
 
     docs/theory/rotation.md, (24), (R11).
 
-    iterations: Newton steps on the quartic, or None for round-off. F is a rotation whatever s is. Raises NoSolution.
+    iterations: Newton steps on the quartic, or None for round-off. F is a rotation for any s. Raises NoSolution.
     """
     s = quartic_root(a, J, iterations)
     c = quartic_parameter(a, J, s)
@@ -255,7 +255,7 @@ def quartic(a: Array, J: Array, iterations: int | None = None) -> Array:
 
 
 def rotation_or_raise(F: Array, name: str) -> Array:
-    """F, if it is a rotation up to the digits that an explicit solution may lose. Raises NoSolution."""
+    """Return F if it is a rotation up to the digits that an explicit solution may lose. Raises NoSolution."""
     if not np.linalg.det(F) > 0.0 or not np.abs(F.T @ F - np.eye(3)).max() < LOST_DIGITS:
         raise NoSolution(f"{name}: the explicit solution is not a rotation")
     return F
@@ -284,8 +284,8 @@ def moser_veselov(a: Array, J: Array, iterations: int | None = None) -> Array:
     docs/theory/rotation.md, (R14).
 
     v_i spans the kernel of I - lambda_i hat(a) - lambda_i^2 Jd^2, and F = (Jd psi Lambda psi^-1)^T (every J of the
-    printed text is Jd). Explicit: iterations means nothing here. Raises NoSolution where roots coincide (near a sphere,
-    a = 0), where none has a positive real part, where Jd is singular, and where the answer is no rotation.
+    printed text is Jd). The solution is explicit; `iterations` is not used. Raises NoSolution if roots coincide (near a
+    sphere, a = 0), none has a positive real part, Jd is singular, or the answer is no rotation.
     """
     Jd = np.diag(modified_inertia(np.diag(J)))
     lambdas = moser_veselov_roots(a, Jd**2)
@@ -304,8 +304,8 @@ def riccati(a: Array, J: Array, iterations: int | None = None) -> Array:
     docs/theory/rotation.md, (R15).
 
     The columns of (I, S) span an invariant subspace of H, on which H acts as A + S = F Jd: the one of the three
-    eigenvalues with positive real part. Explicit: iterations means nothing here. Raises NoSolution where that subspace
-    does not give an S or F is no rotation, and where Jd is singular (plates).
+    eigenvalues with positive real part. The solution is explicit; `iterations` is not used. Raises NoSolution if this
+    subspace gives no S, F is no rotation, or Jd is singular (plates).
     """
     A, Jd = 0.5 * hat(a), modified_inertia(J)
     if not np.linalg.cond(Jd) < 1.0 / SINGULAR:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sub-maps that every method is a program of (Ab, Ap, T, D, K), on one vehicle."""
+"""The sub-maps of which every method is a program (Ab, Ap, T, D, K), for one vehicle."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -18,7 +18,7 @@ GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 class State:
     """b (3,) [m], R (3, 3) body to inertial, p (3,) [N s] and pi (3,) [N m s] relative to the water; t [s]; step.
 
-    memory: what each of the body's laws remembers, in their order. used: the energy used since the start [J].
+    memory: memory of each of the body's laws, in their order. used: energy used since the start [J].
     """
 
     b: Array
@@ -35,11 +35,11 @@ class State:
 class Body:
     """M (3, 3) [kg], J (3, 3) [kg m2], both symmetric, and the laws that act.
 
-    excess: displaced mass less mass [kg], and excess_lever (3,) [kg m], the same times their levers: water that
-    accelerates pushes them.
-    mass [kg], and mass_lever (3,) [kg m], mass times the centre of mass: those of the dry body, of which M and C less
-    these are the added mass. Water that varies in space pushes the two differently.
-    C (3, 3) [kg m], the coupling of M and J, for K alone: the other sub-maps of this file want it zero.
+    excess [kg]: displaced mass minus dry mass; excess_lever (3,) [kg m]: the same with their lever arms. Accelerating
+    water acts on them.
+    mass [kg], and mass_lever (3,) [kg m], mass times the centre of mass, of the dry body. M and C minus these are the
+    added mass. Water that varies in space acts differently on dry mass and added mass.
+    C (3, 3) [kg m]: coupling of M and J, only for K; the other sub-maps of this file need C = 0.
     """
 
     M: Array
@@ -60,7 +60,7 @@ class Body:
     def wrench(
         self, b: Array, R: Array, views: tuple[View, ...] = (), potential: bool | None = None
     ) -> tuple[Array, Array]:
-        """Sum of the laws' wrenches; potential: True: only those that follow from a potential; False: only the others."""
+        """Sum of the laws' wrenches; potential: True: only of laws that follow from a potential; False: of the others."""
         force, torque = np.zeros(3), np.zeros(3)
         views = views or tuple(View(R, b, np.zeros(3), np.zeros(3)) for _ in self.terms)
         for term, view in zip(self.terms, views, strict=True):
@@ -75,7 +75,7 @@ class Body:
 
 
 def start(body: Body, b: Array, R: Array, p: Array, pi: Array) -> State:
-    """The state at t = 0, with what the laws remember."""
+    """The state at t = 0, with the initial memory of the laws."""
     return State(b, R, p, pi, memory=tuple(term.start() for term in body.terms))
 
 
@@ -126,7 +126,7 @@ def water(views: tuple[View, ...], body: Body) -> Flow:
 
 
 def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]:
-    """(rho V - m) R^T Du/Dt at the centres of buoyancy and gravity: the push of water that accelerates.
+    """(rho V - m) R^T Du/Dt at the centres of buoyancy and gravity: the force of accelerating water.
 
     docs/theory/water.md, (W2).
     """
@@ -135,20 +135,20 @@ def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]
 
 
 def remembered(x: State, body: Body, h: float, second: bool, late: float = 0.0) -> State:
-    """Memory of the laws, half a kick later; late: see K."""
+    """Memory of the laws half a kick later; late: see K."""
     views = look(replace(x, t=x.t + late * h), body, h)
     memory = tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True))
     return recorded(x, body, views, memory)
 
 
 def recorded(x: State, body: Body, views: tuple[View, ...], memory: tuple[Array, ...]) -> State:
-    """The same state with what the laws remember now, and the energy that they took meanwhile."""
+    """The same state with the present memory of the laws, and with the energy that they used meanwhile."""
     spent = sum(term.spent(view, rows) for term, view, rows in zip(body.terms, views, memory, strict=True))
     return replace(x, memory=memory, used=x.used + spent)
 
 
 def power(x: State, body: Body, h: float, velocities: Array | None = None) -> float:
-    """The power [W] that all laws take at a state; velocities: (nu; Om) (6,), where they are not I6^-1 of the momenta."""
+    """Power [W] of all laws at a state; velocities: (nu; Om) (6,), if they are not I6^-1 times the momenta."""
     views = look(x, body, h)
     if velocities is not None:
         views = tuple(replace(view, nu=velocities[:3], Om=velocities[3:]) for view in views)
@@ -156,7 +156,7 @@ def power(x: State, body: Body, h: float, velocities: Array | None = None) -> fl
 
 
 def load(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, Array]:
-    """D (6, 6) and w (6,) of the laws that look at the water: their force and torque are w - D (nu; Om)."""
+    """D (6, 6) and w (6,) of the laws with access to the water: their force and torque are w - D (nu; Om)."""
     views = look(x, body, h)
 
     def water_at(point: Array) -> Flow:
@@ -170,11 +170,12 @@ def load(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, A
 
 
 def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) -> Array:
-    """D (6, 6) at nu, Om: the sum of the damping laws, and what water that varies in space does.
+    """D (6, 6) at nu, Om: the sum of the damping laws, and the effect of water that varies in space.
 
     docs/theory/water.md, (W3).
 
-    With X = R^T G R: force -m X nu - X^T (A11 nu + A12 Om), torque -m r_g x X nu (Lamb 1932, art. 137; Galper & Miloh 1994).
+    With X = R^T G R: force -m X nu - X^T (A11 nu + A12 Om), torque -m r_g x X nu (Lamb 1932, art. 137; Galper & Miloh
+    1994).
     """
     views = tuple(replace(view, nu=nu, Om=Om) for view in look(x, body, h))
     total = sum((term.damping(view) for term, view in zip(body.terms, views, strict=True)), np.zeros((6, 6)))
@@ -186,7 +187,7 @@ def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) ->
 
 
 def V(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Velocity-dependent laws, w - D(nu) nu, by the linearly implicit step of order 2, D and w of the predicted middle.
+    """Velocity-dependent laws, w - D(nu) nu, by a linearly implicit step of order 2, D and w at the predicted middle.
 
     docs/theory/splitting.md, (S14).
     """
@@ -202,7 +203,7 @@ def V(x: State, body: Body, h: float, flow: Flow) -> State:
 
 
 def E(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Drag by its exact flow; where the inertia is not diagonal, by that of one axis after the other.
+    """Drag by its exact flow; if the inertia is not diagonal, by the exact flows of one axis after the other.
 
     docs/theory/splitting.md, (S13).
     """
@@ -217,7 +218,7 @@ def E(x: State, body: Body, h: float, flow: Flow) -> State:
 
 
 def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
-    """E where drag is the only velocity-dependent law, V otherwise."""
+    """E if drag is the only velocity-dependent law, V otherwise."""
     damped = [term for term in body.terms if type(term).damping is not Law.damping or type(term).load is not Law.load]
     alone = len(damped) == 1 and isinstance(damped[0], Drag) and not np.any(flow.gradient)
     if alone:
@@ -235,8 +236,8 @@ def K(x: State, body: Body, h: float, solve: Solver = newton, late: float = 0.0)
 
     docs/theory/splitting.md, (S5), (S15).
 
-    Half of what the laws remember and of the water's drift, half the kick, drag, and the other halves: order 2. late: how much
-    later than the kick the middle of the time is that laws remember, in lengths of the kick.
+    Half of the memory's step and of the water's drift, half the kick, drag, and the other halves: order 2. late: time
+    from the kick to the middle of the interval over which memory is advanced, in lengths of the kick.
     """
     x = remembered(x, body, h, second=False, late=late)
     b = x.b

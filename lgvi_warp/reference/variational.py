@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The discrete Lagrange-d'Alembert principle that Phi follows from, equations (2)-(9) and (17) of Nordkvist & Sanyal (2010).
+"""The discrete Lagrange-d'Alembert principle behind Phi, equations (2)-(9) and (17) of Nordkvist & Sanyal (2010).
 
-A path is a list of configurations (b, R) at t_0, t_1, ...; a variation is a list of (delta b, Sigma), delta R = R hat(Sigma).
-docs/theory/integrator.md derives the integrator in these functions.
+A path is a list of configurations (b, R) at t_0, t_1, ...; a variation is a list of (delta b, Sigma), delta R = R
+hat(Sigma). docs/theory/integrator.md derives the integrator in these functions.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def equation_3(path: Path, variation: Variation, wrenches: Sequence[Wrench], bod
 
 
 def displaced(path: Path, variation: Variation, eps: float) -> Path:
-    """b + eps delta b and R cay(eps Sigma / 2): to first order the path's variation."""
+    """b + eps delta b and R cay(eps Sigma / 2): the varied path to first order."""
     half = (np.eye(3) + 0.5 * eps * hat(Sigma) for _, Sigma in variation)
     turns = (A @ np.linalg.inv(A.T) for A in half)
     return [(b + eps * db, R @ F) for (b, R), (db, _), F in zip(path, variation, turns, strict=True)]
@@ -98,7 +98,7 @@ def equation_9(path: Path, variation: Variation, wrenches: Sequence[Wrench], bod
 
 
 def momenta_before(nu: Array, Om: Array, b: Array, R: Array, body: Body, h: float) -> tuple[Array, Array]:
-    """p^-, pi^- (3,): the momenta at t_k by the step that begins there. docs/theory/integrator.md, (I6)."""
+    """p^-, pi^- (3,): the momenta at t_k from the step that begins at t_k. docs/theory/integrator.md, (I6)."""
     force, torque = body.wrench(b, R, potential=True)
     p = body.M @ nu
     return p - 0.5 * h * force, body.J @ Om - h * cross(p, nu) - 0.5 * h * torque
@@ -107,7 +107,7 @@ def momenta_before(nu: Array, Om: Array, b: Array, R: Array, body: Body, h: floa
 def momenta_after(
     nu: Array, Om: Array, F: Array, b_k1: Array, R_k1: Array, body: Body, h: float
 ) -> tuple[Array, Array]:
-    """p^+, pi^+ (3,): the momenta at t_k+1 by the step that ends there. docs/theory/integrator.md, (I6)."""
+    """p^+, pi^+ (3,): the momenta at t_k+1 from the step that ends at t_k+1. docs/theory/integrator.md, (I6)."""
     force, torque = body.wrench(b_k1, R_k1, potential=True)
     return F.T @ body.M @ nu + 0.5 * h * force, F.T @ body.J @ Om + 0.5 * h * torque
 

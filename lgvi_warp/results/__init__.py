@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results of a run: samples, status and fields of each member, provenance, and files."""
+"""Results of a run: samples, status and fields of each member, provenance, and result files."""

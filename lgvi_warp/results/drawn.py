@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers of members that are drawn when they are first read: parameters, and those of the start."""
+"""Numbers of members that are drawn at their first use: parameters, and varied numbers of the start."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 
 class DrawnParameters(Mapping[str, np.ndarray]):
-    """Parameters of members of an ensemble that follow each other, drawn when they are first read.
+    """Parameters of consecutive members of an ensemble, drawn at their first use.
 
-    Before that they take no memory.
+    Before their first use they take no memory.
 
     Args:
         ensemble: The ensemble.
@@ -31,7 +31,7 @@ class DrawnParameters(Mapping[str, np.ndarray]):
         self.ensemble, self._first, self._stop = ensemble, first, stop
 
     def select(self, first: int, stop: int) -> Members:
-        """Return parameters and initial states of some of these members, counted from the first of them."""
+        """Return parameters and initial states of some of these members; indices count from the first of these members."""
         return self.ensemble.select(self._first + first, self._first + stop)
 
     @functools.cached_property
@@ -51,7 +51,7 @@ class DrawnParameters(Mapping[str, np.ndarray]):
         return len(self._drawn)
 
     def __repr__(self) -> str:
-        """A table of the first member's numbers, so that no others are drawn; first what varies."""
+        """Table of the first member's numbers, the varied numbers first; other members are not drawn for it."""
         first = type(self)(self.ensemble, self._first + 1, self._first)
         varied = {*self.ensemble.varied(), *self.ensemble.varied_starts()}
         names = sorted(first, key=lambda name: name not in varied)
@@ -60,7 +60,7 @@ class DrawnParameters(Mapping[str, np.ndarray]):
 
 
 class GivenParameters(dict[str, np.ndarray]):
-    """Numbers of members that are in memory, each (1, ...) or (n, ...), which print as a table."""
+    """Numbers of members in memory, each (1, ...) or (n, ...), printed as a table."""
 
     def __repr__(self) -> str:
         def text(values: np.ndarray) -> str:
@@ -75,7 +75,7 @@ class GivenParameters(dict[str, np.ndarray]):
 
 
 class DrawnStarts(DrawnParameters):
-    """Numbers of the start that vary, of members of an ensemble that follow each other, drawn when they are first read."""
+    """Varied numbers of the start, of consecutive members of an ensemble, drawn at their first use."""
 
     def _values(self) -> dict[str, np.ndarray]:
         return self.ensemble.starts(self._first, self._stop)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The end of a run as its result has it, and as a result's file holds it."""
+"""The final states of a run in a result, and in a result's file."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from lgvi_warp.sampling.final import NUMBERS, PREFIX, SUM, Final
 def final_of(
     plan: Plan, members: int, states: Mapping[str, np.ndarray], status: np.ndarray, rows: Mapping[str, np.ndarray]
 ) -> Final:
-    """The end of the first members of a plan's run.
+    """Build the final states of the first members of a plan's run.
 
-    states: (n, ...), by field. status: (n,). rows: what their packets left (see engine/going_on.py).
+    states: (n, ...), by field. status: (n,). rows: final rows of their packets (see engine/going_on.py).
     """
     fleet = plan.ensemble
     return Final(
@@ -39,7 +39,7 @@ def final_of(
 
 
 def to_file(final: Final) -> tuple[dict[str, np.ndarray], str]:
-    """An end as arrays and a text, without states, status and parameters, which are the result's."""
+    """Convert final states to arrays and a text; states, status and parameters are omitted, since the result has them."""
     left_out = f"{PREFIX}states.", f"{PREFIX}{SUM}"
     arrays = {name: rows for name, rows in final.to_arrays().items() if not name.startswith(left_out)}
     return arrays, json.dumps({name: getattr(final, name) for name in NUMBERS})
@@ -48,7 +48,7 @@ def to_file(final: Final) -> tuple[dict[str, np.ndarray], str]:
 def from_file(
     content: Mapping[str, np.ndarray], samples: Mapping[str, np.ndarray], parameters: Mapping[str, np.ndarray]
 ) -> Final | None:
-    """The end in a file that was checked; None where it has none."""
+    """Read the final states from a checked file; None if it has none."""
     if "final" not in content:
         return None
     states = {f"{PREFIX}states.{name}": samples[name][-1] for name in FIELDS if name in samples}

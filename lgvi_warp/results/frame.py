@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run as a table of pandas: a row for each member."""
+"""A run as a pandas table with a row for each member."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def frame_of(result: Any) -> pandas.DataFrame:
 
 
 def _ends(result: Any) -> dict[str, np.ndarray]:
-    """States (n, 3) at the end by field: those that were kept."""
+    """States (n, 3) at the end, by field, for the fields that were kept."""
     if result.end is not None:
         states = dict(result.final.states)
     else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Records of each member besides samples: one line per field, for memory, files and stores alike."""
+"""Records of each member besides samples, one definition per field, used in memory, files and stores."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class MemberField:
 
     dtype: NumPy's type string.
     attributes: CF attributes.
-    of: Function of a plan and an outcome that gives the values, shape (n,).
+    of: Function of a plan and an outcome that returns the values, shape (n,).
     when: Function of a plan that tells whether its runs have the field; default always.
     """
 
@@ -34,14 +34,14 @@ class MemberField:
 
 
 def _failure_time(plan: Plan, outcome: MemberStatus) -> np.ndarray:
-    """Time of the last good state, or of the event [s]; NaN where there was neither."""
+    """Time of the last good state, or of the event [s]; NaN for a member without failure or event."""
     if not outcome.status.any():
         return np.full(len(outcome.status), np.nan)
     return np.where(outcome.status != 0, outcome.end_time(plan), np.nan)
 
 
 def _failure_value(plan: Plan, outcome: MemberStatus) -> np.ndarray:
-    """The value that crossed its limit; 0 for an event, NaN without."""
+    """The value that crossed its limit; 0 for an event, NaN for a member without failure or event."""
     if not outcome.status.any():
         return np.full(len(outcome.status), np.nan)
     size = np.where(stopped(outcome.status), 0.0, outcome.failed_size)
@@ -49,14 +49,14 @@ def _failure_value(plan: Plan, outcome: MemberStatus) -> np.ndarray:
 
 
 def _warning_time(plan: Plan, outcome: MemberStatus) -> np.ndarray:
-    """Time when the most serious warning was first seen [s]; NaN without."""
+    """Time when the most serious warning was first seen [s]; NaN without a warning."""
     if not outcome.warnings.any():
         return np.full(len(outcome.status), np.nan)
     return np.where(outcome.warnings != 0, outcome.warning_step * plan.grid.h, np.nan)
 
 
 def _warning_value(plan: Plan, outcome: MemberStatus) -> np.ndarray:
-    """The value that was seen at that time; NaN without."""
+    """The value that was seen at that time; NaN without a warning."""
     if not outcome.warnings.any():
         return np.full(len(outcome.status), np.nan)
     return np.where(outcome.warnings != 0, outcome.warning_value, np.nan)
@@ -67,7 +67,7 @@ def _adaptive(plan: Plan) -> bool:
 
 
 def _alike(plan: Plan) -> bool:
-    """Whether several events of the scene have one status, which then does not tell them apart."""
+    """Whether several events of the scene have the same status, so that the status does not identify the event."""
     statuses = [event.status for event in plan.ensemble.scene.events]
     return len(set(statuses)) < len(statuses)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Outcomes of a run's members, in words: a sentence for each status that occurs."""
+"""Outcomes of a run's members in words: one sentence for each status that occurs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ENDS = {"ends ok": "end ok", "is stopped by an event": "are stopped by an event"
 
 
 def answer_of(result: Result) -> str:
-    """Sentence on how the members of a run ended."""
+    """Write one sentence on the outcomes of a run's members."""
     status, run = np.asarray(result.status), result.provenance
     end = run.get("start", {}).get("time", 0.0) + run["step"] * run["steps"]
     texts = []
@@ -87,10 +87,10 @@ STOP = "stop members there by the event lw.events.Surface(), or let them float b
 
 
 def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...]:
-    """Tell of members that an event stopped before their first step.
+    """Report members that an event stopped before their first step.
 
     status: Status of each member, (n,).
-    failure_time: When each was stopped or failed [s], (n,).
+    failure_time: Time at which each member was stopped or failed [s], (n,).
     """
     begun = stopped(status) & (np.asarray(failure_time) == 0.0)
     if not begun.any():
@@ -104,7 +104,7 @@ def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...
 
 
 def remarks_on(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
-    """List what the fields of members (n,), by name, tell of how they ran."""
+    """List the messages that follow from the records of members: arrays (n,) by name."""
     bits, time, value = (fields[name] for name in ("warnings", "warning_time", "warning_value"))
     begun = begun_beyond(fields["status"], fields["failure_time"])
     kinds = (Warnings.CONTROL_NOT_CONVERGED, Warnings.FILTER_DIVERGED)
@@ -113,9 +113,9 @@ def remarks_on(fields: Mapping[str, np.ndarray]) -> tuple[str, ...]:
 
 
 def ticks_with(warnings: np.ndarray, time: np.ndarray, value: np.ndarray, kind: Warnings) -> tuple[str, ...]:
-    """Tell of members with a warning of their ticks, such as iterations that had not converged.
+    """Report members with a warning from their ticks, such as iterations that did not converge.
 
-    warnings, time, value: Bits of each member, when the most serious one was first seen [s], and its value, (n,).
+    warnings, time, value: Warning bits of each member, time and value of the most serious warning at its first, (n,).
     """
     bits, bit = np.asarray(warnings), int(kind)
     count = int(np.count_nonzero(bits & bit))
@@ -130,6 +130,6 @@ def ticks_with(warnings: np.ndarray, time: np.ndarray, value: np.ndarray, kind: 
 
 
 def failure_text(result: Result) -> str:
-    """Describe each kind of failure in a line with its remedy."""
+    """Describe each kind of failure in one line with a remedy."""
     failures = [code for code in outcomes(result) if code != Status.OK and not code.stopped]
     return "\n".join(outcome_text(result, code) for code in failures)

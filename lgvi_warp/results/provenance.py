@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Provenance of a run, and the messages that the user should see about its settings and starts."""
+"""Provenance of a run, and the messages for the user about its settings and starts."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from lgvi_warp.scene.slices import AT_ONCE
 
 
 def messages(plan: Plan) -> tuple[str, ...]:
-    """List what the user should know before the run: on times, vehicle, parameters and starts."""
+    """List the messages for the user before the run: on times, vehicle, parameters and starts."""
     return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings) + odd_before(plan)
 
 
 def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None) -> dict[str, Any]:
-    """Everything that a result follows from: scene, ensemble, settings, versions and machine."""
+    """Everything that determines a result: scene, ensemble, settings, versions and machine."""
     return with_scene(provenance_but_scene(plan, observed, fields))
 
 
 def with_scene(content: Mapping[str, Any]) -> dict[str, Any]:
-    """The provenance of a run, out of what `provenance_but_scene` returns."""
+    """Build the provenance of a run from the output of `provenance_but_scene`."""
     return {**content, "scene": content["scene"]()}
 
 
 def when_read(content: Mapping[str, Any]) -> Any:
-    """The field `provenance` of a result, which `with_scene` makes of this when it is first read."""
+    """The field `provenance` of a result, which `with_scene` builds at its first use."""
     return functools.partial(with_scene, content)
 
 
 def provenance_but_scene(
     plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None
 ) -> dict[str, Any]:
-    """The provenance, with a function in place of the scene's tables: lists of all numbers of a field take seconds."""
+    """The provenance with a function in place of the scene's tables: to list all numbers of a field takes seconds."""
     content = {
         "scene": Once(plan.ensemble.scene.to_dict),
         "ensemble": plan.ensemble.to_dict(),
@@ -79,7 +79,7 @@ def provenance_but_scene(
 
 
 def starts_at(plan: Plan) -> dict[str, Any]:
-    """Start of a run, in its provenance: empty at t = 0."""
+    """Start of a continued run, for its provenance: empty at t = 0."""
     final, time = plan.ensemble.final, float(plan.grid.times[0])
     if final is None:
         return {"start": {"time": time}} if plan.grid.first else {}
@@ -91,10 +91,10 @@ def starts_at(plan: Plan) -> dict[str, Any]:
 
 
 def at_end(content: dict[str, Any], values: Mapping[str, np.ndarray], members: int, planned: int) -> dict[str, Any]:
-    """Add to the provenance of a run what its end tells.
+    """Add the facts that are known at the end of a run to its provenance.
 
     values: Fields of the members that ran, by name, each of shape (n,).
-    Returns: The provenance with the mean numbers of steps if these were chosen, and with n if the run ended early.
+    Returns: The provenance, with the mean number of steps for an adaptive method, and with n if the run ended early.
     """
     means = {name: float(values[name].mean()) for name in ("steps_made", "steps_tried") if name in values}
     return content | means | ({"members": members} if members < planned else {})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Quantities of interest: one or a few numbers of each member of a result, named by a text or computed by a function."""
+"""Quantities of interest: one or a few numbers of each member of a result, given as a text or a function."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ OfInterest = str | Quantity | Statistic | Mapping[str, Any] | Callable[..., Any]
 class OfResult:
     """A quantity of interest of a result: a `Functional`, or a function of a Result.
 
-    "position[2]" is the value at the end; max(...), min(...), mean(...) and range(...) are over the path, as its
-    samples were kept; norm(...) is the length of a vector.
+    "position[2]" is the value at the end; max(...), min(...), mean(...) and range(...) are taken over the samples of
+    the path; norm(...) is the length of a vector.
 
     of: The functional or function.
-    looks_at_members: Whether it may use more of the members than their parameters.
+    looks_at_members: Whether the function may use other data of the members than their parameters.
     """
 
     label: str
@@ -51,42 +51,42 @@ class OfResult:
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Names of the samples it needs; all of them for a function, because what that uses cannot be known."""
+        """Names of the required samples; all fields for a function, because the samples that it uses are not known."""
         return self.of.quantity.fields if isinstance(self.of, Functional) else FIELDS
 
     @property
     def unit(self) -> str:
-        """Its unit; "" where that is not known."""
+        """Unit of the quantity; "" if unknown."""
         return self.of.unit if isinstance(self.of, Functional) else ""
 
     @property
     def over_path(self) -> bool:
-        """Whether it needs the samples at all times."""
+        """Whether the quantity needs the samples at all times."""
         return isinstance(self.of, Functional) and self.of.over_path
 
     @property
     def is_function(self) -> bool:
-        """Whether it is a function of a Result."""
+        """Whether the quantity is a function of a Result."""
         return not isinstance(self.of, Functional)
 
     @property
     def is_plain(self) -> bool:
-        """Whether it reads samples and parameters of a Result alone."""
+        """Whether the quantity reads only samples and parameters of a Result."""
         return type(self) is OfResult and not self.is_function
 
     @property
     def may_be_infinite(self) -> bool:
-        """Whether an infinite number is an answer, and no failure."""
+        """Whether an infinite number is a valid value of the quantity."""
         return False
 
     def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
-        """Statistics that a run must gather for it, by the name of the estimate."""
+        """Statistics that a run must gather for the quantity, by the name of the estimate."""
         return {}
 
     def values(self, result: Result, members: Any = None) -> np.ndarray:
-        """Compute its numbers for each member.
+        """Compute the numbers of the quantity for each member.
 
-        members: As lw.Ensemble.select gives them, for a Quantity that looks at them; by default the result's own parameters
+        members: Members from lw.Ensemble.select, for a Quantity that uses them; by default the result's own parameters
             and first samples.
         Returns: float64 array, shape (n, m).
         """
@@ -106,7 +106,7 @@ class OfResult:
         return numbers.reshape(result.members, -1)
 
     def labels(self, count: int) -> list[str]:
-        """Name each of its numbers."""
+        """Name each number of the quantity."""
         if isinstance(self.of, Functional):
             return list(self.of.labels)
         return [self.label] if count == 1 else [f"{self.label}[{i}]" for i in range(count)]
@@ -118,10 +118,10 @@ ENDS = ("outcome ", "end_time ")
 
 @dataclass(frozen=True)
 class EndQuantity(OfResult):
-    """Outcome or end time of members, or a quantity then or at a time.
+    """Outcome or end time of members, or a quantity at their end or at a time.
 
-    "outcome floor" is 1 for members that ended so, else 0; "end_time floor" says when, and "depth at floor" gives the depth
-    there, NaN for members that ended otherwise; "depth at 30" is the depth after 30 s.
+    "outcome floor" is 1 for members that ended at the floor, else 0. "end_time floor" is the time of this end, and
+    "depth at floor" the depth at it; they are NaN for other members. "depth at 30" is the depth at 30 s.
 
     kind: "outcome", "end_time" or "at".
     outcome: Name of the outcome; "" for a time.
@@ -134,18 +134,18 @@ class EndQuantity(OfResult):
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Names of the samples it needs."""
+        """Names of the required samples."""
         return super().fields if self.kind == "at" else ("position",)
 
     @property
     def unit(self) -> str:
-        """Its unit."""
+        """Unit of the quantity."""
         return {"outcome": "1", "end_time": "s"}.get(self.kind, super().unit)
 
     def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
-        """Statistics that a run must gather, where several events have the status of this one.
+        """Statistics that a run must gather if several events have the status of this one.
 
-        Which then does not tell them apart.
+        In this case the status does not identify the event.
         """
         if not self.outcome:
             return {}
@@ -157,7 +157,7 @@ class EndQuantity(OfResult):
         return {} if alone else {f"each end_time {self.outcome}": EndTime(self.outcome, then=MemberValues())}
 
     def values(self, result: Result, members: Any = None) -> np.ndarray:
-        """Compute its numbers for each member, float64, (n, m)."""
+        """Compute the numbers of the quantity for each member, float64, (n, m)."""
         if self.when is not None:
             rows = rows_at(result.time, self.when)
             if not len(rows):
@@ -192,7 +192,7 @@ class EndQuantity(OfResult):
         return self.of(*samples_of(result, when, members))[0]
 
     def labels(self, count: int) -> list[str]:
-        """Name each of its numbers."""
+        """Name each number of the quantity."""
         if self.kind != "at":
             return [self.label]
         end = self.label.partition(" at ")[2]
@@ -201,45 +201,45 @@ class EndQuantity(OfResult):
 
 @dataclass(frozen=True)
 class MetricQuantity(OfResult):
-    """A metric of a loop, one number of each member: infinite where it never gets there, NaN of a member that failed.
+    """Metric of a control loop, one number per member: infinite if it is never reached, NaN for a failed member.
 
-    metric: The statistic, which keeps the numbers of all members.
+    metric: The statistic that keeps the numbers of all members.
     """
 
     metric: Any = None
 
     @classmethod
     def named(cls, key: str, entry: Any) -> MetricQuantity:
-        """The metric that an entry names, as a sweep names it; key: of the argument, for faults."""
+        """Make the quantity from a metric's name or object, as in a sweep; key: name of the argument, for messages."""
         label, metric = metric_of(key, entry)
         return cls(label, functional(key, "position"), metric=metric)
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """Names of the samples it needs: what it gathers is beside them."""
+        """Names of the required samples; the data of the metric itself are gathered separately."""
         return ("position",)
 
     @property
     def unit(self) -> str:
-        """Its unit; "" for a metric."""
+        """Unit of the quantity; "" for a metric."""
         return ""
 
     @property
     def of_samples(self) -> bool:
-        """Whether it sees the samples that are kept: else it comes to every tick."""
+        """Whether the metric uses the saved samples instead of every tick."""
         return not self.metric.ticks
 
     @property
     def may_be_infinite(self) -> bool:
-        """Yes, as a settling time is where a member never settles."""
+        """Always true: a settling time is infinite if a member never settles."""
         return True
 
     def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
-        """The metric."""
+        """The metric as the statistic to gather."""
         return {gathered_name(self.label): self.metric}
 
     def values(self, result: Result, members: Any = None) -> np.ndarray:
-        """Look its numbers up, float64, (n, 1)."""
+        """Look up the numbers of the members, float64, (n, 1)."""
         if gathered_name(self.label) not in result.statistics:
             problem = "is a metric that the run has not gathered by member"
             raise refusal(
@@ -252,12 +252,12 @@ class MetricQuantity(OfResult):
         return np.where(failed(np.asarray(result.status)), np.nan, numbers)[:, None]
 
     def labels(self, count: int) -> list[str]:
-        """Name it."""
+        """Name of the quantity."""
         return [self.label]
 
 
 def _of_ends(text: str) -> EndQuantity | None:
-    """The quantity that a text names by an outcome or a time; None where it names neither. Raises SceneError."""
+    """Parse a text that names an outcome or a time; None if it names neither. Raises SceneError."""
     kind, _, outcome = text.partition(" ")
     if f"{kind} ".startswith(ENDS) and outcome.strip():
         return EndQuantity(text, functional("of", "position"), kind=kind, outcome=outcome.strip())
@@ -278,7 +278,7 @@ def _of_ends(text: str) -> EndQuantity | None:
 
 
 class _Samples(dict[str, np.ndarray]):
-    """Samples of a result in the form that functions of (samples, members) take."""
+    """Samples of a result as an argument of functions of (samples, members)."""
 
     def __init__(self, fields: Mapping[str, np.ndarray], time: np.ndarray, result: Result):
         super().__init__(fields)
@@ -291,7 +291,7 @@ class _Samples(dict[str, np.ndarray]):
 
 
 def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
-    """The (samples, members) of a result in the form that a Quantity's function takes."""
+    """The (samples, members) of a result, as arguments of a Quantity's function."""
     fields = {name: result.samples[name][when] for name in ordered(result.samples)}
     start = {name: result.samples[name][0] for name in fields}
     known = SimpleNamespace(parameters=result.parameters, starts=result.starts, count=result.members, **start)
@@ -299,7 +299,7 @@ def samples_of(result: Result, when: slice = slice(None), members: Any = None) -
 
 
 def unit_of(of: OfInterest) -> str:
-    """The unit of a quantity of interest; "" where it has none, or is not known."""
+    """Unit of a quantity of interest; "" if it has none, or if it is unknown."""
     try:
         (each,) = quantities(of)
     except SceneError:
@@ -309,10 +309,10 @@ def unit_of(of: OfInterest) -> str:
 
 
 def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
-    """Read one or several quantities of interest.
+    """Convert one or several quantities of interest to `OfResult`.
 
-    of: A text such as "max(depth)", "outcome floor", "end_time floor", "depth at 30" or "iae depth", a Quantity, a metric, a
-        function of a Result or of (samples, members), one of these that was read before, or several of them.
+    of: A text such as "max(depth)", "outcome floor", "end_time floor", "depth at 30" or "iae depth", a Quantity, a
+        metric, a function of a Result or of (samples, members), an `OfResult`, or a sequence of these.
     """
     items = None if isinstance(of, OfResult | Statistic) or callable(of) else items_of(of)
     requests = [of] if items is None else items
@@ -345,18 +345,18 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
 
 
 def names_a_metric(request: Any) -> bool:
-    """Whether what is asked for is a metric: a text of how members ended is none, and "energy" is that at the end."""
+    """Whether a request is a metric. A text about the members' ends is none, and "energy" is the energy at the end."""
     a_quantity = isinstance(request, str) and request in KNOWN
     return names_a_statistic(request) and not names_an_end(request) and not a_quantity
 
 
 def names_an_end(request: Any) -> bool:
-    """Whether what is asked for is how or when members ended."""
+    """Whether a request is the outcome or the end time of members."""
     return isinstance(request, str) and request.startswith(ENDS)
 
 
 def _of_samples(function: Callable[..., Any]) -> bool:
-    """Whether a function is one of (samples, members), as statistics take them, and not one of a Result."""
+    """Whether a function takes (samples, members), as for statistics, and not a Result."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The result of a run: samples, status of each member, statistics, and the provenance they follow from."""
+"""The result of a run: samples, status of each member, statistics, and provenance."""
 
 from __future__ import annotations
 
@@ -61,53 +61,56 @@ class _Signal:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(Summarized):
-    """Samples of n members at k times, the status of each member, and the provenance they follow from.
+    """Samples of n members at k times, the status of each member, statistics, messages and provenance of a run.
 
-    Sample 0 is the initial state. Samples are float64 or float32, as the run's dtype. With float32_compensated everything is
-    float32 except position, which is float64 so that no digit of the compensated sum is lost.
+    Sample 0 is the initial state. Samples have the run's dtype, float64 or float32. With float32_compensated, position
+    is float64, so that no digit of the compensated sum is lost, and all other samples are float32.
 
     Attributes:
         time: Times of the samples [s], shape (k,).
-        samples: Arrays of the fields that were kept, by name. Each is also an attribute: position (k, n, 3) [m, inertial],
+        samples: Arrays of the saved fields, by name; each is also an attribute. Motion: position (k, n, 3) [m, inertial],
             attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
-            Signals of a controller, if SaveAt(fields=...) names them, are the values after the tick at each time: command
-            and actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand, unmet and exerted
-            (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
-            _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed. Of a
-            filter (see lw.control.ErrorStateFilter): estimate_sigma (k, n, 15), estimate_bias (k, n, 6), nees, nis,
-            nis_count (k, n), innovation and innovation_sigma (k, n, 12). So are energy_used (k, n) [J], of a scene that
-            accounts it, and navigation_error (k, n, 3) [m, inertial], of one that estimates the position.
+            Signals of a controller need SaveAt(fields=...), and are the values after the tick at each time. These are
+            command (k, n, channels); actuator (k, n, channels), after delay, fault, limit and lag; demand, unmet and
+            exerted (k, n, 6) [N, N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth,
+            _heading; reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed.
+            Signals of a filter (see lw.control.ErrorStateFilter) are estimate_sigma (k, n, 15), estimate_bias (k, n, 6),
+            nees, nis, nis_count (k, n), innovation and innovation_sigma (k, n, 12). energy_used (k, n) [J] needs a term
+            `lw.terms.EnergyUse`; navigation_error (k, n, 3) [m, inertial] needs an estimate of the position.
         status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
-        failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN where there
-            was neither.
-        failure_value: The value that crossed its limit, shape (n,): |J^-1 a| or the relative residual (psi_x: half the angle
-            of its turns); 0 for a non-finite state and for an event, NaN without.
-        warnings: Bits of Warnings, shape (n,). Motion is checked every 128 steps and at the end, with checks="all" only.
-        warning_time: When each member's most serious warning was first seen [s], shape (n,); 0 for one that follows from its
-            start, NaN without.
-        warning_value: The value at that time, shape (n,); NaN without.
+        failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN
+            without failure or event.
+        failure_value: The value that crossed its limit, shape (n,): |J^-1 a| or the relative residual (psi_x: half the
+            angle of its turns). It is 0 for a non-finite state and for an event, and NaN without failure or event.
+        warnings: Bits of Warnings, shape (n,). Warnings about the motion need checks="all", which checks it every 128
+            steps and at the end.
+        warning_time: Time at which each member's most serious warning was first seen [s], shape (n,); 0 for a warning
+            about its start, NaN without a warning.
+        warning_value: The value that caused the warning at that time, shape (n,); NaN without a warning.
         substeps: Number of steps that were divided (on_failure="substep"), shape (n,).
-        event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None where `status` tells.
+        event: Number of the event that stopped each member, from 1; 0 for none, shape (n,). None if `status` identifies
+            it.
         parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
         starts: Numbers of the start that varied, by name, (n, ...): "start.position", "start.euler_deg", ...
         weights: Statistical weights of the members, (n,), of mean 1 (see lw.designs.Table); None: equal weights.
-        messages: Remarks on how far the result can be relied on.
+        messages: Notes and warnings on the reliability of the result.
         provenance: Scene, ensemble with its seed, settings, versions and machine.
         terms: The scene's terms.
         statistics: Estimates of the statistics gathered during the run, by name.
-        kept: Samples of the members in kept_members, where not those of all members were kept; else None.
+        kept: Result with the samples of the members in kept_members, if `keep` selected some members; else None.
         kept_members: Indices of these members, shape (m,).
         store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
-        jacobian: Derivatives of the samples by the numbers in `tangents`, by name, each of the samples' shape and one
-            dimension more: (k, n, ..., tangents); NaN from where a member ended. Empty without `tangents`.
-        tangents: Names of these numbers, as `solve(tangents=...)` got them.
+        jacobian: Derivatives of the samples with respect to the numbers in `tangents`, by field. Each has the shape of
+            the samples and a last dimension for these numbers. NaN after a member ended. Empty without `tangents`.
+        tangents: Names of these numbers, as given in `solve(tangents=...)`.
         end: Value of `final`, or a function without arguments that reads it; None if it was not kept.
         compile_seconds: Time to load the kernel [s].
-        compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
-        run_seconds: Time of the run without that [s].
+        compile_phases: Parts of compile_seconds [s]: `source` to write C++, `clang` to compile it (0 if cached),
+            `load`.
+        run_seconds: Time of the run without compile_seconds [s].
         members: Number of members, n.
         end_time: Time up to which each member ran [s], shape (n,).
-        final: Final states, from which a run can go on.
+        final: Final states, from which a run can be continued.
         depth: Depth [m], shape (k, n).
         altitude: Height above the floor [m], shape (k, n).
         speed: Length of the velocity [m/s], shape (k, n).
@@ -117,10 +120,10 @@ class Result(Summarized):
         dataset: The samples as an xarray Dataset.
 
     Methods:
-        frame: Table of the members: inputs, outcome, end.
+        frame: Table of the members: inputs, outcome and final state.
         part: Select members.
         save: Write the result to a file.
-        load: Read such a file.
+        load: Read a file that `save` wrote.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -188,7 +191,7 @@ class Result(Summarized):
         return title, [row for row in rows if row[1]]
 
     def summary_picture(self) -> str:
-        """Depths of a few members over time; of a run in memory alone, since a store may be slow."""
+        """Curves of the depth of a few members; only for a run in memory, since a store may be slow."""
         drawn = self if self.samples and self.store is None else self.kept
         if drawn is None or "position" not in drawn.samples:
             return ""
@@ -252,7 +255,7 @@ class Result(Summarized):
         return notation.quaternion_from_matrix(self.attitude).astype(self.attitude.dtype)
 
     def _quantity(self, name: str) -> np.ndarray:
-        """A quantity that statistics know, float64, of the samples that it needs."""
+        """Compute a quantity of statistics from the samples, float64."""
         quantity = KNOWN[name]
         samples: Any = {field: self._kept(field) for field in quantity.fields}
         return np.asarray(quantity.function(samples, None), dtype=np.float64)  # type: ignore[arg-type]
@@ -285,10 +288,10 @@ class Result(Summarized):
 
     @property
     def final(self) -> Final:
-        """Final states of the members, from which a run can go on: lw.solve(..., start=result.final).
+        """Final states of the members, from which a run can be continued: lw.solve(..., start=result.final).
 
         Raises:
-            AttributeError: If it was not kept.
+            AttributeError: If the final states were not kept.
         """
         if self.end is None:
             raise AttributeError("the end of the run was not kept. Give SaveAt(final=True)")
@@ -298,7 +301,7 @@ class Result(Summarized):
     def end_time(self) -> np.ndarray:
         """Time up to which each member ran [s], shape (n,): its event, its failure, or the end of the run.
 
-        With `status` these are the event times and event types of survival analysis.
+        In survival analysis, end_time and `status` are the event times and event types.
         """
         return np.where(np.isnan(self.failure_time), self.time[-1], self.failure_time)
 
@@ -314,16 +317,16 @@ class Result(Summarized):
         return own(term, self.parameters)
 
     def part(self, places: Sequence[int] | np.ndarray | slice) -> Result:
-        """Select members, in the order given; one may come several times.
+        """Select members, in the given order; an index may occur several times.
 
         Args:
             places: Indices of the members in this result, counted from 0, shape (m,); a slice; or a mask (n,).
 
         Returns:
-            A result of these members alone; statistics stay those of the whole run.
+            A result of these members alone. Its statistics are those of the whole run.
 
         Raises:
-            SceneError: If there are no such members (also an IndexError).
+            SceneError: If the result does not have these members (this error is also an IndexError).
         """
         places = members_of("places", places, self.members)
         parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
@@ -359,7 +362,7 @@ class Result(Summarized):
     def dataset(self) -> xarray.Dataset:
         """The samples as an xarray Dataset with dimensions time, realization, component (needs the extra `store`).
 
-        For a run in a store it is a view: values are read when they are used, and energy is left out.
+        For a run in a store the values are read when they are used, and energy is omitted.
 
         Raises:
             ImportError: If xarray is not installed.
@@ -385,16 +388,17 @@ class Result(Summarized):
         return xr.Dataset(data, coordinates, attributes)
 
     def frame(self) -> pandas.DataFrame:
-        """Build a table of the members, one a row (needs pandas, which the extra `store` brings).
+        """Build a table with one row per member (needs pandas, which the extra `store` installs).
 
         Columns:
 
         * inputs that differ between members, by name and component: "vehicle.buoyancy", "start.position[2]";
         * `outcome`, the status by name, and `end_time` [s];
-        * the end, as far as it was kept: `position[0]` to `position[2]` [m, inertial axes], `euler[0]` ... [rad],
-          `velocity[0]` ... [m/s] and `angular_velocity[0]` ... [rad/s], body axes.
+        * the final state, for the fields that were kept: `position[0]` to `position[2]` [m, inertial axes], `euler[0]` to
+          `euler[2]` [rad], `velocity[0]` to `velocity[2]` [m/s] and `angular_velocity[0]` to `angular_velocity[2]`
+          [rad/s], body axes.
 
-        `frame.attrs["units"]` has the units. Of samples in a store the last time alone is read.
+        `frame.attrs["units"]` has the units. From a store, only the samples of the last time are read.
 
         Returns:
             The table. Its index is the member in this result, counted from 0.
@@ -415,15 +419,15 @@ class Result(Summarized):
         return frame_of(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the result to an .npz file, durable, and either whole or not at all.
+        """Write the result to an .npz file. The file is either complete and durable, or not written at all.
 
-        Where no samples were kept, parameters are left out too: they follow from the provenance's ensemble.
+        If no samples were kept, parameters are omitted too, since the ensemble in the provenance determines them.
 
         Args:
-            path: The file; one that exists is replaced.
+            path: The file; an existing file is replaced.
 
         Returns:
-            The path.
+            The path of the file.
 
         Raises:
             OSError: If the file cannot be written.
@@ -451,10 +455,10 @@ class Result(Summarized):
 
     @classmethod
     def per_member(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Select from arrays those that are arguments of a result, one number for each member.
+        """Select the arrays that are arguments of a result with one number for each member.
 
         Args:
-            arrays: Arrays of shape (n,), by name, status and warnings among them.
+            arrays: Arrays of shape (n,), by name, including status and warnings.
 
         Returns:
             Arguments of Result, by name.
@@ -466,7 +470,7 @@ class Result(Summarized):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Result:
-        """Read a file that `save` wrote, also one from elsewhere: nothing in it is executed.
+        """Read a file that `save` wrote. A file from an untrusted source is safe: nothing in it is executed.
 
         Reading takes no more memory than the size of the file.
 
@@ -478,7 +482,7 @@ class Result(Summarized):
 
         Raises:
             OSError: If the file cannot be read.
-            SceneError: If it is damaged, or no result (SceneError is a ValueError).
+            SceneError: If the file is damaged, or is not a result (SceneError is a ValueError).
         """
         with corrupt_file_as_scene_error(
             path, "no result of lgvi-warp", "run the scene again, or ask for the file anew"
@@ -488,7 +492,7 @@ class Result(Summarized):
 
     @classmethod
     def _from(cls, content: Mapping[str, np.ndarray], texts: Mapping[str, Any]) -> Result:
-        """A result from arrays and texts that were checked."""
+        """Build a result from checked arrays and texts."""
         estimates = Estimates()
         if "statistics" in content:
             estimates = Estimates.from_arrays(_below("statistics/", content), str(content["statistics"]))
@@ -517,10 +521,10 @@ class Result(Summarized):
 
 
 def _part_of(end: Callable[[], Final], places: np.ndarray) -> Final:
-    """Some members of the end that a function reads."""
+    """Select some members of the final states that a function reads."""
     return end().part(places)
 
 
 def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The arrays whose names begin with a prefix, under their names without it."""
+    """Select the arrays whose names begin with a prefix, and remove the prefix."""
     return {name.removeprefix(prefix): value for name, value in content.items() if name.startswith(prefix)}

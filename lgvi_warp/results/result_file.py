@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of the arrays in a result.npz, so that a damaged or foreign file is rejected with one clear line."""
+"""Checks of the arrays in a result.npz: a damaged or foreign file is refused with a clear message."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TEXTS = ("messages", "provenance", "statistics", "final", "tangents")
 
 
 def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Check that the arrays of a result fit each other, and read its texts."""
+    """Check that the arrays of a result are consistent, and read its texts."""
     if missing := [name for name in ("time", "status", *TEXTS[:2]) if name not in content]:
         raise ValueError(f"it has no {', '.join(missing)}")
     of_members = {item.name: np.dtype(item.dtype) for item in member_fields.FIELDS}
@@ -63,7 +63,7 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
 
 
 def _tangents(content: Mapping[str, np.ndarray]) -> tuple[str, ...]:
-    """The names of the numbers of the derivatives. Raises ValueError."""
+    """Names of the numbers of the derivatives. Raises ValueError."""
     names = parsed(str(content["tangents"])) if "tangents" in content else []
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ValueError("its tangents are not names")
@@ -73,7 +73,7 @@ def _tangents(content: Mapping[str, np.ndarray]) -> tuple[str, ...]:
 
 
 def _final(content: Mapping[str, np.ndarray]) -> None:
-    """Check the numbers of the end of a run. Raises ValueError."""
+    """Check the arrays of the final states. Raises ValueError."""
     if "final" not in content:
         return
     table = parsed(str(content["final"]))
@@ -86,7 +86,7 @@ def _final(content: Mapping[str, np.ndarray]) -> None:
 
 
 def _provenance(table: Any) -> None:
-    """Check what the summary and the pictures read of the provenance. Raises ValueError."""
+    """Check the entries of the provenance that the summary and the pictures read. Raises ValueError."""
     good = isinstance(table, dict) and isinstance(table.get("scene"), dict) and isinstance(table.get("method"), dict)
     if not good or not isinstance(table["method"].get("name"), str) or not isinstance(table.get("step"), int | float):
         raise ValueError("its provenance tells no scene, method or step")

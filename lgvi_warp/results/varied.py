@@ -13,7 +13,7 @@ STARTS = ("position", "velocity", "angular_velocity")
 
 
 def varied(result: Any) -> dict[str, np.ndarray]:
-    """Collect the numbers (n,) that differ between members, by name and component: parameters, then those of the start."""
+    """Collect the numbers (n,) that differ between members, by name and component: first parameters, then the start."""
     inputs = {}
     starts: Mapping[str, np.ndarray] = result.starts
     if not starts and result.store is None:

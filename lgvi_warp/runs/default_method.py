@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The method of a run for which no one names one, chosen by what acts in the scene and by the error at the step.
+"""The default method of a run, chosen from the terms of the scene and from the estimated error at its step.
 
-Conservative motion keeps its symplectic method. A splitting moves steady motion, and Runge-Kutta methods keep it, so these
-advance damped scenes: the cheapest whose step is stable and whose error is small, as the rates of the motion tell.
+A scene without damping gets a symplectic method, or rk4 if its inertia changes. A splitting changes the steady motion
+of a damped scene, and Runge-Kutta methods keep it. A damped scene therefore gets the cheapest Runge-Kutta method that
+is stable and accurate at the step, judged by the rates of the motion.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ OTHERWISE = ("psi_x", "psi_s")
 
 
 def planned(ensemble: Ensemble, grid: TimeGrid, others: tuple[Any, ...]) -> Plan:
-    """Plan a run with the first method that takes it; `others` are the arguments of `choose_plan` after the grid."""
+    """Plan a run with the first method that is possible; `others` are the arguments of `choose_plan` after the grid."""
     known_rates = rates(ensemble)
     for method in choices(ensemble, grid.h, known_rates):
         remarks = messages(method, known_rates, grid.h, max(AHEAD, grid.h * grid.steps))
@@ -83,18 +84,18 @@ def choices(ensemble: Ensemble, h: float, known_rates: Rates | None = None) -> I
 def ranked(errors: dict[str, float], well: Collection[str]) -> list[str]:
     """Rank methods by their errors at a step.
 
-    Returns: Those whose error is small, the cheapest first; then the others, the least error first. Near its limit of
-        damping a method is one of the others.
+    well: Methods that are well within their limits at this step.
+    Returns: The methods of `well` with a small error, the cheapest first; then the others, the smallest error first.
     """
     known = [name for name in errors if name in well or math.isfinite(errors[name])]
     return sorted(known, key=lambda name: 0.0 if name in well and errors[name] <= CHEAPER else errors[name])
 
 
 def messages(method: Method, rates: Rates, h: float, t1: float) -> tuple[str, ...]:
-    """Tell that a step is too long to follow the path.
+    """Warn if the step is too long to follow the path.
 
     h: Step [s].
-    t1: End [s]. A step is judged by no less than AHEAD, as the choice is.
+    t1: End of the time over which the error is estimated [s]; the caller passes at least AHEAD, as in the choice.
     """
     near = method.name in DAMPED and not stable(method, h_rates(rates, h))
     if path_error(method, rates, h, t1) <= ALLOWED and not near:
@@ -110,11 +111,11 @@ def messages(method: Method, rates: Rates, h: float, t1: float) -> tuple[str, ..
 
 
 def cost(method: Method, rates: Rates, h: float, measured: tuple[float, float] | None = None) -> str:
-    """Tell how far a method for damped scenes is off, and what it costs beside the cheapest one, and that would lose.
+    """Describe the error and the cost of a method for damped scenes, compared with the cheapest such method.
 
     h: Step [s].
-    measured: the method's error over the length of the path [1] and the time that it was measured in [s]; default None: by
-        its rates.
+    measured: the method's error divided by the length of the path [1], and the simulated time [s]; default
+        None: the error is estimated from the rates.
     Returns: A text; "" for a method that is not chosen by its error.
     """
     if method.name not in DAMPED:
@@ -136,7 +137,7 @@ def cost(method: Method, rates: Rates, h: float, measured: tuple[float, float] |
 
 
 def best_error(method: Method, rates: Rates, h: float, t1: float) -> float:
-    """The error at a shorter step, by the method itself or one of those for damped scenes.
+    """Smallest error at a shorter step, among the method itself and the methods for damped scenes.
 
     h: The shorter step [s].
     t1: End [s].
@@ -147,7 +148,7 @@ def best_error(method: Method, rates: Rates, h: float, t1: float) -> float:
 
 
 def stable(method: Method, numbers: dict[str, float], share: float = SHARES["drag"]) -> bool:
-    """Tell whether a step is well within a method's limits."""
+    """Tell whether a step is well within the stability limits of a method."""
     drag = MOST_IMPLICIT if method.linearly_implicit else share * drag_limit(method.name)
     return numbers["drag"] <= drag and numbers["rotation"] <= SHARES["rotation"] * rotation_limit(method)
 
@@ -162,9 +163,9 @@ def is_damped(ensemble: Ensemble) -> bool:
 
 
 def h_rates(rates: Rates, h: float) -> dict[str, float]:
-    """Multiply the rates of the fastest of the first members by the step.
+    """Multiply the fastest rates among the first members by the step.
 
     h: Step [s].
-    Returns: "drag" and "rotation" -> number [1]; drag as large as rkw3 takes where a term does not tell how it brakes.
+    Returns: "drag" and "rotation" -> number [1]; the limit of rkw3 for drag if the damping of a term is unknown.
     """
     return {"drag": MOST_IMPLICIT if rates.drag is None else h * rates.drag, "rotation": h * rates.rotation}

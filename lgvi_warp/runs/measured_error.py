@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Error of a planned run, measured on its first member at the step and at half of it.
+"""Error of a planned run, measured on its first member by a comparison of the step with half the step.
 
-Estimates by rates (`step_error`) linearise the motion at the start, and miss what damping near the limit of a method adds.
+Estimates from rates (`step_error`) linearise the motion at the start. They miss the error of damping near a method's limit.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ NEAR = 1.0 / 3.0
 
 
 def measured_error(plan: Plan, most: int = MOST_STEPS) -> tuple[float, float] | None:
-    """Measure how far the first member's positions at the step and at half of it are apart, over the length of its path.
+    """Measure the difference of the first member's positions between the step and half the step, relative to its path.
 
-    most: Most steps of both runs; a longer run is measured up to there.
-    Returns: The error [1], infinite where a run fails, and the time that was looked at [s]; None where a second run would not
-        be the same motion, or nothing moves.
+    most: Largest number of steps of both runs together; of a longer run only the first part is measured.
+    Returns: The error divided by the length of the path [1], infinite if a run fails, and the simulated time [s]; None
+        if a second run would not be the same motion, or nothing moves.
     """
     fleet, choice = plan.ensemble, plan.kernel_choice
     if fleet.final is not None or fleet.given is not None or fleet.copies is not None or choice.has_callback:
@@ -58,13 +58,13 @@ def measured_error(plan: Plan, most: int = MOST_STEPS) -> tuple[float, float] | 
 
 
 def telling_error(plan: Plan) -> Plan:
-    """The plan with a message where its method was chosen, its step is near the limit of damping, and the error is large."""
+    """Add a warning to a plan with a default method whose step is near the damping limit and whose error is large."""
     said = any(text.startswith("step h =") for text in plan.grid.messages)
     return plan if not plan.method.reason or plan.method.name not in DAMPED or said else _near_the_limit(plan)
 
 
 def _near_the_limit(plan: Plan) -> Plan:
-    """The same for a method of DAMPED that was chosen."""
+    """Measure the error of a plan with a method of DAMPED near its limit, and add a warning if it is large."""
     name = plan.method.name
     drag, limit = h_rates(rates(plan.ensemble), plan.grid.h)["drag"], drag_limit(name)
     measured = measured_error(plan, FEW_STEPS) if NEAR * limit < drag < math.inf else None

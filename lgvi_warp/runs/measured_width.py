@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The width of packets by the kernel itself: measured on one block, where a run is long enough to pay for it."""
+"""The best width of packets, measured with the kernel on one block, if a run is long enough to repay the time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WORTH = 0.03
 
 @dataclass(frozen=True)
 class WidthTimes:
-    """Time per vehicle and step [ns] by width; before: the width that the plan had; best: the one to keep."""
+    """Time per vehicle and step [ns] by width; before: width of the plan; best: width to use."""
 
     ns: dict[int, float]
     before: int
@@ -33,7 +33,7 @@ class WidthTimes:
 
 
 def candidates(plan: Plan, registers: Sequence[int]) -> list[int]:
-    """The widths of one number in so many SIMD registers."""
+    """Widths at which one number of all vehicles fills these numbers of SIMD registers."""
     found = (n * register_width(plan.dtype) for n in registers)
     return [width for width in found if width in widths.WIDTHS]
 
@@ -55,7 +55,7 @@ def measure(
 
 
 def _launch(plan: Plan, clock: Callable[[], float]) -> Callable[[], float]:
-    """A call that starts some members anew and steps them: how long a step of one took [s]."""
+    """Make a function that restarts some members, advances them, and returns the time per member and step [s]."""
     plan.compile()
     count, steps = min(plan.ensemble.members, MEMBERS), min(plan.grid.steps, STEPS)
     members = plan.ensemble.select(0, count)
@@ -72,7 +72,7 @@ def _launch(plan: Plan, clock: Callable[[], float]) -> Callable[[], float]:
 
 
 def with_best_width(plan: Plan, threads: int, clock: Callable[[], float] = thread_seconds) -> Plan:
-    """The plan, or that of a better width: if the run is long, two widths are measured, and the answer kept for others."""
+    """Return a plan with the faster width. For a long run two widths are measured; the result is saved for later."""
     asked, choice = plan.width_source in ("asked for", "measured"), plan.kernel_choice
     work = plan.ensemble.members * plan.grid.steps
     # The bits of adaptive steps depend on the packet, and a function of the host is called between launches.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run as it is asked for: its members, its settings, what is kept of it and who runs it, settled once for every call."""
+"""A requested run: its members, its settings, the data that it keeps and its executor, settled once for every call."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ ALL_SAMPLES = Observation()
 
 @dataclass(frozen=True)
 class Request:
-    """A run as it is asked for; settings that are None come from the [run] of the scene, and are explained at `lw.solve`.
+    """A requested run. Settings that are None come from the scene's [run]; `lw.solve` explains them.
 
     h: step [s].
     t1: end of the run [s].
-    observed: statistics, members whose samples are kept, and when the run stops.
-    threads: None for as many as the run is worth.
+    observed: statistics, members whose samples are kept, and the rule that ends the run.
+    threads: number of threads; None: chosen by the amount of work.
     executor: None for threads.
-    settled: steps and sample times of a run that goes on; None where h, t1 and save say them.
+    settled: steps and sample times of a resumed run; None if h, t1 and save determine them.
     """
 
     fleet: Ensemble
@@ -81,7 +81,7 @@ class Request:
         scheduler: str | None = None,
         **settings: Any,
     ) -> Request:
-        """The run that the arguments of `solve` ask for; what is wrong with those named here is added to the faults."""
+        """Make the request from arguments of `solve`; problems with those named here are added to the faults."""
         observed, runner = ALL_SAMPLES, None
         with faults.including():
             observed = observe(fleet, statistics, keep, until)
@@ -99,7 +99,7 @@ class Request:
 
     @property
     def keeps_final(self) -> bool:
-        """Whether the result is to hold what another run needs to go on."""
+        """Whether the result is to have `final`, from which another run can continue."""
         if self.save is not None and self.save.final is not None:
             return self.save.final
         return self.observed.samples and self.fleet.members < MOST_FINALS
@@ -133,7 +133,7 @@ class Request:
         return time_grid(h, t1, SaveAt(), t0).telling(f"{problem}: only the start and the end are kept")
 
     def plan(self, survey_all: bool = True) -> Plan:
-        """Settle the run: its steps, its method and its kernel.
+        """Plan the run: its steps, its method and its kernel.
 
         survey_all: as in `choose_plan`.
         """
@@ -156,10 +156,10 @@ class Request:
         return choose_plan(self.fleet, method, grid, *others)
 
     def run(self, plan: Plan, **settings: Any) -> Result:
-        """Run in memory, and the members again whose samples alone are kept.
+        """Run in memory, then run the members again whose samples are to be kept.
 
-        plan: the plan of this request. Where a member beyond those that were looked at needs another kernel, the run begins
-            anew with a kernel for all members, so that they have the bits of one kernel.
+        plan: the plan of this request, from a survey of some members. If another member needs another kernel, the run
+            starts again with a kernel for all members, so that all bits come from one kernel.
         settings: as in `run_plan`.
         """
         settings = {"observed": self.observed, "fields": self.saved, "executor": self.executor, **settings}
@@ -174,9 +174,9 @@ class Request:
         return refuse_failed(result, plan)
 
     def again(self, plan: Plan, status: np.ndarray) -> tuple[np.ndarray, Result | None]:
-        """Run the members again whose samples are wanted after the run; they have the same bits as in the run.
+        """Run the members again whose samples are kept after the run; the bits are the same as in the run.
 
-        status: (n,), of each member.
+        status: status of each member (n,).
         Returns: Their indices, (m,), and their result, None if there are none.
         """
         indices = self.observed.again(status)
@@ -189,20 +189,20 @@ class Request:
 
 
 def scene_of(fleet: Any, key: str = "fleet") -> Any:
-    """The scene of an Ensemble, or a Scene itself; key: name of the argument. Raises SceneError."""
+    """The scene of an Ensemble, or the Scene itself; key: name of the argument. Raises SceneError."""
     if not isinstance(fleet, Ensemble | Scene):
         raise refusal(key, fleet, "is neither an Ensemble nor a Scene", "give lw.Scene(...) or lw.Ensemble(...)")
     return fleet.scene if isinstance(fleet, Ensemble) else fleet
 
 
 def ensemble_of(fleet: Any) -> Ensemble:
-    """The members that are meant: those of an Ensemble, or of a Scene with its [ensemble]."""
+    """The Ensemble itself, or the ensemble of a Scene with its [ensemble]."""
     scene = scene_of(fleet)
     return fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(scene)
 
 
 def longest(scene: SceneLike, h: Any) -> float:
-    """The end of the longest run of a scene with steps of h [s]; 1 s where h is no step, of which a run tells."""
+    """End of the longest possible run of a scene with steps h [s]; 1 s for an invalid h, which the run itself reports."""
     if not (isinstance(h, float | int) and np.isfinite(h) and h > 0.0):
         return 1.0
     draws = [term.draws(h) for term in scene.terms if isinstance(term, NoisyTerm)]
@@ -213,7 +213,7 @@ def longest(scene: SceneLike, h: Any) -> float:
 def enough_iterations(fleet: Ensemble, method: Method, h: float, dtype: str) -> int | None:
     """Find the least number of Newton steps that leaves every member's residual below the tolerance at twice the step.
 
-    The residual after a fixed number grows with h |Omega|: twice the step leaves room for members that spin up.
+    The residual after a fixed number of iterations grows with h |Omega|; twice the step allows members to spin up.
 
     h: Step of the run [s].
     Returns: The number of Newton steps, or None if more than MOST_FIXED would be needed.

@@ -38,7 +38,7 @@ Known = Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]]
 
 
 def refuse_failed(result: Result, plan: Plan) -> Result:
-    """The result of a run, unless members failed and the run is to raise then."""
+    """Return the result, or raise MembersFailed if members failed and on_failure is "raise"."""
     failed = failure_text(result) if plan.on_failure == "raise" else ""
     if failed:
         raise MembersFailed(failed, result)
@@ -61,11 +61,11 @@ def run_plan(
 ) -> Result:
     """Run the blocks of a plan, all or as many as its statistics need, and gather the result in memory.
 
-    fields: Names of the samples to keep; None: all of the plan.
-    known: Function from the plan to provenance and messages, where many runs share them; by default they are made for this
+    fields: Names of the samples to keep; None: all fields of the plan.
+    known: Function from the plan to provenance and messages, if many runs share them; by default they are made for this
         run.
-    final: Whether the result holds what another run needs to go on.
-    slopes: The keeper of the slopes of a run with tangents.
+    final: Whether the result has `final`, from which another run can continue.
+    slopes: The keeper of the derivatives of a run with tangents.
     """
     total, runner, merged = plan.ensemble.members, executor or Threads(threads), Merged()
     compile_seconds = plan.compile()
@@ -103,7 +103,7 @@ def run_plan(
 
 
 class _Gathered:
-    """Data that a run in memory gathers, and the results built from it."""
+    """Data that a run in memory gathers; it builds the results from them."""
 
     def __init__(
         self, plan: Plan, observed: Observation, fields: Sequence[str] | None, known: Known | None, final: bool
@@ -122,13 +122,13 @@ class _Gathered:
 
     @functools.cached_property
     def keepers(self) -> tuple[Any, ...]:
-        """The keepers of a run by blocks: of outcomes, of samples where these are kept, and of statistics."""
+        """The keepers of a run by blocks: for outcomes, for samples if these are kept, and for statistics."""
         samples = (Samples(self.plan, self.fields),) if self.observed.samples else ()
         finals = (self._finals,) if self._finals is not None else ()
         return (Outcomes(self.plan), *samples, *self.observing.keepers, *finals)
 
     def take_all(self, samples: dict[str, np.ndarray], outcome: MemberStatus, rows: Rows) -> None:
-        """Take what was gathered without keepers: the samples and the outcome of all members, and what they left."""
+        """Store data gathered without keepers: samples and outcome of all members, and the rows of their final states."""
         self._whole = samples, outcome, rows
 
     @property
@@ -144,7 +144,7 @@ class _Gathered:
         return {name: values[:, at] for name, values in (kept or {}).items()}
 
     def final(self, n: int, states: Mapping[str, np.ndarray], status: np.ndarray) -> Final | None:
-        """Final states of the first n members; None where not requested, and where none is complete."""
+        """Final states of the first n members; None if not requested, or if none is complete."""
         if self._finals is None or not n:
             return None
         rows = {name: each[:n] for name, each in (self._whole[2] if self._whole else self._finals.rows(n)).items()}
@@ -153,7 +153,7 @@ class _Gathered:
     def of_block(self, block: Block) -> Result:
         """The result of a block's members: their samples and outcomes, without statistics and messages.
 
-        Its arrays are its own: whoever gets it may write into them, and the run goes on with what it has.
+        Its arrays are copies: the caller may change them without an effect on the run.
         """
         plan, at = self.plan, slice(block.first, block.stop)
         of_members = {
@@ -172,7 +172,7 @@ class _Gathered:
         )
 
     def result(self, n: int, complete: bool, compile_seconds: float, run_seconds: float) -> Result:
-        """The result of the first n members; statistics are left out where they include other members (not `complete`)."""
+        """The result of the first n members. Without `complete` it has no statistics: these include other members."""
         plan = self.plan
         if self.known is None:
             content, texts = provenance_but_scene(plan, self.observed, self.fields), messages(plan)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plan of a run by itself."""
+"""A plan from the arguments of `solve`."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ from lgvi_warp.scene.ensemble import Ensemble
 
 
 def make_plan(fleet: Ensemble, *arguments: Any, survey_all: bool = True, **settings: Any) -> Plan:
-    """Settle the settings of a run, as in `Request`."""
+    """Make the plan of a run from its settings, as in `Request`."""
     return Request(fleet, *arguments, **settings).plan(survey_all)

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""About how far a step takes a method off: by the rates at which the motion of a scene changes.
+"""Approximate error of a method at a step, estimated from the rates at which the motion of a scene changes.
 
-The motion is linearised about the members' start, with the damping of the speed that their drive brings. Of each mode
-y' = z y / h an explicit method makes R(z) in place of exp(z). Errors of a mode that dies away end with it, those of the others
-add up.
-Measured beside the errors of runs by `python -m benchmarks run damped`.
+The motion is linearised about the members' start, with the damping at the speed that their drive produces. For each
+mode y' = z y / h an explicit method multiplies by R(z) instead of exp(z). The error of a mode that decays ends with the
+mode; errors of other modes accumulate. `python -m benchmarks run damped` compares the estimates with measured errors.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ class Rates:
     """Rates of change of the first members' motion.
 
     modes: rates of the modes of each member (n, 10), complex [1/s]; infinite where damping is beyond float64.
-    drag: fastest rate of damping alone [1/s]; None where a term does not tell how it brakes.
+    drag: fastest rate of damping alone [1/s]; None if the damping of a term is unknown.
     rotation: largest angular rate at the start [rad/s].
     """
 
@@ -59,7 +58,7 @@ class Rates:
 
 @np.errstate(over="ignore", invalid="ignore")
 def rates(ensemble: Ensemble) -> Rates:
-    """Find the rates of the first members under way."""
+    """Find the rates of the first members that are under way."""
     members = ensemble.select(0, min(LOOKED_AT, ensemble.members))
     p, terms = members.parameters, damping_terms(ensemble.scene.terms)
     known = all(type(term).braking is not Term.braking for term in terms)
@@ -75,7 +74,7 @@ def rates(ensemble: Ensemble) -> Rates:
 
 
 def braking(ensemble: Ensemble, terms: list[Any], members: Members) -> np.ndarray:
-    """Damping of the members at the larger of their speeds at the start and of those that their drive brings.
+    """Damping of the members at their initial speed or at the speed that their drive produces, whichever is larger.
 
     Returns: Matrices (n, 6, 6) [N s/m, N s, N m s].
     """
@@ -98,10 +97,10 @@ def braking(ensemble: Ensemble, terms: list[Any], members: Members) -> np.ndarra
 
 
 def drive(term: Any, numbers: dict[str, np.ndarray]) -> np.ndarray:
-    """Force and torque with which a term drives each member, by the member's own numbers.
+    """Force and torque with which a term drives each member, from the member's own numbers.
 
-    numbers: Its numbers by field, of shape (1, ...) or (n, ...).
-    Returns: Sizes (1 or n, 6) [N, N m].
+    numbers: Numbers of the term by field, of shape (1, ...) or (n, ...).
+    Returns: Magnitudes (1 or n, 6) [N, N m].
     """
     varied = {name: values for name, values in numbers.items() if len(values) > 1}
     if type(term).drive is Term.drive or not varied:
@@ -119,21 +118,21 @@ def drive(term: Any, numbers: dict[str, np.ndarray]) -> np.ndarray:
 def terminal_speeds(force: np.ndarray, linear: np.ndarray, quadratic: np.ndarray) -> np.ndarray:
     """Speeds at which drag along an axis balances a force.
 
-    force: Sizes of force and torque, (n, 6) [N, N m].
+    force: Magnitudes of force and torque, (n, 6) [N, N m].
     linear: Linear drag, (n, 6) [N s/m, N m s].
     quadratic: Quadratic drag, (n, 6) [N s2/m2, N m s2].
-    Returns: Speeds (n, 6) [m/s, rad/s]; 0 where nothing brakes.
+    Returns: Speeds (n, 6) [m/s, rad/s]; 0 without drag.
     """
     root = linear + np.sqrt(linear**2 + 4.0 * np.maximum(quadratic, 0.0) * force)
     return np.divide(2.0 * force, root, out=np.zeros(np.broadcast_shapes(force.shape, root.shape)), where=root > 0.0)
 
 
 def modes(inertia: np.ndarray, damping: np.ndarray, members: Members) -> np.ndarray:
-    """Rates of the motion linearised about the start: velocity, rate, and the attitude, which the restoring moment turns back.
+    """Rates of the motion linearised about the start: velocity, angular rate, and attitude with the restoring moment.
 
     inertia: Mass matrices about the user's origin (1 or n, 6, 6) [kg, kg m, kg m2].
     damping: Damping (1 or n, 6, 6) [N s/m, N s, N m s].
-    Returns: Rates (n, 10), complex [1/s]: of the nine modes, and of the turning itself.
+    Returns: Rates (n, 10), complex [1/s]: of the nine modes, and of the initial rotation itself.
     """
     v, w = members.velocity, members.angular_velocity
     n = len(v)
@@ -160,11 +159,11 @@ def modes(inertia: np.ndarray, damping: np.ndarray, members: Members) -> np.ndar
 
 @np.errstate(all="ignore")
 def path_error(method: Method, rates: Rates, h: float, t1: float) -> float:
-    """Estimate how far a method is off.
+    """Estimate the error of a method over a path.
 
     h: Step [s].
     t1: End [s].
-    Returns: Largest error in position over the length of the path, about [1]; infinite where the step is unstable.
+    Returns: Approximate largest error in position divided by the length of the path [1]; infinite if the step is unstable.
     """
     if not np.isfinite(rates.modes).all():
         return math.inf

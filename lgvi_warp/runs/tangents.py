@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs whose numbers carry slopes: the derivatives of all that is saved by some numbers of the scene, two in one pass."""
+"""Runs with tangents: derivatives of all saved samples with respect to numbers of the scene, two in one pass."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ UNDEFINED = {
 
 
 def check(request: Request, tangents: Any, store: Any, start: Any, on_block: Any) -> tuple[str, ...]:
-    """The names of the numbers, without blanks; refuse what a run with tangents cannot do, before anything is computed."""
+    """Check the names of the numbers, and refuse arguments that a run with tangents does not support, before any work."""
     faults, fleet = Faults(), request.fleet
     names = _names(faults, tangents)
     faults.raise_if_any()
@@ -93,21 +93,21 @@ def _names(faults: Faults, tangents: Any) -> tuple[str, ...]:
 
 
 def _timed(name: str, fleet: Ensemble) -> bool:
-    """Whether a name is that of a part of the controller whose words these are, or of an event; a circle's radius is none."""
+    """Whether a name belongs to an event, or to a part of the controller other than a circle."""
     scene = fleet.scene
     parts = scene.controller.parts if scene.controller else ()
     return name.partition(".")[0] in {part.key for part in (*parts, *scene.events) if not isinstance(part, Loiter)}
 
 
 def _jumping(fleet: Ensemble) -> list[str]:
-    """Keys of schedules in steps."""
+    """Keys of the schedules with steps (jumps)."""
     return [term.key for term in fleet.scene.terms if isinstance(term, WrenchSchedule) and term.jumps]
 
 
 def run_with_tangents(
     request: Request, plan: Plan, tangents: Sequence[str], progress: Callable[[float], None] | None
 ) -> Result:
-    """The run of a request with the derivatives of its samples by these numbers; plan: that of the same without them."""
+    """Run a request with the derivatives of its samples; plan: the plan of the same run without derivatives."""
     _check_plan(plan)
     every = with_copies(request.fleet, tangents)
     result: Result | None = None
@@ -146,7 +146,7 @@ def run_with_tangents(
 
 
 def _passes(tangents: Sequence[str]) -> list[Sequence[str]]:
-    """The names of each pass; where one is left over, another stands behind it, so that one kernel serves all passes."""
+    """Group the names by pass. A last single name is paired with the first name, so that one kernel serves all passes."""
     passes = [tangents[first : first + AT_ONCE] for first in range(0, len(tangents), AT_ONCE)]
     if len(passes) > 1 and len(passes[-1]) < AT_ONCE:
         passes[-1] = [*passes[-1], tangents[0]]
@@ -168,7 +168,7 @@ def _check_plan(plan: Plan) -> None:
 
 
 def plan_of(plan: Plan, tangents: Sequence[str], every: Ensemble) -> Plan:
-    """The same run with slopes by these numbers; every: with those by all, which the kernel serves."""
+    """Plan the same run with derivatives by these numbers; every: the ensemble with derivatives by all, for one kernel."""
     asked = plan.width_source == "asked for"
     # Slopes give the core enough to do beside each other: values of one register leave more of these free.
     width = plan.spec.width if asked else max(2, machine.register_width(plan.dtype))
@@ -188,7 +188,7 @@ def plan_of(plan: Plan, tangents: Sequence[str], every: Ensemble) -> Plan:
 
 
 def _without(result: Result, jacobian: dict[str, np.ndarray]) -> np.ndarray:
-    """Take the derivatives away of members from where they ended on; which members (n,) ended."""
+    """Set derivatives to NaN from the time at which a member ended; returns which members (n,) ended."""
     ended = np.asarray(result.status) != Status.OK
     if ended.any():
         gone = ended & ~(result.time[:, None] < result.failure_time)
@@ -216,7 +216,7 @@ def _of_members(ended: np.ndarray, jacobian: dict[str, np.ndarray], members: int
 
 
 def _remarks(fleet: Ensemble, plan: Plan) -> list[str]:
-    """Sentences on effects that the derivatives of this run leave out."""
+    """Messages on effects that the derivatives of this run leave out."""
     texts = []
     numbers = fleet.parameters(0, fleet.members)
     parts = fleet.scene.controller.parts if fleet.scene.controller else ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`BlockFiles`: the keeper that writes blocks into a store and knows their files, and the format of markers and parts."""
+"""`BlockFiles`: the keeper that writes blocks into a store and knows their files; the format of markers and of parts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def name_of(block: Block) -> str:
 
 @dataclass(frozen=True)
 class BlockFiles:
-    """Keeper that writes blocks into a store, from threads, processes or other machines that see its folder.
+    """Keeper that writes blocks into a store. It may run in threads, processes or other machines that share the folder.
 
     columns: The arrays that are written block by block.
     room: Memory for chunks.
@@ -53,14 +53,14 @@ class BlockFiles:
         return BlockWriter(self.root, self.columns, self.room, plan, block, members)
 
     def understood(self, block: Block) -> AbstractContextManager[None]:
-        """Turn errors that arise while a block's parts are used into faults of their file."""
+        """Turn errors that arise while a block's parts are used into faults of the parts' file."""
         return corrupt_store_as_scene_error(self.root / self.parts_key(block))
 
     def merge(self, block: Block, part: Any) -> None:
-        """Do nothing: the block is in its place already."""
+        """Do nothing: the block is already in its place."""
 
     def finish(self, block: Block, files: durable.Files, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
-        """Hand over a block to be made durable and marked."""
+        """Pass a block on to be made durable and marked."""
         if keepers:
             files.write(self.parts_key(block), packed(keepers, parts))
         self.commits.add(files, self.marker(block), marker(files.sums))
@@ -75,7 +75,7 @@ class BlockFiles:
         return read_marker(self.root, f"blocks/{name_of(block)}.json")
 
     def marker(self, block: Block) -> Path:
-        """Return the path of a block's marker, the file that says that the block is finished."""
+        """Return the path of a block's marker, the file whose existence says that the block is finished."""
         return self.root / "blocks" / f"{name_of(block)}.json"
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
@@ -119,7 +119,7 @@ class BlockFiles:
             (self.root / self.parts_key(block)).unlink(missing_ok=True)
 
     def remove_unfinished(self) -> None:
-        """Remove the unfinished files that killed writers left."""
+        """Remove the unfinished files that killed processes left behind."""
         names = ("blocks", "parts", *(column.name for column in self.columns))
         durable.remove_unfinished([self.root, *(self.root / name for name in names)])
 
@@ -157,7 +157,7 @@ def marker(sums: Mapping[str, list[int]]) -> bytes:
 
 
 def damaged(root: Path, sums: Mapping[str, Sequence[int]]) -> dict[str, str]:
-    """Find the files that are not as their marker says.
+    """Find the files that differ from their marker.
 
     sums: [size, checksum] by path of the file.
     """
@@ -166,7 +166,7 @@ def damaged(root: Path, sums: Mapping[str, Sequence[int]]) -> dict[str, str]:
 
 
 def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
-    """Read a marker: [size, checksum] by path of the file; None if there is none, or a damaged one."""
+    """Read a marker: [size, checksum] by path of the file; None if it is missing or damaged."""
     try:
         content = safe_files.read(root, key, safe_files.MOST_JSON)
         text, _, last = content.rstrip(b"\n").rpartition(b"\n")
@@ -183,7 +183,7 @@ def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
 def check_blocks(
     block_files: BlockFiles, runs: Sequence[Block], samples: int, keepers: Sequence[Any] = ()
 ) -> Iterator[tuple[Block, list[str]]]:
-    """Yield each block with its faults (see BlockFiles.faults), in order; every file is read."""
+    """Yield each block with its faults (see BlockFiles.faults), in order; this reads every file."""
     with ThreadPoolExecutor(machine.thread_count()) as pool:
         faults = pool.map(lambda block: block_files.faults(block, samples, keepers), runs)
         yield from zip(runs, faults, strict=True)

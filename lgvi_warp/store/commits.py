@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commits of blocks: files are made durable several blocks at a time, while others are computed."""
+"""Commits of blocks: the files of several blocks at a time are made durable, while other blocks are computed."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ PERIOD, MOST = 0.1, 64
 
 @dataclass
 class Commit:
-    """The files of one block, and its marker, which says that all of them are safe.
+    """The files of one block, and its marker, which says that all of them are on disk.
 
-    files: The files, written and not synced.
+    files: The files, written but not yet synced.
     path: Path of the marker.
-    done: Done when the block is durable, or failed.
+    done: Future that ends when the block is durable, or with an error.
     """
 
     files: Files
@@ -32,15 +32,15 @@ class Commit:
 
 
 class Commits:
-    """Queue of the blocks that are written but not durable yet; as a context, it waits for them at its end.
+    """Queue of the blocks that are written but not durable yet. Used as a context, it waits for them at its end.
 
-    A thread takes all blocks that wait as one group: it syncs their files and puts them in their places, then syncs each
-    folder once, and only then does the same with the markers. The first error is raised by the next `add`, or at the end;
-    blocks that can be made durable nevertheless are.
+    A thread takes all waiting blocks as one group. It syncs their files and moves them to their places, then syncs each
+    folder once, and only then does the same with the markers. The next `add`, or the end of the context, raises the
+    first error. Blocks without an error are made durable all the same.
 
-    waits: Whether `add` returns only when its block is durable. Copies in other processes wait, because nothing waits for the
-        end of these processes. Default False.
-    period, most: How long a block waits for others [s], and the most blocks in the queue.
+    waits: Whether `add` returns only when its block is durable. Copies in other processes wait, because nothing waits
+        for the end of these processes. Default False.
+    period, most: Time for which a block waits for others [s]; largest number of blocks in the queue.
     """
 
     def __init__(self, waits: bool = False, *, period: float = PERIOD, most: int = MOST):
@@ -54,7 +54,7 @@ class Commits:
         return Commits, (True,)
 
     def add(self, files: Files, path: Path, marker: bytes) -> None:
-        """Add a block; waits where too many blocks are in the queue."""
+        """Add a block; wait while the queue is full."""
         commit = Commit(files, path, marker)
         with self._changed:
             self._changed.wait_for(lambda: len(self._waiting) < self._most)
@@ -80,7 +80,7 @@ class Commits:
             raise self._error
 
     def _work(self) -> None:
-        """In a thread of its own: make group after group durable, until none waits."""
+        """Run in its own thread: make group after group durable, until no block waits."""
         while group := self._group():
             try:
                 _make_durable(group)
@@ -92,7 +92,7 @@ class Commits:
             self._error = self._error or next((error for error in errors if error is not None), None)
 
     def _group(self) -> list[Commit]:
-        """Take the blocks that wait, after some time in which more may come."""
+        """Take the waiting blocks, after some time in which more may come."""
         with self._changed:
             self._changed.wait_for(
                 lambda: self._waits or self._ending or len(self._waiting) == self._most, self._period
@@ -120,7 +120,7 @@ def _make_durable(group: Sequence[Commit]) -> None:
 
 
 def _finished(group: Sequence[Commit], files: Sequence[Files]) -> list[Commit]:
-    """The commits whose files are safe now; the others get their error."""
+    """Return the commits whose files are durable now; the others get their error."""
     safe = []
     for commit, error in zip(group, finish_together(files), strict=True):
         if error is None:

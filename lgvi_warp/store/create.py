@@ -54,7 +54,7 @@ def names_of(keepers: Sequence[Keeper]) -> list[str]:
 
 
 def nearest_folder(path: Path) -> Path:
-    """Find the folder that exists on the way to a path."""
+    """Find the nearest existing folder above a path."""
     path = path.absolute()
     while not path.is_dir():
         path = path.parent
@@ -62,7 +62,7 @@ def nearest_folder(path: Path) -> Path:
 
 
 def free_enough(path: Path, wanted: int) -> None:
-    """Raise SceneError if a disk has less room than a run needs: its size `wanted` [bytes]."""
+    """Raise SceneError if a disk has less free space than a run needs; wanted: size of the run [bytes]."""
     free = shutil.disk_usage(nearest_folder(path)).free
     if wanted + SPARE_BYTES > free:
         shortage = f"needs {wanted / 1e9:.2f} GB, and the disk has {free / 1e9:.2f} GB left"
@@ -78,7 +78,7 @@ def skeleton(
     messages: Sequence[str],
     keepers: Sequence[Keeper] = (),
 ) -> None:
-    """Write groups and arrays without their blocks to disk."""
+    """Write groups and arrays to disk, without their blocks."""
     import zarr
     from zarr.storage import MemoryStore
 

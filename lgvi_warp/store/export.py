@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Export of a run to one file of another program, piece by piece, whatever its size."""
+"""Export of a run of any size to one file for another program, part by part."""
 
 from __future__ import annotations
 
@@ -54,32 +54,33 @@ def export(
     overwrite: bool = False,
     progress: Callable[[float], None] | bool | None = None,
 ) -> Path:
-    """Export a run, some of its members, or a scene to a file for other programs; the file's ending chooses the format.
+    """Export a run, some of its members, or a scene to a file for other programs; the file name selects the format.
 
-    ".csv" and ".parquet": a table with a row for each member and time of the samples, else for each member. ".nc": NetCDF-4
-    with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and transforms in the
-    axes of ROS. docs/guide/exports.md has their columns, names, units and axes. A footprint is exported as its regions, to
-    ".geojson" or ".kml". A scene is exported to ".fmu": its vehicle as a unit of the FMI standard (docs/guide/exports.md).
+    ".csv" and ".parquet": a table with one row per member and sample time, or one row per member if there are no samples.
+    ".nc": NetCDF-4 with trajectories in the CF conventions. ".geojson" and ".kml": tracks on a map. ".mcap": odometry and
+    transforms in the axes of ROS. docs/guide/exports.md lists columns, names, units and axes. A footprint is exported as
+    its regions, to ".geojson" or ".kml". A scene is exported to ".fmu": its vehicle as a unit of the FMI standard.
 
     Args:
-        run: A result, a result.npz, a store, or a folder with one of the two; or what `lw.studies.footprint` returns. For
-            ".fmu" a scene, or a scene file.
-        to: The file. Or one of two formats, with `out` as the file: "netcdf", all arrays of a store unchanged, or "parquet".
-        out: The file, if `to` is "netcdf" or "parquet"; by default beside the run.
-        members: Indices or a slice of the members, or a mask of all; by default all whose samples were kept. For maps and MCAP
-            1,000 at most.
-        origin: Latitude and longitude of the axes' origin [deg]; by default that of the run's environment, if it has one.
-        start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; by default that of the run's environment.
-        inputs: Inputs of an ".fmu": "commands" (default) of the actuators, in place of the scene's laws; or "set_points" of
-            its controller, which is then part of the unit.
-        overwrite: Whether to replace a file that exists; by default it is kept, and the export refused.
-        progress: Function of the fraction done, or True to show it; by default nothing.
+        run: A result, a result.npz, a store, a folder with one result.npz or store, or the result of
+            `lw.studies.footprint`. For ".fmu" a scene, or a scene file.
+        to: Path of the new file. Or a format, with the path in `out`: "netcdf" (all arrays of a store unchanged) or
+            "parquet".
+        out: Path of the new file if `to` is "netcdf" or "parquet"; by default next to the run.
+        members: Indices, a slice or a mask of the members; by default all members whose samples were kept. Maps and
+            MCAP take at most 1,000 members.
+        origin: Latitude and longitude of the axes' origin [deg]; by default the origin of the run's environment, if set.
+        start: Date and time at t = 0, as "2026-06-01T00:00:00Z"; by default the start of the run's environment.
+        inputs: Inputs of an ".fmu": "commands" (default) of the actuators, in place of the scene's control laws; or
+            "set_points" of the controller, which is then part of the unit.
+        overwrite: Whether to replace an existing file; by default the export is refused.
+        progress: Function that is called with the finished fraction, or True to show it; by default nothing is shown.
 
     Returns:
         Path of the file.
 
     Raises:
-        SceneError: If the run is not complete or is damaged, has not kept what the file is made of, the file exists, or a
+        SceneError: If the run is incomplete or damaged or did not keep the data of this format, the file exists, or a
             library is missing.
         OSError: If the file cannot be written.
 
@@ -127,7 +128,7 @@ def export(
 
 @dataclass(frozen=True)
 class Source:
-    """The run that is exported: its result, the store that it is in, and the path beside which a file of it lies."""
+    """The exported run: its result, its store if it has one, and the path next to which an exported file is written."""
 
     result: Callable[[], Result]
     folder: Folder | None = None
@@ -135,7 +136,7 @@ class Source:
 
 
 def _source(run: Any) -> Source:
-    """Find the run that the user means."""
+    """Find the run that the argument names."""
     if isinstance(run, Result):
         folder = None if run.store is None else Folder(run.store)
         return Source(lambda: run, folder, run.store)
@@ -150,7 +151,7 @@ def _source(run: Any) -> Source:
 
 
 def _only_result(path: Path) -> Path | None:
-    """The one result.npz of a folder without a store; None where there is none, or a store."""
+    """Find the only result.npz of a folder; None if the folder has no result, or has a store."""
     if path.suffix == ".zarr" or not path.is_dir() or any(path.glob("*.zarr")):
         return None
     files = sorted(path.glob("result*.npz"))
@@ -161,7 +162,7 @@ def _only_result(path: Path) -> Path | None:
 
 
 def _ending(to: Any) -> str:
-    """The ending of the file that the user names, in lower case; refuse what no file can be made of."""
+    """Return the file's extension in lower case; refuse an unknown one."""
     ending = Path(to).suffix.lower() if isinstance(to, str | os.PathLike) else ""
     if ending not in (known := [*WRITERS, *extensions.words("exporters"), *extensions.words(OF_SCENES)]):
         remedy = f"give a name that ends in {', '.join(known)}, or a word of {', '.join(FORMATS)}"
@@ -170,14 +171,14 @@ def _ending(to: Any) -> str:
 
 
 def _beside(source: Source, ending: str) -> Path:
-    """The file beside the run."""
+    """Path of the exported file next to the run."""
     if source.path is None:
         raise refusal("out", None, "is missing, and the run is in memory", "give the file")
     return source.path.with_suffix(ending)
 
 
 def _where(origin: Any, start: Any) -> Environment | None:
-    """Origin and start that the user gives; None for neither."""
+    """Environment with the given origin and start; None if neither is given."""
     if origin is None and start is None:
         return None
     try:
@@ -189,7 +190,7 @@ def _where(origin: Any, start: Any) -> Environment | None:
 
 
 def _environment_of(result: Result, given: Environment | None) -> Environment:
-    """Origin and start of the run, or those given in their place."""
+    """Environment of the run, in which a given origin or start replaces the run's own."""
     origin, start = (recorded(result.provenance, "scene", "environment", name) for name in ("origin", "start"))
     own = Environment(origin=origin, start=start)
     if given is None:
@@ -202,7 +203,7 @@ Write = Callable[[Path, Report], None]
 
 
 def _whole_store(source: Source) -> Write:
-    """Writer of a whole store."""
+    """Make the function that writes a whole store."""
     folder = source.folder
     if folder is None:
         raise refusal("to", "netcdf", "is all that a store holds, and the run is in none", "give a file: to='run.nc'")
@@ -210,7 +211,7 @@ def _whole_store(source: Source) -> Write:
 
 
 def _some_members(result: Result, ending: str, members: Any, given: Environment | None) -> Write:
-    """Writer of members of a run into a file with this ending."""
+    """Make the function that writes members of a run into a file with this extension."""
     tracks = tracks_of(result, members, _environment_of(result, given))
     if ending in WRITERS:
         return functools.partial(WRITERS[ending], tracks)
@@ -224,7 +225,7 @@ def _some_members(result: Result, ending: str, members: Any, given: Environment 
 
 
 def _of_scene(run: Any, ending: str, inputs: Any, arguments: dict[str, Any]) -> Write | None:
-    """Writer of a scene into a file with this ending; None for a run."""
+    """Make the function that writes a scene into a file with this extension; None for a run."""
     name = os.fspath(run) if isinstance(run, str | os.PathLike) else ""
     named = name.lower().endswith(".toml") or name.startswith(PREFIX)
     made_of_scenes = ending in extensions.words(OF_SCENES)
@@ -252,7 +253,7 @@ def _of_scene(run: Any, ending: str, inputs: Any, arguments: dict[str, Any]) -> 
 
 
 def _regions(footprint: Any, ending: str, arguments: dict[str, Any]) -> Write:
-    """Writer of the regions of a footprint into a file with this ending."""
+    """Make the function that writes the regions of a footprint into a file with this extension."""
     exporter: Any = None if ending in WRITERS else extensions.load("exporters", ending)
     if not hasattr(exporter, "write_regions"):
         raise refusal(
@@ -271,7 +272,7 @@ def _nothing(fraction: float) -> None:
 
 @contextlib.contextmanager
 def fault_of_library(to: str, target: Path) -> Iterator[None]:
-    """Say of what a library of the format raises which file it is about, and what helps."""
+    """Complete errors of a format's library: name the file and a remedy."""
     try:
         yield
     except MissingExtra as error:
@@ -285,7 +286,7 @@ def fault_of_library(to: str, target: Path) -> Iterator[None]:
 
 
 def check_whole(folder: Folder) -> None:
-    """Check that every file is as it was written: a missing chunk would be exported as NaN."""
+    """Check that every file is unchanged since it was written: a missing chunk would be exported as NaN."""
     content = state(folder.path)
     if not content["complete"]:
         unfinished = content["blocks"] - content["finished"]

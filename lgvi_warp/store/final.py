@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The end of a run in a store, read from the parts of its blocks."""
+"""The final states of a run in a store, read from the parts of its blocks."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
 
 
 def has_end(folder: Folder) -> bool:
-    """Whether the run in a folder wrote its end."""
+    """Whether the run in a folder stored its final states."""
     return FINAL in folder.recipe["keepers"]
 
 
 def end_of(path: Path, places: slice | np.ndarray, parameters: Mapping[str, np.ndarray]) -> Final:
-    """Read the end of some members of the run in a folder; parameters: theirs, by name."""
+    """Read the final states of some members of the run in a folder; parameters: those of these members, by name."""
     folder = Folder(path)
     at = np.arange(folder.members)[places]
     parts, settings = dict[int, dict[str, np.ndarray]](), dict[str, Any]()
@@ -60,7 +60,7 @@ def end_of(path: Path, places: slice | np.ndarray, parameters: Mapping[str, np.n
 
 
 def check_parts(folder: Folder, sums: Any, block: Block) -> None:
-    """Check that a block's parts are those that were written. Raises SceneError."""
+    """Check that a block's parts are unchanged since they were written. Raises SceneError."""
     key = folder.block_files.parts_key(block)
     if sums is None:
         faults = [f"blocks/{name_of(block)}.json is missing or damaged"]

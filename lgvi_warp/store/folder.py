@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run on disk: a zarr v3 group, written block by block, each block marked when all of it is safe.
+"""A run on disk: a zarr v3 group, written block by block; a marker says that all files of a block are on disk.
 
     run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
     run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see layout)
     run.zarr/parts/000000768.npy  the block's parts of the keepers
-    run.zarr/blocks/000000768.json   marker of the finished block that begins with member 768: its files, sizes, checksums
-    run.zarr/kept/                a group like the run's own, of members that were run again for their samples (see kept)
+    run.zarr/blocks/000000768.json   marker of the finished block that begins with member 768: its files, sizes,
+    checksums run.zarr/kept/                a group like the run's own, with members that were run again for their
+    samples (see kept)
 
-No file holds a date or time of day: the same run leaves the same bytes.
+No file contains a date or time of day, so the same run always writes the same bytes.
 """
 
 from __future__ import annotations
@@ -41,19 +42,19 @@ ROOT, CREATED, KEPT = "zarr.json", "created.json", "kept"
 
 
 class Folder:
-    """An existing store, which may come from elsewhere: everything it says is checked before it is used.
+    """An existing store. It may come from an untrusted source, so its content is checked before it is used.
 
     Attributes:
         attributes: The attributes of its zarr group.
         provenance: Scene, ensemble, settings, versions and machine of the run.
         recipe: Settings of its plan.
         shared: Parameters that all members have in common.
-        messages: Remarks on how far the result can be relied on.
-        layout: Its arrays.
-        found: Blocks that this process found finished.
-        ran: Blocks that this process ran.
-        ran_kept: Blocks of kept members that this process ran.
-        noted: What cannot be promised of going on with it.
+        messages: Messages on the reliability of the result.
+        layout: Arrays of the store.
+        found: Number of blocks that were finished before this process.
+        ran: Number of blocks that this process ran.
+        ran_kept: Number of blocks of kept members that this process ran.
+        noted: Warnings for a resumed run, such as changed functions of the user.
     """
 
     def __init__(self, path: Path, within: Path | None = None):
@@ -89,17 +90,17 @@ class Folder:
         return safe_files.read_json(self.within, (self.path / ROOT).relative_to(self.within).as_posix())
 
     def kept(self) -> Folder | None:
-        """Open the group of the kept members; None if there is none."""
+        """The group of the kept members, opened; None if there is none."""
         return Folder(self.path / KEPT, self.path) if os.path.lexists(self.path / KEPT) else None
 
     @property
     def complete(self) -> bool:
-        """Whether every block was finished when the run ended."""
+        """Whether the run has ended with every block finished."""
         return bool(self.attributes["complete"])
 
     @property
     def members(self) -> int:
-        """Number of members; fewer than the ensemble has where `until` ended the run."""
+        """Number of members; smaller than the ensemble's if `until` ended the run."""
         return int(self.attributes.get("members", self.recipe["members"]))
 
     @property
@@ -109,24 +110,24 @@ class Folder:
 
     @property
     def block_files(self) -> BlockFiles:
-        """The keeper that knows its blocks and their files."""
+        """The keeper that knows the files of the blocks."""
         return BlockFiles(self.path, self.layout.columns)
 
     def checked(self) -> Any:
-        """Return the zarr store through which zarr and xarray read the folder, with all checks."""
+        """The zarr store through which zarr and xarray read the folder, with all checks."""
         from lgvi_warp.store.zarr_access import checked_store
 
         present = {name: value for name, value in self.attributes.items() if value is not None}
         return checked_store(self.path, self.layout, self.layout.root(present))
 
     def group(self) -> Any:
-        """Open the zarr group, for reading only."""
+        """The zarr group, opened for reading only."""
         import zarr
 
         return zarr.open_group(self.checked(), mode="r", zarr_format=3)
 
     def refuse_too_large(self) -> None:
-        """Check that what is read at once, numbers of members without times, fits into memory."""
+        """Check that the arrays that are read at once (one number per member, without times) fit into memory."""
         each = sum(column.bytes for column in self.layout.columns if not column.times) * len(self.runs)
         memory = machine.memory_bytes() or 2**40
         if each > memory:
@@ -140,7 +141,7 @@ class Folder:
         return [b for b in self.runs if f"{name_of(b)}.json" not in marked or files.sums(b) is None]
 
     def lost(self) -> list[str]:
-        """List the files of blocks that are not there; none is read.
+        """List the missing files of blocks; no file is read.
 
         A missing chunk raises no error: it reads as NaN or 0.
         """
@@ -162,7 +163,7 @@ class Folder:
         raise self._cannot_go_on("times are lost")
 
     def steps_and_arrays(self) -> tuple[TimeGrid, dict[str, np.ndarray]]:
-        """Read the steps with the sample times, and by name the arrays that the ensemble was given."""
+        """Read the steps with the sample times, and the arrays from which the ensemble was made, by name."""
         try:
             # A missing chunk raises no error: it reads as NaN or 0.
             lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
@@ -180,7 +181,7 @@ class Folder:
         return SceneError([f"{self.path}: {'; '.join(self.damage()) or reason}. {capital(remedy)}"])
 
     def damage(self) -> list[str]:
-        """List what is wrong with the files that belong to no block."""
+        """List the faults of the files that belong to no block."""
         sums, wanted = read_marker(self.path, CREATED), self.layout.frame()
         if sums is None:
             return [f"{CREATED} is damaged"]
@@ -190,7 +191,7 @@ class Folder:
         return [f"{key} {text}" for key, text in faults.items()] + self._unlike(faults)
 
     def _unlike(self, damaged: Container[str]) -> list[str]:
-        """Arrays whose own metadata is undamaged but differs from that in the root."""
+        """Name the arrays whose own metadata is undamaged but differs from the root's metadata."""
         unlike = []
         for name, array in self.layout.arrays.items():
             key = f"{name}/{ROOT}"
@@ -206,7 +207,7 @@ class Folder:
             )
 
     def take_layout(self, source: Path) -> None:
-        """Take over the layout in the root's metadata of another folder of the same run.
+        """Copy the layout in the root's metadata from another folder of the same run.
 
         If it differs from this folder's, the run is marked as incomplete.
         """
@@ -232,7 +233,7 @@ class Folder:
 
 
 def metadata_under(path: Path) -> dict[str, Any]:
-    """Read the metadata of a group and its arrays, in the form that the enclosing group holds them."""
+    """Read the metadata of a group and its arrays, in the form that the enclosing group needs."""
     if not path.exists():
         return {}
     root = safe_files.read_json(path.parent, f"{path.name}/{ROOT}")
@@ -247,7 +248,7 @@ def checksum_of(texts: Sequence[str]) -> int:
 
 
 def check_names(arrays: Sequence[StoreArray]) -> None:
-    """Check that each array's name can be that of a folder."""
+    """Check that each array's name is valid as the name of a folder."""
     faults = Faults("store.")
     for name in (column.name for column in arrays if not store_check.is_name(column.name)):
         remedy = 'give the term or event another name, without / \\ : * ? " < > | and of 200 bytes at most'
@@ -257,7 +258,7 @@ def check_names(arrays: Sequence[StoreArray]) -> None:
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold the lock of a store, which need not exist yet, and clean up what a killed run left."""
+    """Hold the lock of a store, which need not exist yet, and remove the remains of a killed run."""
     with write_lock(path):
         place = Path(os.path.realpath(path))
         durable.restored(place)
@@ -268,9 +269,9 @@ def held(path: Path) -> Iterator[None]:
 
 
 def foreign(path: Path) -> str | None:
-    """Find what no run wrote in a folder.
+    """Find a file in a folder that no run wrote.
 
-    Returns: A text on the first such file, or on why the folder is none of a run; None if it holds a run alone.
+    Returns: A text on the first such file, or on why the folder holds no run; None if it holds only a run.
     """
     if path.is_symlink() or not path.is_dir():
         return "is not a folder of a run"
@@ -286,6 +287,6 @@ def foreign(path: Path) -> str | None:
 
 
 def refuse_foreign(path: Path) -> None:
-    """Check that a folder that is to be replaced holds only what a run wrote."""
+    """Check that a folder that is to be replaced contains only files of a run."""
     if os.path.lexists(path) and (fault := foreign(Path(os.path.realpath(path)))):
         raise SceneError([sentences(path, f"{fault}, and is not overwritten", "move it away, or give another folder")])

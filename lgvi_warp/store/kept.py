@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members that are run again for their samples when a run has ended, into the group `kept` of its store.
+"""Second run, at the end of a stored run, of members whose samples are kept, into the group `kept` of the store.
 
     run.zarr/kept/member/c.0      indices of these members in the run
     run.zarr/kept/position/...    chunks, markers and checksums like those of the run itself
 
-The group is written like a run: in blocks, each marked when all of it is safe.
+The group is written like a run: in blocks, each with a marker after all of its files are on disk.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ CHOSEN = {
 class KeptStore(Store):
     """The group of a store that holds the samples of kept members.
 
-    members: Indices of the members that it holds, shape (m,).
-    chosen: Which of them are kept, shape (m,); the others share a packet with a kept one, so they run too.
+    members: Indices of the members in the group, shape (m,).
+    chosen: Mask of the kept members, shape (m,); the others run too, since they share a packet with a kept member.
     """
 
     members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64), compare=False)
@@ -50,16 +50,16 @@ class KeptStore(Store):
 
     @property
     def along(self) -> str:
-        """Name of its own dimension of members: a dimension shared with the run's group would have to be as long as there."""
+        """Name of the group's own dimension of members: one shared with the run's group would need the same length."""
         return KEPT_MEMBER
 
     @property
     def whole(self) -> Path:
-        """Folder of the run that it is a group of."""
+        """Folder of the run to which the group belongs."""
         return self.folder.parent
 
     def write_given(self, group: Any, plan: Plan) -> None:
-        """Write which members the group holds; what they were given as arrays is in the run's own group."""
+        """Write the indices of the group's members; the arrays from which the ensemble was made are in the run's group."""
         whole_array(group, KEPT_MEMBER, self.members, (KEPT_MEMBER,), MEMBERS)
         if not self.chosen.all():
             whole_array(group, "chosen", self.chosen.astype(np.uint8), (KEPT_MEMBER,), CHOSEN)
@@ -85,7 +85,7 @@ class KeptRun:
     def __call__(
         self, run: StoredRun, members: int, executor: Executor, progress: Callable[[float], None] | None = None
     ) -> int:
-        """Run the blocks that are missing or damaged."""
+        """Run the missing or damaged blocks."""
         store, path = run.store, run.store.folder / KEPT
         wanted = members_kept(self.observed.keep, Folder(store.folder), members)
         group = group_of(store, run.plan, wanted)
@@ -102,19 +102,19 @@ class KeptRun:
 
 
 def group_of(store: Store, plan: Plan, wanted: np.ndarray) -> KeptStore:
-    """Build the group of a store for the members wanted, by their indices (m,)."""
+    """Build the group of a store for the selected members, by their indices (m,)."""
     beside = plan.with_neighbours(wanted)
     chosen = np.isin(beside, wanted)
     return KeptStore(store.folder / KEPT, store.dtype, None, "resume", store.force, store.chunk_bytes, beside, chosen)
 
 
 def _after(progress: Callable[[float], None], before: int, more: int) -> Callable[[float], None]:
-    """Progress of the whole, from that of `more` members which follow `before` others."""
+    """Progress of the whole work, from the progress of `more` members that follow `before` others."""
     return lambda fraction: progress((before + fraction * more) / (before + more))
 
 
 def members_kept(keep: Any, folder: Folder, members: int | None = None) -> np.ndarray:
-    """Indices (m,) of the members whose samples are kept, where those of all members are not."""
+    """Indices (m,) of the members whose samples are kept; empty if all members are kept, or none."""
     if isinstance(keep, str) and keep in ("all", "none"):
         return np.empty(0, np.int64)
     status = folder.group()["status"][: folder.members if members is None else members]
@@ -122,5 +122,5 @@ def members_kept(keep: Any, folder: Folder, members: int | None = None) -> np.nd
 
 
 def keep_of(provenance: Mapping[str, Any]) -> Any:
-    """Read from provenance which samples a run keeps."""
+    """Read the setting `keep` of a run from its provenance."""
     return provenance.get("observed", {}).get("keep", "all")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The arrays of a store and their chunks: every block of members is one column of chunks in each array."""
+"""The arrays of a store and their chunks: in each array, a block of members is one column of chunks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WEIGHT = "weight"
 
 
 class Chunking(Protocol):
-    """The settings that decide the chunks of a store; Store has them."""
+    """The settings of a `Store` that determine its chunks."""
 
     @property
     def fields(self) -> Sequence[str] | None:
@@ -36,11 +36,11 @@ class Chunking(Protocol):
 
     @property
     def dtype(self) -> str | None:
-        """Number type of the stored samples; None: that of the run."""
+        """Number type of the stored samples; None: the type of the run."""
 
     @property
     def chunk_bytes(self) -> int:
-        """Size that a chunk has at most, about [bytes]."""
+        """Approximate largest size of a chunk [bytes]."""
 
     @property
     def along(self) -> str:
@@ -53,7 +53,7 @@ class StoreArray:
 
     tail: Shape of one member's value at one time.
     dtype: NumPy's type string.
-    length: Members in a chunk: those of a block.
+    length: Members in a chunk, as many as in a block.
     times: Samples in a chunk; 0 for an array without times.
     along: Name of the dimension of members.
     """
@@ -78,7 +78,7 @@ class StoreArray:
 
     @property
     def fill(self) -> float | int:
-        """Value in a chunk beyond the last member or time."""
+        """Value of a chunk's entries beyond the last member or time."""
         return np.nan if np.dtype(self.dtype).kind == "f" else 0
 
     def shape(self, samples: int, members: int) -> tuple[int, ...]:
@@ -147,7 +147,7 @@ def _parameters(plan: Plan, length: int) -> list[StoreArray]:
 
 
 def units_of_numbers(scene: Any, names: Iterable[str]) -> dict[str, str]:
-    """Look up the units of numbers of a scene, also of entries: "drag.linear[0]"; "1" where none is known."""
+    """Look up the units of a scene's numbers and of their entries, such as "drag.linear[0]"; "1" if unknown."""
     known, units = parameter_units(scene), {}
     for name in names:
         base, _, entry = name.rstrip("]").partition("[")

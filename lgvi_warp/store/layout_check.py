@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Check of what a store says of its arrays and files against what this package writes: names, types, shapes, sizes.
+"""Check of a store's arrays and files against what this package writes: names, types, shapes, sizes.
 
-Nothing that a store says is joined to a path, opened or read before this check. zarr gets metadata that is written anew
-from what was checked, so that it never looks for another codec, data type or kind of chunk.
+Before this check, no name from a store is joined to a path, opened or read. zarr gets metadata that is written anew
+from the checked values, so it never loads another codec, data type or kind of chunk.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ FILE = re.compile(
 
 
 class NotOursError(ValueError):
-    """Raised when a store says what this package does not write; the text says what."""
+    """Raised if a store's metadata is not what this package writes; the text says what differs."""
 
 
 def is_name(name: Any) -> bool:
@@ -57,7 +57,7 @@ def is_name(name: Any) -> bool:
 
 
 def is_file_of_store(name: str) -> bool:
-    """Tell whether a run, or a killed writer of one, may have left a file of this name."""
+    """Tell whether a run, or a killed process that wrote one, may have left a file of this name."""
     folder, _, last = name.rpartition("/")
     if scratch.is_unfinished(last):
         ends = (dot.start() for dot in re.finditer(r"\.", last))
@@ -67,7 +67,7 @@ def is_file_of_store(name: str) -> bool:
 
 @dataclass(frozen=True)
 class StoredArray:
-    """An array of a store, as its checked metadata describes it.
+    """An array of a store, described by its checked metadata.
 
     dtype: NumPy's type string.
     dims: Names of the dimensions.
@@ -90,7 +90,7 @@ class StoredArray:
         return self.chunk == self.shape
 
     def metadata(self) -> dict[str, Any]:
-        """Return its metadata as zarr writes them, with this package's own codecs."""
+        """Its metadata in zarr's form, with this package's own codecs."""
         (kind,) = (name for name, dtype in TYPES.items() if dtype == self.dtype)
         real = self.dtype[1] == "f"
         numbers = {"name": "bytes"} | ({} if self.dtype == "|u1" else {"configuration": {"endian": "little"}})
@@ -114,7 +114,7 @@ class Layout:
     """The arrays of a store.
 
     arrays: Arrays of the run by name, without those of its kept members.
-    columns: Those of the arrays that are written block by block.
+    columns: The arrays that are written block by block.
     times: Number of sample times.
     """
 
@@ -124,7 +124,7 @@ class Layout:
     times: int
 
     def frame(self) -> dict[str, int | None]:
-        """Sizes [bytes] of the files that belong to no block, by path below the root; None where not known."""
+        """Sizes [bytes] of the files that belong to no block, by path below the root; None if unknown."""
         files: dict[str, int | None] = {f"{name}/zarr.json": None for name in (*self.arrays, *self.groups)}
         block_names = {column.name for column in self.columns}
         for name, array in self.arrays.items():
@@ -144,7 +144,7 @@ class Layout:
         return array.bytes if inside else None
 
     def root(self, attributes: Mapping[str, Any]) -> bytes:
-        """Write the root's metadata for zarr, with those of all arrays in it."""
+        """The root's metadata for zarr, which contains the metadata of all arrays."""
         group = {"attributes": {}, "zarr_format": 3, "node_type": "group"}
         empty = {"kind": "inline", "must_understand": False, "metadata": {}}
         inner = {name: group | {"consolidated_metadata": empty} for name in self.groups}
@@ -179,7 +179,7 @@ def _table(value: Any, name: str) -> dict[str, Any]:
 
 
 def _array(name: str, metadata: dict[str, Any]) -> StoredArray:
-    """An array whose metadata is exactly what this package would write. Raises NotOursError."""
+    """Make an array from metadata that must be exactly what this package would write. Raises NotOursError."""
     shape, dims = metadata.get("shape"), metadata.get("dimension_names")
     grid = _table(metadata.get("chunk_grid"), f"chunk_grid of {name}").get("configuration")
     chunk = _table(grid, f"chunk_grid of {name}").get("chunk_shape")
@@ -219,12 +219,12 @@ def _plain(attributes: Mapping[str, Any], name: str) -> None:
 
 
 def is_text(value: Any) -> bool:
-    """Tell whether a value is a text that cannot control a terminal."""
+    """Tell whether a value is a text without terminal control characters."""
     return isinstance(value, str) and (value.isprintable() or value.replace("\n", " ").isprintable())
 
 
 def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: int) -> Layout:
-    """The layout of arrays, which must fit each other and the run. Raises NotOursError."""
+    """Make the layout of arrays, which must be consistent with each other and with the run. Raises NotOursError."""
     if missing := [name for name in ("time", "step", *REQUIRED) if name not in arrays]:
         raise NotOursError(f"it has no {', '.join(missing)}")
     k, length = arrays["time"].shape[0], min(block_size(members), members)
@@ -256,7 +256,7 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
 
 @contextlib.contextmanager
 def corrupt_store_as_scene_error(path: Path) -> Iterator[None]:
-    """Turn errors that arise while a file is read into faults of the file."""
+    """Turn errors that arise while a store is read into SceneErrors that name the file."""
     try:
         yield
     except SceneError:

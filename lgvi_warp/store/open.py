@@ -45,7 +45,7 @@ class Arrays(Mapping[str, np.ndarray]):
     group: zarr group of the store.
     axis: Axis of the members.
     members: Slice with start, stop and step, or indices, of the members to read.
-    in_memory: Further arrays by name, which are in memory.
+    in_memory: Additional arrays by name, held in memory.
     """
 
     group: Any
@@ -64,7 +64,7 @@ class Arrays(Mapping[str, np.ndarray]):
         return np.asarray(array[at] if isinstance(self.members, slice) else array.oindex[at])
 
     def __repr__(self) -> str:
-        """A table of names and shapes, for which nothing is read."""
+        """Table of names and shapes; no array is read for it."""
         rows = [(name, f"{' x '.join(map(str, self.group[name].shape))} numbers in the store") for name in self.names]
         return as_table(
             f"{len(self)} arrays",
@@ -72,12 +72,12 @@ class Arrays(Mapping[str, np.ndarray]):
         )
 
     def rows(self, name: str, when: slice | np.ndarray, places: slice) -> np.ndarray:
-        """Read samples at some of the times, of some of these members: only the chunks that hold them are read."""
+        """Read samples of some of these members at some times; only the chunks that contain them are read."""
         few, array = self.part(places), self.group[name]
         return np.asarray(array.oindex[when, few.members])
 
     def part(self, places: slice | np.ndarray) -> Arrays:
-        """Select members of those that these arrays read."""
+        """Select some of the members of these arrays."""
         if not isinstance(self.members, slice):
             return replace(self, members=self.members[places])
         of_slice = range(self.members.start, self.members.stop, self.members.step)
@@ -127,22 +127,22 @@ def open_run(
 ) -> Result:
     """Open a run in a store as a Result that reads samples and parameters when they are used.
 
-    `result.dataset` is a view of the whole run by xarray, read piece by piece. `result.statistics` and `result.kept` are
-    those of all members of a complete run; opened with `members`, a result has neither.
+    `result.dataset` is the whole run as an xarray Dataset, read chunk by chunk. `result.statistics` and `result.kept`
+    exist for all members of a complete run; a result opened with `members` has neither.
 
     Args:
         path: A store, or a folder with one store.
-        members: Indices of the members to open, counted from 0, in the order wanted; a slice; or a mask with a truth value for
-            each member; default all.
-        incomplete: Whether to open a run that has not ended as well; members that were not reached read as NaN and status 0.
-        statistics: The statistics that were passed to the run. Needed if one is of a function, which a store does not hold.
+        members: Members to open: indices from 0, in the order of the result; a slice; or a mask with a truth value for
+            each member. Default: all members.
+        incomplete: Whether to open an unfinished run too. Members that were not run yet read as NaN with status 0.
+        statistics: The statistics that were passed to the run. Needed if one uses a function, which a store cannot save.
 
     Returns:
         The result.
 
     Raises:
-        SceneError: If there is no run, or it is not complete, or a file of it is missing.
-        SceneError: If there are no such members (also an IndexError).
+        SceneError: If the path holds no run, the run is not complete, or one of its files is missing.
+        SceneError: If the run does not have these members (this error is also an IndexError).
 
     Examples:
         >>> import lgvi_warp as lw
@@ -266,12 +266,12 @@ def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result |
 
 
 def _chosen_places(group: Any) -> np.ndarray | None:
-    """Places of the kept members among those that were run with them; None where these are all."""
+    """Positions of the kept members among the members of the second run; None if all of these are kept."""
     return np.flatnonzero(group["chosen"][:]) if "chosen" in group else None
 
 
 def _places(members: Any, n: int) -> slice | np.ndarray:
-    """Slice or indices of the members asked for among n; all by default."""
+    """Slice or indices of the selected members among n members; all by default."""
     if members is None:
         return slice(0, n, 1)
     indices = members_of("members", members, n)
@@ -288,7 +288,7 @@ def chosen(result: Result, members: Sequence[int]) -> Result:
 
 
 def dataset(path: Path) -> xarray.Dataset:
-    """Open a store as an xarray Dataset, in pieces of its chunks if dask is installed."""
+    """Open a store as an xarray Dataset; with dask installed it is divided into the store's chunks."""
     import importlib.util
 
     import xarray

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recipes: a plan as plain numbers and texts, and back, so that a stored run can go on elsewhere and later."""
+"""Recipes: a plan written as plain numbers and texts and read back, so that a stored run can be resumed elsewhere."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ ARRAYS = "arrays_sha256"
 
 
 def of_store(provenance: Mapping[str, Any], ensemble: Ensemble) -> dict[str, Any]:
-    """Shorten provenance for a store: instead of arrays it holds their checksum, of a table its column names.
+    """Shorten provenance for a store: arrays are replaced by their checksum, a table by its column names.
 
-    A table read from a file keeps the file's name and checksum, which it has already.
+    A table that was read from a file keeps the file's name and checksum.
     """
     explicit, sampling = ensemble.explicit(), ensemble.sampling
     arrays, content = sampling.arrays(), dict(provenance["ensemble"])
@@ -73,7 +73,7 @@ def _checksum(arrays: Mapping[str, np.ndarray]) -> str:
 
 
 def stored_ensemble(provenance: Mapping[str, Any], arrays: Mapping[str, np.ndarray], store: Path) -> Ensemble:
-    """Build the ensemble that provenance describes, with the arrays that it was given."""
+    """Build the ensemble that provenance describes, with the arrays from which it was made."""
     scene, settings = provenance["scene"], provenance["ensemble"]
     explicit = {name: rows for name, rows in arrays.items() if name != "indices" and not name.startswith(PREFIX)}
     _check_table(_table_in(settings))
@@ -105,7 +105,7 @@ def stored_ensemble(provenance: Mapping[str, Any], arrays: Mapping[str, np.ndarr
 
 
 def _gone_on(ensemble: Ensemble, start: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Ensemble:
-    """The ensemble as it goes on from where another run ended, where the run of the store did."""
+    """If the run in the store continued another run, return the ensemble that continues it."""
     if "end" not in start:
         return ensemble
     # With the numbers that the members had then, or with others, as the run itself found.
@@ -115,14 +115,14 @@ def _gone_on(ensemble: Ensemble, start: Mapping[str, Any], arrays: Mapping[str, 
 
 
 def _table_in(ensemble: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The settings of an ensemble's table; empty if its members come from elsewhere."""
+    """Settings of an ensemble's table; empty if its members do not come from a table."""
     sampling = ensemble.get("sampling")
     table = sampling.get("table") if isinstance(sampling, Mapping) else None
     return table if isinstance(table, Mapping) else {}
 
 
 def _check_table(table: Mapping[str, Any]) -> None:
-    """Require a checksum for a table's file that a store names. Raises SceneError."""
+    """Require a checksum if a store names the file of a table. Raises SceneError."""
     if "file" in table and not isinstance(table.get("sha256"), str):
         faults = Faults("ensemble.sampling.table.")
         faults.add("sha256", table.get("sha256"), "is missing beside the file", "run the scene again")
@@ -130,7 +130,7 @@ def _check_table(table: Mapping[str, Any]) -> None:
 
 
 def _table(settings: Mapping[str, Any], explicit: Mapping[str, np.ndarray], store: Path) -> Any:
-    """The table of a file that an ensemble was drawn from: its numbers in the store, else the file; None without a file."""
+    """The table from which an ensemble was drawn: its numbers in the store, or else its file; None without a file."""
     table = _table_in(settings)
     if "file" not in table:
         return None
@@ -142,7 +142,7 @@ def _table(settings: Mapping[str, Any], explicit: Mapping[str, np.ndarray], stor
 def same_run(
     stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other_name: str | None = None
 ) -> list[str]:
-    """List the differences between two provenances that the bits of a run depend on."""
+    """List the differences between two provenances that can change the bits of a run."""
     leaves = [*differences(_comparable(stored), _comparable(now)), *_functions(stored, now)[0]]
     return [
         f"{key} is {first!r} in {name} and {second!r} {f'in {other_name}' if other_name else 'here'}"
@@ -157,7 +157,7 @@ UNTOLD = (
 
 
 def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[tuple[str, str, str]], list[str]]:
-    """The user's functions that differ between two provenances, as in `differences`; and those that cannot be compared."""
+    """User's functions that differ between two provenances, as in `differences`; and names of functions not compared."""
     before, current = stored.get("functions", {}), now.get("functions", {})
     differ, untold = list[tuple[str, str, str]](), list[str]()
     for name in dict.fromkeys([*before, *current]):
@@ -170,9 +170,9 @@ def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[
 
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance without what changes no bit: threads, Python, the scene's [ensemble], [run], shape, title and text, places.
+    """Remove from provenance what changes no bit: threads, Python, paths, the scene's [ensemble], [run] and texts.
 
-    The user's functions are compared elsewhere.
+    The user's functions are removed too, since `_functions` compares them.
     """
     provenance = {key: value for key, value in provenance.items() if key != "source"}
     scene = {key: value for key, value in provenance["scene"].items() if key not in ("ensemble", "run")}
@@ -186,7 +186,7 @@ def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
-    """Ensemble whose table of a file has its checksum, but not the file's path."""
+    """Remove the file's path of an ensemble's table, and keep the file's checksum."""
     table = _table_in(ensemble)
     if table.get("sha256") is None:
         return dict(ensemble)
@@ -205,7 +205,7 @@ def differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any
 def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any], force: bool) -> tuple[str, ...]:
     """Check that two provenances are of the same run.
 
-    Only machine, versions and the user's functions can be forced: another scene or method makes another run.
+    `force` allows differences in machine, versions and user's functions alone: another scene or method is another run.
     """
     mismatches = same_run(stored, parsed(json.dumps(now)))
     forcible = [text for text in mismatches if text.startswith(("machine.", "versions.", "kernel", "functions."))]
@@ -222,7 +222,7 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
 
 
 def noted_functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
-    """Say which functions of a finished run's statistics are others than those that it was given."""
+    """Name the functions in a finished run's statistics that differ from the run's, or cannot be compared with them."""
     current = now["functions"]
     before = {name: text for name, text in stored.get("functions", {}).items() if name in current}
     differ, untold = _functions({"functions": before}, now)

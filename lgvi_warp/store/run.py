@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The run loop of a store: what is missing or damaged is run, what is finished is kept."""
+"""The loop of a stored run: missing and damaged blocks are run, finished blocks are kept."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 @dataclass(frozen=True)
 class StoredRun:
-    """A run into a store, new or continued.
+    """A run into a store, new or resumed.
 
-    It is complete when every block is there, or as many as `enough` asks for, and `last` is done.
+    It is complete when every block is stored, or as many blocks as `enough` requires, and `last` is done.
 
-    provenance: Provenance as the store keeps it.
-    keepers: Further keepers, whose parts lie in the store.
+    provenance: Provenance in the form of a store.
+    keepers: Additional keepers, whose parts are in the store.
     only: Indices of the blocks to run; None: all.
-    enough: Tells whether this many members are enough (see run_blocks).
-    last: Last stage of the run; called with this run, its members, the executor and the progress, it returns how many
+    enough: Function that tells whether this many members are enough (see run_blocks).
+    last: Last stage of the run: a function of this run, its members, the executor and the progress. It returns how many
         blocks it ran.
-    after: Called with each block as soon as it is in the store, in order; default nothing.
+    after: Function that is called with each block, in order, as soon as the block is in the store; default nothing.
     """
 
     plan: Plan
@@ -56,7 +56,7 @@ class StoredRun:
     after: Callable[[Block], None] | None = None
 
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
-        """Run the blocks that are missing or damaged."""
+        """Run the missing or damaged blocks."""
         check_keepers(self.keepers)
         path = self.store.folder
         with self._alone():
@@ -85,7 +85,7 @@ class StoredRun:
 
     @contextlib.contextmanager
     def _alone(self) -> Iterator[None]:
-        """Lock the store from the first look at it to the end of the run; a group is locked by the run that it belongs to."""
+        """Hold the lock of the store for the whole run. A group is locked by the run to which it belongs."""
         if self.store.whole != self.store.folder:
             yield
             return
@@ -101,7 +101,7 @@ class StoredRun:
         return runs if self.only is None else [runs[i] for i in self.only]
 
     def _begin(self) -> tuple[str, ...]:
-        """Make the folder, or check that what lies there is this run, and say what of it cannot be promised."""
+        """Create the folder, or check that it holds this run. Returns warnings about differences that change the bits."""
         path, store = self.store.folder, self.store
         exists = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
         if exists and store.existing == "refuse":
@@ -124,7 +124,7 @@ class StoredRun:
         return ()
 
     def _mend(self) -> None:
-        """Write those files anew that belong to no block and are damaged."""
+        """Rewrite the damaged files that belong to no block."""
         path = self.store.folder
         for name in ("blocks", "parts"):
             (path / name).mkdir(exist_ok=True)
@@ -144,7 +144,7 @@ class StoredRun:
             scratch.remove_folder(beside)
 
     def _left(self, block_files: BlockFiles) -> list[Block]:
-        """Blocks that are not finished or not whole; a damaged one loses its marker."""
+        """List the unfinished or damaged blocks; a damaged block loses its marker."""
         missing = []
         for block, faults in check_blocks(block_files, self.blocks, len(self.plan.grid.times), self.keepers):
             if faults:
@@ -159,7 +159,7 @@ class StoredRun:
         executor: Executor,
         progress: Callable[[float], None] | None,
     ) -> int:
-        """Run the blocks left, and merge the parts of all in order. Returns where their members end."""
+        """Run the remaining blocks, and merge the parts of all blocks in order. Returns the end of their members."""
         runs, n, steps = self.blocks, self.plan.ensemble.members, self.plan.grid.steps
         overall = RunProgress(n * steps, progress)
         for block in set(runs) - set(remaining):
@@ -179,7 +179,7 @@ class StoredRun:
 
 
 def check_keepers(keepers: Sequence[Keeper]) -> None:
-    """Check that each keeper can leave its parts in a store, under its own name."""
+    """Check that each keeper can write its parts into a store, under its own name."""
     faults = Faults("keepers.")
     for keeper in keepers:
         if not isinstance(keeper, PartKeeper):
@@ -192,7 +192,7 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
 
 @contextlib.contextmanager
 def disk_error_with_remedy(path: os.PathLike[str]) -> Iterator[None]:
-    """Add to errors of the disk what they mean for the run."""
+    """Extend errors of the disk by their consequence for the run."""
     try:
         yield
     except OSError as error:

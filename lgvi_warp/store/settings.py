@@ -34,10 +34,10 @@ class Store:
     Args:
         path: A folder whose name ends in .zarr.
         dtype: "float32" stores the samples of a float64 run in single precision; default the dtype of the run.
-        fields: Names of the fields whose samples are stored; default all that are kept.
-        existing: What to do if the folder holds a run already: "refuse" (default), "resume" (continue it, if it is the same
+        fields: Names of the fields whose samples are stored; default: all sampled fields.
+        existing: Action if the folder already holds a run: "refuse" (default), "resume" (complete it, if it is the same
             run) or "overwrite".
-        force: Whether to continue on another machine or with other versions, where the bits may differ; default False.
+        force: Whether to resume on another machine or with other versions, which may change the bits; default False.
         chunk_bytes: Approximate largest size of a chunk [bytes]; default 10 MB. Each running block holds one chunk per
             field in memory.
 
@@ -72,7 +72,7 @@ class Store:
         needed()
 
     def layout(self) -> dict[str, Any]:
-        """Return the settings that the bytes in the store depend on, as JSON holds them."""
+        """Settings that determine the bytes in the store, in JSON types."""
         fields = None if self.fields is None else list(self.fields)
         return {"dtype": self.dtype, "fields": fields, "chunk_bytes": int(self.chunk_bytes)}
 
@@ -88,11 +88,11 @@ class Store:
 
     @property
     def whole(self) -> Path:
-        """Folder of the whole run that the store is part of: here its own."""
+        """Folder of the whole run to which the store belongs: here its own folder."""
         return self.folder
 
     def write_given(self, group: Any, plan: Plan) -> None:
-        """Write the states and parameters that the ensemble was given as arrays: nothing else in the store holds them.
+        """Write the states and parameters that the ensemble received as arrays: nothing else in the store has them.
 
         Args:
             group: zarr group of the store.
@@ -107,7 +107,7 @@ class Store:
 
 
 def needed() -> None:
-    """Raise SceneError if the libraries that stores need are not installed."""
+    """Raise SceneError if a library that stores need is not installed."""
     try:
         import google_crc32c  # noqa: F401
         import xarray  # noqa: F401

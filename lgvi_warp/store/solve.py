@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of a plan into a store, as `solve` and `resume` make them."""
+"""Runs of a plan into a store, for `solve` and `resume`."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def run_stored(
 def request_of(
     folder: Folder, fleet: Ensemble | Scene | None = None, statistics: Any = None, executor: Executor | None = None
 ) -> Request:
-    """The request of a run in a store, with the steps and settings that it began with.
+    """Rebuild the request of a run in a store, with the steps and settings of its first start.
 
-    fleet, statistics: needed where a store cannot hold them.
+    fleet, statistics: needed if a store cannot save them.
     """
     recipe = folder.recipe
     grid, arrays = folder.steps_and_arrays()
@@ -93,7 +93,7 @@ def resume_stored(
     force: bool = False,
     keepers: Sequence[Keeper] = (),
 ) -> Result:
-    """Run what is missing of the run in a folder; provenance and messages stay those of its start, wherever it goes on."""
+    """Run the missing blocks of the run in a folder. Provenance and messages stay those of its start, even elsewhere."""
     observed_before = folder.provenance.get("observed")
     with corrupt_store_as_scene_error(folder.path / ROOT):
         plan = request.plan()
@@ -113,7 +113,7 @@ def _observed(
     progress: Callable[[float], None] | None,
     noted: tuple[str, ...] = (),
 ) -> tuple[Result, tuple[str, ...]]:
-    """Run with what a request observes; the result, and remarks on what was in the store before."""
+    """Run with the statistics and kept members of a request. Returns the result, and messages on resumed blocks."""
     plan, observed = run.plan, request.observed
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     assert request.executor is not None
@@ -131,7 +131,7 @@ def _observed(
 
 
 def blocks_there(only: range | None, plan: Plan) -> range | None:
-    """Limit the blocks asked for to those that the run has.
+    """Limit a range of requested blocks to the blocks of the run.
 
     only: Indices of blocks, in steps of 1; the end may lie beyond the last block. None: all blocks.
     Returns: The indices that exist, or None for all blocks.
@@ -147,7 +147,7 @@ def blocks_there(only: range | None, plan: Plan) -> range | None:
 
 
 def resume_message(folder: Folder) -> tuple[str, ...]:
-    """Tell how many blocks of a run were in the store already."""
+    """Report how many blocks of a run were already in the store."""
     present, ran, ran_kept = folder.found, folder.ran, folder.ran_kept
     if not present:
         return ()
@@ -158,7 +158,7 @@ def resume_message(folder: Folder) -> tuple[str, ...]:
 
 
 def with_saved_fields(store: Store | str | os.PathLike[str], request: Request) -> tuple[Store, tuple[str, ...]]:
-    """Settle which samples a store holds: none if those of all members are not kept.
+    """Decide which samples a store holds: none unless the samples of all members are kept.
 
     Returns: The store, and the names of the samples of the members that are kept.
     """

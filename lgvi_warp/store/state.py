@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""State of a store: what it holds, what is finished, and what is damaged."""
+"""State of a store: its content, its finished blocks, and its damage."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from lgvi_warp.store.settings import Store
 
 
 def store_of(folder: Folder, force: bool = False) -> Store:
-    """Restore the settings that a store was made with, to continue its run."""
+    """Restore the settings with which a store was made, to resume its run."""
     layout = folder.recipe["store"]
     fields = None if layout["fields"] is None else tuple(layout["fields"])
     return Store(folder.path, layout["dtype"], fields, "resume", force, layout["chunk_bytes"])
 
 
 def state(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Report what a store holds; every file is read.
+    """Report the content of a store; this reads every file.
 
-    Returns: A table: path, members, samples (times), fields, keepers, blocks (in all), finished (blocks), kept (members),
-        complete, bytes, damage (texts) and provenance.
+    Returns: A table: path, members, samples (times), fields, keepers, blocks (in all), finished (blocks), kept
+        (members), complete, bytes, damage (texts) and provenance.
     """
     folder = Folder(folder_of(path))
     runs, recipe = folder.runs, folder.recipe
@@ -55,7 +55,7 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def kept_state(folder: Folder, sound: bool) -> tuple[int, list[str]]:
-    """Report on the members that a run keeps."""
+    """Report on the kept members of a run."""
     wanted = len(members_kept(keep_of(folder.provenance), folder)) if folder.complete and sound else 0
     try:
         group = folder.kept()

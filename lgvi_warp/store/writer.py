@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writer of one block: samples are gathered in chunks, and full chunks are written to disk."""
+"""Writer of one block: samples are collected in chunks, and full chunks are written to disk."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 class Room(list[dict[str, np.ndarray]]):
-    """Pool of chunks that no block uses at the moment: getting fresh memory costs more than filling it."""
+    """Pool of unused chunks: allocating fresh memory costs more than filling it."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Each process has its own pool: it is pickled empty."""
+        """Pickle an empty pool: each process has its own pool."""
         return Room, ()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The zarr store that zarr and xarray read through: checked metadata, and chunks of exactly the size they must have."""
+"""The zarr store through which zarr and xarray read: checked metadata, and chunks that must have their exact size."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def checked_store(root: Path, layout: Layout, metadata: bytes) -> Any:
 
 
 class CheckedFolder:
-    """Folder of a store as zarr reads it, without zarr.
+    """Folder of a store for reading by zarr, independent of the zarr library.
 
     layout: the arrays and chunks that it may hold.
     metadata: content of its zarr.json.
@@ -45,7 +45,7 @@ class CheckedFolder:
         return hash((self.root, self.metadata))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Build it again in another process, such as one of Dask."""
+        """Rebuild it in another process, such as one of Dask."""
         return checked_store, (self.root, self.layout, self.metadata)
 
     def __str__(self) -> str:
@@ -58,7 +58,7 @@ class CheckedFolder:
         return self
 
     def content(self, key: str) -> bytes | None:
-        """Read the bytes of a file; None if it is missing, or no file of the layout."""
+        """Read the bytes of a file; None if it is missing, or is not in the layout."""
         if key == ROOT:
             return self.metadata
         size = self.layout.chunk_bytes(key)
@@ -117,7 +117,7 @@ class CheckedFolder:
 
 @functools.cache
 def _class() -> Any:
-    """Define the class of zarr store, when zarr is first needed."""
+    """Define the class of zarr store, at the first use of zarr."""
     from zarr.abc.store import Store
 
     class CheckedStore(CheckedFolder, Store):

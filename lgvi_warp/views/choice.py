@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Choice of what is shown of a run: drawn members, times, and members of the quantiles."""
+"""Choice of the members and times that pictures and recordings show, and of the members of their quantiles."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class Shown:
     """Selection of a run for a picture or a recording.
 
     Attributes:
-        members: Indices of the members that are drawn, rising, shape (m,).
-        frames: Indices of the samples that are drawn, rising, shape (f,); the first and the last are among them.
-        ranked: Indices of the members that quantiles are taken of, rising, shape (q,).
+        members: Increasing indices of the drawn members, shape (m,).
+        frames: Increasing indices of the drawn samples, shape (f,), including the first and the last.
+        ranked: Increasing indices of the members from which quantiles are computed, shape (q,).
         total: Number of members of the result.
     """
 
@@ -47,16 +47,16 @@ class Shown:
 
     @property
     def text(self) -> str:
-        """Count of drawn members out of all, as "1,000 of 100,000 members"."""
+        """Number of drawn members and of all members, as "1,000 of 100,000 members"."""
         return of_members(len(self.members), self.total)
 
     def ranked_of(self, members: slice) -> np.ndarray:
-        """Places, among successive members, of those that quantiles are taken of."""
+        """Positions, in a slice of members, of those from which quantiles are computed."""
         return self.ranked[(self.ranked >= members.start) & (self.ranked < members.stop)] - members.start
 
 
 def of_members(count: int, total: int) -> str:
-    """Say how many members of how many."""
+    """Write a number of members out of all, as "1,000 of 100,000 members"."""
     if count < total:
         return f"{count:,} of {total:,} members"
     return f"{total:,} member{'s' * (total != 1)}"
@@ -65,21 +65,21 @@ def of_members(count: int, total: int) -> str:
 def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
     """Choose the members that pictures and recordings show when they draw only some.
 
-    First come the members that reach farthest along each axis. Up to a third of the places go to members that did not end
-    "ok", shared among the outcomes. The rest follow in the order of a hash of their index. The hash is as fair for grids,
-    tables and Sobol points as for random draws, and the same run always gives the same choice. Times are evenly spaced, at
-    most 240. Quantiles are those of at most 20,000 members, chosen by the same hash.
+    The members that reach farthest along each axis come first. Up to a third of the chosen members did not end "ok",
+    divided evenly between the outcomes. The other members are chosen by a hash of their index. The hash is
+    representative for grids, tables, Sobol points and random draws, and the same run always gives the same choice. At
+    most 240 evenly spaced times are shown. Quantiles are computed from at most 20,000 members, chosen by the same hash.
 
     Args:
         result: A result with positions, in memory or in a store.
-        most: The most members to draw.
+        most: Largest number of members to draw.
 
     Returns:
         Members and times.
 
     Raises:
         NothingToDraw: No samples were kept, or no member has a finite start.
-        SceneError: most is no whole number from 1, or the result is none.
+        SceneError: `most` is not a whole number from 1, or `result` is not a result.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -107,7 +107,7 @@ def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
 
 
 def frames_of(time: np.ndarray, most: int = MOST_FRAMES) -> np.ndarray:
-    """Choose samples that are even in time, of rising times (k,) [s]."""
+    """Choose samples at evenly spaced times from increasing times (k,) [s]."""
     if len(time) <= most:
         return np.arange(len(time))
     wanted = np.linspace(time[0], time[-1], most)
@@ -119,7 +119,8 @@ def frames_of(time: np.ndarray, most: int = MOST_FRAMES) -> np.ndarray:
 def mixed(index: np.ndarray) -> np.ndarray:
     """Hash whole numbers so that neighbours are far apart: the finalizer of SplitMix64.
 
-    Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators, OOPSLA. Different numbers have different ones.
+    Different numbers have different hashes. Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators,
+    OOPSLA.
     """
     z = (index.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -128,7 +129,7 @@ def mixed(index: np.ndarray) -> np.ndarray:
 
 
 def pieces(result: Result, fields: tuple[str, ...]) -> Iterator[tuple[slice, Mapping[str, np.ndarray]]]:
-    """Read samples (k, members, ...) of slices of the members, so that a large run in a store never lies in memory whole."""
+    """Read samples (k, members, ...) of slices of the members: a large stored run is never in memory as a whole."""
     many = max(1, AT_ONCE // len(result.time))
     for first in range(0, result.members, many):
         members = slice(first, min(first + many, result.members))
@@ -138,9 +139,9 @@ def pieces(result: Result, fields: tuple[str, ...]) -> Iterator[tuple[slice, Map
 def samples_of(
     result: Result, fields: tuple[str, ...], members: slice | np.ndarray, frames: np.ndarray | None = None
 ) -> dict[str, np.ndarray]:
-    """Read samples (k, members, ...) of some members by name, at these times, by default all.
+    """Read samples (k, members, ...) of some members by name, at the times `frames`, by default at all.
 
-    They are views where the result is in memory, members are a slice and times are all.
+    They are views if the result is in memory, `members` is a slice and all times are read.
     """
     at: Any = slice(None) if frames is None else frames
     if result.store is not None:
@@ -176,7 +177,7 @@ def finite_rows(vectors: np.ndarray) -> np.ndarray:
 
 
 def _ended(result: Result, rank: np.ndarray, places: int) -> list[int]:
-    """Members that did not end ok, at most as many as the places, which the outcomes share as evenly as they can."""
+    """Members that did not end ok, at most `places`, divided between the outcomes as evenly as possible."""
     status = np.asarray(result.status)[rank]
     groups = [rank[status == code] for code in outcomes(result) if code != Status.OK]
     chosen: list[int] = []
@@ -189,7 +190,7 @@ def _ended(result: Result, rank: np.ndarray, places: int) -> list[int]:
 def few(
     result: Result, members: slice | np.ndarray, fields: tuple[str, ...], frames: np.ndarray | None = None
 ) -> Result:
-    """Take some members at some times, by default all, into memory."""
+    """Read some members at some times (by default all times) into memory."""
     samples = samples_of(result, tuple(name for name in fields if name in result.samples), members, frames)
     of_members = {item.name: getattr(result, item.name)[members] for item in member_fields.EVERY}
     time = result.time if frames is None else result.time[frames]
@@ -198,7 +199,7 @@ def few(
 
 
 class _Part(Mapping[str, np.ndarray]):
-    """Parameters of some members, read when they are used: most pictures use none."""
+    """Parameters of some members, read at their first use: most pictures need none."""
 
     def __init__(self, samples: Mapping[str, np.ndarray], members: slice | np.ndarray):
         self._of_all, self._members = samples, members

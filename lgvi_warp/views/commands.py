@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of a controller in words: the channels of its actuators with their limits, and its faults."""
+"""Names of a controller's commands: the channels of its actuators with their limits, and its faults."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class ActuatorChannel(NamedTuple):
     limit: float
 
     def limits(self, values: np.ndarray) -> tuple[float, ...]:
-        """Choose the limits that are drawn beside values."""
+        """Choose the limits that are drawn with these values."""
         near = self.limit < NEAR * max(np.nanmax(np.abs(values), initial=0.0), 1e-9)
         return (-self.limit, self.limit) if near else ()
 
 
 class Broken(NamedTuple):
-    """A fault of a run, and when it begins for the first member [s]."""
+    """A fault of an actuator or sensor, and the time at which it begins for the first member [s]."""
 
     time: float
     text: str
@@ -79,6 +79,6 @@ def faults(result: Result) -> list[Broken]:
 
 
 def _between(values: np.ndarray) -> str:
-    """A number of the members in words."""
+    """Write the value of a number, or its range over the members."""
     low, high = float(values.min()), float(values.max())
     return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"

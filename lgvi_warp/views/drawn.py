@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Drawing data of one run: poses of the members shown at the times shown, and curves of all members."""
+"""Drawing data of one run: poses of the drawn members at the drawn times, and curves of all members."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Fan:
 
     name: Name of its entity, as "height"; title: name and unit in words.
     levels: Values at LEVELS, shape (7, f); NaN at times when no member is under way.
-    believed: What filters believe of that number, shape (f,), where they do.
+    believed: Value that the filters estimate for this number, shape (f,); None without a filter.
     """
 
     name: str
@@ -52,10 +52,10 @@ class Fan:
 
 @dataclass(frozen=True, eq=False)
 class Spread:
-    """Ellipsoids that hold the members under way, on the axes of their covariance.
+    """Ellipsoids around the members under way, with axes from their covariance.
 
-    at: Indices of the frames that have one, shape (e,); center, half: centres and half sizes along the axes, shape (e, 3) [m].
-    axes: Axes as columns, a rotation each, shape (e, 3, 3).
+    at: Indices of the frames with an ellipsoid, shape (e,); center, half: centres and semi-axes, shape (e, 3) [m].
+    axes: Rotations whose columns are the axes, shape (e, 3, 3).
     """
 
     at: np.ndarray
@@ -68,13 +68,13 @@ class Spread:
 class Drawn:
     """Drawing data of one run.
 
-    source: The members whose samples were kept: the result itself, or its kept members; choice: which of these are drawn.
-    few: The members drawn at the times drawn, in memory; counted: which of them are under way at each time, shape (f, m).
-    label, rgb: Name and colour of the run among those that are compared; "" and None, colours by outcome, for a single one.
+    source: The members whose samples were kept: the result itself, or its kept members; choice: the drawn members of these.
+    few: The drawn members at the drawn times, in memory; counted: mask of those under way at each time, shape (f, m).
+    label, rgb: Name and colour of the run in a comparison; "" and None for a single run, which is coloured by outcome.
     shares: Share of all members by status at each time, shape (f,) each; OK for those under way.
     bins: Edges of the depths' histogram [m], shape (b + 1,).
-    heights: Members under way in each bin at each time, of those that quantiles are taken of, shape (f, b).
-    above: Members that pass above depth 0, of all.
+    heights: Number of members under way in each bin at each time, shape (f, b), of the members used for quantiles.
+    above: Number of all members that rise above depth 0.
     """
 
     result: Result
@@ -93,31 +93,31 @@ class Drawn:
 
     @property
     def text(self) -> str:
-        """Count of drawn members out of all."""
+        """Number of drawn members and of all members."""
         return of_members(len(self.choice.members), self.result.members)
 
     @property
     def members(self) -> np.ndarray:
-        """Indices of the members drawn, in the whole result, shape (m,)."""
+        """Indices of the drawn members in the whole result, shape (m,)."""
         return self.choice.members if self.source is self.result else self.result.kept_members[self.choice.members]
 
     @property
     def time(self) -> np.ndarray:
-        """Times drawn [s], shape (f,)."""
+        """Drawn times [s], shape (f,)."""
         return self.few.time
 
     @property
     def position(self) -> np.ndarray:
-        """Positions drawn [m], float32, shape (f, m, 3)."""
+        """Drawn positions [m], float32, shape (f, m, 3)."""
         return self.few.position.astype(np.float32)
 
     @property
     def watered(self) -> bool:
-        """Whether the water has a surface: no member is a metre above it."""
+        """Whether the water has a surface: it has none if a member is more than a metre above depth 0."""
         return not np.nanmax(self.fans[0].levels, initial=-np.inf) > 1.0
 
     def color(self, code: Status) -> tuple[int, int, int]:
-        """Choose the colour of members."""
+        """Choose the colour of members with this outcome."""
         return self.rgb or OUTCOME_STYLES[code].rgb
 
     def path(self, head: str, *parts: str) -> str:
@@ -127,7 +127,7 @@ class Drawn:
         return str(rr.new_entity_path([*head.split("/"), *([self.label] if self.label else []), *parts]))
 
     def groups(self) -> list[tuple[Status, np.ndarray]]:
-        """Divide the members drawn by what became of them until each time: masks (f, m) by status, OK for those under way."""
+        """Divide the drawn members by their outcome until each time: masks (f, m) by status, OK for those under way."""
         status = np.asarray(self.few.status)
         is_finite = finite_rows(self.few.position)
         ended = ((code, is_finite & ~self.counted & (status == code)) for code in outcomes(self.few) if code)
@@ -135,7 +135,7 @@ class Drawn:
 
 
 def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[int, int, int] | None = None) -> Drawn:
-    """Read what is drawn of a run, by itself or as one of several with labels and colours."""
+    """Read the drawing data of a single run, or of one of several runs with labels and colours."""
     source = result.kept if not result.samples and result.kept is not None else result
     if missing := [name for name in NEEDED if source.samples and name not in source.samples]:
         names = ", ".join(missing)
@@ -168,7 +168,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
 
 
 def _navigation(few: Result, counted: np.ndarray, text: str) -> Iterator[Fan]:
-    """Fans of how far members are from where their filters believe, and of NEES, as far as it was saved."""
+    """Fans of the distance between true and estimated position, and of NEES, if their samples were saved."""
     if {"measured_position", "estimate_sigma"} <= set(few.samples):
         off = np.linalg.norm(few.measured_position - few.position, axis=-1)
         title = f"Off the estimated place [m] of {text}; orange: as filters believe"
@@ -178,13 +178,13 @@ def _navigation(few: Result, counted: np.ndarray, text: str) -> Iterator[Fan]:
 
 
 def believed_sigma(few: Result, counted: np.ndarray) -> np.ndarray:
-    """Standard deviation of position that the filters report, a root mean square (f,) [m], by the median member."""
+    """Standard deviation (f,) [m] of the position that filters report: square root of the trace, median of members."""
     sigma = np.linalg.norm(few.estimate_sigma[..., :3], axis=-1)
     return np.asarray(at_levels(sigma, counted, [0.5])[0])
 
 
 def places_of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:
-    """Find the places of the user's indices among the kept members."""
+    """Find the positions of the user's indices among the kept members."""
     indices = members_of("members", members, total)
     if len(lost := np.setdiff1d(indices, kept)):
         raise refusal("members", int(lost[0]), "has no samples", f"keep them: keep={[int(index) for index in indices]}")
@@ -196,7 +196,7 @@ STREAMED = {"height": ("depth", -1.0), "speed": ("speed", 1.0)}
 
 
 def streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
-    """Take a fan of all members from the run's own quantiles and extremes, where no samples of all were kept."""
+    """Replace a fan by the run's own quantiles and extremes of all members, if the samples of all were not kept."""
     quantity, sign = STREAMED.get(fan.name, ("", 1.0))
     levels, replaced = np.full_like(fan.levels, np.nan), False
     for estimate in result.statistics.values() if not result.samples else ():
@@ -214,7 +214,7 @@ def streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
 
 
 def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute roll, pitch and heading [deg], float32, of rotations (..., 3, 3) from body to inertial axes."""
+    """Compute roll, pitch and heading [deg], float32, from rotations (..., 3, 3) from body to inertial axes."""
     part = {place: attitude[..., *place].astype(np.float32) for place in ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2))}
     roll = np.degrees(np.arctan2(part[2, 1], part[2, 2]))
     pitch = np.degrees(np.arcsin(np.clip(-part[2, 0], -1.0, 1.0)))
@@ -222,7 +222,7 @@ def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
 
 
 def _directions(few: Result, counted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean directions [deg] of roll and heading, shape (f, 1) each, continuous in time: angles are taken about them."""
+    """Mean directions [deg] of roll and heading, shape (f, 1) each, continuous in time, as the middle for angles."""
     directions = []
     for angle in roll_pitch_heading(few.attitude)[::2]:
         arm = np.where(counted & np.isfinite(angle), np.exp(1j * np.radians(angle)), 0.0).sum(axis=1)
@@ -231,7 +231,7 @@ def _directions(few: Result, counted: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def about(angle: np.ndarray, direction: np.ndarray, turn: float) -> np.ndarray:
-    """Angles within half a turn of a direction; turn: 2 pi [rad] or 360 [deg]."""
+    """Shift angles by whole turns to within half a turn of a direction; turn: 2 pi [rad] or 360 [deg]."""
     off = angle - direction
     return np.asarray(direction + off - turn * np.round(off / turn))
 
@@ -249,7 +249,7 @@ CURVES = (
 def _survey(
     result: Result, choice: Shown, directions: tuple[np.ndarray, np.ndarray]
 ) -> tuple[tuple[Fan, ...], dict[str, np.ndarray], int]:
-    """Fans of all members: extremes of all, quantiles of those ranked. Positions of these, and how many rise above depth 0."""
+    """Compute (fans: extremes of all members, quantiles of the ranked ones; positions of these; members above depth 0)."""
     frames, counted = choice.frames, under_way(result)[choice.frames]
     low, high = (np.full((len(CURVES), len(frames)), np.nan, np.float32) for _ in range(2))
     rows: list[list[np.ndarray]] = [[] for _ in CURVES]
@@ -282,9 +282,9 @@ def _survey(
 
 
 def at_levels(values: np.ndarray, counted: np.ndarray, levels: Sequence[float]) -> np.ndarray:
-    """Quantiles (m, f) of values (f, n) over the members that count at each time, linear between neighbours.
+    """Quantiles (m, f) of values (f, n) over the members that count at each time, with linear interpolation.
 
-    A value that is not finite never counts; at times when no member does, they are NaN.
+    A value that is not finite never counts. At times when no value counts, the quantiles are NaN.
     """
     ranked = np.sort(np.where(counted & np.isfinite(values), values, np.inf), axis=1)
     counts = np.isfinite(ranked).sum(axis=1)
@@ -298,7 +298,7 @@ def at_levels(values: np.ndarray, counted: np.ndarray, levels: Sequence[float]) 
 
 
 def _spread(position: np.ndarray, counted: np.ndarray) -> Spread:
-    """Ellipsoids of the members under way, wherever there are four: half sizes from quantiles along the covariance's axes."""
+    """Ellipsoids at times with four or more members under way: semi-axes from quantiles along the covariance's axes."""
     at = np.flatnonzero(counted.sum(axis=1) >= 4)
     center, half, axes = np.empty((len(at), 3)), np.empty((len(at), 3)), np.empty((len(at), 3, 3))
     for i, k in enumerate(at):
@@ -313,7 +313,7 @@ def _spread(position: np.ndarray, counted: np.ndarray) -> Spread:
 
 
 def _shares(result: Result, frames: np.ndarray) -> dict[Status, np.ndarray]:
-    """Share of all members under way at each time, as OK, and of those that ended, by outcome."""
+    """Share of all members under way at each time, as OK, and of the ended members by outcome."""
     counted = under_way(result)[frames]
     status = np.asarray(result.status)
     ended = {code: (~counted[:, status == code]).sum(axis=1) for code in outcomes(result) if code}
@@ -321,7 +321,7 @@ def _shares(result: Result, frames: np.ndarray) -> dict[Status, np.ndarray]:
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:
-    """Limits of a histogram of finite values, at least a little apart."""
+    """Limits of a histogram of finite values; they always differ a little."""
     first, last = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
     wide = max(last - first, 1e-3 * max(abs(first), abs(last)), 1e-6)
     return first - 0.01 * wide, last + 0.01 * wide
@@ -333,5 +333,5 @@ def first_ended(result: Result, code: Status) -> float:
 
 
 def quaternion_xyzw(attitude: np.ndarray) -> np.ndarray:
-    """Quaternions (..., 4) as the viewer takes them, scalar last, float32, of rotations (..., 3, 3)."""
+    """Quaternions (..., 4), scalar last, float32, for the viewer, from rotations (..., 3, 3)."""
     return notation.quaternion_from_matrix(attitude)[..., [1, 2, 3, 0]].astype(np.float32)

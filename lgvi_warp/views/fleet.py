@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common parts of the picture and the recording of a fleet: styles of outcomes, the title, and curves of members under way."""
+"""Common parts of the picture and the recording of a fleet: styles of outcomes, the title, curves of members under way."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ class Curve(NamedTuple):
 
 
 def energy_curve(result: Result) -> Curve:
-    """Energy against time [J], as its error E(t) - E(0) where the scene's laws conserve it."""
+    """Energy against time [J], or its error E(t) - E(0) if the terms of the scene conserve energy."""
     if "energy" in invariants.conserved(result):
         return Curve("Energy error", "E(t) - E(0) [J]", result.energy - result.energy[:1])
     return Curve("Energy", "E(t) [J]", result.energy)
 
 
 def title(result: Result) -> str:
-    """Title of a picture: members, method and step, and the outcomes where not all ran to the end."""
+    """Title of a picture: members, method and step, and the outcomes unless all ran to the end."""
     method, step = result.provenance["method"]["name"], result.provenance["step"]
     text = f"{of_members(result.members, members_of_run(result))}, {method}, step {step:g} s"
     counts = result.status.counts()
@@ -73,13 +73,13 @@ def title(result: Result) -> str:
 
 
 def members_of_run(result: Result) -> int:
-    """Count the members of the run that a result is of, or a part of."""
+    """Count the members of the run from which a result, or part of one, comes."""
     planned = result.provenance["ensemble"].get("members") or 0
     return max(result.members, int(result.provenance.get("members", planned)))
 
 
 def identity(result: Result) -> str:
-    """Identifier of a run: a hash of its provenance, which parts of a run share, and samples."""
+    """Identifier of a run: a hash of its provenance, which parts of a run have in common, and of samples."""
     digest = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
     arrays = [result.time, np.asarray(result.status), stop_time(result)]
     for array in (*arrays, *(samples["position"][[0, -1]] for _, samples in pieces(result, ("position",)))):

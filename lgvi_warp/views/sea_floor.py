@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The floors of a scene as pictures and recordings draw them."""
+"""The floors of a scene, as drawn in pictures and recordings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MOST_PLACES = 121
 
 
 class Relief(NamedTuple):
-    """Depths (a, b) [m] at places to the north (a,) and to the east (b,) [m]."""
+    """Depths (a, b) [m] at north coordinates (a,) [m] and east coordinates (b,) [m]."""
 
     north: np.ndarray
     east: np.ndarray
@@ -29,7 +29,7 @@ def flat_depths(scene: Mapping[str, Any]) -> list[float]:
 
 
 def reliefs(scene: Mapping[str, Any], low: np.ndarray, high: np.ndarray) -> list[Relief]:
-    """The floors on grids in the tables of a scene, within a box from low to high (2,) [m]; none of those outside."""
+    """The gridded floors in the tables of a scene, within a box from low to high (2,) [m]; floors outside are left out."""
     grids: list[Any] = [table for table in _tables(scene) if np.ndim(table["depth"]) > 0]
     found = [_relief(floor, low, high) for floor in from_list(grids) if isinstance(floor, Floor)]
     return [relief for relief in found if relief is not None]
@@ -40,7 +40,7 @@ def _tables(scene: Mapping[str, Any]) -> list[Mapping[str, Any]]:
 
 
 def _relief(floor: Floor, low: np.ndarray, high: np.ndarray) -> Relief | None:
-    """The floor at its nodes within the box and at the box's edges, or at evenly spaced places where these are too many."""
+    """The floor at its nodes within the box and at the box's edges, or at evenly spaced points if nodes are too many."""
     sides = []
     for i in (0, 1):
         nodes = floor.origin[i] + floor.spacing[i] * np.arange(floor.depth.shape[i])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Executors: where blocks run, in threads of this process, processes of this machine, or workers of a Dask cluster."""
+"""Executors run blocks in threads of this process, processes of this machine, or workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_THREADS = 100_000
 
 
 def check_threads(faults: Faults, threads: Any) -> None:
-    """Add a fault where a number of threads is neither None, for all cores, nor a whole number from 1 to MOST_THREADS."""
+    """Add a fault unless a number of threads is None (all cores) or a whole number from 1 to MOST_THREADS."""
     if threads is None:
         return
     remedy = "give 1 or more, or leave it out for all cores"
@@ -30,10 +30,9 @@ def check_threads(faults: Faults, threads: Any) -> None:
 
 
 def executor_of(choice: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
-    """The executor that a name stands for, or the executor itself where an object is given.
+    """Make the executor of a name; an executor object is returned itself.
 
-    threads: number of threads, processes or workers; None (default) for all cores, of threads for as many
-        as the run is worth.
+    threads: number of threads, processes or workers; None (default): all cores, or fewer threads for a short run.
     """
     faults = Faults()
     check_threads(faults, threads)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common parts of executors: their protocol, and how work travels to other processes."""
+"""Common parts of executors: their protocol, and the transfer of work to other processes."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ MOST_DEATHS = 3
 
 @runtime_checkable
 class Executor(Protocol):
-    """Runs blocks in any order and anywhere; results do not depend on it."""
+    """Runs blocks in any order and anywhere; results do not depend on this."""
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Run all blocks and yield each with its result, as it finishes; closing the generator cancels what still runs."""
+        """Run all blocks and yield each with its result as it finishes. Closing the generator cancels running blocks."""
 
 
 @contextlib.contextmanager
 def deaf() -> Iterator[None]:
-    """Let processes started inside ignore interrupts from the terminal, from their first moment on."""
+    """Make processes that are started inside ignore interrupts from the terminal, from their start."""
     before: dict[int, Any] = {}
     try:
         for number in (getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)):
@@ -74,7 +74,7 @@ def _refusal(name: str, problem: str, error: Exception) -> str:
 
 
 def finished_blocks(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
-    """The blocks that finished although their run was interrupted."""
+    """Blocks that finished although their run was interrupted."""
     for future, block in futures.items():
         done = future.done() and not future.cancelled() and future.exception() is None
         if done and not isinstance(future.result(), Exception | None):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Blocks on the workers of a Dask cluster, of one machine or of many; a worker that dies costs the block it was at."""
+"""Blocks on the workers of a Dask cluster, on one or many machines; a dead worker loses only its current block."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Dask:
                         client.run(_end, topic, on_error="ignore")
 
     def check(self) -> None:
-        """Check that the scheduler answers, before anything is written."""
+        """Check that the scheduler responds, before anything is written."""
         if isinstance(self.scheduler, str):
             with self._client():
                 pass
@@ -110,7 +110,7 @@ def _received(data: bytes) -> Work:
 
 
 def _work(data: bytes, block: Block, topic: str, kind: dict[str, str]) -> Any:
-    """On a worker: run one block, if the machine is of the same kind as the one that asks."""
+    """On a worker: run one block, if the worker's machine is of the same kind as the client's."""
     worker_kind = machine.kind()
     if worker_kind != kind:
         raise SceneError(
@@ -137,7 +137,7 @@ async def _end(topic: str) -> None:
 
 
 def _teller(topic: str, block: Block) -> Callable[[int], None]:
-    """A function that reports a block's progress to the client, at most once every PERIOD."""
+    """Make a function that reports a block's progress to the client, at most once every PERIOD."""
     from distributed import get_worker
 
     worker, last = get_worker(), 0.0

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Blocks in processes of one machine, each started afresh (spawn).
+"""Blocks in processes of one machine, each started new (spawn).
 
-When a process dies, Python ends all of them; the blocks they were at run again.
+When a process dies, Python ends all of them, and their current blocks run again.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ HALT = -1
 
 @dataclass(frozen=True)
 class Processes:
-    """Runs blocks in processes of one thread each; the kernel is compiled here and loaded from Warp's cache there."""
+    """Runs blocks in processes of one thread each; the kernel is compiled here, and loaded there from Warp's cache."""
 
     workers: int
 
@@ -50,7 +50,7 @@ class Processes:
     def _until_death(
         self, data: bytes, unfinished: dict[int, Block], advanced: Advanced, deaths: Counter[int]
     ) -> Generator[tuple[Block, Any], None, None]:
-        """Run blocks until all are done or a process died; those that finish are removed from `unfinished`."""
+        """Run blocks until all are done or a process died; finished blocks are removed from `unfinished`."""
         context = multiprocessing.get_context("spawn")
         # Steps made of each block, and a flag that halts all. No lock: a killed process could hold it for ever.
         steps_made = context.RawArray("q", max(unfinished) + 2)
@@ -91,7 +91,7 @@ _state: dict[str, Any] = {}
 
 
 def _begin(data: bytes, steps_made: Any) -> None:
-    """In a new process: unpickle the work, leave interrupts to the parent, and end when it ends."""
+    """In a new process: unpickle the work, leave interrupts to the parent, and end when the parent ends."""
     for name in ("SIGINT", "SIGHUP"):  # by SIGTERM a broken pool ends what is left of it
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

@@ -21,7 +21,7 @@ PERIOD = 0.2
 
 
 class ThisThread:
-    """Runs blocks in the thread that asks: its CPU time is theirs, and it hears an interrupt between two launches."""
+    """Runs blocks in the calling thread, which uses its CPU time and receives interrupts between two launches."""
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
         """Run all blocks and yield each with its result."""
@@ -30,7 +30,7 @@ class ThisThread:
 
 
 def threads_for(plan: Any) -> int:
-    """Number of threads of a plan's run where nobody names it."""
+    """Default number of threads for the run of a plan."""
     return default_threads(plan.ensemble.members, plan.grid.steps, machine.thread_count())
 
 
@@ -38,7 +38,7 @@ def threads_for(plan: Any) -> int:
 class Threads:
     """Runs blocks in threads of this process.
 
-    threads: how many; None: as many as the run is worth (see `default_threads`).
+    threads: number of threads; None: chosen by the amount of work (see `default_threads`).
     """
 
     threads: int | None = None
@@ -46,8 +46,8 @@ class Threads:
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
         """Run all blocks and yield each with its result.
 
-        The first exception halts running blocks, drops those that have not begun, and is raised. After an interrupt from
-        the keyboard, blocks that finished nevertheless are yielded first, since a launch cannot be cut short.
+        The first exception halts running blocks, drops blocks that have not begun, and is raised. After an interrupt
+        from the keyboard, blocks that still finish are yielded first, since a launch cannot be aborted.
         """
         # The main thread waits, so that blocks at work come to their end when it hears an interrupt. One block alone would
         # be lost in any thread.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keepers: what a run retains of each block, namely outcomes, samples and statistics."""
+"""Keepers: objects that store the outcomes, samples or statistics of each block of a run."""

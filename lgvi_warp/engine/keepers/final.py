@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The keeper of what the members of a run end with, from which another run goes on."""
+"""The keeper of the final states of a run's members, from which another run can continue."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ FINAL = "final"
 
 
 class Finals:
-    """Keeps what the packets of every block leave; in a store it is a part of each block.
+    """Keeps the final rows of every block's packets; in a store they are a part of each block.
 
-    in_store: whether blocks write their parts into a store: then none is held in memory.
+    in_store: whether blocks write their parts into a store; then no part is held in memory.
     """
 
     name = FINAL
@@ -43,16 +43,16 @@ class Finals:
         return _BlockFinal(plan)
 
     def merge(self, block: Block, part: Part) -> None:
-        """Keep what a block left."""
+        """Keep the final rows of a block."""
         if not self._in_store:
             self.parts[block.first] = part[0]
 
     def rows(self, members: int) -> Rows:
-        """Final rows of the first members, all of whose blocks have ended."""
+        """Final rows of the first members, whose blocks have all ended."""
         return joined({first: part for first, part in self.parts.items() if first < members})
 
     def to_arrays(self, part: Part) -> Part:
-        """A block's rows are arrays already."""
+        """Return a block's rows, which are arrays already."""
         return part
 
     def from_arrays(self, arrays: Rows, content: Any) -> Part:
@@ -69,9 +69,9 @@ class _BlockFinal:
         """Ignore the samples."""
 
     def take_packets(self, packets: Packets) -> None:
-        """Copy what the packets leave."""
+        """Copy the final rows of the packets."""
         self.rows = left_by(packets)
 
     def close(self, outcome: MemberStatus) -> Part:
-        """Return what they left."""
+        """Return the final rows."""
         return self.rows, known_settings(self.plan)

@@ -19,7 +19,7 @@ from lgvi_warp.statistics.values.samples import Fields
 
 
 class Outcomes:
-    """Keeps the outcome of every member, in the run's own process: it is pickled without its contents."""
+    """Keeps the outcome of every member, in the run's own process; it is pickled without its contents."""
 
     def __init__(self, plan: Plan):
         self.all = MemberStatus.clear(plan.ensemble.members, 2 if plan.method.adaptive else 0)
@@ -49,14 +49,14 @@ class _BlockOutcome:
         """Ignore the samples, which do not affect the outcome."""
 
     def close(self, outcome: MemberStatus) -> MemberStatus:
-        """Return the outcome as it is."""
+        """Return the outcome unchanged."""
         return outcome
 
 
 class Samples:
-    """Keeps every sample of every member, by name (k times, n members, ...); threads of this process write into it directly.
+    """Keeps every sample of every member, by name (k times, n members, ...); threads of this process write into it.
 
-    From other processes a block's samples come as its result; there `fields` is None. names: None for those of the plan.
+    Other processes return a block's samples as its result; there `fields` is None. names: None for those of the plan.
     """
 
     fields: dict[str, np.ndarray] | None = None
@@ -67,7 +67,7 @@ class Samples:
 
     @classmethod
     def elsewhere(cls, names: Sequence[str]) -> Samples:
-        """The keeper as another process has it: without room for all members."""
+        """The keeper for another process, without memory for all members."""
         samples = cls.__new__(cls)
         samples.names = tuple(names)
         return samples
@@ -82,14 +82,14 @@ class Samples:
         return _BlockSamples({name: values[:, block.first : block.stop] for name, values in self.fields.items()})
 
     def merge(self, block: Block, part: dict[str, np.ndarray] | None) -> None:
-        """Copy samples (k, members of the block, ...) that came from another process; None where they are in their places."""
+        """Copy samples (k, members of the block, ...) from another process; None if they are already in their places."""
         assert self.fields is not None
         for name, values in (part or {}).items():
             self.fields[name][:, block.first : block.stop] = values
 
 
 def empty_samples(plan: Plan, names: Sequence[str], members: int) -> dict[str, np.ndarray]:
-    """Uninitialised arrays for all samples of so many members, by field."""
+    """Uninitialised arrays for all samples of this many members, by field."""
     k, real = len(plan.grid.times), machine.DTYPES[plan.dtype]
     fields = {name: np.empty((k, members, *plan.layout.table[name].shape), real) for name in names}
     if plan.spec.compensated and "position" in fields:

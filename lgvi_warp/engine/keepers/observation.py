@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Data that a run keeps of its members, samples, statistics or both, and the condition under which it stops early."""
+"""Data that a run keeps (samples, statistics or both), and the condition under which it stops early."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")
 
 
 def replicates_of(ensemble: Mapping[str, Any]) -> int:
-    """The number of independent replicates of an ensemble's design, from its provenance."""
+    """Number of independent replicates of an ensemble's design, from its provenance."""
     sampling = ensemble.get("sampling", "random")
     if isinstance(sampling, str) or "indices" in ensemble or ensemble.get("explicit"):
         return 1
@@ -40,7 +40,7 @@ def replicates_of(ensemble: Mapping[str, Any]) -> int:
 
 @dataclass(frozen=True)
 class Observation:
-    """Data to keep of a run, and the condition `until` that ends it before the last member; None for none."""
+    """Data that a run keeps, and the condition `until` that ends it before the last member; None without a condition."""
 
     statistics: tuple[Statistic, ...] = ()
     keep: Any = "all"
@@ -53,12 +53,12 @@ class Observation:
 
     @property
     def ticks(self) -> bool:
-        """Whether some statistic takes the samples at all ticks of a controller."""
+        """Whether a statistic uses the samples at all ticks of a controller."""
         return any(statistic.ticks for statistic in self.statistics)
 
     @property
     def apart(self) -> bool:
-        """Whether each block runs apart: the run may end after any, and what all ticks give should stay in the caches."""
+        """Whether each block runs alone: the run may end after any, or the data of all ticks should stay in the caches."""
         return self.until is not None or self.ticks
 
     def read_at_ticks(self) -> dict[str, tuple[int, ...]]:
@@ -86,9 +86,9 @@ class Observation:
         return ordered(wanted)
 
     def watch(self, times: np.ndarray) -> tuple[tuple[Statistic, ...], StoppingRule | None]:
-        """The statistics to gather at times (k,) [s], and the watch of the stopping condition, None without one.
+        """The statistics to gather at times (k,) [s], and the rule of the stopping condition, or None.
 
-        The watched statistic is added where it is not among them.
+        The statistic of the stopping condition is added if it is not among them.
         """
         if self.until is None:
             return self.statistics, None
@@ -97,7 +97,7 @@ class Observation:
         return (*self.statistics, *added), watching
 
     def again(self, status: np.ndarray) -> np.ndarray:
-        """The members to run again in order to store their samples, by the status (n,) of all."""
+        """The members to run again for their samples, from the status (n,) of all members."""
         if isinstance(self.keep, str):
             return np.flatnonzero(failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
         return np.array([i for i in self.keep if i < len(status)], dtype=np.int64)
@@ -113,7 +113,7 @@ class Observation:
 
 
 def of_functions(value: Any) -> bool:
-    """Whether a statistic depends on the user's functions or quantities, which its table cannot hold."""
+    """Whether a statistic depends on the user's functions or quantities, which its table cannot contain."""
     if isinstance(value, Statistic):
         return any(of_functions(getattr(value, field.name)) for field in fields(value))
     if isinstance(value, list | tuple):
@@ -122,9 +122,9 @@ def of_functions(value: Any) -> bool:
 
 
 def observation_of(saved: Mapping[str, Any] | None, statistics: Any = None) -> Observation:
-    """Restore an observation from its table; None: of a run that kept nothing but samples.
+    """Restore an observation from its table; None: from a run that kept only samples.
 
-    statistics: the run's statistics; needed where they depend on functions.
+    statistics: the run's statistics; needed if they depend on functions.
     """
     if saved is None:
         if statistics:
@@ -145,7 +145,7 @@ def observation_of(saved: Mapping[str, Any] | None, statistics: Any = None) -> O
 
 
 class Observing:
-    """An observation during a run: gathers the statistics at times (k,) [s], and decides whether the run may stop."""
+    """An observation during a run: it gathers the statistics at times (k,) [s], and decides whether the run may stop."""
 
     def __init__(self, observed: Observation, time: np.ndarray, members: int, replicates: int = 1):
         statistics, self._watch = observed.watch(time)
@@ -159,7 +159,7 @@ class Observing:
         return (self._gathered,) if self._gathered else ()
 
     def enough(self, members: int) -> bool:
-        """Whether the run may end; asked after each block, in block order."""
+        """Whether the run may end; called after each block, in block order."""
         watch = self._watch
         return bool(watch and watch.due(members) and watch.reached(self._watched()))
 
@@ -167,7 +167,7 @@ class Observing:
         return self._gathered.estimates(self._watch.statistic) if self._gathered and self._watch else []
 
     def read(self, ensemble: Mapping[str, Any], status: np.ndarray) -> tuple[Estimates, tuple[str, ...]]:
-        """The statistics by name, and what the user should know about them; status: (m,), of the members that ran."""
+        """The statistics by name, and messages about them; status: (m,), of the members that ran."""
         estimates, members = self._gathered.result() if self._gathered else Estimates(), len(status)
         messages = messages_about(estimates, ensemble, status, self._gathered.apart if self._gathered else ())
         return estimates, messages + ((self._watch.report(members, self._watched()),) if self._watch else ())
@@ -179,7 +179,7 @@ def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ..
 
 
 def observe(fleet: Ensemble, statistics: Any = None, keep: Any = None, until: Any = None) -> Observation:
-    """The observation that the arguments of solve describe; those that are None come from the scene's [run]."""
+    """Make the observation from the arguments of solve; arguments that are None come from the scene's [run]."""
     faults, scene = Faults(), fleet.scene
     settings, events = scene.run, scene.events
     gathered: tuple[Statistic, ...] = ()
@@ -208,7 +208,7 @@ def observe(fleet: Ensemble, statistics: Any = None, keep: Any = None, until: An
 def messages_about(
     estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], status: np.ndarray, apart: Collection[str] = ()
 ) -> tuple[str, ...]:
-    """Messages about statistics: members left out by status (m,), and intervals that do not fit the sampling."""
+    """Messages about statistics: members left out by status (m,), and intervals that do not suit the sampling."""
     if not estimates:
         return ()
     members, messages = len(status), _left_out(estimates, status, apart) + _few_effective(estimates, apart)
@@ -232,7 +232,7 @@ def messages_about(
 
 
 def _few_effective(estimates: Mapping[str, Estimate], apart: Collection[str]) -> tuple[str, ...]:
-    """A message that the weights leave few effective members, of those that estimates of all members are of."""
+    """Message that the weights leave few effective members, for estimates over all members."""
     numbers = [
         (float(estimate.count.min()), int(estimate["members"].max()))
         for name, estimate in estimates.items()
@@ -253,7 +253,7 @@ def _few_effective(estimates: Mapping[str, Estimate], apart: Collection[str]) ->
 
 
 def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Collection[str]) -> tuple[str, ...]:
-    """A message that some members do not count, and why; first passages report theirs as lost, and those `apart` mean to."""
+    """Message on members that do not count. First passages report theirs; estimates `apart` omit members by design."""
     members = len(status)
     count = {
         estimate: int(estimate.arrays.get("members", estimate.count).min())

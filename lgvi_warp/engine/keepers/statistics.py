@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 
 class Gathered:
-    """The statistics of a run so far: for each, a tree of parts; of paths, where one looks over them. time: (k,) [s].
+    """The statistics of a run so far: for each statistic a tree of parts. time: (k,) [s].
 
-    With R replicates, member i belongs to replicate i mod R, and parts hold the numbers of each replicate separately.
+    With R replicates, member i belongs to replicate i mod R, and parts contain the numbers of each replicate separately.
     """
 
     # Name of its results in a store.
@@ -44,11 +44,11 @@ class Gathered:
         return _BlocksOfRun(self, plan, block, members)
 
     def place(self, block: Block) -> tuple[int, int, int]:
-        """The first member of a block, the block's number, and the size of all blocks but the last."""
+        """Return (first member of a block, number of the block, size of all blocks except the last)."""
         return block.first, block.first // self._size, self._size
 
     def merge(self, block: Block, part: list[Part]) -> None:
-        """Add the parts of a block, or those of several in their order, to the trees."""
+        """Add the parts of a block, or of several blocks in order, to the trees."""
         first = block.first // self._size
         numbers = range(first, first + len(blocks(block.count, self._size)))
         each = list(zip(itertools.product(numbers, range(len(self.trees))), part, strict=True))
@@ -77,7 +77,7 @@ class Gathered:
         return statistic.estimates(parts, time)
 
     def times_of(self, statistic: Statistic) -> np.ndarray:
-        """The times of a statistic's values: all sample times (k,), or the end alone (1,) [s]."""
+        """Times of a statistic's values [s]: all sample times (k,), or the end alone (1,)."""
         return self.time if statistic.at is None else self.time[-1:]
 
     def result(self) -> Estimates:
@@ -86,11 +86,11 @@ class Gathered:
 
     @property
     def apart(self) -> set[str]:
-        """Names of estimates that leave members out on purpose: those of how members end."""
+        """Names of estimates that omit members on purpose: those about the members' ends."""
         return {part.key for statistic in self.statistics if statistic.at_end for part in statistic.parts()}
 
     def __getstate__(self) -> dict[str, Any]:
-        """State for another process to gather blocks, without data gathered here."""
+        """State for another process that gathers blocks, without the data gathered here."""
         return {name: value for name, value in vars(self).items() if name != "trees"}
 
     @staticmethod
@@ -109,9 +109,9 @@ class Gathered:
 class BlockStatistics:
     """Gathers the statistics of one block from its samples, in order, and from the ends of its members.
 
-    members: what functions of (samples, members) see of the block's members.
-    weight: (n,), what the members count for; None: all alike.
-    ticks: (m,) [s], the times of a controller's ticks, which come by `take_ticks`; None where samples serve for ticks.
+    members: the block's members, for functions of (samples, members).
+    weight: weights of the members (n,); None: equal weights.
+    ticks: (m,) [s], times of a controller's ticks, passed to `take_ticks`; None if samples are used as ticks.
     """
 
     def __init__(
@@ -133,11 +133,11 @@ class BlockStatistics:
         self._open = [statistic.open(time, block.count) for statistic, time in zip(run.statistics, times, strict=True)]
 
     def take(self, when: slice, samples: Fields) -> None:
-        """Pass to each statistic the values of its quantity; statistics of the same quantity share them."""
+        """Pass the values of its quantity to each statistic; statistics of the same quantity share them."""
         self._pass(when, samples, ticks=not self._takes_ticks)
 
     def take_ticks(self, when: slice, samples: Fields) -> None:
-        """Pass the values at all ticks to the statistics that want them."""
+        """Pass the values at all ticks to the statistics that need them."""
         self._pass(when, samples, ticks=True, others=False)
 
     def _pass(self, when: slice, samples: Fields, ticks: bool, others: bool = True) -> None:
@@ -163,7 +163,7 @@ class BlockStatistics:
         return dealt(x, good, *self._place, self._replicates)
 
     def ended(self, ends: Ends) -> list[Part]:
-        """Return, for each statistic, arrays by name."""
+        """Return arrays by name, for each statistic."""
         for statistic, gathers in zip(self._statistics, self._open, strict=True):
             if statistic.at_end:
                 gathers.take(self._values(*statistic.at_ends(ends, self._last.get(statistic))), slice(0, 1))
@@ -172,7 +172,7 @@ class BlockStatistics:
 
 
 class _BlocksOfRun:
-    """The statistics of a block that is advanced, or of several that are advanced as one: of each those that it has alone."""
+    """Statistics of blocks that are advanced together, gathered for each block separately."""
 
     def __init__(self, run: Gathered, plan: Plan, block: Block, members: Members):
         self._plan, ticks = plan, plan.launches.gathered
@@ -195,5 +195,5 @@ class _BlocksOfRun:
             gathers.take_ticks(when, samples.of_members(some))
 
     def close(self, outcome: MemberStatus) -> list[Part]:
-        """Return, for each block and statistic, arrays by name."""
+        """Return arrays by name, for each block and statistic."""
         return [part for some, gathers in self._each for part in gathers.ended(outcome.at(some).ends(self._plan))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of a controller of one vehicle, in the user's body axes and about his origin: what each does at a tick."""
+"""The parts of a controller of one vehicle, in the user's body axes and about the user's origin."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,11 +11,11 @@ from lgvi_warp.reference.rotation import Array
 
 @dataclass(frozen=True)
 class Measurement:
-    """Motion as measured at a tick: the truth, until a sensor changes it.
+    """Motion as measured at a tick: equal to the truth unless a sensor changes it.
 
-    position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
-    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick, numbers of the step that begins and of the tick;
-    member.
+    position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s]
+    and angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick: index of the next step, and of the
+    tick; member.
     """
 
     position: Array
@@ -33,7 +33,7 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Reference:
-    """The wanted motion: position [m] and velocity [m/s], inertial; R; speed [m/s].
+    """The reference motion: position [m] and velocity [m/s], inertial; R; speed [m/s].
 
     angular_velocity [rad/s] and angular_acceleration [rad/s^2] in the axes of R.
     """
@@ -50,9 +50,9 @@ NO_WISH = Reference(np.zeros(3), np.zeros(3), np.eye(3), np.zeros(3), 0.0)
 
 
 class Part:
-    """A part that does nothing; each overrides its role. Its numbers have the names and units of the part in lgvi_warp.
+    """Base class of parts, which does nothing. A subclass overrides its role; its numbers are as in lgvi_warp.
 
-    It remembers in attributes of its own, which `begin` sets.
+    Its memory is in attributes, which `begin` sets.
     """
 
     def __init__(self, **numbers: Any) -> None:
@@ -65,39 +65,39 @@ class Part:
     ahead = 0
 
     def begin(self) -> None:
-        """Forget everything, before the first tick."""
+        """Reset the memory, before the first tick."""
 
     def measure(self, y: Measurement) -> Measurement:
-        """The measurement as a sensor or an estimator changes it."""
+        """Change the measurement, as a sensor or an estimator."""
         return y
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
-        """The wanted motion as a guidance changes it."""
+        """Change the reference motion, as a guidance."""
         return r
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
-        """The demand of the laws before w (6,) [N, N m] plus that of this law; unmet (6,): of the last one, not delivered."""
+        """Add the demand of this law to w (6,) [N, N m] of earlier laws; unmet (6,): undelivered part of the last one."""
         return w
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
-        """Sets `command` of an actuator; returns what is left of the demand."""
+        """Set `command` of an actuator; return the remaining demand."""
         return w
 
 
 def upright(heading: float) -> Array:
-    """The attitude (3, 3) of a heading [rad], without roll and pitch."""
+    """Attitude (3, 3) with a heading [rad], without roll and pitch."""
     c, s = np.cos(heading), np.sin(heading)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def heading_error(wanted: Array, measured: Array) -> float:
-    """The heading of one attitude (3, 3) less that of another [rad], in [-pi, pi], from their forward axes."""
+    """Heading of one attitude (3, 3) minus that of another [rad], in [-pi, pi], from their forward axes."""
     s, c = wanted[:2, 0], measured[:2, 0]
     return float(np.arctan2(s[1] * c[0] - s[0] * c[1], s @ c))
 
 
 def attitude_error(wanted: Array, measured: Array) -> Array:
-    """e_R = vee(R_d^T R - R^T R_d) / 2 (3,), in the axes of the measured attitude R, of the wanted one R_d."""
+    """e_R = vee(R_d^T R - R^T R_d) / 2 (3,), in the axes of the measured attitude R; R_d: reference attitude."""
     skew = wanted.T @ measured - measured.T @ wanted
     return 0.5 * np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
 
@@ -109,22 +109,22 @@ def pose_errors(r: Reference, y: Measurement) -> tuple[Array, Array, Array, Arra
 
 
 def unhindered(error: Array, unmet: Array, conditional: bool) -> Array:
-    """An error (3,) without the entries that would demand more of what is not delivered already, the part `unmet` (3,)."""
+    """An error (3,) without the entries that would increase a demand that is not delivered already (`unmet`, (3,))."""
     return np.where(conditional & (unmet * error > 0.0), 0.0, error)
 
 
 class PoseIntegrals:
-    """The integrals I of e_b, inertial axes, and I_R of e_R, body axes, of a law of the pose; each waits in body axes."""
+    """Integrals I of e_b, inertial axes, and I_R of e_R, body axes, for a law of the pose; they stop in body axes."""
 
     def __init__(self) -> None:
         zero: Array = np.zeros(3)
         self.I, self.I_R, self.e, self.e_R = zero, zero, zero, zero
 
     def at_tick(self, law: Any, y: Measurement, unmet: Array, e: Array, e_R: Array) -> tuple[Array, Array]:
-        """I and I_R at this tick, from the errors of the last one; those of this tick are kept.
+        """I and I_R at this tick, from the errors of the last tick; the errors of this tick are stored.
 
         law: integral_limit (2,) and anti_windup.
-        y, unmet, e, e_R: Measurement; what the last tick did not deliver (6,); errors of this tick.
+        y, unmet, e, e_R: measurement; undelivered part of the last demand (6,); errors of this tick.
         """
         conditional = law.anti_windup == "conditional"
         error = y.R @ unhindered(y.R.T @ self.e, unmet[:3], conditional)
@@ -149,23 +149,23 @@ def balance(law: Any, y: Measurement) -> Array:
 
 
 def cannot(reached: Array) -> Array:
-    """The projector (6, 6) onto the demands that actuators cannot make, from that onto those they can, without round-off."""
+    """Projector (6, 6) onto demands beyond the actuators, from the projector onto the others, without round-off."""
     others = np.eye(6) - reached
     return np.where(np.abs(others) < 1e-12, 0.0, others)
 
 
 class Integral:
-    """The integral of an error, which waits while the actuators deliver no more (conditional integration)."""
+    """Integral of an error that stops while the actuators deliver no more (conditional integration)."""
 
     def __init__(self) -> None:
         self.value, self.error = 0.0, 0.0
 
     def at_tick(self, period: float, limit: float, unmet: float, conditional: bool) -> float:
-        """I + T e within +-limit, unless more of the demand would go where some of it was not delivered.
+        """I + T e within +-limit, unless this increases a demand that was not delivered.
 
         docs/theory/control_loop.md, (C8).
 
-        period, limit: Time between ticks T [s]; largest size of I.
+        period, limit: time T between ticks [s]; largest |I|.
         """
         if not (conditional and unmet * self.error > 0.0):
             self.value = float(np.clip(self.value + period * self.error, -limit, limit))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An altimeter, and the sea floor that it looks at."""
+"""An altimeter, and the sea floor that it measures."""
 
 from dataclasses import replace
 from typing import Any
@@ -12,7 +12,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class Ground:
-    """A floor on a grid: depth (x, y), origin (2,), spacing (2,), all [m]; bilinear between the nodes, held outside."""
+    """A gridded floor: depth (x, y), origin (2,), spacing (2,), all [m]; bilinear between nodes, constant outside."""
 
     def __init__(self, depth: Array, origin: Array, spacing: Array) -> None:
         self.depth, self.origin, self.spacing = depth, np.asarray(origin, float), np.asarray(spacing, float)
@@ -29,7 +29,7 @@ class Ground:
         return float(total)
 
     def along(self, start: Array, beam: Array, most: float) -> float:
-        """Distance to the floor along a beam: in each cell on its way the height is quadratic, known by three values."""
+        """Distance to the floor along a beam: in each cell on its way the height is quadratic, given by three values."""
         crossings = [0.0, most]
         for axis in (0, 1):
             if beam[axis] != 0.0:
@@ -49,13 +49,13 @@ class Ground:
 
 
 class Altimeter(Part):
-    """Numbers as those of `lw.control.Altimeter`; ground. The last reading is `reading`."""
+    """Attributes as in `lw.control.Altimeter`; ground: the floor. The last reading is `reading`."""
 
     direction, point, most = (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 100.0
     ground: Any = None
 
     def begin(self) -> None:
-        """No reading yet."""
+        """Start without a reading."""
         names = {"noise", "bias", "drift", "quantum", "every", "latency", "dropout", "burst", "outlier", "outlier_std"}
         names |= {"seed0", "seed1", "channel"}
         self.errors = Sensor(of="depth", **{name: value for name, value in vars(self).items() if name in names})
@@ -63,7 +63,7 @@ class Altimeter(Part):
         self.reading = 0.0
 
     def measure(self, y: Measurement) -> Measurement:
-        """The reading, with the errors of a sensor that reads it as a depth; the measurement stays as it is."""
+        """Take a reading, with the errors of a sensor that reads it as a depth; the measurement is unchanged."""
         beam = y.R @ (np.asarray(self.direction, float) / np.linalg.norm(self.direction))
         reach = self.ground.along(y.position + y.R @ np.asarray(self.point, float), beam, self.most)
         seen = self.errors.measure(replace(y, position=np.array([*y.position[:2], reach])))

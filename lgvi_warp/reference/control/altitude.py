@@ -10,14 +10,14 @@ from lgvi_warp.reference.control import Measurement, Part, Reference
 
 
 class Altitude(Part):
-    """Numbers as those of `lw.control.Altitude`; an Altimeter, or the ground of the chart."""
+    """Attributes as in `lw.control.Altitude`; an Altimeter, or the ground of the chart."""
 
     look_ahead, shallowest, deepest = 0.0, 0.0, 12_000.0
     altimeter: Any = None
     ground: Any = None
 
     def floor(self, y: Measurement) -> float:
-        """The depth of the floor, as far as it is known."""
+        """Known depth of the floor."""
         if self.altimeter is not None:
             direction = np.asarray(self.altimeter.direction, float)
             hit = self.altimeter.point + self.altimeter.reading * direction / np.linalg.norm(direction)
@@ -27,6 +27,6 @@ class Altitude(Part):
         return min(self.ground.at(here), self.ground.at(here + self.look_ahead * ahead))
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
-        """The wanted depth, within its limits."""
+        """Set the reference depth, within its limits."""
         wanted = max(min(self.floor(y) - self.altitude, self.deepest), self.shallowest)
         return replace(r, position=np.array([*r.position[:2], wanted]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Allocation within the limits of the actuators, by a primal active set."""
+"""Allocation within the limits of the actuators, by a primal active-set method."""
 
 from typing import Any
 
@@ -15,13 +15,13 @@ DEPENDENT, NONE, FLAT, BESIDE, TOLD = 1e-9, 1e-12, 1e-9, 1e-13, 1e-10
 
 
 class BoundedLeastSquares(PseudoInverse):
-    """Numbers as those of `lw.control.BoundedLeastSquares`; effect, losses and the actuator as in `PseudoInverse`."""
+    """Attributes as in `lw.control.BoundedLeastSquares`; effect, losses and the actuator as in `PseudoInverse`."""
 
     priorities = np.ones(6)
     iterations = 100
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
-        """Efforts t of least sum (priority (B t - w))^2 within the limits; left is w - B t."""
+        """Efforts t with the smallest sum (priority (B t - w))^2 within the limits; w - B t remains."""
         actuator, B = actuators[self.to], self.effect
         root = 1.0 / np.sqrt(np.ones(B.shape[1]) if self.weights is None else np.asarray(self.weights))
         arm = np.sqrt(np.square(B[3:]).sum() / np.square(B[:3]).sum()) if B[:3].any() and B[3:].any() else 1.0
@@ -42,7 +42,7 @@ class BoundedLeastSquares(PseudoInverse):
         return np.asarray(np.where(np.abs(units * left) > TOLD * np.linalg.norm(units * w), left, 0.0))
 
     def limits(self, actuator: Any) -> tuple[Array, Array]:
-        """The efforts at full command astern and ahead; 0 of a channel that is known to be lost."""
+        """Efforts at full command astern and ahead; 0 for a channel that is known to be lost."""
         ends = (actuator.command_for(np.full(len(actuator.limit), side)) for side in (-1e9, 1e9))
         low, high = (actuator.effort(np.clip(end, -actuator.limit, actuator.limit)) for end in ends)
         lost = [channel for channel, time in self.losses if self.time >= time]
@@ -51,7 +51,7 @@ class BoundedLeastSquares(PseudoInverse):
 
 
 def nearest(A: Array, b: Array, s: Array, x: Array, low: Array, high: Array, iterations: int) -> Array:
-    """x of least sum s^2 (A x - b)^2 within limits, s falling, from x on, by so many steps at most."""
+    """x with the smallest sum s^2 (A x - b)^2 within limits, s decreasing, from x on, in at most this many steps."""
     state = np.where(x >= high, 1, np.where(x <= low, -1, 0))
     for _ in range(iterations):
         goal, slopes = free_solution(A, b, s, np.where(state == 0, 0.0, x), state == 0)
@@ -94,7 +94,7 @@ def released(A: Array, s: Array, slopes: Array, x: Array, state: Array, low: Arr
 
 
 def free_solution(A: Array, b: Array, s: Array, held: Array, free: Array) -> tuple[Array, Array]:
-    """The smallest x of free channels of least error, and s^2 times that error, which is beside the lines of these."""
+    """Smallest x of the free channels with the least error, and s^2 times this error, which is normal to their columns."""
     L, Q, kept = np.zeros((6, 6)), A * free, np.zeros(6, bool)
     for i in range(6):
         size = Q[i] @ Q[i]

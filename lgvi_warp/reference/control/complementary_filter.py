@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The attitude from rates, and in the long run from a measured attitude."""
+"""Attitude from angular rates, corrected slowly by a measured attitude."""
 
 from dataclasses import replace
 
@@ -10,14 +10,14 @@ from lgvi_warp.reference.rotation import exp
 
 
 class ComplementaryFilter(Part):
-    """Numbers as those of `lw.control.ComplementaryFilter`."""
+    """Attributes as in `lw.control.ComplementaryFilter`."""
 
     def begin(self) -> None:
-        """Forget the estimate, before the first reading."""
+        """Reset the estimate, before the first reading."""
         self.last: Measurement | None = None
 
     def measure(self, y: Measurement) -> Measurement:
-        """R exp(T (Om_old + Om) / 2), then the part 1 - exp(-T / time constant) of the turn to the measured attitude."""
+        """R exp(T (Om_old + Om) / 2), then a fraction 1 - exp(-T / time constant) of the turn to the measured attitude."""
         if self.last is not None:
             R = self.last.R @ exp(0.5 * y.period * (self.last.angular_velocity + y.angular_velocity))
             y = replace(y, R=R @ exp(share(y.period, self.time_constant) * turn_to(R, y.R)))

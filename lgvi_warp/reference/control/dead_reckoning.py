@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The position from attitude and velocity."""
+"""Position from attitude and velocity."""
 
 from dataclasses import replace
 
@@ -9,17 +9,17 @@ from lgvi_warp.reference.control import Measurement, Part
 
 
 class DeadReckoning(Part):
-    """Numbers as those of `lw.control.DeadReckoning`."""
+    """Attributes as in `lw.control.DeadReckoning`."""
 
     rule, velocity, depth = "trapezoid", "velocity", "reckoned"
     start_error = np.zeros(3)
 
     def begin(self) -> None:
-        """Forget the place, before the first reading."""
+        """Reset the position, before the first reading."""
         self.last: np.ndarray | None = None
 
     def measure(self, y: Measurement) -> Measurement:
-        """b <- b + T (v_old + v) / 2, or T v_old, of inertial velocities, from the position measured at the first tick."""
+        """b <- b + T (v_old + v) / 2, or T v_old, with inertial velocities, from the position at the first tick."""
         v = y.R @ getattr(y, self.velocity)
         if self.last is None:
             self.position = y.position + self.start_error

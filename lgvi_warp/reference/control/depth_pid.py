@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PID of the depth by way of the pitch angle."""
+"""PID control of the depth by the pitch angle."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class DepthPID(Part):
-    """Numbers as those of `lw.control.DepthPID`."""
+    """Attributes as in `lw.control.DepthPID`."""
 
     ki = ki_pitch = kd_pitch = k_heave = 0.0
     pitch_limit = 0.5

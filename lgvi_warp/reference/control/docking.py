@@ -9,16 +9,16 @@ from lgvi_warp.reference.control import Measurement, Part, Reference, upright
 
 
 class Docking(Part):
-    """Numbers as those of `lw.control.Docking`."""
+    """Attributes as in `lw.control.Docking`."""
 
     offset, kappa = 0.0, 0.1
 
     def begin(self) -> None:
-        """Not yet begun; J is 0."""
+        """Reset the phase; J is 0."""
         self.phase, self.J = "not begun", 0.0
 
     def next_phase(self, left: float, off: float) -> str:
-        """Next phase of the vehicle, `left` before the dock's plane and `off` the centre line."""
+        """Next phase of a vehicle at the distance `left` before the dock's plane and `off` the centre line."""
         outside = off > self.mouth + max(left, 0.0) * np.tan(self.funnel)
         if self.phase == "not begun":
             return "on the line" if left > 0.0 else "going round"
@@ -31,7 +31,7 @@ class Docking(Part):
         return self.phase
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
-        """Along the centre line, or round to where it begins."""
+        """Guide along the centre line, or round to its start."""
         axes = upright(self.heading)
         dock = np.asarray(self.position, float)
         along, aside, below = axes.T @ (y.position - dock)

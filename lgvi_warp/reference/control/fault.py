@@ -14,9 +14,9 @@ SAME = 1e-7
 
 
 class Fault:
-    """Numbers as those of `lw.control.Fault`, its kind that of one member; for each number that it changes one object.
+    """Attributes as in `lw.control.Fault`, with the kind of one member; one object for each number that it changes.
 
-    angle: whether differences are within half a turn; held: whether an intermittent one keeps the last number.
+    angle: whether differences are within half a turn; held: whether an intermittent fault keeps the last number.
     """
 
     of: str
@@ -32,13 +32,13 @@ class Fault:
         self.begin()
 
     def begin(self) -> None:
-        """Forget everything."""
+        """Reset the memory."""
         self.last: float | None = None
         # Numbers since the onset, that of the tick before it first.
         self.since: list[float] = []
 
     def acts(self, tick: int, T: float) -> bool:
-        """Whether it acts at a tick, T [s] after the one before. docs/theory/control_loop.md, (C5)."""
+        """Whether the fault acts at a tick, T [s] after the previous tick. docs/theory/control_loop.md, (C5)."""
         if not self.time / T - SAME <= tick < self.until / T - SAME:
             return False
         if self.kind != "intermittent":
@@ -48,7 +48,7 @@ class Fault:
         return bool(age % cycle < self.duty * cycle - SAME)
 
     def change(self, tick: int, T: float, x: float, place: float | None = None) -> float:
-        """Its number x at a tick as it leaves the fault; place: where the actuator is, of one that lags."""
+        """The number x at a tick, changed by the fault; place: position of an actuator with a lag."""
         now = self.acts(tick, T)
         self.since = [*self.since, x] if now and self.since else [x if self.last is None else self.last, x]
         out = self.changed(x, round(self.delay / T), T, place if len(self.since) == 2 else None) if now else x
@@ -58,7 +58,7 @@ class Fault:
         return out
 
     def changed(self, x: float, late: int, T: float, place: float | None) -> float:
-        """The number while it acts; place: at the onset."""
+        """The number while the fault acts; place: position of the actuator at the onset."""
         last = self.since[0] if self.last is None else self.last
         stays = last if place is None or self.kind == "freeze" else place
         if self.kind == "slow":
@@ -76,15 +76,15 @@ class Fault:
 
 
 class SensorFault(Part):
-    """Numbers as those of `lw.control.Fault`, of a sensor; of: what that sensor reads. A channel "all": of all numbers."""
+    """Attributes as in `lw.control.Fault`, for a sensor; of: quantity that it reads. Channel "all": all its numbers."""
 
     def begin(self) -> None:
-        """No reading yet."""
+        """Start without a reading."""
         numbers = {"angle": self.of in ("heading", "attitude"), "held": True} | vars(self)
         self.each = [Fault(**numbers) for _ in range(3)]
 
     def measure(self, y: Measurement) -> Measurement:
-        """The reading, with those numbers changed that it hits."""
+        """Take a reading, and change the numbers of the fault's channel."""
         if not self.each[0].acts(y.tick, y.period):
             for fault, x in zip(self.each, np.atleast_1d(values(y, self.of)), strict=False):
                 fault.change(y.tick, y.period, float(x))

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PID of the heading."""
+"""PID control of the heading."""
 
 from lgvi_warp.reference.control import Integral, Measurement, Part, Reference, heading_error
 from lgvi_warp.reference.rotation import Array
 
 
 class HeadingPID(Part):
-    """Numbers as those of `lw.control.HeadingPID`."""
+    """Attributes as in `lw.control.HeadingPID`."""
 
     ki = kd = 0.0
     integral_limit = 1e6
     anti_windup = "conditional"
 
     def begin(self) -> None:
-        """Set the integral to 0, and remember no error."""
+        """Set the integral to 0, and clear the last error."""
         self.integral = Integral()
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:

@@ -8,14 +8,14 @@ from lgvi_warp.reference.rotation import Array
 
 
 class HeadingSMC(Part):
-    """Numbers as those of `lw.control.HeadingSMC`."""
+    """Attributes as in `lw.control.HeadingSMC`."""
 
     k_d = nomoto_time = 0.0
     integral_limit = 1e6
     anti_windup = "conditional"
 
     def begin(self) -> None:
-        """Set the integral to 0, and remember no error."""
+        """Set the integral to 0, and clear the last error."""
         self.integral = Integral()
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:

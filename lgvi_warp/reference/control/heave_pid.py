@@ -1,23 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PID of the depth by a force."""
+"""PID control of the depth by a force."""
 
 from lgvi_warp.reference.control import Integral, Measurement, Part, Reference
 from lgvi_warp.reference.rotation import Array
 
 
 class HeavePID(Part):
-    """Numbers as those of `lw.control.HeavePID`."""
+    """Attributes as in `lw.control.HeavePID`."""
 
     ki = kd = 0.0
     integral_limit = 1e6
     anti_windup = "conditional"
 
     def begin(self) -> None:
-        """Set the integral to 0, and remember no error."""
+        """Set the integral to 0, and clear the last error."""
         self.integral = Integral()
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
-        """Z = kp e + ki I + kd (wanted - measured rate of the depth)."""
+        """Z = kp e + ki I + kd (reference - measured rate of the depth)."""
         e = r.position[2] - y.position[2]
         total = self.integral.at_tick(y.period, self.integral_limit, unmet[2], self.anti_windup == "conditional")
         self.integral.error = e

@@ -12,7 +12,7 @@ from lgvi_warp.reference.rotation import Array
 def circled(
     r: Reference, y: Measurement, center: Array, radius: float, look_ahead: float, speed: float, clockwise: bool
 ) -> Reference:
-    """Round a circle: along its tangent, turned towards the circle by atan((distance - radius) / look_ahead)."""
+    """Guide around a circle: along its tangent, turned towards it by atan((distance - radius) / look_ahead)."""
     sense = 1.0 if clockwise else -1.0
     out = y.position[:2] - np.asarray(center)[:2]
     bearing, distance = np.arctan2(out[1], out[0]), np.hypot(*out)
@@ -31,10 +31,10 @@ def circled(
 
 
 class Loiter(Part):
-    """Numbers as those of `lw.control.Loiter`."""
+    """Attributes as in `lw.control.Loiter`."""
 
     clockwise = True
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
-        """Onto the circle, and round it."""
+        """Guide onto the circle, and around it."""
         return circled(r, y, self.center, self.radius, self.look_ahead, self.speed, self.clockwise)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The closed loop of one vehicle: ticks between steps, and the commands that are held until the next one."""
+"""The closed loop of one vehicle: ticks between steps, and commands that are held until the next tick."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,9 +17,9 @@ from lgvi_warp.reference.submaps import Body, State, look, water
 class Loop:
     """A controller of one vehicle.
 
-    parts: in the order in which they act; actuators: the laws that take commands, by name, each with `command`, an array that
-    the allocation sets, and `held`, by which the law acts; every: steps between ticks; delay: steps from a tick until its
-    commands act. measured, demand, unmet: of the last tick.
+    parts: in the order in which they act; actuators: the laws with commands, by name, each with `command`, an array
+    that the allocation sets, and `held`, which the law uses; every: steps between ticks; delay: steps from a tick until
+    its commands act. measured, demand, unmet: values of the last tick.
     """
 
     parts: Sequence[Part]
@@ -33,7 +33,7 @@ class Loop:
     measured: Measurement | None = None
 
     def begin(self) -> None:
-        """Before the first tick: no part remembers anything, and no command has come."""
+        """Reset the memory of all parts and the commands, before the first tick."""
         for part in self.parts:
             part.begin()
         for law in self.actuators.values():
@@ -70,19 +70,19 @@ class Loop:
         self.change(x, body, self.every * h)
 
     def wanted_later(self, y: Measurement, ticks: int) -> Reference:
-        """What guidance that follows from the time alone will want some ticks later."""
+        """Reference of a time-dependent guidance some ticks later."""
         y, r = replace(y, t=y.t + ticks * y.period, step=y.step + ticks * self.every, tick=y.tick + ticks), NO_WISH
         for part in self.parts:
             r = part.guide(r, y)
         return r
 
     def arrived(self, step: int) -> dict[str, Array]:
-        """The last commands that have come by a step."""
+        """The last commands that have arrived by a step."""
         arrived = [commands for since, commands in self.sent if since <= step]
         return arrived[-1] if arrived else {name: np.zeros_like(law.limit) for name, law in self.actuators.items()}
 
     def change(self, x: State, body: Body, T: float) -> None:
-        """Let the faults change what acts in a period T [s], before its commands arrive and from then on.
+        """Let the faults change the commands of a period T [s], before its new commands arrive and afterwards.
 
         docs/theory/control_loop.md, (C5).
         """
@@ -102,12 +102,12 @@ class Loop:
                 before[i] = (after[i] if last is None else last) if memory else old
 
     def place(self, name: str, x: State, body: Body) -> Any:
-        """The place of an actuator that lags; None for one that is where it is commanded."""
+        """Position of an actuator with a lag; None for one that is always at its command."""
         law = self.actuators[name]
         return next(rows for term, rows in zip(body.terms, x.memory, strict=True) if term is law) if law.moves else None
 
     def act(self, step: int, h: float) -> None:
-        """Let the actuators hold what acts in a step: the last commands that have come, as the faults leave them.
+        """Set the commands of actuators in a step: the last commands that have arrived, as changed by faults.
 
         docs/theory/control_loop.md, (C4).
         """
@@ -118,11 +118,11 @@ class Loop:
 def closed_loop(
     x: State, body: Body, loop: Loop, step: Callable[[State, Body, float], State], h: float, steps: int
 ) -> list[State]:
-    """The states after 0, 1, ..., steps steps, with a tick before every `every`-th.
+    """The states after 0, 1, ..., steps steps, with a tick before every `every`-th step.
 
     docs/theory/control_loop.md, (C1).
 
-    step, h, steps: (x, body, h) -> the state h later; step [s]; number of steps.
+    step: function of (x, body, h) that returns the state h later; h: step [s]; steps: number of steps.
     """
     loop.begin()
     states = [x]

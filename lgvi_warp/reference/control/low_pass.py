@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A filter of the first order."""
+"""A first-order low-pass filter."""
 
 import math
 from dataclasses import replace
@@ -12,7 +12,7 @@ from lgvi_warp.reference.rotation import exp
 
 
 def share(period: float, time_constant: float) -> float:
-    """1 - exp(-T / time constant): how far a filter goes towards its input over a period T [s]; 1 where the constant is 0.
+    """1 - exp(-T / time constant): fraction of the way to its input that a filter moves in T [s]; 1 for constant 0.
 
     docs/theory/control_loop.md, (C7).
     """
@@ -20,10 +20,10 @@ def share(period: float, time_constant: float) -> float:
 
 
 class LowPass(Part):
-    """Numbers as those of `lw.control.LowPass`."""
+    """Attributes as in `lw.control.LowPass`."""
 
     def begin(self) -> None:
-        """Begin without a reading: the first one passes whole."""
+        """Start without a reading: the first reading passes unchanged."""
         self.last: Measurement | None = None
 
     def measure(self, y: Measurement) -> Measurement:

@@ -10,10 +10,10 @@ from lgvi_warp.reference.rotation import Array
 
 
 class AllocationMatrix(Part):
-    """Numbers as those of `lw.control.AllocationMatrix`; `to` names an actuator, which has a limit."""
+    """Attributes as in `lw.control.AllocationMatrix`; `to` names an actuator, which has a limit."""
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
-        """u = A w within the limits; left are (I - A^+ A) w and A^+ of what the limits cut off."""
+        """u = A w within the limits; (I - A^+ A) w and A^+ times the part beyond the limits remain."""
         actuator, inverse = actuators[self.to], np.linalg.pinv(self.matrix)
         wanted = self.matrix @ w
         actuator.command = np.clip(wanted, -actuator.limit, actuator.limit)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A perceptron as a law."""
+"""A multilayer perceptron as a law."""
 
 from collections.abc import Callable
 
@@ -17,7 +17,7 @@ FUNCTIONS: dict[str, Callable[[Array], Array]] = {
 
 
 class Policy(Part):
-    """Numbers as those of `lw.control.Policy`; in place of its file, layers: pairs of weights (n, m) and biases (n,)."""
+    """Attributes as in `lw.control.Policy`, but instead of its file layers: pairs of weights (n, m) and biases (n,)."""
 
     scale = 1.0
     activation, output_activation = "tanh", "linear"

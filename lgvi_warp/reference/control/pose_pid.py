@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Geometric PID of position and attitude."""
+"""Geometric PID control of position and attitude."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class PosePID(Part):
-    """Numbers as those of `lw.control.PosePID`; weight, buoyancy, center_of_mass, center_of_buoyancy: see `balance`."""
+    """Attributes as in `lw.control.PosePID`; weight, buoyancy, center_of_mass, center_of_buoyancy: see `balance`."""
 
     ki = ki_r = np.zeros(3)
     integral_limit = (1e6, 1e6)

@@ -8,7 +8,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class PoseSMC(Part):
-    """Numbers as those of `lw.control.PoseSMC`; weight, buoyancy, center_of_mass, center_of_buoyancy: see `balance`."""
+    """Attributes as in `lw.control.PoseSMC`; weight, buoyancy, center_of_mass, center_of_buoyancy: see `balance`."""
 
     integral_limit = (1e6, 1e6)
     feedforward = "none"

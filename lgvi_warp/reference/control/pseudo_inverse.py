@@ -10,10 +10,10 @@ from lgvi_warp.reference.rotation import Array
 
 
 class PseudoInverse(Part):
-    """Numbers as those of `lw.control.PseudoInverse`; effect (6, n): the wrench of a unit of effort of each channel of `to`.
+    """Attributes as in `lw.control.PseudoInverse`; effect (6, n): wrench per unit of effort of each channel of `to`.
 
-    The actuator has limit, and effort(command) with its inverse command_for(effort). losses: (channel, time [s]) of each
-    channel that is known to be lost.
+    The actuator has `limit`, and effort(command) with its inverse command_for(effort). losses: (channel, time [s]) of
+    channels that are known to be lost.
     """
 
     weights = None
@@ -21,12 +21,12 @@ class PseudoInverse(Part):
     time = 0.0
 
     def measure(self, y: Measurement) -> Measurement:
-        """Keeps the time, a little later since times round."""
+        """Store the time, slightly increased since times are rounded."""
         self.time = y.t + 1e-6 * y.h
         return y
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
-        """t = W^-1 B^T (B W^-1 B^T)^+ w, as commands within limits; left are (I - B B^+) w and B times what is cut off."""
+        """t = W^-1 B^T (B W^-1 B^T)^+ w, as commands within limits; (I - B B^+) w and B times the excess remain."""
         actuator, B = actuators[self.to], self.effect.copy()
         B[:, [channel for channel, time in self.losses if self.time >= time]] = 0.0
         W = np.diag(1.0 / np.sqrt(np.ones(B.shape[1]) if self.weights is None else np.asarray(self.weights)))

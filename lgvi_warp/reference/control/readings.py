@@ -11,7 +11,7 @@ from lgvi_warp.reference.rotation import Array, exp, norm
 
 
 def heading(R: Array) -> float:
-    """The heading [rad] of an attitude (3, 3), from the forward axis alone."""
+    """Heading [rad] of an attitude (3, 3), from the forward axis alone."""
     return float(np.arctan2(R[1, 0], R[0, 0]))
 
 
@@ -26,7 +26,7 @@ def angles(R: Array) -> Array:
 
 
 def attitude(roll: float, pitch: float, yaw: float) -> Array:
-    """The attitude R (3, 3) of three Euler angles [rad], about the forward axis, that to starboard and that down."""
+    """Attitude R (3, 3) from Euler angles [rad] about the forward, the starboard and the down axis."""
     about = [np.array(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     return exp(yaw * about[2]) @ exp(pitch * about[1]) @ exp(roll * about[0])
 
@@ -40,7 +40,7 @@ def turn_to(A: Array, B: Array) -> Array:
 
 
 def values(y: Measurement, of: str) -> Array:
-    """The numbers (1,) or (3,) of a reading; of an attitude roll, pitch and yaw."""
+    """The numbers (1,) or (3,) of a reading; for an attitude: roll, pitch and yaw."""
     if of == "depth":
         return y.position[2:]
     if of == "heading":
@@ -49,7 +49,7 @@ def values(y: Measurement, of: str) -> Array:
 
 
 def with_values(y: Measurement, of: str, v: Array) -> Measurement:
-    """The measurement y that reads the numbers v, (1,) or (3,), of what is measured."""
+    """The measurement y with the numbers v, (1,) or (3,), as its reading of a quantity."""
     if of == "depth":
         return replace(y, position=np.array([*y.position[:2], v[0]]))
     if of == "heading":
@@ -61,5 +61,5 @@ def with_values(y: Measurement, of: str, v: Array) -> Measurement:
 
 
 def shifted(y: Measurement, of: str, e: Array) -> Measurement:
-    """The measurement with the error e (1,) or (3,); an attitude is turned by it."""
+    """The measurement with the error e (1,) or (3,) added; an attitude is turned by it."""
     return replace(y, R=y.R @ exp(e)) if of == "attitude" else with_values(y, of, values(y, of) + e)

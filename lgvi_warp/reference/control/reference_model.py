@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A filter of what is wanted: a reference model of third order."""
+"""A filter of the reference: a third-order reference model."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 def exponential(A: Array) -> Array:
-    """e^A of a square matrix: the series of a part of A so small that it ends soon, squared as often as A was halved."""
+    """e^A of a square matrix: A is halved until its series is short, and the sum is squared as often."""
     halvings = 3 + max(0, int(np.ceil(np.log2(np.abs(A).max()))))
     term = total = np.eye(len(A))
     for k in range(1, 16):
@@ -20,16 +20,16 @@ def exponential(A: Array) -> Array:
 
 
 class ReferenceModel(Part):
-    """Numbers as those of `lw.control.ReferenceModel`."""
+    """Attributes as in `lw.control.ReferenceModel`."""
 
     damping_ratio = rate_limit = None
 
     def begin(self) -> None:
-        """Forget the filtered motion, before the first tick."""
+        """Reset the filtered motion, before the first tick."""
         self.z: Array | None = None
 
     def moved(self, i: int, target: float, period: float) -> Array:
-        """x, x' and x'' of number i after one period [s] with its target held."""
+        """x, x' and x'' of number i after one period [s] with a constant target."""
         assert self.z is not None
         omega, zeta = self.natural_frequency[i], 1.0 if self.damping_ratio is None else self.damping_ratio[i]
         b = 2.0 * zeta + 1.0
@@ -43,7 +43,7 @@ class ReferenceModel(Part):
         return z
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
-        """The wanted depth and heading, and where four are filtered the position, with their rates."""
+        """Reference depth and heading, and with four filtered numbers the position, with their rates."""
         places = [0, 1, 2] if len(self.natural_frequency) == 4 else [2]
         if self.z is None:
             rates = y.R @ y.velocity

@@ -15,19 +15,19 @@ from lgvi_warp.reference.terms import View
 
 
 def chance_of(z: float) -> float:
-    """Phi of a standard normal, which is uniform."""
+    """Phi of a standard normal, a uniform number."""
     return 0.5 * math.erfc(-z / math.sqrt(2.0))
 
 
 class Losses:
-    """Losses with a probability, each by itself, or in runs of a mean length (Gilbert 1960)."""
+    """Losses with a probability: independent, or in bursts of a mean length (Gilbert 1960)."""
 
     def __init__(self, dropout: float, burst: float) -> None:
         self.dropout, self.burst = dropout, burst
         self.lost: bool | None = None
 
     def next(self, u: float) -> bool:
-        """Whether the next one is lost, by a uniform number."""
+        """Whether the next reading is lost, from a uniform number."""
         chance = self.dropout
         if self.burst > 0.0 and self.lost is not None and self.dropout < 1.0:
             begins = self.dropout / (1.0 - self.dropout) / self.burst
@@ -37,9 +37,9 @@ class Losses:
 
 
 class Sensor(Part):
-    """Numbers as those of `lw.control.Sensor`, those of a 3-vector for all axes or (3,); the key of its random numbers.
+    """Attributes as in `lw.control.Sensor`, for a 3-vector one number or (3,); the key of its random numbers.
 
-    handed: None, or {name: what is handed on}, shared by sensors and a filter; key: its name there.
+    handed: None, or {name: data passed on}, shared by sensors and a filter; key: its name there.
     """
 
     key, handed = "sensor", None
@@ -51,7 +51,7 @@ class Sensor(Part):
     seed0 = seed1 = channel = 0
 
     def begin(self) -> None:
-        """No reading yet, and no walk."""
+        """Start without a reading and without a random walk."""
         self.walk: Any = 0.0
         self.arrived: list[Measurement] = []
         self.losses = Losses(self.dropout, self.burst)
@@ -61,7 +61,7 @@ class Sensor(Part):
         return normals(self.seed0, self.seed1, y.member, y.tick, self.channel + stream)
 
     def measure(self, y: Measurement) -> Measurement:
-        """The reading that has arrived by now."""
+        """The reading that has arrived so far."""
         count, truth = len(values(y, self.of)), y
         if self.place is not None:
             arm = y.R @ self.place

@@ -9,12 +9,12 @@ from lgvi_warp.reference.control import Measurement, Part, Reference, upright
 
 
 class SetPoint(Part):
-    """Numbers as those of `lw.control.SetPoint`; what is None is not wanted."""
+    """Attributes as in `lw.control.SetPoint`; None leaves a quantity without a set point."""
 
     position = depth = heading = speed = None
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
-        """Position, an upright attitude of this heading, and speed."""
+        """Set the position, an upright attitude of this heading, and the speed."""
         position = r.position if self.position is None else np.asarray(self.position)
         if self.depth is not None:
             position = np.array([*position[:2], self.depth])

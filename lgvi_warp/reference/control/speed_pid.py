@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PI of the speed through the water."""
+"""PI control of the speed through the water."""
 
 from lgvi_warp.reference.control import Integral, Measurement, Part, Reference
 from lgvi_warp.reference.rotation import Array
 
 
 class SpeedPID(Part):
-    """Numbers as those of `lw.control.SpeedPID`."""
+    """Attributes as in `lw.control.SpeedPID`."""
 
     ki = drag = 0.0
     integral_limit = 1e6
     anti_windup = "conditional"
 
     def begin(self) -> None:
-        """Set the integral to 0, and remember no error."""
+        """Set the integral to 0, and clear the last error."""
         self.integral = Integral()
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:

@@ -8,7 +8,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class StateFeedback(Part):
-    """Numbers as those of `lw.control.StateFeedback`."""
+    """Attributes as in `lw.control.StateFeedback`."""
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """w = -K x."""

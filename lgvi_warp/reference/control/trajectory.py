@@ -10,13 +10,13 @@ from lgvi_warp.reference.rotation import Array
 
 
 class Trajectory(Part):
-    """Numbers as those of `lw.control.Trajectory`."""
+    """Attributes as in `lw.control.Trajectory`."""
 
     headings = speed = None
     interpolation = "linear"
 
     def bends(self, values: Array) -> Array:
-        """Second derivatives (k,) at the times: of natural cubic splines, or none."""
+        """Second derivatives (k,) at the times: of natural cubic splines, or zero."""
         t, k = np.asarray(self.times), len(self.times)
         A, b, h = np.eye(k), np.zeros(k), np.diff(t)
         if self.interpolation == "linear":
@@ -27,7 +27,7 @@ class Trajectory(Part):
         return np.linalg.solve(A, b)
 
     def at(self, values: Array, t: float, h: float) -> tuple[float, float, float]:
-        """A number, with values (k,) at the times, and its two derivatives at t; half a step h early counts as in time."""
+        """A number with values (k,) at the times, and its two derivatives, at t; times within h / 2 are reached."""
         i = int(np.searchsorted(self.times, t + 0.5 * h)) - 1
         if i < 0 or i == len(self.times) - 1 or self.interpolation == "steps":
             return float(values[max(i, 0)]), 0.0, 0.0

@@ -12,7 +12,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class Waypoints(Part):
-    """Numbers as those of `lw.control.Waypoints`; done: time of the tick at which the last point was reached [s]."""
+    """Attributes as in `lw.control.Waypoints`; done: time of the tick at which the last point was reached [s]."""
 
     method, kappa, gamma, at_end = "los", 0.1, 0.002, "stop"
     times: Any = None
@@ -22,13 +22,13 @@ class Waypoints(Part):
     clockwise = True
 
     def begin(self) -> None:
-        """The first leg, and no circle; J and beta are 0."""
+        """Start at the first leg, without a circle; J and beta are 0."""
         self.leg, self.J, self.beta = 0, 0.0, 0.0
         self.circling, self.angle, self.since, self.bearing = False, 0.0, 0.0, 0.0
         self.done: float | None = None
 
     def way(self, leg: int, position: Array) -> tuple[float, float, float, float]:
-        """Angle and length of a leg on the map; how far the position is along, and to starboard of it."""
+        """Angle and length of a leg on the map; distance of the position along the leg, and to starboard of it."""
         begin, end = self.points[leg], self.points[leg + 1]
         x, y, _ = end - begin
         angle = np.arctan2(y, x)
@@ -36,7 +36,7 @@ class Waypoints(Part):
         return float(angle), float(np.hypot(x, y)), float(along), float(aside)
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
-        """Change the leg where this one is done, then head along it."""
+        """Change the leg at its end, then head along it."""
         legs = len(self.points) - 1
         last = legs - 1 if self.at_end == "go_on" else legs
         i = min(self.leg, legs - 1)
@@ -79,13 +79,13 @@ class Waypoints(Part):
         return replace(r, position=position, velocity=velocity, R=upright(heading), speed=speed)
 
     def pace_in_time(self, y: Measurement, leg: int, distance: float) -> float:
-        """The pace that makes a distance by the time of the end of a leg, up to the speed; 0 before the first time."""
+        """Speed that covers a distance by the time of a leg's end, up to the set speed; 0 before the first time."""
         if y.t + 0.5 * y.h <= self.times[0]:
             return 0.0
         return float(min(max(distance, 0.0) / max(self.times[leg + 1] - y.t, y.period), self.speed))
 
     def circled_enough(self, y: Measurement, point: int, arrived: bool) -> bool:
-        """Whether a leg is done, to a point that may have to be circled about first."""
+        """Whether a leg is done; its end point may have to be circled first."""
         turns = 0.0 if self.loiter_turns is None else self.loiter_turns[point]
         time = 0.0 if self.loiter_time is None else self.loiter_time[point]
         out = y.position - self.points[point]

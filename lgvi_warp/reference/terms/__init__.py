@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Laws of one vehicle, in the user's body axes and about his origin: numbers and the methods of `Law`."""
+"""Laws of one vehicle, in the user's body axes and about the user's origin: numbers and the methods of `Law`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,9 +14,9 @@ from lgvi_warp.reference.rotation import Array
 class View:
     """Inputs of a law.
 
-    R (3, 3) body to inertial; b (3,) [m] of the body's origin; nu (3,) [m/s] and Om (3,) [rad/s], body axes, relative to
-    the water; t [s]; h [s], the length of the kick; step and member, which key random numbers; memory (rows,), what the
-    law itself remembers.
+    R (3, 3) body to inertial; b (3,) [m] of the body's origin; nu (3,) [m/s] and Om (3,) [rad/s], body axes, relative
+    to the water; t [s]; h [s], the length of the kick; step and member, the keys of random numbers; memory (rows,) of
+    the law itself.
     """
 
     R: Array
@@ -53,7 +53,7 @@ STILL = Flow(np.zeros(3), np.zeros(3), np.zeros((3, 3)))
 
 
 class Law:
-    """A law that does nothing; each overrides what it does. Its numbers have the names and units of the term in lgvi_warp."""
+    """Base class of laws, which does nothing. A subclass overrides its roles; its numbers are as in lgvi_warp."""
 
     potential_force = False  # whether `wrench` follows from `potential`
     in_order: tuple[str, ...] = ()  # numbers that may be given without their names
@@ -77,23 +77,23 @@ class Law:
         return STILL
 
     def load(self, view: View, water_at: WaterAt) -> tuple[Array, Array]:
-        """D (6, 6) and w (6,) with (force; torque) = w - D (nu; Om), of a law that looks at the water."""
+        """D (6, 6) and w (6,) with (force; torque) = w - D (nu; Om), of a law with access to the water."""
         return np.zeros((6, 6)), np.zeros(6)
 
     def carried(self, view: View) -> tuple[Array, Array]:
-        """D (6, 6), the change of the vehicle's inertia, and w (6,), the momentum of what moves in it, in body axes."""
+        """D (6, 6), the change of the vehicle's inertia, and w (6,), the momentum of masses that move in it, body axes."""
         return np.zeros((6, 6)), np.zeros(6)
 
     def depart(self, view: View) -> Array:
-        """Memory for the step of view.h that begins at view.t."""
+        """Memory for the step of length view.h that begins at view.t."""
         return view.memory
 
     def power(self, view: View) -> float:
-        """The power that it takes [W]."""
+        """Power that the law uses [W]."""
         return 0.0
 
     def spent(self, view: View, memory: Array) -> float:
-        """The energy that it takes [J] while what it remembers becomes `memory`, beside its power."""
+        """Energy [J] that the law uses while its memory becomes `memory`, in addition to its power."""
         return 0.0
 
     def potential(self, view: View) -> float:
@@ -101,7 +101,7 @@ class Law:
         return 0.0
 
     def beside(self, laws: tuple["Law", ...]) -> "Law":
-        """The same law among all laws of a vehicle, for one that follows from them as well."""
+        """The law adapted to all laws of a vehicle, if it depends on them."""
         return self
 
     def start(self) -> Array:
@@ -109,9 +109,9 @@ class Law:
         return np.zeros(0)
 
     def evolve(self, view: View, second: bool) -> Array:
-        """Memory after the first or second half of a kick of view.h, view.t being the middle of the kick."""
+        """Memory after the first or second half of a kick of length view.h; view.t is the middle of the kick."""
         return view.memory
 
     def follow(self, view: View) -> Array:
-        """Memory at view.t, exactly, from that view.h before; a function of time and memory alone."""
+        """Exact memory at view.t, from the memory view.h earlier; a function of time and memory alone."""
         return view.memory

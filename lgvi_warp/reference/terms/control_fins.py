@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Control fins: fins whose deflection follows a command, within a limit, no faster than a rate and after a lag."""
+"""Control fins: their deflection follows a command, with a limit, a largest rate and a lag."""
 
 import math
 from typing import Any
@@ -13,28 +13,28 @@ from lgvi_warp.reference.terms.following import Following
 
 
 class ControlFins(Following, Fins):
-    """Numbers as those of `lw.terms.ControlFins`, and of `Following`."""
+    """Attributes as in `lw.terms.ControlFins` and in `Following`."""
 
     flow_angle = True
     lift_angles: Any = None
     lift_coefficients: Any = None
 
     def deflection(self, view: View) -> Array:
-        """The place of each fin."""
+        """Angle of each fin."""
         return self.place(view)
 
     def lift_coefficient(self, i: int, uc: float, un: float, V: float) -> float:
-        """The coefficient of `Fins`, or of the table, which is odd in the angle of attack."""
+        """The coefficient of `Fins`, or of the table, which is an odd function of the angle of attack."""
         if self.lift_angles is None:
             return super().lift_coefficient(i, uc, un, V)
         return float(self.lift_slope[i] * self.table(math.atan2(un, uc)))
 
     def table(self, angle: float) -> float:
-        """The table of lift at an angle [rad] of either sign."""
+        """Value of the lift table at an angle [rad] of either sign."""
         return math.copysign(float(np.interp(abs(angle), self.lift_angles, self.lift_coefficients)), angle)
 
     def fin_damping(self, i: int, angle: float, view: View) -> Array:
-        """D of `Fins`; without the angle of the flow: lift slope d u u, drag (drag + drag_normal d^2) |u| u, d the angle."""
+        """D of `Fins`; without the flow's angle: lift slope d u u, drag (drag + drag_normal d^2) |u| u, d: fin's angle."""
         if self.flow_angle:
             return super().fin_damping(i, angle, view)
         c, n = orthonormal(self.chord[i], self.normal[i])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cross-flow drag of a slender hull along the body's x axis, by two Gauss points a segment."""
+"""Cross-flow drag of a slender hull along the body's x axis, by two Gauss points per segment."""
 
 import math
 
@@ -10,7 +10,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class CrossFlow(Law):
-    """Numbers as those of `lw.terms.CrossFlow`; density [kg/m3]."""
+    """Attributes as in `lw.terms.CrossFlow`; density [kg/m3]."""
 
     def points(self) -> list[tuple[float, float]]:
         """(x, weight times Cd D) of each Gauss point, Cd D linear in each segment."""

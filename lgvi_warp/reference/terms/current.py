@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Currents: steady and uniform, or by depth."""
+"""Currents: steady and uniform, or as a profile over depth."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from lgvi_warp.reference.terms import Flow, Law, View
 
 
 class Current(Law):
-    """Numbers as those of `lw.terms.Current`."""
+    """Attributes as in `lw.terms.Current`."""
 
     def flow(self, view: View) -> Flow:
         """The constant velocity, without derivatives."""
@@ -15,7 +15,7 @@ class Current(Law):
 
 
 class CurrentProfile(Law):
-    """Numbers as those of `lw.terms.CurrentProfile`."""
+    """Attributes as in `lw.terms.CurrentProfile`."""
 
     def flow(self, view: View) -> Flow:
         """u(b3), and its slope within the segment. docs/theory/water.md, (W5)."""

@@ -8,10 +8,10 @@ from lgvi_warp.reference.terms import Flow, Law, View
 
 
 class CurrentField(Law):
-    """Numbers as those of `lw.terms.CurrentField`, velocities (s, t, x, y, z, 3) and times given."""
+    """Attributes as in `lw.terms.CurrentField`, with velocities (s, t, x, y, z, 3) and times."""
 
     def flow(self, view: View) -> Flow:
-        """The sum over the corners of the cell, each weighted by how near it is along every axis.
+        """Multilinear interpolation: the sum over the corners of the cell, weighted by the nearness along every axis.
 
         docs/theory/water.md, (W6).
         """

@@ -7,7 +7,7 @@ from lgvi_warp.reference.terms import Flow, Law, View
 
 
 class CurrentHarmonics(Law):
-    """Numbers as those of `lw.terms.CurrentHarmonics`."""
+    """Attributes as in `lw.terms.CurrentHarmonics`."""
 
     def flow(self, view: View) -> Flow:
         """u = sum a cos(omega t + phase) and its derivative. docs/theory/water.md, (W8)."""

@@ -8,7 +8,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Drag(Law):
-    """Numbers as those of `lw.terms.Drag`: -(l + q|v|) v on each axis."""
+    """Attributes as in `lw.terms.Drag`: -(l + q|v|) v on each axis."""
 
     def damping(self, view: View) -> Array:
         """The diagonal matrix l + q|v|."""
@@ -38,7 +38,7 @@ class Drag(Law):
 
 
 class DragMatrix(Law):
-    """Numbers as those of `lw.terms.DragMatrix`: force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j."""
+    """Attributes as in `lw.terms.DragMatrix`: force_i = -sum_j (linear_ij + quadratic_ij |v_j|) v_j."""
 
     def damping(self, view: View) -> Array:
         """Each column of the quadratic matrix by its own speed."""

@@ -29,7 +29,7 @@ class ControlWrench(Following):
 
 
 class DrivenThrusters(Thrusters):
-    """Numbers as those of the twin's `Thrusters`."""
+    """Attributes as in the twin's `Thrusters`."""
 
     driven = True
 
@@ -38,7 +38,7 @@ class DrivenThrusters(Thrusters):
         return self.thrust(command)
 
     def command_for(self, effort: Array) -> Array:
-        """The least commands of thrusts (k,) [N], or those of the largest thrust."""
+        """Smallest commands for thrusts (k,) [N]; for a thrust out of range, the command of the largest thrust."""
         return np.array([self._command(i, float(t)) for i, t in enumerate(effort)])
 
     def _thrust(self, i: int, side: float, w: float) -> float:
@@ -49,7 +49,7 @@ class DrivenThrusters(Thrusters):
     def _range(self, i: int, side: float) -> float:
         """Command at which the thrust of channel i stops rising, from the edge of the dead band.
 
-        At the limit, or where it turns.
+        It is the limit, or the maximum of the curve.
         """
         reach = max(self.limit[i] - self.dead_band[i], 0.0)
         if self._thrust(i, side, 1e-9 * reach) <= 0.0 and self.table_commands is None:
@@ -62,7 +62,7 @@ class DrivenThrusters(Thrusters):
         return min([float(w.real) for w in turns if abs(w.imag) < 1e-9 and w.real > 0.0] + [float(reach)])
 
     def _command(self, i: int, wanted: float) -> float:
-        """By bisection."""
+        """Find the command by bisection."""
         side = 1.0 if wanted > 0.0 else -1.0
         low, high = 0.0, self._range(i, side)
         if wanted == 0.0 or high == 0.0:

@@ -6,7 +6,7 @@ from lgvi_warp.reference.terms.control_fins import ControlFins
 
 
 class DrivenFins(ControlFins):
-    """Numbers as those of the twin's `ControlFins`."""
+    """Attributes as in the twin's `ControlFins`."""
 
     driven = True
 

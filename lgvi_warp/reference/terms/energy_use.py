@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Power of everything but the actuators of a vehicle; the sum of all powers over time is in the state (see submaps.py)."""
+"""Power of everything except the actuators of a vehicle; the energy used is in the state (see submaps.py)."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ class EnergyUse(Law):
     hotel: float
 
     def start(self) -> Array:
-        """The rows in which the device has the sum and its low part: the twin's is in the state."""
+        """Rows for the sum and its low part in the device code; the twin has the sum in its state."""
         return np.zeros(2)
 
     def power(self, view: View) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fins, fixed and turned by a command: each seen from its own chord and normal."""
+"""Fixed fins, and fins turned by a command, in the axes of their chord and normal."""
 
 import math
 
@@ -10,7 +10,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Fins(Law):
-    """Numbers as those of `lw.terms.Fins`; density [kg/m3]."""
+    """Attributes as in `lw.terms.Fins`; density [kg/m3]."""
 
     def deflection(self, view: View) -> Array:
         """Angles (n,) [rad]: 0, since these fins do not turn."""
@@ -22,7 +22,7 @@ class Fins(Law):
         return np.asarray(sum((self.fin_damping(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
 
     def lift_coefficient(self, i: int, uc: float, un: float, V: float) -> float:
-        """slope sin a cos a of fin i, a the angle of attack; uc, un: speed along chord and normal, V: size of both [m/s]."""
+        """slope sin a cos a of fin i, a: angle of attack; uc, un: speed along chord and normal, V: their norm [m/s]."""
         return float(self.lift_slope[i] * uc * un / V**2)
 
     def fin_damping(self, i: int, angle: float, view: View) -> Array:
@@ -45,12 +45,12 @@ class Fins(Law):
 
 
 def orthonormal(chord: Array, normal: Array) -> tuple[Array, Array]:
-    """Unit vectors along the chord, and along the part of the normal that is across it."""
+    """Unit vectors along the chord, and along the part of the normal that is perpendicular to it."""
     c = np.asarray(chord) / math.sqrt(np.dot(chord, chord))
     n = normal - np.dot(normal, c) * c
     return c, n / math.sqrt(np.dot(n, n))
 
 
 def turned(c: Array, n: Array, angle: float) -> tuple[Array, Array]:
-    """c' = cos c + sin n, n' = cos n - sin c of the unit vectors along chord and normal, turned by an angle [rad]."""
+    """c' = cos c + sin n, n' = cos n - sin c, for unit vectors c, n along chord and normal, turned by an angle [rad]."""
     return math.cos(angle) * c + math.sin(angle) * n, math.cos(angle) * n - math.sin(angle) * c

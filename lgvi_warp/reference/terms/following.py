@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Actuators that follow commands: of a schedule or of a controller, within a limit, with a lag and at a limited rate."""
+"""Actuators that follow commands of a schedule or of a controller, with a limit, a lag and a largest rate."""
 
 import math
 from dataclasses import replace
@@ -14,7 +14,7 @@ from lgvi_warp.reference.terms.wrench import at_time, pieces
 class Following(Law):
     """Channels with limit (n,), time_constant (n,) [s] or 0, rate_limit (n,) or inf; times (k,) [s] and command (k, n).
 
-    A law that is driven has `held` (n,) instead, the commands of a controller, which its loop sets.
+    Instead of a schedule, a driven law has `held` (n,), the commands of a controller, set by its loop.
     """
 
     driven = False
@@ -23,7 +23,7 @@ class Following(Law):
 
     @property
     def moves(self) -> bool:
-        """Whether some channel has a lag or a limited rate, and commands change: then all remember."""
+        """Whether a channel has a lag or a limited rate, and commands change; then all channels have memory."""
         slow = np.any(np.greater(self.time_constant, 0.0)) or np.any(np.isfinite(self.rate_limit))
         return bool(slow and (self.driven or len(self.times) > 1))
 
@@ -33,22 +33,22 @@ class Following(Law):
         return np.clip(wanted, -self.limit, self.limit)
 
     def start(self) -> Array:
-        """The commands at t = 0, of a driven law 0; none where nothing moves."""
+        """The commands at t = 0, 0 for a driven law; empty if no channel has memory."""
         if not self.moves:
             return np.zeros(0)
         return np.zeros(len(self.limit)) if self.driven else self.commanded(0.0)
 
     def place(self, view: View) -> Array:
-        """Remembered command, or the command itself."""
+        """Position in the memory, or the command itself."""
         return view.memory if self.moves else self.commanded(view.t)
 
     def evolve(self, view: View, second: bool) -> Array:
-        """Follow over the half of a kick that ends in its middle, or begins there."""
+        """Follow the command over the half of a kick that ends or begins at its middle."""
         half = 0.5 * view.h
         return self.follow(replace(view, t=view.t + second * half, h=half))
 
     def follow(self, view: View) -> Array:
-        """Along each straight piece of the command within the view.h before view.t.
+        """Follow each straight part of the command within the view.h before view.t.
 
         docs/theory/control_loop.md, (C6).
         """
@@ -67,7 +67,7 @@ class Following(Law):
 
 
 def chased(n: float, first: float, last: float, lag: float, rate: float, s: float) -> float:
-    """n after s [s] in which the command u goes straight from first to last: n' = (u - n) / lag, no faster than rate.
+    """n after s [s], while the command u moves linearly from first to last: n' = (u - n) / lag, with a limited rate.
 
     docs/theory/control_loop.md, (C6).
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A uniform current that wanders: a first-order Gauss-Markov process."""
+"""A uniform current with random variation: a first-order Gauss-Markov process."""
 
 import math
 
@@ -11,7 +11,7 @@ from lgvi_warp.reference.terms import Flow, Law, View
 
 
 class GaussMarkovCurrent(Law):
-    """Numbers as those of `lw.terms.GaussMarkovCurrent`; the key of its noise; initial (3,) [m/s]."""
+    """Attributes as in `lw.terms.GaussMarkovCurrent`; the key of its noise; initial (3,) [m/s]."""
 
     channel = 0
     seed0 = 0
@@ -20,11 +20,11 @@ class GaussMarkovCurrent(Law):
     initial = np.zeros(3)
 
     def start(self) -> Array:
-        """u during a kick, u at its end, du/dt."""
+        """Memory: u during a kick, u at its end, du/dt."""
         return np.concatenate([self.initial, self.initial, np.zeros(3)])
 
     def evolve(self, view: View, second: bool) -> Array:
-        """Exact over each draw (Gillespie 1996); during it, the mean of the old and the new.
+        """Exact solution over each draw (Gillespie 1996); during a draw, the mean of its old and new value.
 
         docs/theory/water.md, (W9).
         """
@@ -39,5 +39,5 @@ class GaussMarkovCurrent(Law):
         return np.concatenate([0.5 * (old + new), new, (new - old) / view.h])
 
     def flow(self, view: View) -> Flow:
-        """The velocity and the rate that are remembered."""
+        """The velocity and the rate in the memory."""
         return Flow(view.memory[:3], view.memory[6:], np.zeros((3, 3)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Loads of water that varies along a slender hull, by two Gauss points a segment, strip by strip."""
+"""Loads of spatially varying water on a slender hull, strip by strip, by two Gauss points per segment."""
 
 import math
 
@@ -13,7 +13,7 @@ ACROSS = np.diag([0.0, 1.0, 1.0])
 
 
 class HullLoads(Law):
-    """Numbers as those of `lw.terms.HullLoads`, added_mass given; density [kg/m3]."""
+    """Attributes as in `lw.terms.HullLoads`, with a given added_mass; density [kg/m3]."""
 
     def points(self) -> list[tuple[float, float, float, float, float, float]]:
         """Gauss points: x, weight, Cd D, area S, (S^2 / 4 pi)' and added mass per length."""
@@ -38,7 +38,7 @@ class HullLoads(Law):
         return strips
 
     def load(self, view: View, water_at: WaterAt) -> tuple[Array, Array]:
-        """Each strip's load in the water there, less what the water at the origin would do to it."""
+        """Load of each strip in its local water, minus the load that the water at the origin would cause."""
         D, w, here = np.zeros((6, 6)), np.zeros(6), water_at(np.zeros(3))
         body = view.nu + view.R.T @ here.velocity
         for x, weight, drag, S, tilting, a in self.points():
@@ -67,5 +67,5 @@ class HullLoads(Law):
 
 
 def material(water: Flow, v: Array) -> Array:
-    """Acceleration of the water as seen by a point that moves at v in it [m/s2], inertial axes."""
+    """Acceleration of the water [m/s2], inertial axes, at a point that moves through it at v."""
     return water.rate + water.gradient @ v

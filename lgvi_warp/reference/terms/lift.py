@@ -8,7 +8,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class BodyLift(Law):
-    """Numbers as those of `lw.terms.BodyLift`: force_i = -u sum_j matrix_ij v_j."""
+    """Attributes as in `lw.terms.BodyLift`: force_i = -u sum_j matrix_ij v_j."""
 
     def damping(self, view: View) -> Array:
         """D (6, 6): the speed ahead times the matrix."""

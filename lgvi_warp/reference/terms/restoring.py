@@ -8,7 +8,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Restoring(Law):
-    """moment: buoyancy times the lever B r (less weight times its own), (3,) [N m], from the body's origin."""
+    """moment: buoyancy times its lever arm, B r, (minus weight times its own), (3,) [N m], from the body's origin."""
 
     potential_force = True
     in_order = ("moment",)

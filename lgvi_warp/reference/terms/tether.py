@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tether: a spring from an anchor to a point of the vehicle, slack below its rest length."""
+"""Tether: a spring from an anchor to a point of the vehicle, without force below its rest length."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Tether(Law):
-    """Numbers as those of `lw.terms.Tether`."""
+    """Attributes as in `lw.terms.Tether`."""
 
     rest_length = 0.0
     potential_force = True
 
     def span(self, view: View) -> Array:
-        """From the attachment to the anchor, inertial axes."""
+        """Vector from the attachment to the anchor, inertial axes."""
         return np.asarray(self.anchor - view.b - view.R @ self.attachment)
 
     def wrench(self, view: View) -> tuple[Array, Array]:

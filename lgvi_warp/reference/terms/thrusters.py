@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thrusters: a thrust curve with dead band and saturation, after a lag; thrust that falls with the speed, and torque."""
+"""Thrusters with a lag, a thrust curve with dead band and saturation, loss of thrust with speed, and torque."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from lgvi_warp.reference.terms.following import Following
 
 
 class Thrusters(Following):
-    """Numbers as those of `lw.terms.Thrusters`, with coefficients forward, backward (n,), and of `Following`."""
+    """Attributes as in `lw.terms.Thrusters`, with coefficients forward, backward (n,), and in `Following`."""
 
     polynomial = (0.0, 1.0)
     polynomial_astern = (0.0, 1.0)
@@ -27,11 +27,11 @@ class Thrusters(Following):
     efficiency: Array | float = 1.0
 
     def beyond(self, n: Array) -> Array:
-        """w, the places (n,) less the dead band."""
+        """w, the commands after the lag (n,) minus the dead band."""
         return np.asarray(np.sign(n) * np.maximum(np.abs(n) - self.dead_band, 0.0))
 
     def curve(self, w: Array) -> Array:
-        """f (n,), ahead and astern, without the coefficients."""
+        """f (n,), the curve ahead and astern, without the coefficients."""
         if self.table_commands is not None:
             columns = zip(w, np.transpose(self.table_thrusts), strict=True)
             return np.array([np.interp(x, self.table_commands, values) for x, values in columns])
@@ -40,12 +40,12 @@ class Thrusters(Following):
         return np.asarray(f_ahead - sum(p * astern ** (i + 1) for i, p in enumerate(self.polynomial_astern)))
 
     def thrust(self, n: Array) -> Array:
-        """Thrusts (n,) [N] at places, at rest."""
+        """Thrusts (n,) [N] at zero speed, from the commands after the lag."""
         w = self.beyond(n)
         return np.asarray(np.where(w > 0.0, self.forward, self.backward) * self.curve(w))
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """The thrust along each, and the torque k w |w| about it."""
+        """The thrust along each axis, and the torque k w |w| about it."""
         n = self.place(view)
         w = self.beyond(n)
         forces = self.thrust(n)[:, None] * self.direction
@@ -53,7 +53,7 @@ class Thrusters(Following):
         return forces.sum(axis=0), torque + (self.torque_coefficient * w * np.abs(w)) @ self.direction
 
     def power(self, view: View) -> float:
-        """Watts of a table (k, n) at w, or the shaft's speed times the torque against its turn over the efficiency."""
+        """Power [W]: from a table (k, n) at w, or shaft speed times torque against the turn, divided by the efficiency."""
         w = self.beyond(self.place(view))
         if self.power_table is not None:
             columns = zip(w, np.transpose(self.power_table), strict=True)
@@ -64,7 +64,7 @@ class Thrusters(Following):
         return float(np.sum(np.maximum(self.shaft_speed * w * hand * torque, 0.0) / self.efficiency))
 
     def damping(self, view: View) -> Array:
-        """Thrust falls by c_u |w| a, torque by k_u |w| a, where a is the speed of the thruster along its direction."""
+        """Thrust decreases by c_u |w| a and torque by k_u |w| a; a: speed of the thruster along its direction."""
         D = np.zeros((6, 6))
         w = self.beyond(self.place(view))
         losses = np.abs(w) * np.where(w > 0.0, self.advance_loss, self.advance_loss_astern)

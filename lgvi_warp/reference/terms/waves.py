@@ -24,18 +24,18 @@ class Wave(NamedTuple):
 
 
 class Waves(Law):
-    """Numbers as those of `lw.terms.Waves`; gravity [m/s2]; current (3,) [m/s], the uniform one of the scene."""
+    """Attributes as in `lw.terms.Waves`; gravity [m/s2]; current (3,) [m/s], the uniform one of the scene."""
 
     depth, periods_of = math.inf, "ground"
     current = np.zeros(3)
 
     def beside(self, laws: tuple[Law, ...]) -> Law:
-        """The same law on the uniform currents among some laws."""
+        """The same law on the uniform currents among these laws."""
         current = sum((law.velocity for law in laws if isinstance(law, Current)), np.zeros(3))
         return type(self)(**vars(self) | {"current": current})
 
     def components(self) -> Iterator[Wave]:
-        """The components whose waves can travel on the current."""
+        """The components whose waves can propagate on the current."""
         for a, period, heading_deg, phase in zip(
             self.amplitudes, self.periods, self.headings_deg, self.phases, strict=True
         ):
@@ -55,7 +55,7 @@ class Waves(Law):
         return sum((self.component(view, wave) for wave in self.components()), STILL)
 
     def component(self, view: View, wave: Wave) -> Flow:
-        """One wave: u = Re (C heading, -i S down)^T a sigma e^(-i theta), and its derivatives; C, S by `profiles`.
+        """One wave: u = Re (C heading, -i S down)^T a sigma e^(-i theta), and its derivatives; C, S from `profiles`.
 
         docs/theory/water.md, (W7).
         """
@@ -72,7 +72,7 @@ class Waves(Law):
         return sum((wave.a * math.cos(theta(wave, view)) for wave in self.components()), 0.0)
 
     def acceleration(self, view: View) -> Array:
-        """Acceleration of the water at view.b, in its own frame [m/s2], without what is of second order."""
+        """First-order acceleration of the water at view.b, in its own frame [m/s2]."""
         total = np.zeros(3)
         for wave in self.components():
             C, S = profiles(wave.k, view.b[2], self.depth)
@@ -81,7 +81,7 @@ class Waves(Law):
         return total
 
     def head(self, view: View) -> float:
-        """Pressure of the waves at view.b over rho g [m]: a cosh k(h - depth) / cosh k h."""
+        """Wave pressure at view.b divided by rho g [m]: a cosh k(h - depth) / cosh k h."""
         total = 0.0
         for wave in self.components():
             held = 1.0 if math.isinf(self.depth) else math.tanh(wave.k * self.depth)
@@ -98,7 +98,7 @@ def theta(wave: Wave, view: View) -> float:
 
 
 def profiles(k: float, depth: float, h: float) -> tuple[float, float]:
-    """cosh k(h - depth) / sinh k h and sinh k(h - depth) / sinh k h, held above the surface and below the floor."""
+    """cosh k(h - depth) / sinh k h and sinh k(h - depth) / sinh k h, constant above the surface and below the floor."""
     z = min(max(depth, 0.0), h)
     if math.isinf(h):
         return math.exp(-k * z), math.exp(-k * z)
@@ -106,9 +106,9 @@ def profiles(k: float, depth: float, h: float) -> tuple[float, float]:
 
 
 def wavenumber(omega: float, drift: float, h: float, g: float) -> float | None:
-    """The k with sqrt(g k tanh k h) + k U = omega, by halving an interval; None where there is none.
+    """The k with sqrt(g k tanh k h) + k U = omega, by bisection; None if there is none.
 
-    The left side rises up to where waves stand still against the current.
+    The left side increases up to the k of waves that stand still against the current.
     """
 
     def beyond(k: float) -> float:
@@ -127,7 +127,7 @@ def wavenumber(omega: float, drift: float, h: float, g: float) -> float | None:
 
 
 def halved(f, low: float, high: float) -> float:  # type: ignore[no-untyped-def]
-    """The root of a function that is negative at low and positive at high."""
+    """Root, by bisection, of a function that is negative at low and positive at high."""
     for _ in range(200):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if f(middle) > 0.0 else (middle, high)

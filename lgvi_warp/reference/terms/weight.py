@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Weight less buoyancy (section IV of Nordkvist & Sanyal 2010)."""
+"""Weight minus buoyancy (section IV of Nordkvist & Sanyal 2010)."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Weight(Law):
-    """net: weight less buoyancy (m - rho V) g [N]."""
+    """net: weight minus buoyancy (m - rho V) g [N]."""
 
     potential_force = True
     in_order = ("net",)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A wrench in body axes, held or by a schedule."""
+"""A wrench in body axes, constant or from a schedule."""
 
 from collections.abc import Iterator
 
@@ -10,7 +10,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Wrench(Law):
-    """Numbers as those of `lw.terms.Wrench`."""
+    """Attributes as in `lw.terms.Wrench`."""
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """The constant force [N] and torque [N m]."""
@@ -18,7 +18,7 @@ class Wrench(Law):
 
 
 class WrenchSchedule(Law):
-    """Numbers as those of `lw.terms.WrenchSchedule`; steps: whether each value is held until the next time."""
+    """Attributes as in `lw.terms.WrenchSchedule`; steps: whether each value is held until the next time."""
 
     steps = False
 
@@ -28,14 +28,14 @@ class WrenchSchedule(Law):
 
 
 def at_time(t: float, times: Array, values: Array, steps: bool) -> Array:
-    """A table's row (3,) at t: linear between the times, or held from each to the next; constant outside."""
+    """A table's row (3,) at t: linear between the times, or held from each time to the next; constant outside."""
     if steps:
         return np.asarray(np.asarray(values)[max(int(np.searchsorted(times, t, side="left")) - 1, 0)])
     return np.array([np.interp(t, times, column) for column in np.transpose(values)])
 
 
 def pieces(t: float, h: float, times: Array, values: Array, limit: Array) -> Iterator[tuple[float, Array, Array]]:
-    """The straight pieces of a limited table (k, n) within the h before t, in order: (duration [s], first, last value)."""
+    """Straight parts of a limited table (k, n) within the h before t, in order: (duration [s], first, last value)."""
     changes = np.diff(values, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         crossings = [(sign * limit - values[:-1]) / changes for sign in (-1.0, 1.0)]

@@ -9,7 +9,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class WrenchNoise(Law):
-    """Numbers as those of `lw.terms.WrenchNoise`; the key of its noise."""
+    """Attributes as in `lw.terms.WrenchNoise`; the key of its noise."""
 
     channel = 0
     seed0 = 0
@@ -17,7 +17,7 @@ class WrenchNoise(Law):
     noise_step = None
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """Force and torque S xi / sqrt(h), held over the step; xi is the sum of the draws over the root of their number."""
+        """Force and torque S xi / sqrt(h), constant over the step; xi: sum of the draws divided by sqrt(their number)."""
         draws = [draws_of_step(self, view, stream) for stream in (0, 1)]
         f, m = (xi.sum(axis=0) / np.sqrt(len(xi)) / np.sqrt(view.h) for xi in draws)
         return self.force * f, self.torque * m

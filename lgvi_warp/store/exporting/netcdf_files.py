@@ -15,7 +15,7 @@ CLOSINGS = 5
 
 @contextlib.contextmanager
 def new_netcdf(target: Path) -> Iterator[Any]:
-    """Create a NetCDF-4 file; after an error it is closed all the same, and its content is lost."""
+    """Create a NetCDF-4 file. After an error it is also closed, and its content is lost."""
     import netCDF4
 
     file = netCDF4.Dataset(target, "w")
@@ -28,7 +28,7 @@ def new_netcdf(target: Path) -> Iterator[Any]:
 
 
 def _abandon(file: Any, target: Path) -> None:
-    """Close a file that the disk has no room for: HDF5 keeps it open until the rest is written, here to nowhere."""
+    """Close a file that does not fit on the disk. HDF5 keeps it open until the rest is written, here to nowhere."""
     folder = "/dev/fd"
     for name in os.listdir(folder) if os.path.isdir(folder) else ():
         with contextlib.suppress(OSError):

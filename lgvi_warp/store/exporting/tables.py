@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run as a table, CSV or Parquet: a row for each member and time that has samples, else for each member."""
+"""A run as a CSV or Parquet table: one row per member and sample time, or one row per member without samples."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ TIMES = ("failure_time", "end_time")
 
 
 def parquet(tracks: Tracks, target: Path, report: Report) -> None:
-    """Write a Parquet file; units are in the metadata of the columns, and for pandas in its `attrs`."""
+    """Write a Parquet file. Units are in the metadata of the columns, and for pandas in its `attrs`."""
     import pyarrow.parquet as pq
 
     _write(tracks, report, lambda schema: pq.ParquetWriter(target, schema))
 
 
 def csv(tracks: Tracks, target: Path, report: Report) -> None:
-    """Write a CSV file whose first line names the columns; numbers have the digits that tell them apart."""
+    """Write a CSV file whose first line names the columns. Each number has the digits that identify its value."""
     import pyarrow.csv as pc
 
     options = pc.WriteOptions(quoting_style="needed")
@@ -52,12 +52,12 @@ def _write(tracks: Tracks, report: Report, writer_of: Callable[[Any], Any]) -> N
 
 
 def _width(tracks: Tracks) -> int:
-    """Count of numbers in a row."""
+    """Number of values in a row."""
     return len(_columns(tracks, slice(0, 1)))
 
 
 def _table(tracks: Tracks, rows: slice) -> Any:
-    """The rows of some members, with units and origin of the numbers in the metadata."""
+    """Make the rows of some members, with units and origin of the numbers in the metadata."""
     import pyarrow as pa
 
     columns = _columns(tracks, rows)
@@ -70,7 +70,7 @@ def _table(tracks: Tracks, rows: slice) -> Any:
 
 
 def _columns(tracks: Tracks, rows: slice) -> Columns:
-    """The columns of some members, member by member."""
+    """Columns of some members; the rows of one member follow one another."""
     fields, count = tracks.fields, len(tracks.members[rows])
     k = len(tracks.time) if fields else 1
     columns: Columns = {MEMBER: ("", np.repeat(tracks.members[rows], k))}
@@ -102,7 +102,7 @@ def _ends(tracks: Tracks, rows: slice) -> Columns:
 
 
 def _in_utc(moments: np.ndarray) -> Any:
-    """Dates and times that say that they are in UTC."""
+    """Convert dates and times to a type that says that they are in UTC."""
     import pyarrow as pa
 
     return pa.array(moments, pa.timestamp("us")).cast(pa.timestamp("us", "UTC"))

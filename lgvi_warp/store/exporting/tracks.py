@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tracks of a run's members: which are exported, where and when on the Earth they are, read piece by piece."""
+"""The tracks of a run's exported members: their samples, read part by part, and their place and time on the Earth."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ START_UNITS = {"start.position": "m", "start.rotation_vector": "rad", "start.eul
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """Members of a run whose samples, or whose ends alone, are exported.
+    """Exported members of a run, with their samples or only their final states.
 
     result: The members whose samples were kept: the run itself, or its kept members.
-    places: Where the members exported are in `result`, (m,). members: their indices in the ensemble, (m,).
-    environment: Origin and start of the axes and the times. piece_bytes: Most numbers that are read at once, in bytes; a
-    member's samples are read whole by what writes member by member, however many they are.
+    places: Positions of the exported members in `result`, (m,). members: their indices in the ensemble, (m,).
+    environment: Origin of the axes and date of t = 0. piece_bytes: Most bytes of numbers that are read at once. Formats
+    that write member by member read all samples of a member at once, even if they are more.
     """
 
     result: Result
@@ -59,7 +59,7 @@ class Tracks:
 
     @property
     def plane(self) -> LocalPlane | None:
-        """The plane of the axes on the Earth; None where the origin is not known."""
+        """The plane of the axes on the Earth; None if the origin is unknown."""
         return self.environment.plane
 
     @property
@@ -69,7 +69,7 @@ class Tracks:
 
     @property
     def source(self) -> str:
-        """The program and the method that made the run."""
+        """The program and the method that produced the run."""
         version, method = (recorded(self.provenance, *keys) for keys in (("versions", "lgvi-warp"), ("method", "name")))
         return f"lgvi-warp {version}, method {method}"
 
@@ -79,13 +79,13 @@ class Tracks:
         return ordered(self.result.samples)
 
     def needing(self, names: Sequence[str], purpose: str) -> None:
-        """Refuse a run that has not kept what a kind of file is made of."""
+        """Refuse a run that did not keep the samples that a format needs."""
         if missing := [name for name in names if name not in self.result.samples]:
             remedy = "run it with keep='all', or SaveAt(fields=...) that names them"
             raise SceneError([f"{', '.join(missing)} were not kept: {purpose} is made of them. {capital(remedy)}"])
 
     def needing_origin(self, purpose: str) -> LocalPlane:
-        """The plane of the axes on the Earth; refuse a run whose origin is not known."""
+        """The plane of the axes on the Earth; refuse a run whose origin is unknown."""
         return plane_of(self.environment, purpose)
 
     def sample(self, name: str, rows: slice = slice(None), when: slice = slice(None)) -> np.ndarray:
@@ -101,7 +101,7 @@ class Tracks:
         return np.asarray(getattr(self.result, name))[self.places[rows]]
 
     def statuses(self) -> list[str]:
-        """Outcome of each member in a word."""
+        """Outcome of each member as a word."""
         return [Status(int(code)).name.lower() for code in self.of_members("status")]
 
     def numbers(self, rows: slice = slice(None)) -> dict[str, np.ndarray]:
@@ -112,16 +112,16 @@ class Tracks:
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Names of the parameters that members have of their own."""
+        """Names of the parameters that differ between members."""
         parameters: Any = self.result.parameters
         if self.result.store is not None:
             return tuple(name for name in parameters.names)
         return tuple(name for name, values in parameters.items() if len(values) > 1)
 
     def pieces(self, numbers: int, together: int = 1) -> Iterator[slice]:
-        """Slices of the members, of which each has this many numbers at each time.
+        """Slices of the members for reading in parts; each member has this many numbers at each time.
 
-        together: Members that a file keeps in one chunk, which is best written once.
+        together: Number of members in one chunk of the file; a chunk should be written only once.
         """
         most = max(1, self.piece_bytes // (8 * max(1, len(self.time) * numbers)))
         most = most // together * together or most
@@ -129,13 +129,13 @@ class Tracks:
             yield slice(first, min(first + most, self.count))
 
     def spans(self, numbers: int) -> Iterator[slice]:
-        """Slices of the times, at which each member has this many numbers."""
+        """Slices of the times for reading in parts; each member has this many numbers at each time."""
         most = max(1, self.piece_bytes // (8 * max(1, self.count * numbers)))
         for first in range(0, len(self.time), most):
             yield slice(first, min(first + most, len(self.time)))
 
     def moments(self, times: Any) -> np.ndarray:
-        """Dates and times in UTC, to the microsecond, at times [s]; of 1970 where the start is not known."""
+        """Dates and times in UTC, to the microsecond, at times [s]; they count from 1970 if the start is unknown."""
         start = self.environment.start_time
         begin = np.datetime64(0, "us") if start is None else start
         return np.asarray(begin + np.round(np.asarray(times, float) * 1e6).astype("timedelta64[us]"))
@@ -143,7 +143,8 @@ class Tracks:
     def path(self, member: int) -> tuple[np.ndarray, np.ndarray]:
         """The samples (p,) of a member until it ended, and their times (p,) [s].
 
-        A member that ended between two samples has the state of its end in those after it: the first of them is at that time.
+        If a member ended between two samples, its final state is in the later samples. The first of these is returned
+        as its last one, with the time of its end.
         """
         time = self.time
         end = float(self.of_members("end_time", slice(member, member + 1))[0])
@@ -155,7 +156,7 @@ class Tracks:
 
 
 def plane_of(environment: Environment, purpose: str) -> LocalPlane:
-    """Find the plane of axes on the Earth; refuse axes whose origin is not known."""
+    """Find the plane of axes on the Earth; refuse axes whose origin is unknown."""
     plane = environment.plane
     if plane is None:
         remedy = "give origin=[latitude, longitude] (--origin=LAT,LON), or the scene [environment] origin"
@@ -164,7 +165,7 @@ def plane_of(environment: Environment, purpose: str) -> LocalPlane:
 
 
 def tracks_of(result: Result, members: Any, environment: Environment) -> Tracks:
-    """Choose members of a run: a slice or indices; None for all whose samples were kept, or all of a run without samples."""
+    """Choose members of a run by a slice or indices; None: all members with samples, or all of a run without samples."""
     source = result.kept if not result.samples and result.kept is not None else result
     present = np.arange(result.members) if source is result else result.kept_members
     identities = _identities(result, source)
@@ -181,7 +182,7 @@ def tracks_of(result: Result, members: Any, environment: Environment) -> Tracks:
 
 
 def _identities(result: Result, source: Result) -> np.ndarray:
-    """Indices of the members in the ensemble that the run is of."""
+    """Indices of the members in the run's ensemble."""
     if source.store is not None:
         samples: Any = source.samples
         return np.asarray(dataclasses.replace(samples, names=("realization",), axis=0)["realization"])
@@ -193,27 +194,27 @@ def _identities(result: Result, source: Result) -> np.ndarray:
 
 
 def recorded(provenance: Any, *keys: str) -> Any:
-    """Value at some keys of a run's provenance, which may come from elsewhere; None where missing."""
+    """Value at some keys of a run's provenance, which may come from an untrusted file; None if missing."""
     for key in keys:
         provenance = provenance.get(key) if isinstance(provenance, Mapping) else None
     return provenance
 
 
 def as_slice(places: np.ndarray) -> Any:
-    """Successive places as a slice, which is read faster; others as they are."""
+    """Convert consecutive positions to a slice, which is read faster; return others unchanged."""
     if len(places) and places[-1] - places[0] == len(places) - 1 and np.all(np.diff(places) == 1):
         return slice(int(places[0]), int(places[-1]) + 1)
     return places
 
 
 def _of(values: Mapping[str, Any], name: str, places: np.ndarray) -> np.ndarray:
-    """An array (m, ...) of some members; of a store only these are read."""
+    """An array (m, ...) of some members; from a store, only these members are read."""
     part = getattr(values, "part", None)
     return np.asarray(part(places)[name] if part is not None else values[name][places])
 
 
 def units_of(tracks: Tracks) -> dict[str, str]:
-    """Units of what varied, by name; a number of a part of the controller may have none here."""
+    """Units of the varied numbers, by name; a number of a part of the controller may have no unit here."""
     units: dict[str, str] = {f"vehicle.{name}": unit for name, unit in vehicles.UNITS.items()}
     units |= {"environment.gravity": "m/s2", "environment.water_density": "kg/m3"}
     for term in tracks.result.terms:
@@ -231,7 +232,7 @@ Function = Callable[[Tracks, Mapping[str, np.ndarray]], np.ndarray]
 
 @dataclass(frozen=True)
 class DerivedNumber:
-    """A number that follows from samples: its field, the samples, and whether it needs an origin."""
+    """A number that is computed from samples: its field, its function, and whether it needs an origin."""
 
     field: Field
     of: tuple[str, ...]
@@ -256,7 +257,7 @@ def _angle(axis: int) -> Function:
 
 
 def _heading(tracks: Tracks, samples: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Direction of the body's x axis from true north to the east, 0 to 360."""
+    """Direction of the body's x axis, from true north towards east, 0 to 360 [deg]."""
     plane, x = tracks.plane, np.asarray(samples["position"], dtype=np.float64)
     assert plane is not None
     latitude, longitude = plane.geodetic(x[..., 0], x[..., 1])
@@ -295,7 +296,7 @@ DERIVED = {
 
 
 def derived_of(tracks: Tracks, names: Sequence[str]) -> tuple[DerivedNumber, ...]:
-    """Derived numbers among the names that follow from kept samples."""
+    """Derived numbers with these names that can be computed from kept samples."""
     chosen = (DERIVED[name] for name in names)
     return tuple(
         item

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members of a run as trajectories in a NetCDF file, by chapter 9 of the CF conventions: arrays over members and times."""
+"""Members of a run as trajectories in a NetCDF file (CF conventions, chapter 9): arrays over members and times."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ NO_DATE = "the run has no date: times count from its start, which is put at 1970
 
 
 def netcdf(tracks: Tracks, target: Path, report: Report) -> None:
-    """Write a NetCDF-4 file: numbers over trajectory and obs, and numbers of each member over trajectory."""
+    """Write a NetCDF-4 file: sampled numbers over trajectory and obs, and numbers of each member over trajectory."""
     tracks.needing(("position",), "a trajectory")
     with new_netcdf(target) as file:
         file.setncatts(_attributes(tracks))
@@ -87,13 +87,13 @@ def _create(file: Any, name: str, kind: Any, dimensions: tuple[str, ...], attrib
 
 
 def _chunks(members: int, times: int) -> tuple[int, int]:
-    """Members and times in a chunk: the samples of a member lie together."""
+    """Choose the members and times in a chunk: the samples of a member lie together."""
     length = min(times, CHUNK)
     return min(members, CHUNK // length), length
 
 
 def _layout(tracks: Tracks, file: Any) -> list[str]:
-    """Create the numbers over members and times; return their names."""
+    """Create the variables over members and times; return their names."""
     start = tracks.environment.start_time
     epoch = "1970-01-01T00:00:00" if start is None else np.datetime_as_string(start, unit="us").rstrip("0").rstrip(".")
     time = {"units": f"seconds since {str(epoch).replace('T', ' ')}", "calendar": "standard", "axis": "T",
@@ -120,20 +120,20 @@ def _layout(tracks: Tracks, file: Any) -> list[str]:
 
 
 def _described(meaning: str, unit: str, entry: int, entries: int) -> dict[str, str]:
-    """Meaning of an entry of a number, and its unit, where one is known: forces and moments have two, "N, N m"."""
+    """Meaning and unit of an entry of a number, if known; for forces and moments the unit "N, N m" is divided."""
     units = [word.strip().replace("/s", " s-1") for word in unit.split(",")]
     known = len(units) == 1 or 3 * len(units) == entries
     return {"long_name": meaning} | ({"units": units[entry // 3 if len(units) > 1 else 0]} if known and unit else {})
 
 
 def _standard(tracks: Tracks, name: str) -> dict[str, str]:
-    """The standard name of a number; coordinates of a projection only where it is known."""
+    """CF standard name of a number; map coordinates have one only if the projection is known."""
     known = name in STANDARD and not (name in ("north", "east") and tracks.plane is None)
     return {"standard_name": STANDARD[name]} if known else {}
 
 
 def _about(tracks: Tracks, name: str) -> dict[str, str]:
-    """Coordinates of a number."""
+    """Names of a number's coordinates."""
     if name in ("lat", "lon"):
         return {}
     if tracks.plane is None:
@@ -142,14 +142,14 @@ def _about(tracks: Tracks, name: str) -> dict[str, str]:
 
 
 def _entries(name: str, shape: tuple[int, ...]) -> list[str]:
-    """Names of the entries of a field: velocity_x for those of three axes, else by number."""
+    """Names of the entries of a field: velocity_x and so on for three axes, otherwise by number."""
     if shape == (3,):
         return [f"{name}_{axis}" for axis in "xyz"]
     return [f"{name}_{'_'.join(map(str, at))}" for at in itertools.product(*map(range, shape))] if shape else [name]
 
 
 def _numbers(tracks: Tracks, rows: slice) -> Iterable[tuple[str, np.ndarray]]:
-    """The numbers of some members over the times, by their names in the file, (m, k)."""
+    """Numbers of some members over the times, (m, k), with their names in the file."""
     samples = {name: tracks.sample(name, rows) for name in tracks.fields}
     yield "time", np.broadcast_to(tracks.time, (len(tracks.members[rows]), len(tracks.time)))
     for axis, name in enumerate(AXES):
@@ -163,7 +163,7 @@ def _numbers(tracks: Tracks, rows: slice) -> Iterable[tuple[str, np.ndarray]]:
 
 
 def _members(tracks: Tracks, file: Any) -> None:
-    """Write which member each trajectory is of, and what varied."""
+    """Write the member of each trajectory, and its varied numbers."""
     about = {"cf_role": "trajectory_id", "long_name": "index of the member in its ensemble"}
     _create(file, "trajectory", "i4", DIMENSIONS[:1], about)[:] = tracks.members
     units = units_of(tracks)
@@ -175,7 +175,7 @@ def _members(tracks: Tracks, file: Any) -> None:
 
 
 def _ends(tracks: Tracks, file: Any) -> None:
-    """Write how and when each member ended."""
+    """Write the outcome and the end time of each member."""
     of_status = member_fields.STATUS | {"flag_values": np.array(member_fields.STATUS["flag_values"], "i1")}
     _create(file, "status", "i1", DIMENSIONS[:1], of_status)[:] = tracks.of_members("status").astype("i1")
     about = {item.name: item.attributes for item in member_fields.FIELDS}
@@ -189,7 +189,7 @@ def _ends(tracks: Tracks, file: Any) -> None:
 
 
 def _grid_mapping(tracks: Tracks, file: Any) -> None:
-    """Write the plane of north and east."""
+    """Write the local plane of north and east (the grid mapping)."""
     plane = tracks.plane
     assert plane is not None
     variable = file.createVariable("plane", "i4", ())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All that a store holds as one NetCDF file: its arrays as they are, kept members and statistics in groups of their own."""
+"""A whole store as one NetCDF file: its arrays unchanged, kept members and statistics in separate groups."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MEMBERS = (MEMBER, KEPT_MEMBER)
 
 
 def netcdf(folder: Folder, target: Path, report: Report) -> None:
-    """Write the run, and its kept members and statistics in groups of their own."""
+    """Write the run, and its kept members and statistics in separate groups."""
     with new_netcdf(target) as file:
         _group(folder, file, report)
         if (kept := folder.kept()) is not None:
@@ -59,7 +59,7 @@ def _group(folder: Folder, file: Any, report: Report) -> None:
 
 
 def _end_time(folder: Folder, file: Any, failures: Any, group: Any) -> None:
-    """Write when members ended beside when they failed: at their event, at their failure, or at the end of the run."""
+    """Write the end times of members with those of failures: an event, a failure, or the end of the run."""
     ends = file.createVariable("end_time", "f8", failures.dimensions, chunksizes=failures.chunking(), fill_value=False)
     for key, value in END_TIME.items():
         ends.setncattr(key, value)
@@ -70,7 +70,7 @@ def _end_time(folder: Folder, file: Any, failures: Any, group: Any) -> None:
 
 
 def _pieces(array: zarr.Array[Any], runs: list[Block]) -> Iterator[tuple[slice, ...]]:
-    """Slices that cover an array, a block of members at a time, or at once if it has no dimension of members."""
+    """Slices that cover an array, one block of members at a time; a single slice if it has no dimension of members."""
     axis = next((i for i, dim in enumerate(array.metadata.dimension_names) if dim in MEMBERS), None)
     if axis is None:
         yield (slice(None),) * array.ndim

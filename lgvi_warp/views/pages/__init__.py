@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages about runs and studies: the report, and how to run them again."""
+"""Pages about runs and studies: the report, and instructions to repeat a run."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a run or of studies: one HTML file with pictures, tables, the scene and how to run it again."""
+"""The report of a run or of studies: one HTML file with pictures, tables, the scene and the command."""
 
 from __future__ import annotations
 
@@ -60,15 +60,16 @@ svg, img { max-width: 100%; height: auto; } .outcome { display: inline-block; wi
 
 
 def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
-    """Write one HTML file with the results of a run or of studies; it opens without a network.
+    """Write one HTML file with the results of a run or of studies. The file needs no network to be read.
 
-    The report of a run has the outcomes of the members with remedies, notes and warnings, pictures, the statistics with their
-    intervals, the settings, the scene as it was written, and the command that runs it again. The report of a study has the
-    pictures and tables of its folder.
+    The report of a run has the outcomes of the members with remedies, notes and warnings, pictures, and statistics with
+    intervals. It also has the settings, the original text of the scene, and the command that repeats the run. The
+    report of a study has the pictures and tables of its folder.
 
     Args:
-        result: A result, or the folder of a run, a trade-off, a stability map, a sensitivity study or a sweep, or of several.
-        path: The file.
+        result: A result, or a folder with a run, a trade-off, a stability map, a sensitivity study, a sweep or several
+            of these.
+        path: Path of the HTML file.
 
     Returns:
         The path.
@@ -98,7 +99,7 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
 
 
 def _of_folder(folder: Path) -> tuple[str, list[str]]:
-    """Name and parts of the page of what a folder holds. Raises SceneError where that is damaged."""
+    """Title and HTML parts of the page for a folder. Raises SceneError if its content is damaged."""
     with corrupt_file_as_scene_error(folder, "not what a verb wrote", "write it again"):
         run, studies = run_in(folder), studies_in(folder)
         if run is None and not studies:
@@ -121,7 +122,7 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
 
 
 def run_in(folder: Path) -> tuple[Result, Path] | None:
-    """Read the run that a folder holds, if it does: the result, and the file or the store."""
+    """Read the run in a folder: the result, and its file or store; None if the folder holds no run."""
     from lgvi_warp.results.result import Result
     from lgvi_warp.store.open import open_run
 
@@ -134,29 +135,29 @@ def run_in(folder: Path) -> tuple[Result, Path] | None:
 
 
 def studies_in(folder: Path) -> list[Path]:
-    """Find the studies that a folder holds."""
+    """Find the studies in a folder."""
     return [inside(folder, path.name) for pattern in study_files().values() for path in sorted(folder.glob(pattern))]
 
 
 def name_of(provenance: Mapping[str, Any]) -> str:
-    """Name a run: by its scene file, and by its vehicle."""
+    """Name a run by its scene file and its vehicle."""
     source, vehicle = provenance.get("source", {}), provenance["scene"].get("vehicle", {})
     names = (Path(str(source.get("file", ""))).stem, str(vehicle.get("title") or ""))
     return ": ".join(name for name in names if name) or "Run"
 
 
 def _day(seconds: float) -> str:
-    """The day of a time since the epoch [s], in local time."""
+    """Date of a time since the epoch [s], in local time."""
     return time.strftime("%Y-%m-%d", time.localtime(seconds))
 
 
 def _words(path: Path) -> str:
-    """Name of a file in words."""
+    """Title made from the name of a file."""
     return path.stem.replace("_", " ").capitalize()
 
 
 def _of_run(result: Result) -> Iterator[str]:
-    """The parts of a run's page."""
+    """HTML parts of a run's page."""
     yield _paragraph(title(result))
     yield _paragraph(run_answer(result))
     yield _section("What became of the members", _outcome_table(result))
@@ -186,13 +187,13 @@ def _outcome_table(result: Result) -> str:
 
 
 def _warnings(result: Result) -> list[str]:
-    """A line for each warning that arose."""
+    """Write one line for each warning that arose."""
     texts = {str(warning.name).lower(): warning.text for warning in Warnings}
     return [f"{name}, {number:,} members: {texts[name]}" for name, number in result.warnings.counts().items()]
 
 
 def _pictures_of(result: Result) -> list[Callable[..., Any]]:
-    """Functions that draw what suits a run: a summary, inputs of members that ended differently, statistics."""
+    """Functions that draw the pictures of a run: a summary, inputs of members that ended differently, statistics."""
     differ = len(outcomes(result)) > 1
     sampled = result.samples or result.kept is not None
     drawn: list[Callable[..., Any]] = [plots.summary] if sampled else [plots.outcomes] * differ
@@ -201,7 +202,7 @@ def _pictures_of(result: Result) -> list[Callable[..., Any]]:
 
 
 def inline(draw: Callable[..., Any], result: Result) -> str:
-    """A picture as SVG, or in pixels where that is large; a sentence where there is nothing to draw."""
+    """A picture as SVG, or as pixels if it is large; a sentence if there is nothing to draw."""
     with tempfile.TemporaryDirectory() as folder:
         drawn, pixels = (Path(folder) / f"picture.{ending}" for ending in ("svg", "png"))
         try:
@@ -221,7 +222,7 @@ def _pixels(path: Path) -> str:
 
 
 def _settings(result: Result) -> Iterator[tuple[str, str]]:
-    """Names and values of how the run was made."""
+    """Names and values of a run's settings."""
     provenance = result.provenance
     method = provenance["method"]
     yield "method", f"{method['name']}, {method['chosen']}" if method.get("chosen") else str(method["name"])
@@ -235,13 +236,13 @@ def _settings(result: Result) -> Iterator[tuple[str, str]]:
 
 
 def _again(result: Result) -> str:
-    """The command that runs it again, and the scene."""
+    """The command that repeats the run, and the scene."""
     command, remark, text = how_to_run_again(result.provenance)
     return _paragraph(remark) + (_preformatted(command) if command else "") + _preformatted(text)
 
 
 def _of_study(path: Path) -> Iterator[str]:
-    """The parts of a study's page but for its pictures: words, its table, and its settings."""
+    """HTML parts of a study's page without its pictures: words, table and settings."""
     with of_study(path):
         short = {
             key: _shortened(value)
@@ -259,7 +260,7 @@ def _of_study(path: Path) -> Iterator[str]:
 
 
 def _shortened(value: Any) -> Any:
-    """The same without long lists and texts, as of times and of members, which the file itself has."""
+    """Shorten long lists and texts, such as times and members; the file itself has them."""
     if isinstance(value, dict):
         return {key: _shortened(each) for key, each in value.items()}
     if isinstance(value, list | str) and len(value) > MOST_LISTED:
@@ -268,7 +269,7 @@ def _shortened(value: Any) -> Any:
 
 
 def _pictures_in(folder: Path, has_run: bool) -> list[Path]:
-    """Pictures of studies in a folder, those of a sweep in their order; those of a run are drawn anew."""
+    """Pictures of studies in a folder, those of a sweep in their order; pictures of a run are drawn anew elsewhere."""
     drawn = {path.name for path in folder.glob("*.png")} - set(OF_A_RUN if has_run else ())
     of_sweeps = [name for name in PICTURES if name in drawn]
     pictures = [inside(folder, name) for name in (*of_sweeps, *sorted(drawn.difference(of_sweeps)))]
@@ -280,7 +281,7 @@ def _pictures_in(folder: Path, has_run: bool) -> list[Path]:
 
 
 def _rows_in(path: Path) -> list[list[str]]:
-    """Rows of a CSV file of a study. Raises SceneError for one that is damaged."""
+    """Rows of a CSV file of a study. Raises SceneError if it is damaged."""
     text = file_text(path, "CSV file")
     with of_study(path):
         try:
@@ -290,13 +291,13 @@ def _rows_in(path: Path) -> list[list[str]]:
 
 
 class _Html(str):
-    """Text that is HTML already."""
+    """Text that is already HTML."""
 
     __slots__ = ()
 
 
 def _plain(text: str) -> str:
-    """A text in HTML, without control characters but for line ends."""
+    """Convert a text to HTML, without control characters except line ends."""
     return html.escape(printable(text, "\n"))
 
 
@@ -321,7 +322,7 @@ def _list(items: Sequence[str]) -> str:
 
 
 def _table(head: Sequence[str], rows: Iterator[Sequence[str]] | Sequence[Sequence[str]]) -> str:
-    """A table; head: titles of its columns, none for a table of names and values."""
+    """Table in HTML; head: titles of its columns, empty for a table of names and values."""
     titles = "".join(f"<th>{_plain(text)}</th>" for text in head)
     body = "".join(f"<tr>{''.join(f'<td>{_escaped(text)}</td>' for text in row)}</tr>" for row in rows)
     return f"<table>{f'<tr>{titles}</tr>' if titles else ''}{body}</table>"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Instructions to repeat a run: its scene as it was written, and the command."""
+"""Instructions to repeat a run: its scene in the original text, and the command."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ DEFAULTS = {"dtype": "float64", "checks": "safe", "on_failure": "freeze"}
 
 
 def how_to_run_again(provenance: Mapping[str, Any]) -> tuple[str | None, str, str]:
-    """Say how to run a run again: the command, None where no file holds all of it; a remark; and the text of the scene file.
+    """Write instructions to repeat a run: (command, or None if no file holds the scene; a remark; text of the scene file).
 
-    That is as it was written, else of the scene's tables. An ensemble given in Python stands in it in place of the file's own.
+    The text is the original one, or else is made from the scene's tables. An ensemble from Python replaces the file's own.
     """
     scene, source = provenance["scene"], provenance.get("source", {})
     written = isinstance(source.get("text"), str)
@@ -43,7 +43,7 @@ def how_to_run_again(provenance: Mapping[str, Any]) -> tuple[str | None, str, st
 
 
 def _given_ensemble(provenance: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """The section [ensemble] that a run had, where that is not its scene's own; None where it is."""
+    """The [ensemble] section of a run, if it differs from the scene's own; else None."""
     had, of_scene = provenance.get("ensemble"), provenance["scene"].get("ensemble", {"members": 1, "seed": 0})
     if had is None or json.dumps(had, sort_keys=True) == json.dumps(
         {"members": had["members"]} | of_scene, sort_keys=True
@@ -53,7 +53,7 @@ def _given_ensemble(provenance: Mapping[str, Any]) -> Mapping[str, Any] | None:
 
 
 def _is_scene(content: Mapping[str, Any]) -> bool:
-    """Whether tables are a scene's."""
+    """Whether tables describe a valid scene."""
     from lgvi_warp.scene.scene import Scene
 
     try:
@@ -64,7 +64,7 @@ def _is_scene(content: Mapping[str, Any]) -> bool:
 
 
 def _with_ensemble(text: str, ensemble: Mapping[str, Any]) -> str:
-    """The text of a scene file with another section [ensemble], all else as it was written."""
+    """Replace the section [ensemble] in the text of a scene file; the rest is unchanged."""
     toml = _tomlkit()
     document = toml.parse(text)
     if "ensemble" in document:
@@ -73,7 +73,7 @@ def _with_ensemble(text: str, ensemble: Mapping[str, Any]) -> str:
 
 
 def _given(provenance: Mapping[str, Any]) -> list[str]:
-    """Options for what a run was given in place of its scene's own settings."""
+    """Options for the settings of a run that differ from its scene's own settings."""
     settings, method = provenance["scene"].get("run", {}), provenance["method"]
     options = {
         "method": method["name"],
@@ -92,14 +92,14 @@ def _given(provenance: Mapping[str, Any]) -> list[str]:
 
 
 def _same(setting: Any, value: Any) -> bool:
-    """Whether a setting of a scene is what a run had."""
+    """Whether a setting of a scene has the value of the run."""
     if isinstance(value, str):
         return bool(setting == value)
     return isinstance(setting, int | float) and math.isclose(setting, value, rel_tol=1e-9)
 
 
 def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Name a vehicle of the package in place of its numbers, where that is the same scene."""
+    """Replace the numbers of a vehicle by its name in the package, if the scene stays the same."""
     from lgvi_warp.scene.scene import Scene
     from lgvi_warp.vehicles.fossen import vehicle_names
 
@@ -125,7 +125,7 @@ def toml_of(content: Mapping[str, Any]) -> str:
 
 
 def _tomlkit() -> Any:
-    """Load tomlkit. Raises ImportError where it is not installed."""
+    """Load tomlkit. Raises ImportError if it is not installed."""
     try:
         import tomlkit
     except ModuleNotFoundError as error:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of a recording: what is drawn of a run, the world, the graphs, the words, and their layout."""
+"""Recordings: drawing data of a run in the rerun viewer as a world, graphs and texts, with their layout."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Eye of a recording, and the size of things as seen from it."""
+"""Position of the camera of a recording, and the apparent size of things."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FIELD, ASPECT, HIGH = 0.9 * TANGENT, 1.3, 600.0
 
 
 def distance(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
-    """Distance [m] of the eye from the middle of a box, low to high (3,) [m], to see all of it."""
+    """Distance [m] of the camera from the middle of a box from low to high (3,) [m] at which all of the box is visible."""
     across = np.cross(SIGHT, (0.0, 0.0, -1.0))
     across /= np.linalg.norm(across)
     above = np.cross(across, SIGHT)
@@ -23,11 +23,11 @@ def distance(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
 
 
 def far_pixel(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
-    """Size of one pixel across the sight [m] at the far end of a box from low to high (3,) [m]."""
+    """Width of one pixel [m] at the far end of a box from low to high (3,) [m]."""
     farthest = distance(low, high, aspect) + float((_corners(low, high) @ SIGHT).max())
     return 2.0 * TANGENT * farthest / HIGH
 
 
 def _corners(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Corners of a box from its middle (8, 3)."""
+    """Corners of a box (8, 3), relative to its middle."""
     return 0.5 * (high - low) * np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The graphs of a recording: fans, shares by outcome, commands and actuators, the log, and the histogram at the cursor."""
+"""Graphs of a recording: fans, shares by outcome, commands and actuators, the log, and the histogram at the cursor."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def log_graphs(recording: Any, run: Drawn) -> None:
 
 
 def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
-    """Log the bands of a fan and its median; of one member, its curve."""
+    """Log the bands of a fan and its median; for a single member, its curve."""
     import rerun as rr
 
     rgb, single = run.rgb or PALE, run.source.members == 1
@@ -64,7 +64,7 @@ def _series(
     recording: Any, entity: str, time: np.ndarray, values: np.ndarray, name: str, color: tuple[int, int, int],
     width: float = 2.0,
 ) -> None:  # fmt: skip
-    """Log one curve, broken where its values are not finite; with markers where there are few."""
+    """Log one curve, with gaps at values that are not finite; few values have markers."""
     import rerun as rr
 
     log_static(recording, entity, rr.SeriesLines(names=name, colors=color, widths=width))
@@ -98,7 +98,7 @@ MOST_MARKS = 12
 
 
 def _shares(recording: Any, run: Drawn) -> None:
-    """Log which share of all members is under way, and which has ended, by outcome."""
+    """Log the share of all members that is under way, and the shares that have ended, by outcome."""
     import rerun as rr
 
     for code, share in run.shares.items():
@@ -115,7 +115,7 @@ def _shares(recording: Any, run: Drawn) -> None:
 
 
 def _channels(recording: Any, run: Drawn) -> None:
-    """Log medians of commands and actuators over the members drawn that are under way, and the actuators' limits."""
+    """Log medians of commands and actuators over the drawn members that are under way, and the actuators' limits."""
     for field in CHANNELS:
         if field not in run.few.samples:
             continue
@@ -132,7 +132,7 @@ def _channels(recording: Any, run: Drawn) -> None:
 
 
 def _log(recording: Any, run: Drawn) -> None:
-    """Log each outcome when its first member has it, with how many have it and the value, and each fault when it begins."""
+    """Log each outcome at its first member, with the number of members and the value, and each fault when it begins."""
     import rerun as rr
 
     def say(when: float, text: str, level: str, color: tuple[int, int, int]) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rerun viewer without a window: it opens a recording, shows any time of it, and is shot."""
+"""The rerun viewer without a window: it opens a recording, shows any time of it, and takes pictures."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ PATIENCE, SETTLED, DRAWN = 60.0, 4.0, 0.3
 
 
 class DriverMissingError(RuntimeError):
-    """This machine has no graphics driver by which the viewer could draw."""
+    """This machine has no graphics driver that the viewer could use."""
 
 
 def free_port() -> int:
-    """Find a port of this machine that nothing listens at."""
+    """Find a free port of this machine."""
     with socket.socket() as trial:
         trial.bind(("127.0.0.1", 0))
         return int(trial.getsockname()[1])
@@ -39,7 +39,7 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def started(size: tuple[int, int]) -> Iterator[tuple[Any, str]]:
-    """A client of a viewer of this size [pixels], and its address. Raises DriverMissingError."""
+    """Start a viewer of this size [pixels]; yields its client and address. Raises DriverMissingError."""
     rerun()
     from rerun.experimental import ViewerClient
 
@@ -66,7 +66,7 @@ def started(size: tuple[int, int]) -> Iterator[tuple[Any, str]]:
 
 
 def _why(log: IO[str]) -> Exception:
-    """Why a viewer ended, by its log."""
+    """Find the reason why a viewer ended, from its log."""
     log.seek(0)
     text = log.read()
     if NO_DRIVER.search(text):
@@ -90,7 +90,7 @@ def show_time(client: Any, when: float, wait: float = DRAWN) -> None:
 
 
 def shots(recording: Path, times: Iterable[float], size: tuple[int, int]) -> Iterator[Any]:
-    """Pictures of a recording's window at some times [s]."""
+    """Take pictures of a recording's window at some times [s]."""
     from PIL import Image
 
     with started(size) as (client, _):
@@ -102,7 +102,7 @@ def shots(recording: Path, times: Iterable[float], size: tuple[int, int]) -> Ite
 
 
 def _client(kind: Any, process: subprocess.Popen[bytes], port: int) -> Any:
-    """A client of the viewer; None where it ended. Its port opens before its graphics start."""
+    """Client of the viewer; None if the viewer ended. Its port opens before its graphics start."""
     end = time.monotonic() + PATIENCE
     while process.poll() is None and time.monotonic() < end:
         with contextlib.suppress(OSError):

@@ -24,12 +24,12 @@ LIGHT, FIN = (245, 245, 245), (255, 200, 60)
 
 
 class Hull(NamedTuple):
-    """A surface of triangles in body axes.
+    """Surface of triangles in body axes.
 
     points: Corners, shape (p, 3) [m].
     triangles: Indices of corners, shape (t, 3).
     normals: Outward unit vectors at the corners, shape (p, 3).
-    parts: What each corner belongs to, shape (p,): 0 the hull, 1 its nose, 2 its fin.
+    parts: Part of each corner, shape (p,): 0 the hull, 1 its nose, 2 its fin.
     """
 
     points: np.ndarray
@@ -75,7 +75,7 @@ def hull_of(length: float, diameter: float) -> Hull:
 
 
 def shape_of(scene: Mapping[str, Any], parameters: Mapping[str, np.ndarray]) -> tuple[Shape, str]:
-    """Find the shape of a run's vehicle, and where it comes from; without one in the scene, a hull of the displaced volume."""
+    """Find the shape of a run's vehicle and its source. Without a shape in the scene: a hull of the displaced volume."""
     shape = shape_from(scene["vehicle"].get("shape"))
     if shape is not None:
         return shape, "mesh of the scene" if shape.mesh else f"{shape.length:g} m by {shape.diameter:g} m"
@@ -96,7 +96,7 @@ JSON_CHUNK = 0x4E4F534A
 
 
 def mesh_of(path: str) -> Mesh:
-    """Read a binary glTF file that holds all its parts."""
+    """Read a binary glTF file that contains all its data."""
     key, remedy = "vehicle.shape.mesh", "give a binary glTF 2.0 file with all its parts, or length and diameter [m]"
     try:
         content = file_bytes(path, "mesh")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The first layout of the viewer."""
+"""The initial layout of the viewer."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def layout(runs: list[Drawn], box: WorldBox, scales: list[int]) -> Any:
 
 
 def live_layout(run: Drawn, box: WorldBox, scale: int) -> Any:
-    """Lay out the views of a run that goes on: the world on the left, curves of single members on the right."""
+    """Lay out the views of a run in progress: the world on the left, curves of single members on the right."""
     import rerun.blueprint as rrb
 
     titles = {fan.name: fan.title for fan in run.fans}
@@ -53,7 +53,7 @@ def live_layout(run: Drawn, box: WorldBox, scale: int) -> Any:
 
 
 def _whole_window(views: Any, played: float) -> Any:
-    """A blueprint of views, which plays so long a time [s] of a run."""
+    """Blueprint of views; it plays a run of this time [s]."""
     import rerun.blueprint as rrb
 
     panel = rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="playing", loop_mode="all",
@@ -104,7 +104,7 @@ def _high(fan: Fan, limits: tuple[float, float] | None) -> bool:
 def _curve(
     origin: str, name: str, time_range: Any, limits: tuple[float, float] | None, legend: bool, below: bool = False
 ) -> Any:
-    """A view of curves over the whole time, with the legend above or below them."""
+    """View of curves over the whole time, with the legend above or below them."""
     import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
@@ -114,7 +114,7 @@ def _curve(
 
 
 def _curve_of_channels(time_range: Any) -> Any:
-    """A view of commands, actuators and limits."""
+    """View of commands, actuators and limits."""
     import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
@@ -124,7 +124,7 @@ def _curve_of_channels(time_range: Any) -> Any:
 
 
 def _limits(levels: np.ndarray) -> tuple[float, float] | None:
-    """Limits of an axis around values, a little wider; None where none is finite."""
+    """Limits of an axis, a little wider than the values; None if no value is finite."""
     finite = levels[np.isfinite(levels)]
     if not finite.size:
         return None
@@ -134,7 +134,7 @@ def _limits(levels: np.ndarray) -> tuple[float, float] | None:
 
 
 def _all_times(time: np.ndarray) -> Any:
-    """An axis of time from the first to the last."""
+    """Time axis from the first to the last time."""
     import rerun.blueprint as rrb
 
     start, end = (rrb.TimeRangeBoundary.absolute(seconds=float(time[i])) for i in (0, -1))
@@ -142,7 +142,7 @@ def _all_times(time: np.ndarray) -> Any:
 
 
 def _world(run: Drawn, name: str, box: WorldBox, scale: int, aspect: float) -> Any:
-    """The view of one run's world: across the fleet's way, from a little above; trails up to the cursor."""
+    """View of one run's world: from the side of the fleet's path and a little above; trails up to the cursor."""
     import rerun.blueprint as rrb
 
     middle = 0.5 * (box.low + box.high)

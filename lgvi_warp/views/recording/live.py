@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run in the viewer while it goes on: its members come block by block, each through all times."""
+"""A run in progress in the viewer: its members appear block by block, each with all of its times."""
 
 from __future__ import annotations
 
@@ -34,10 +34,9 @@ PATIENCE = 30.0
 class Live:
     """Shows the members of a run in a viewer as their blocks are finished.
 
-    Of each block as many members are drawn as its share of 1,000, in the order of `lgvi_warp.select_members`: by a hash of
-    their index. Bodies and paths are coloured by outcome; curves are of single members, since quantiles need all of them.
-
-    A viewer that is closed, or takes nothing for a while, ends the view and not the run.
+    About 1,000 members are drawn, divided between the blocks in proportion to their size. The members are chosen by a hash of
+    their index, as in `lgvi_warp.select_members`. Bodies and paths are coloured by outcome. Curves show single members,
+    since quantiles need all members. If the viewer is closed or does not respond, the view ends and the run continues.
     """
 
     closed = False
@@ -60,7 +59,7 @@ class Live:
             self.closed = True
 
     def _add(self, block: Result) -> None:
-        """Count the members, and log those that are drawn."""
+        """Count the members, and log the drawn ones."""
         total, done = members_of_run(block), self._counts.total()
         self._counts.update(block.status.counts())
         if set(NEEDED) <= set(block.samples):
@@ -70,7 +69,7 @@ class Live:
         self._say(total)
 
     def _draw(self, block: Result, places: np.ndarray, first: int) -> None:
-        """Draw members at these places of a block that begins with the member `first`."""
+        """Draw members at these positions of a block that begins with the member `first`."""
         few = choice.few(block, places, tuple(block.samples), choice.frames_of(block.time))
         try:
             run = drawn_of(few, label=f"from_{first}")
@@ -84,7 +83,7 @@ class Live:
             self._curves += 1
 
     def _fit(self, run: Drawn) -> None:
-        """Lay out the view at the first block, and anew when it is outgrown."""
+        """Lay out the view at the first block, and again when the members leave it."""
         box = box_of([run])
         if self._box is None:
             self._scale = scale_of(run, box)
@@ -97,7 +96,7 @@ class Live:
             self._box = box
 
     def _say(self, total: int) -> None:
-        """Say how many members are done, and how they ended."""
+        """Report how many members are done, and how they ended."""
         rr = viewer.rerun()
         counts = ", ".join(f"{name} {number:,}" for name, number in self._counts.items())
         text = f"{choice.of_members(self._counts.total(), total)} done: {counts}"

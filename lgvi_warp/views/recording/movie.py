@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moving pictures of a fleet, for a talk or a page: shot from the viewer without a window, or plainly drawn."""
+"""Animations of a fleet, for a talk or a page: recorded from the viewer without a window, or drawn by Matplotlib."""
 
 from __future__ import annotations
 
@@ -38,26 +38,26 @@ def movie(
     seconds: float = 6.0,
     by: str | None = None,
 ) -> Path:
-    """Write a moving picture of a run, for a talk or a page: the recording as the viewer shows it, without a window.
+    """Write an animation of a run, for a talk or a page: the recording as the viewer shows it, without a window.
 
-    Where the viewer cannot draw, for want of a graphics driver or of rerun-sdk, the fleet is drawn plainly by Matplotlib: from
-    above, and its depth over time.
+    If the viewer cannot draw, because a graphics driver or rerun-sdk is missing, Matplotlib draws the fleet: a view
+    from above, and the depth over time.
 
     Args:
         result: A result with position, attitude and velocity, in memory or in a store.
         path: The file: .webp, .gif or .png (an animated PNG).
-        members: Indices of the members to draw, as [3, 17]; default those that `lgvi_warp.select_members` chooses.
-        frames: Number of pictures, evenly spread over the run's time, at least 2; default 60.
-        seconds: How long it plays [s], above 0; it then begins again. Default 6.
-        by: "viewer" or "plot" for one way alone; default None, the viewer where it can draw.
+        members: Indices of the members to draw, as [3, 17]; default: the choice of `lgvi_warp.select_members`.
+        frames: Number of pictures, evenly spaced over the run's time, at least 2; default 60.
+        seconds: Duration of the animation [s], above 0; it then repeats. Default 6.
+        by: "viewer" or "plot" to allow only one of the two; default None: the viewer if it can draw, else Matplotlib.
 
     Returns:
-        The path.
+        The path of the file.
 
     Raises:
         ImportError: rerun-sdk or Matplotlib is not installed (extra: viz).
         NothingToDraw: No samples were kept, or no member has a finite start.
-        SceneError: The ending, frames, seconds or by is not known; or there are no such members.
+        SceneError: The file name's extension, frames, seconds or by is invalid; or the run does not have these members.
         OSError: The file cannot be written, or by="viewer" and the viewer cannot draw on this machine.
 
     Examples:
@@ -74,7 +74,7 @@ def movie(
 
 def write(result: Result, path: str | os.PathLike[str], *, members: Any = None, frames: int = 60, seconds: float = 6.0,
           by: str | None = None) -> str:  # fmt: skip
-    """Write a moving picture; returns the way it was drawn, of WAYS."""
+    """Write an animation; returns the program that drew it, one of WAYS."""
     result_of(result)
     target = file_path("path", path)
     faults = Faults()
@@ -108,7 +108,7 @@ def write(result: Result, path: str | os.PathLike[str], *, members: Any = None, 
 
 
 def save(pictures: Iterator[Any], target: Path, seconds: float) -> None:
-    """Write pictures one after the other; the file is there whole or not at all."""
+    """Write pictures one after the other; the file is complete or does not appear."""
     every = list(pictures)
     look = {"duration": max(1, round(1000.0 * seconds / len(every))), "loop": 0, "save_all": True,
             "append_images": every[1:], "format": target.suffix.lower().removeprefix(".")}  # fmt: skip

@@ -35,27 +35,27 @@ def record(
 ) -> Path | None:
     """Record the fleet for the rerun viewer. The file appears only when it is complete.
 
-    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`, each in the colour of
-    its outcome from the time at which it ended. Curves are of the members still under way at each time. The same run always
-    gives the
-    recording and the application the same ids: the viewer keeps recordings and layouts apart by them.
+    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`. A hull takes the colour
+    of its outcome at the time at which the member ended. Curves show the members under way at each time. The same run
+    always gives the recording and the application the same ids, by which the viewer distinguishes recordings and layouts.
 
     Args:
-        result: A result with position, attitude and velocity, in memory or in a store; or several by name, which are shown
-            side by side, in one colour each.
-        path: The file; None (default) only with `to`.
-        members: Indices of the members to draw, as [3, 17]; default those that `lgvi_warp.select_members` chooses.
-        to: Where else to send it: an rr.RecordingStream, or the address of a viewer, as
-            "rerun+http://127.0.0.1:9876/proxy"; default nowhere.
+        result: A result with position, attitude and velocity, in memory or in a store; or a mapping of names to
+            results, which are shown side by side, each in its own colour.
+        path: The file; None (default) is allowed only with `to`.
+        members: Indices of the members to draw, as [3, 17]; default: the choice of `lgvi_warp.select_members`.
+        to: Additional receiver: an rr.RecordingStream, or the address of a viewer, as
+            "rerun+http://127.0.0.1:9876/proxy"; default none.
 
     Returns:
-        The path; None without one.
+        The path of the file; None if `path` is None.
 
     Raises:
         ImportError: rerun-sdk is not installed (extra: viz).
         NothingToDraw: No samples were kept, or no member has a finite start.
-        SceneError: There are no such members, or the vehicle's mesh cannot be read.
-        OSError: The file cannot be written, no viewer answers at the address, or it ends meanwhile; then the file is whole.
+        SceneError: The run does not have these members, or the vehicle's mesh cannot be read.
+        OSError: The file cannot be written; or no viewer answers at the address, or it ends too early (the file is
+            complete then).
         ValueError: There is no result; or neither `path` nor `to` is given (a SceneError, which is a ValueError).
 
     Examples:
@@ -95,17 +95,17 @@ def record(
 
 
 def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
-    """Show the fleet in the rerun viewer: a window of its own, or one that is open already.
+    """Show the fleet in the rerun viewer: in a new window, or in a viewer that is already open.
 
     Args:
         result: As for `lw.record`.
-        members: Indices of the members to draw; default those that `lgvi_warp.select_members` chooses.
+        members: Indices of the members to draw; default: the choice of `lgvi_warp.select_members`.
 
     Raises:
         ImportError: rerun-sdk is not installed (extra: viz).
         NothingToDraw: No samples were kept, or no member has a finite start.
-        SceneError: There are no such members, or the vehicle's mesh cannot be read.
-        OSError: The viewer cannot be started, as where there is no display; the message has the path of the recording.
+        SceneError: The run does not have these members, or the vehicle's mesh cannot be read.
+        OSError: The viewer cannot be started, for example without a display; the message has the path of the recording.
     """
     viewer.rerun()
     # The viewer reads the file after this returns; the system clears its folder for temporary files.
@@ -135,7 +135,7 @@ def _recording(runs: list[Drawn]) -> Any:
 
 
 def _content(runs: list[Drawn]) -> bytes:
-    """The content of a file: rerun tells of no error of a disk that it writes to itself."""
+    """The content of a file. rerun reports no disk error of a file that it writes itself."""
     recording = _recording(runs)
     stream = recording.binary_stream()
     recording.send_blueprint(_layout(runs), make_active=False)
@@ -146,7 +146,7 @@ def _content(runs: list[Drawn]) -> bytes:
 
 
 def _to_viewer(runs: list[Drawn], address: str) -> None:
-    """Send a recording of its own to the viewer at an address. Raises OSError."""
+    """Send a separate recording to the viewer at an address. Raises OSError."""
     recording = _recording(runs)
     try:
         recording.set_sinks(viewer.rerun().GrpcSink(address), default_blueprint=_layout(runs))
@@ -163,12 +163,12 @@ def _layout(runs: list[Drawn]) -> Any:
 
 
 def _scales(runs: list[Drawn], box: WorldBox) -> list[int]:
-    """Scale of hulls, of each run in a view of its own."""
+    """Scale of the hulls of each run, which has its own view."""
     return [scale_of(run, box, ASPECT / len(runs)) for run in runs]
 
 
 def _send(recording: Any, runs: list[Drawn], laid_out: bool = False) -> None:
-    """Log all of the runs, and their layout where the stream has none."""
+    """Log all of the runs, and their layout if the stream has none."""
     box = box_of(runs)
     scales = _scales(runs, box)
     if not laid_out:

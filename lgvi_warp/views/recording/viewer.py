@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rerun viewer as a process: whether one listens at an address, and how one is started."""
+"""The rerun viewer as a process: check whether one listens at an address, and start one."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PATIENCE, STARTED, LONGEST = 10.0, 3.0, 600.0
 
 
 def rerun() -> Any:
-    """Load rerun. Raises ImportError with the remedy where it is not installed."""
+    """Load rerun. Raises ImportError with the remedy if it is not installed."""
     try:
         import rerun as module
     except ModuleNotFoundError as error:
@@ -41,7 +41,7 @@ def program() -> Path:
 
 
 def reach(address: str) -> None:
-    """Require that a viewer listens at an address: rerun would wait without end for one that is not there."""
+    """Require that a viewer listens at an address: rerun would wait forever for a missing one."""
     try:
         _connect(address)
     except (OSError, ValueError) as error:
@@ -64,7 +64,7 @@ def _connect(address: str) -> None:
 
 
 def watched(send: Callable[[], None], address: str, patience: float = PATIENCE, longest: float = LONGEST) -> None:
-    """Send to a viewer for as long as it listens: rerun would wait without end for one that does not."""
+    """Send to a viewer for as long as it listens: rerun would wait forever for one that stopped."""
     raised: list[BaseException] = []
 
     def sending() -> None:
@@ -85,7 +85,7 @@ def watched(send: Callable[[], None], address: str, patience: float = PATIENCE, 
 
 
 def start(words: Sequence[str | Path], remedy: str, started: float = STARTED) -> None:
-    """Start a viewer that goes on after this process."""
+    """Start a viewer that continues after this process ends."""
     # The command silences the recorder, not the viewer, whose words say why it does not start.
     environment = {name: value for name, value in os.environ.items() if (name, value) != ("RUST_LOG", "off")}
     with tempfile.TemporaryFile("w+") as log:
@@ -104,7 +104,7 @@ def start(words: Sequence[str | Path], remedy: str, started: float = STARTED) ->
 
 
 def opened(address: str | None, home: str = ADDRESS, patience: float = PATIENCE) -> str:
-    """Find the viewer at an address, or one on this machine, at `home`, which is started where none is open."""
+    """Find the viewer at an address, or on this machine at `home`; start one there if none is open."""
     rerun()
     if address is not None:
         reach(address)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The words of a recording: a summary of ten lines, and the provenance."""
+"""The texts of a recording: a summary of ten lines, and the provenance."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def log_words(recording: Any, runs: list[Drawn], box: WorldBox, scales: list[int
 
 
 def lines(run: Drawn, box: WorldBox, scale: int) -> dict[str, str]:
-    """Say of a run in ten lines what it is, what became of it, and what is drawn."""
+    """Describe a run in ten lines: what it is, how its members ended, and what is drawn."""
     import rerun as rr
 
     result, settings = run.result, run.result.provenance
@@ -88,7 +88,7 @@ def water_text(run: Drawn, box: WorldBox) -> str:
 
 
 def energy_text(run: Drawn) -> str:
-    """Say how well energy is kept, or what does work."""
+    """Say how well energy is conserved, or which forces do work."""
     few = run.few
     if not set(FIELDS) <= set(few.samples):
         return "not known: not all of the motion was kept"

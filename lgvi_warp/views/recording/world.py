@@ -36,7 +36,7 @@ AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 2
 
 @dataclass(frozen=True, eq=False)
 class WorldBox:
-    """The part of the world that is in view: smallest and largest coordinates (3,) [m], and whether the surface is in it."""
+    """The visible part of the world: smallest and largest coordinates (3,) [m], and whether the surface is in it."""
 
     low: np.ndarray
     high: np.ndarray
@@ -44,7 +44,7 @@ class WorldBox:
 
     @property
     def size(self) -> float:
-        """Length of its diagonal [m]."""
+        """Length of the box's diagonal [m]."""
         return float(np.linalg.norm(self.high - self.low))
 
     @property
@@ -58,7 +58,7 @@ class WorldBox:
 
 
 def box_of(runs: list[Drawn]) -> WorldBox:
-    """Find the box around all paths, with all floors, and the surface where it is near."""
+    """Find the box around all paths, with all floors, and with the surface if it is near."""
     paths = [run.position[finite_rows(run.position)] for run in runs]
     low = np.min([path.min(axis=0) for path in paths], axis=0).astype(float)
     high = np.max([path.max(axis=0) for path in paths], axis=0).astype(float)
@@ -75,7 +75,7 @@ def box_of(runs: list[Drawn]) -> WorldBox:
 
 
 def floors_of(run: Drawn) -> list[float]:
-    """Depths of the flat floors of a run's own scene [m], the upper first."""
+    """Depths of the flat floors of a run's own scene [m], the shallowest first."""
     return sorted(flat_depths(run.result.provenance["scene"]))
 
 
@@ -97,7 +97,7 @@ def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
 
 
 def scale_of(run: Drawn, box: WorldBox, aspect: float = ASPECT) -> int:
-    """Scale of a hull, so that it is seen in the box."""
+    """Scale of a hull at which it is visible in the box."""
     form, length = _length(run)
     thickness = length if isinstance(form, Mesh) else min(form)
     wanted = max(LONG / length, THICK / thickness) * far_pixel(box.low, box.high, aspect)
@@ -105,7 +105,7 @@ def scale_of(run: Drawn, box: WorldBox, aspect: float = ASPECT) -> int:
 
 
 def log_world(recording: Any, run: Drawn, box: WorldBox, scale: int) -> None:
-    """Log all of one run that stands in its world."""
+    """Log everything in one run's world."""
     log_frame(recording, run, box)
     log_bodies(recording, run, scale)
     _trails(recording, run)
@@ -114,7 +114,7 @@ def log_world(recording: Any, run: Drawn, box: WorldBox, scale: int) -> None:
 
 
 def log_frame(recording: Any, run: Drawn, box: WorldBox) -> None:
-    """Log what stands around the members of one run: surface, floor, axes and current."""
+    """Log the surroundings of one run's members: surface, floor, axes and current."""
     import rerun as rr
 
     log_static(recording, run.path("world"), rr.ViewCoordinates.FRD)
@@ -124,19 +124,19 @@ def log_frame(recording: Any, run: Drawn, box: WorldBox) -> None:
 
 
 def log_static(recording: Any, entity: str, archetype: Any) -> None:
-    """Log what is the same at all times."""
+    """Log an object that is the same at all times."""
     recording.log(entity, archetype, static=True, strict=True)
 
 
 def send_columns(recording: Any, entity: str, time: np.ndarray, columns: Any) -> None:
-    """Log what changes with time [s]."""
+    """Log data that change with time [s]."""
     import rerun as rr
 
     recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
 
 
 def log_bodies(recording: Any, run: Drawn, scale: int) -> None:
-    """Log a hull for each outcome, and the poses of the members that have had it so far."""
+    """Log one hull for each outcome, and at each time the poses of the members that have this outcome."""
     import rerun as rr
 
     form, _ = _length(run)
@@ -182,7 +182,7 @@ def _poses(
 
 
 def _trails(recording: Any, run: Drawn) -> None:
-    """Log the way of some members piece by piece: the view shows the pieces up to its time."""
+    """Log the path of some members in parts; the view shows the parts up to its time."""
     import rerun as rr
 
     if len(run.time) < 2:
@@ -198,7 +198,7 @@ def _trails(recording: Any, run: Drawn) -> None:
 
 
 def log_paths(recording: Any, run: Drawn) -> None:
-    """Log the whole ways of some members, as they are at all times."""
+    """Log the whole paths of some members, shown at all times."""
     import rerun as rr
 
     members = slice(None, None, -(-run.few.members // TRAILS))
@@ -209,7 +209,7 @@ def log_paths(recording: Any, run: Drawn) -> None:
 
 
 def _spread(recording: Any, run: Drawn) -> None:
-    """Log the ellipsoids of the members under way; none is left where there are too few."""
+    """Log the ellipsoids of the members under way; they are cleared at times with too few members."""
     import rerun as rr
 
     spread, entity = run.spread, run.path("world", "spread")
@@ -226,7 +226,7 @@ def _spread(recording: Any, run: Drawn) -> None:
 
 
 def _planes(recording: Any, run: Drawn, box: WorldBox) -> None:
-    """Log the surface and the floor where they are in view, with a grid in metres; unbounded water has no sheet at depth 0."""
+    """Log the surface and the floor if they are in view, with a grid in metres; unbounded water has no surface."""
     import rerun as rr
 
     margin = AROUND * box.size
@@ -254,7 +254,7 @@ def _planes(recording: Any, run: Drawn, box: WorldBox) -> None:
 
 
 def _mesh(relief: Relief) -> Any:
-    """A floor as a mesh seen from both sides, the lighter the shallower."""
+    """Make a mesh of a floor that is visible from both sides, lighter where it is shallower."""
     import rerun as rr
 
     a, b = relief.depth.shape
@@ -291,9 +291,9 @@ def _axes(recording: Any, run: Drawn, box: WorldBox) -> None:
 
 
 def water_at(run: Drawn, points: np.ndarray) -> np.ndarray:
-    """Compute how the water moves at points (g, 3) [m], by the numbers of the first member drawn: (f, g, 3) [m/s].
+    """Compute the velocity of the water at points (g, 3) [m], for the numbers of the first drawn member: (f, g, 3) [m/s].
 
-    It is zero for water whose motion is not known after the run.
+    It is zero if the motion of the water is not known after the run.
     """
     places = np.broadcast_to(points, (len(run.time), *points.shape))
     total = np.zeros(places.shape)
@@ -306,7 +306,7 @@ def water_at(run: Drawn, points: np.ndarray) -> np.ndarray:
 
 
 def _current(recording: Any, run: Drawn, box: WorldBox) -> None:
-    """Log arrows of the water's motion at the side of the box, where it moves."""
+    """Log arrows of the water's velocity at the side of the box, if it moves."""
     import rerun as rr
 
     middle = 0.5 * (box.low + box.high)
@@ -335,7 +335,7 @@ def _current(recording: Any, run: Drawn, box: WorldBox) -> None:
 
 
 def chosen_member(run: Drawn) -> int:
-    """Choose the member whose forces are drawn: of those drawn the first that goes on longest."""
+    """Choose the member whose forces are drawn: the first of the drawn members with the longest run."""
     return int(run.counted.sum(axis=0).argmax())
 
 
@@ -345,10 +345,10 @@ LITTLE = 1e-3
 
 
 def forces_on(run: Drawn) -> tuple[np.ndarray, np.ndarray]:
-    """Compute weight, buoyancy and all other forces on the chosen member, inertial axes (f, 3, 3) [N].
+    """Compute weight, buoyancy and the sum of other forces on the chosen member, inertial axes (f, 3, 3) [N].
 
-    The last follow from the balance of momentum, as means between the times drawn.
-    Returns: The forces, and where they act in body axes, shape (3, 3) [m].
+    The other forces are computed from the balance of momentum, as means between the drawn times.
+    Returns: The forces, and their points of action in body axes, shape (3, 3) [m].
     """
     member = np.array([chosen_member(run)])
     few = run.few.part(member)
@@ -366,7 +366,7 @@ def forces_on(run: Drawn) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _forces(recording: Any, run: Drawn, box: WorldBox, scale: int) -> None:
-    """Log the forces on the chosen member as arrows; the viewer tells their sizes where the cursor is on them."""
+    """Log the forces on the chosen member as arrows; the viewer shows their magnitudes at the cursor."""
     import rerun as rr
 
     forces, points = forces_on(run)

@@ -23,10 +23,12 @@ TEXT = """# At the extremes
 For readers who want to know how rounding and extreme inputs affect a run. Each row of the tables is one vehicle at an
 extreme. The kernel runs it, and the same map runs it in extended precision, with the same steps (NumPy's longdouble,
 `tests/extremes/extended.py`). A cell has the error at the end and its derived bound, or the status of the vehicle.
-`tests/extremes/test_extremes.py` runs every row and asserts error, bound and status.
+`tests/extremes/test_extremes.py` runs every row, and asserts that errors are within their bounds and statuses as
+expected.
 
-* **error**: the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|, the effect of rounding. The error of the
-  method, of second order in the step, is not included ([accuracy and speed](../guide/accuracy_and_speed.md)).
+* **error**: the largest of |R - R*|, |p - p*| / |p| and |pi - pi*| / |pi|, the effect of rounding. R*, p* and pi* are
+  of the run in extended precision. The error of the method, of second order in the step, is not included (see
+  [accuracy and speed](../guide/accuracy_and_speed.md)).
 * **bound**: G (3 sqrt(n) ({roundings} u + 2 t) + {constants} n u) for n steps. u is the unit of round-off (2^-53 or
   2^-24). t is the tolerance to which psi_s solves its equation (24), twice a step (psi_x solves no equation).
   {constants} is the number of constants that are rounded once for all steps. G is the growth of a small error during
@@ -43,7 +45,8 @@ start is not finite gets NON_FINITE or STEP_TOO_LARGE. No bit of another vehicle
 among 100,000, or only such members (`tests/extremes/test_inputs.py`, `test_neighbours.py`). rk8 with tolerances shares
 its steps within a packet, so other vehicles in the packet of a failing vehicle change, within their tolerance. Explicit
 methods such as rk4 never report STEP_TOO_LARGE. The kernel sets subnormal numbers (below 1e-38 in float32, 2e-308 in
-float64) to zero, so steps stay as fast when damping brings a body to rest (`tests/extremes/test_rest.py`).
+float64) to zero. A body that damping brings to rest keeps momenta of about this size, and its steps take as long as
+before (`tests/extremes/test_rest.py`).
 
 Machine: {cpu}, {simd}. Written by `python -m tests.extremes.table`; do not edit.
 

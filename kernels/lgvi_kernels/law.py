@@ -58,6 +58,8 @@ from lgvi_kernels.lanes.view import (
     gather1,
     gather3,
     heading_error,
+    less_products,
+    less_rows,
     ramp,
     remember,
     remembered,

@@ -96,6 +96,12 @@ entry_of = overloads.family(
 )
 set_element = overloads.family("set_element", "rows[entry, row + offset] = value.")
 copy_rows = overloads.family("copy_rows", "rows[entry, target + i] = rows[entry, source + i] for i from first to last.")
+rows_less_products = overloads.family(
+    "rows_less_products", "total less the sum of rows[entry, a + i] rows[entry, b + i] for i below count."
+)
+rows_less_rows = overloads.family(
+    "rows_less_rows", "rows[entry, target + i] -= f rows[entry, source + i] for i below count."
+)
 gathered = overloads.family("gathered", "The row + offset + index of each lane.")
 gathered3 = overloads.family("gathered3", "`gathered` of three rows from row + index on, as a vector.")
 thirds = overloads.family(
@@ -211,6 +217,12 @@ def _declare_rows(width, real):
     @overloads.func_native(native.copied(width, real))
     def copy_rows(rows: Rows, entry: int, source: int, target: int, first: int, last: int): ...
 
+    @overloads.func_native(native.less_products(width, real))
+    def rows_less_products(rows: Rows, entry: int, a: int, b: int, count: int, total: L) -> L: ...
+
+    @overloads.func_native(native.less_rows(width, real))
+    def rows_less_rows(rows: Rows, entry: int, target: int, f: L, source: int, count: int): ...
+
     @overloads.func_native(native.element(width, real, write))
     def set_element(rows: Rows, entry: int, row: int, offset: int, value: L): ...
 
@@ -225,6 +237,18 @@ def _declare_rows(width, real):
 
     @overloads.func_native(native.own(width, real, write))
     def set_element(rows: OwnLanes, entry: int, row: int, offset: int, value: L): ...
+
+    @overloads.func
+    def rows_less_products(rows: OwnLanes, entry: int, a: int, b: int, count: int, total: L):
+        for i in range(count):
+            total = total - element(rows, entry, a, i) * element(rows, entry, b, i)
+        return total
+
+    @overloads.func
+    def rows_less_rows(rows: OwnLanes, entry: int, target: int, f: L, source: int, count: int):
+        for i in range(count):
+            value = element(rows, entry, target, i) - f * element(rows, entry, source, i)
+            set_element(rows, entry, target, i, value)
 
     @overloads.func_native(native.gather_any(width, real, False))
     def gathered(like: L, rows: Rows, entry: int, row: int, offset: int, index: I) -> L: ...

@@ -21,6 +21,8 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     ones,
     pieces_of,
     positive,
+    rows_less_products,
+    rows_less_rows,
     set_element,
     sub,
     vec3,
@@ -103,6 +105,18 @@ def remembered(view: Any, row: int):
 def remember(view: Any, row: int, value: Any):
     """Write a number that the law remembers, for later in this step or for the next ones."""
     set_element(view.memory, view.packet, row, 0, value)
+
+
+@wp.func
+def less_products(view: Any, a: int, b: int, count: int, total: Any):
+    """total less the sum of products of remembered numbers, from a and from b on."""
+    return rows_less_products(view.memory, view.packet, a, b, count, total)
+
+
+@wp.func
+def less_rows(view: Any, target: int, f: Any, source: int, count: int):
+    """Take f times remembered numbers from `source` on from those from `target` on."""
+    rows_less_rows(view.memory, view.packet, target, f, source, count)
 
 
 @wp.func

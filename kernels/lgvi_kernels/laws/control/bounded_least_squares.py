@@ -9,7 +9,7 @@ import warp as wp
 from lgvi_kernels import device
 from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
+from lgvi_kernels.laws.control.convergence import by_digits, clear, count_unconverged
 from lgvi_kernels.laws.control.efforts import ROWS as effort_rows
 from lgvi_kernels.laws.control.efforts import at_speed, make_command_for
 from lgvi_kernels.laws.control.lost import since
@@ -62,14 +62,6 @@ def highest(y: Any, at: int, zero: Any):
 
 
 @wp.func
-def less_products(y: Any, a: int, b: int, count: int, total: Any):
-    """total less the sum of products of rows of the memory."""
-    for j in range(count):
-        total = total - remembered(y, a + j) * remembered(y, b + j)
-    return total
-
-
-@wp.func
 def solve_triangle(y: Any, L: int, count: int, b: int, z: int):
     """z with L z = b; the diagonal of L holds inverses, 0 in the lines that are left out."""
     for i in range(count):
@@ -111,8 +103,7 @@ def orthogonalise(y: Any, p: Any, channels: int, six: int, L: int, lines: int, z
             other = lines + i * p.count
             c = zero - less_products(y, other, line, p.count, zero)
             remember(y, L + 6 * i + j, c)
-            for k in range(p.count):
-                remember(y, other + k, remembered(y, other + k) - c * remembered(y, line + k))
+            less_rows(y, other, c, line, p.count)
 
 
 @wp.func(inline=False)
@@ -315,17 +306,16 @@ def made(features):
             remember(y, p.work + k, positive(highest(y, at, zero) - t, inside, unity))
             remember(y, p.commands + k, t / row1(y, at + wp.static(EFFORTS) + 6))
         busy = clipped
-        for _ in range(p.iterations):
-            if any_positive(busy):
-                busy = iterate(y, p, channels, six, demand, busy)
+        step = int(0)
+        while step < p.iterations and any_positive(busy):
+            busy = iterate(y, p, channels, six, demand, busy)
+            step += 1
         count_unconverged(y, p.unconverged, busy)
         for k in range(p.count):
             at = channels + wp.static(ROWS) * k
             t = remembered(y, p.commands + k) * row1(y, at + wp.static(EFFORTS) + 6)
             remember(y, p.commands + k, clamp(t, lowest(y, at, zero), highest(y, at, zero)))
-        # A lane leaves nothing behind that others made it calculate.
-        for i in range(8 * p.count + wp.static(VECTORS + MATRICES)):
-            remember(y, p.work + i, zero)
+        clear(y, p.work, p.work + 8 * p.count + wp.static(VECTORS + MATRICES), zero)
 
     @wp.func
     def allocate_within(w: Any, y: Any, p: Any):

@@ -24,3 +24,12 @@ def count_unconverged(y: Any, row: int, left: Any):
     now = positive(left, (y.t + y.period) * unity, zero)
     remember(y, row, remembered(y, row) + positive(left, unity, zero))
     remember(y, row + 1, positive(first, first, now))
+
+
+@wp.func
+def clear(y: Any, first: int, last: int, zero: Any):
+    """Leave nothing in scratch rows from first up to last: a lane shows nothing that others made it calculate."""
+    row = int(first)
+    while row < last:
+        remember(y, row, zero)
+        row += 1

@@ -295,7 +295,7 @@ class LinearMPC(ControlLaw):
             A, B, limit = (member[name] for name in ("A", "B", "limit"))
             lower = member.get("lower", -limit) / limit
             change = period * member["rate_limit"] / limit if "rate_limit" in member else np.zeros(m)
-            half = found.cost[np.tril_indices(k)]
+            half = found.cost[np.triu_indices(k)]
             ends, lines = self.output_rows(member)
             outputs = (ends, -np.linalg.solve(found.cost, found.ahead), found.ahead, lines) if self.preview else (ends,)
             parts = (places, A, B, limit, lower, change, found.best, found.slope, half, *outputs)
@@ -303,11 +303,11 @@ class LinearMPC(ControlLaw):
         words = {"states": n, "inputs": m, "horizon": self.horizon, "iterations": self.iterations}
         rated = int(self.rate_limit is not None)
         words |= {"rated": rated, "unmet": self.bus.unmet, "unconverged": self.bus.unconverged}
-        work = len(COORDINATES) + len(COMPONENTS) + 2 * n + 2 * m + 5 * k + 8 * (1 + rated) * k + k * (k + 1) // 2
+        work = len(COORDINATES) + len(COMPONENTS) + 2 * n + 2 * m + 5 * k + 12 * (1 + rated) * k + k * (k + 1) // 2 + 3
         if self.limits_more:
             p = 0 if self.outputs is None else len(self.outputs)
             words["outputs"] = p
-            work += 9 * (2 * (1 + rated) * k + self.horizon * p) - 8 * (1 + rated) * k - m
+            work += 9 * (2 * (1 + rated) * k + self.horizon * p) - 12 * (1 + rated) * k - m
             words["shifts"] = work
             work += self.horizon * n if self.preview else 0
         return Packed(words | {"gain": gain}, np.array(rows), np.zeros((1, 1 + 2 * n + m + OF_REFERENCE)), work=work)

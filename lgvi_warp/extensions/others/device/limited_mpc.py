@@ -12,14 +12,14 @@ import warp as wp
 from lgvi_kernels import device
 from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.control.convergence import count_unconverged
+from lgvi_kernels.laws.control.convergence import clear, count_unconverged
 from lgvi_warp.extensions.others.device.linear_mpc import (
     DEMAND,
     SEEN,
     advance,
+    cholesky,
     demanded,
     entry,
-    factor_entry,
     look,
     place,
     see,
@@ -104,8 +104,8 @@ def spread(y: Any, p: Any, outputs: int, to: int, t: int, value: Any):
 
 
 @wp.func(inline=False)
-def factor(y: Any, p: Any, outputs: int, cost: int, sides: int, L: int, zero: Any):
-    """The Cholesky factor of H + C^T diag(weights) C, with inverses on its diagonal."""
+def factor(y: Any, p: Any, outputs: int, sides: int, L: int, zero: Any):
+    """The Cholesky factor of H + C^T diag(weights) C, with inverses on its diagonal, from H in its place."""
     k = p.horizon * p.inputs
     m = p.inputs
     unity = ones(zero)
@@ -113,23 +113,21 @@ def factor(y: Any, p: Any, outputs: int, cost: int, sides: int, L: int, zero: An
     size = wp.static(OF_SIDE)
     hard = hard_sides(p)
     for i in range(k):
-        for j in range(i + 1):
-            total = row1(y, cost + entry(i, j)) * unity
-            if i == j:
-                total = total + remembered(y, weights + size * i) + remembered(y, weights + size * (k + i))
-            if p.rated > 0:
-                up = weights + size * 2 * k
-                down = weights + size * 3 * k
-                if i == j:
-                    total = total + remembered(y, up + size * i) + remembered(y, down + size * i)
-                    if i + m < k:
-                        total = total + remembered(y, up + size * (i + m)) + remembered(y, down + size * (i + m))
-                if i - j == m:
-                    total = total - remembered(y, up + size * i) - remembered(y, down + size * i)
-            for r in range((i // m) * p.outputs, p.horizon * p.outputs):
-                at = row_of_output(p, outputs, hard + r) + 2 + 2 * p.states
-                total = total + remembered(y, weights + size * (hard + r)) * (row1(y, at + i) * row1(y, at + j))
-            factor_entry(y, L, i, j, total)
+        advance(y, L + entry(k, i, i), unity, remembered(y, weights + size * i) + remembered(y, weights + size * (k + i)))
+        if p.rated > 0:
+            up = weights + size * (2 * k + i)
+            change = remembered(y, up) + remembered(y, up + size * k)
+            advance(y, L + entry(k, i, i), unity, change)
+            if i >= m:
+                advance(y, L + entry(k, i - m, i - m), unity, change)
+                advance(y, L + entry(k, i, i - m), unity, -change)
+    for r in range(p.horizon * p.outputs):
+        at = row_of_output(p, outputs, hard + r) + 2 + 2 * p.states
+        share = remembered(y, weights + size * (hard + r))
+        for i in range(inputs_of(p, hard + r)):
+            for j in range(i + 1):
+                advance(y, L + entry(k, i, j), unity, share * (row1(y, at + i) * row1(y, at + j)))
+    cholesky(y, k, L)
 
 
 @wp.func
@@ -241,7 +239,7 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, sides: int,
     to = slope + k
     gap = zero
     off = zero
-    slope_at(y, k, f, cost, v, slope)
+    slope_at(y, k, f, cost, v, slope, L)
     for t in range(count):
         at = sides + wp.static(OF_SIDE) * t
         slack = remembered(y, at + wp.static(SLACK))
@@ -266,7 +264,7 @@ def iterate(y: Any, p: Any, outputs: int, v: int, f: int, cost: int, sides: int,
     gap = share_of * gap
     busy = unconverged(y, k, slope, gap, off, size, busy)
     if any_positive(busy):
-        factor(y, p, outputs, cost, sides, L, zero)
+        factor(y, p, outputs, sides, L, zero)
         length = unity / step(y, p, outputs, slope, to, sides, L, zero)
         ahead = zero
         for t in range(count):
@@ -335,7 +333,7 @@ def made(features):
         free = limits + 3 * m
         slope_of = free + 2 * n * k
         cost = slope_of + 2 * n * k
-        outputs = cost + entry(k, 0)
+        outputs = cost + entry(k, k, k - 1)
         # Scratch: errors, demand; state and disturbance; the last inputs as parts of their limits; the best inputs; inputs, f,
         # slope and step of iterations; the sides; the factor.
         demand = p.work + wp.static(SEEN)
@@ -370,15 +368,14 @@ def made(features):
             over = greatest(over, side(y, p, outputs, best_of, t, zero) - room)
         if any_positive(over):
             busy = positive(over, unity, zero)
-            for _ in range(p.iterations):
-                if any_positive(busy):
-                    busy = iterate(y, p, outputs, v, f, cost, sides, L, size, busy)
+            turn = int(0)
+            while turn < p.iterations and any_positive(busy):
+                busy = iterate(y, p, outputs, v, f, cost, sides, L, size, busy)
+                turn += 1
             count_unconverged(y, p.unconverged, busy)
             for i in range(m):
                 remember(y, best_of + i, positive(over, remembered(y, v + i), remembered(y, best_of + i)))
-        # A lane leaves nothing behind that others made it calculate.
-        for i in range(L + entry(k, 0) - v):
-            remember(y, v + i, zero)
+        clear(y, v, L + entry(k, k, k - 1), zero)
         return demanded(w, y, p, limits, best_of, before, demand, zero)
 
     return device(

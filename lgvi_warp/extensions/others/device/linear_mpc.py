@@ -7,7 +7,7 @@ import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import any_positive
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.control.convergence import by_digits, count_unconverged
+from lgvi_kernels.laws.control.convergence import by_digits, clear, count_unconverged
 from lgvi_kernels.laws.control.integral import remember3, remembered3
 from lgvi_kernels.laws.control.pose_error import attitude_error, rate_error, velocity_error
 
@@ -18,11 +18,12 @@ WANTED = 18
 
 # Rows of the table, with n states, m inputs and k = horizon m: places of the states, of the inputs; A, B; largest
 # inputs, and as parts of these the least ones and the limits of changes, m each; the best inputs without limits (k, 2 n) of
-# state and disturbance; the slope of the cost, (k, 2 n); and its matrix, line by line up to the diagonal.
+# state and disturbance; the slope of the cost, (k, 2 n); and its matrix, column by column down from the diagonal.
 # Rows of the memory: whether it has begun; the state (n), the inputs (m) and the disturbance (n); the reference (WANTED).
-# Constraints |C v - middle| <= half are the k inputs, then where `rated` their k changes. Each has eight scratch rows: the
-# slacks above and below, their multipliers, 1 / the slacks, and what a step is to make of slack times multiplier.
-OF_EACH = 8
+# Constraints |C v - middle| <= half are the k inputs, then where `rated` their k changes. Each has twelve scratch rows, two by
+# two, above and below: slacks, multipliers, 1 / slacks, what a step is to make of slack times multiplier, 1 / multipliers, and
+# how far the slacks are from what the inputs leave.
+OF_EACH = 12
 
 
 # The gain of the disturbance; first rows of table, memory, scratch and of what was not delivered; counts.
@@ -150,48 +151,84 @@ def spread(y: Any, p: Any, to: int, j: int, value: Any):
 
 
 @wp.func
-def entry(i: int, j: int):
-    """The place of a number of a symmetric matrix, j <= i, line by line."""
-    return (i * (i + 1)) // 2 + j
+def entry(k: int, i: int, j: int):
+    """The place of a number of a symmetric matrix of k lines, i >= j, column by column down from the diagonal."""
+    return (j * (2 * k - j - 1)) // 2 + i
 
 
-@wp.func
-def factor_entry(y: Any, L: int, i: int, j: int, total: Any):
-    """An entry of the Cholesky factor, from that of its matrix; inverses are on the diagonal."""
-    least_pivot = by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7)) * absolute(total)
-    for q in range(j):
-        total = total - remembered(y, L + entry(i, q)) * remembered(y, L + entry(j, q))
-    if i == j:
-        total = ones(total) / root(positive(total - least_pivot, total, least_pivot))
-    else:
-        total = total * remembered(y, L + entry(j, j))
-    remember(y, L + entry(i, j), total)
+@wp.func(inline=False)
+def cholesky(y: Any, k: int, L: int):
+    """The Cholesky factor of a matrix in its place, with inverses on its diagonal.
+
+    Four numbers of a column at once: their sums do not wait for one another. Rows behind the last of a column are read, not
+    used. In `while` loops, since the step of a `range` is a number that each turn adds.
+    """
+    least_pivot = by_digits(y, y.h.dtype(1e-15), y.h.dtype(1e-7))
+    for j in range(k):
+        diagonal = L + entry(k, j, j)
+        i = int(j)
+        while i < k:
+            at = diagonal + i - j
+            a = remembered(y, at)
+            b = remembered(y, at + 1)
+            c = remembered(y, at + 2)
+            d = remembered(y, at + 3)
+            smallest = least_pivot * absolute(a)
+            line = int(L + i)
+            other = int(L + j)
+            q = int(0)
+            while q < j:
+                known = remembered(y, other)
+                a = a - remembered(y, line) * known
+                b = b - remembered(y, line + 1) * known
+                c = c - remembered(y, line + 2) * known
+                d = d - remembered(y, line + 3) * known
+                q += 1
+                line += k - q
+                other += k - q
+            if i == j:
+                remember(y, at, ones(a) / root(positive(a - smallest, a, smallest)))
+            else:
+                remember(y, at, a * remembered(y, diagonal))
+            if i + 1 < k:
+                remember(y, at + 1, b * remembered(y, diagonal))
+            if i + 2 < k:
+                remember(y, at + 2, c * remembered(y, diagonal))
+            if i + 3 < k:
+                remember(y, at + 3, d * remembered(y, diagonal))
+            i += 4
 
 
-@wp.func
+@wp.func(inline=False)
 def solve_factored(y: Any, k: int, L: int, to: int):
     """Solve with the Cholesky factor, in place."""
-    for i in range(k):
-        total = remembered(y, to + i)
-        for q in range(i):
-            total = total - remembered(y, L + entry(i, q)) * remembered(y, to + q)
-        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+    for j in range(k):
+        at = L + entry(k, j, j)
+        known = remembered(y, to + j) * remembered(y, at)
+        remember(y, to + j, known)
+        less_rows(y, to + j + 1, known, at + 1, k - 1 - j)
     for m in range(k):
-        i = k - 1 - m
-        total = remembered(y, to + i)
-        for q in range(i + 1, k):
-            total = total - remembered(y, L + entry(q, i)) * remembered(y, to + q)
-        remember(y, to + i, total * remembered(y, L + entry(i, i)))
+        j = k - 1 - m
+        at = L + entry(k, j, j)
+        left = less_products(y, at + 1, to + j + 1, m, remembered(y, to + j))
+        remember(y, to + j, left * remembered(y, at))
 
 
-@wp.func
-def slope_at(y: Any, k: int, f: int, cost: int, v: int, slope: int):
-    """The slope of the cost at inputs."""
+@wp.func(inline=False)
+def slope_at(y: Any, k: int, f: int, cost: int, v: int, slope: int, L: int):
+    """The slope of the cost at inputs; leaves the cost's matrix in L."""
     for i in range(k):
-        total = remembered(y, f + i)
-        for j in range(k):
-            total = total + row1(y, cost + entry(wp.max(i, j), wp.min(i, j))) * remembered(y, v + j)
-        remember(y, slope + i, total)
+        remember(y, slope + i, -remembered(y, f + i))
+    q = int(0)
+    while q < entry(k, k, k - 1):
+        remember(y, L + q, row1(y, cost + q) * ones(y.b.x))
+        q += 1
+    for j in range(k):
+        at = L + entry(k, j, j)
+        less_rows(y, slope + j, remembered(y, v + j), at, k - j)
+        remember(y, slope + j, less_products(y, at + 1, v + j + 1, k - 1 - j, remembered(y, slope + j)))
+    for i in range(k):
+        remember(y, slope + i, -remembered(y, slope + i))
 
 
 @wp.func
@@ -258,23 +295,20 @@ def demanded(w: Any, y: Any, p: Any, limits: int, best_of: int, before: int, dem
 
 
 @wp.func(inline=False)
-def factor(y: Any, p: Any, cost: int, sides: int, L: int, zero: Any):
-    """The Cholesky factor of H + C^T diag(multipliers / slacks) C, with inverses on its diagonal."""
+def factor(y: Any, p: Any, sides: int, L: int, zero: Any):
+    """The Cholesky factor of H + C^T diag(multipliers / slacks) C, with inverses on its diagonal, from H in its place."""
     k = p.horizon * p.inputs
+    m = p.inputs
     unity = ones(zero)
     for i in range(k):
-        for j in range(i + 1):
-            total = row1(y, cost + entry(i, j)) * unity
-            if i == j:
-                total = total + weight(y, sides, i)
-                if p.rated > 0:
-                    total = total + weight(y, sides, k + i)
-                    if i + p.inputs < k:
-                        total = total + weight(y, sides, k + i + p.inputs)
-            if p.rated > 0:
-                if i - j == p.inputs:
-                    total = total - weight(y, sides, k + i)
-            factor_entry(y, L, i, j, total)
+        advance(y, L + entry(k, i, i), unity, weight(y, sides, i))
+        if p.rated > 0:
+            change = weight(y, sides, k + i)
+            advance(y, L + entry(k, i, i), unity, change)
+            if i >= m:
+                advance(y, L + entry(k, i - m, i - m), unity, change)
+                advance(y, L + entry(k, i, i - m), unity, -change)
+    cholesky(y, k, L)
 
 
 @wp.func
@@ -293,10 +327,10 @@ def missed(y: Any, p: Any, limits: int, at: int, v: int, before: int, j: int, un
 
 
 @wp.func
-def moves(y: Any, at: int, r1: Any, r2: Any, change: Any):
+def moves(y: Any, at: int, change: Any):
     """How slacks and multipliers of a constraint change in a step that changes C v so."""
-    d1 = -r1 - change
-    d2 = change - r2
+    d1 = -remembered(y, at + 10) - change
+    d2 = change - remembered(y, at + 11)
     m1 = -(remembered(y, at + 6) + remembered(y, at + 2) * d1) * remembered(y, at + 4)
     m2 = -(remembered(y, at + 7) + remembered(y, at + 3) * d2) * remembered(y, at + 5)
     return d1, d2, m1, m2
@@ -310,19 +344,7 @@ def advance(y: Any, row: int, length: Any, change: Any):
 
 
 @wp.func(inline=False)
-def step(
-    y: Any,
-    p: Any,
-    limits: int,
-    v: int,
-    slope: int,
-    to: int,
-    sides: int,
-    L: int,
-    before: int,
-    none: int,
-    zero: Any,
-):
+def step(y: Any, p: Any, slope: int, to: int, sides: int, L: int, none: int, zero: Any):
     """Newton's step of the inputs; 1 / its largest length that keeps slacks and multipliers above 0, at least 1."""
     unity = ones(zero)
     k = p.horizon * p.inputs
@@ -331,18 +353,16 @@ def step(
         remember(y, to + i, -remembered(y, slope + i))
     for j in range(count):
         at = sides + wp.static(OF_EACH) * j
-        r1, r2 = missed(y, p, limits, at, v, before, j, unity)
-        a = (remembered(y, at + 2) * r1 - remembered(y, at + 6)) * remembered(y, at + 4)
-        b = (remembered(y, at + 3) * r2 - remembered(y, at + 7)) * remembered(y, at + 5)
+        a = (remembered(y, at + 2) * remembered(y, at + 10) - remembered(y, at + 6)) * remembered(y, at + 4)
+        b = (remembered(y, at + 3) * remembered(y, at + 11) - remembered(y, at + 7)) * remembered(y, at + 5)
         spread(y, p, to, j, b - a)
     solve_factored(y, k, L, to)
     most = unity
     for j in range(count):
         at = sides + wp.static(OF_EACH) * j
-        r1, r2 = missed(y, p, limits, at, v, before, j, unity)
-        d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
+        d1, d2, m1, m2 = moves(y, at, constrained(y, p, to, none, j))
         most = greatest(most, greatest(-d1 * remembered(y, at + 4), -d2 * remembered(y, at + 5)))
-        most = greatest(most, greatest(-m1 / remembered(y, at + 2), -m2 / remembered(y, at + 3)))
+        most = greatest(most, greatest(-m1 * remembered(y, at + 8), -m2 * remembered(y, at + 9)))
     return most
 
 
@@ -377,27 +397,32 @@ def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, sides: int, 
     to = slope + k
     gap = zero
     off = zero
-    slope_at(y, k, f, cost, v, slope)
+    slope_at(y, k, f, cost, v, slope, L)
     for j in range(count):
         at = sides + wp.static(OF_EACH) * j
         spread(y, p, slope, j, remembered(y, at + 2) - remembered(y, at + 3))
         r1, r2 = missed(y, p, limits, at, v, before, j, unity)
+        remember(y, at + 10, r1)
+        remember(y, at + 11, r2)
         off = greatest(off, greatest(absolute(r1), absolute(r2)))
         for q in range(2):
-            product = remembered(y, at + q) * remembered(y, at + 2 + q)
+            slack = remembered(y, at + q)
+            multiplier = remembered(y, at + 2 + q)
+            product = slack * multiplier
+            inverse = unity / product
             gap = gap + product
-            remember(y, at + 4 + q, unity / remembered(y, at + q))
+            remember(y, at + 4 + q, multiplier * inverse)
             remember(y, at + 6 + q, product)
+            remember(y, at + 8 + q, slack * inverse)
     gap = (y.h.dtype(0.5) / y.h.dtype(count)) * gap
     busy = unconverged(y, k, slope, gap, off, size, busy)
     if any_positive(busy):
-        factor(y, p, cost, sides, L, zero)
-        length = unity / step(y, p, limits, v, slope, to, sides, L, before, none, zero)
+        factor(y, p, sides, L, zero)
+        length = unity / step(y, p, slope, to, sides, L, none, zero)
         ahead = zero
         for j in range(count):
             at = sides + wp.static(OF_EACH) * j
-            r1, r2 = missed(y, p, limits, at, v, before, j, unity)
-            d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
+            d1, d2, m1, m2 = moves(y, at, constrained(y, p, to, none, j))
             ahead = ahead + (remembered(y, at) + length * d1) * (remembered(y, at + 2) + length * m1)
             ahead = ahead + (remembered(y, at + 1) + length * d2) * (remembered(y, at + 3) + length * m2)
             remember(y, at + 6, remembered(y, at + 6) + d1 * m1)
@@ -408,12 +433,11 @@ def iterate(y: Any, p: Any, limits: int, v: int, f: int, cost: int, sides: int, 
             at = sides + wp.static(OF_EACH) * j
             remember(y, at + 6, remembered(y, at + 6) - aim)
             remember(y, at + 7, remembered(y, at + 7) - aim)
-        most = step(y, p, limits, v, slope, to, sides, L, before, none, zero)
+        most = step(y, p, slope, to, sides, L, none, zero)
         length = positive(busy, least(unity, y.h.dtype(0.99) / most), zero)
         for j in range(count):
             at = sides + wp.static(OF_EACH) * j
-            r1, r2 = missed(y, p, limits, at, v, before, j, unity)
-            d1, d2, m1, m2 = moves(y, at, r1, r2, constrained(y, p, to, none, j))
+            d1, d2, m1, m2 = moves(y, at, constrained(y, p, to, none, j))
             advance(y, at, length, d1)
             advance(y, at + 1, length, d2)
             advance(y, at + 2, length, m1)
@@ -466,13 +490,12 @@ def control(w: Any, r: Any, y: Any, p: Any):
             remember(y, f + i, times(y, slope_of + 2 * n * i, x, 2 * n, zero))
         size = begin(y, p, limits, v, f, cost, sides, zero)
         busy = positive(over, unity, zero)
-        for _ in range(p.iterations):
-            if any_positive(busy):
-                busy = iterate(y, p, limits, v, f, cost, sides, L, before, none, size, busy)
+        turn = int(0)
+        while turn < p.iterations and any_positive(busy):
+            busy = iterate(y, p, limits, v, f, cost, sides, L, before, none, size, busy)
+            turn += 1
         count_unconverged(y, p.unconverged, busy)
         for i in range(m):
             remember(y, best_of + i, positive(over, remembered(y, v + i), remembered(y, best_of + i)))
-        # A lane leaves nothing behind that others made it calculate.
-        for i in range(L + entry(k, 0) - v):
-            remember(y, v + i, zero)
+        clear(y, v, L + entry(k, k, k - 1), zero)
     return demanded(w, y, p, limits, best_of, before, demand, zero)

@@ -17,7 +17,7 @@ CONTENT = "vehicle.json"
 
 
 class UnitOfVehicle:
-    """A vehicle of the file's scene. Value references are places in its list of variables."""
+    """A vehicle of the file's scene. Value references are indices in its list of variables."""
 
     # Of PythonFMU's base class.
     log: Any
@@ -44,7 +44,7 @@ class UnitOfVehicle:
         self.unit.begin()
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Make a communication step; False for one that cannot be made, of which the log says why."""
+        """Do a communication step; returns False if it fails, with the reason in the log."""
         from pythonfmu.enums import Fmi2Status
 
         try:
@@ -63,12 +63,12 @@ class UnitOfVehicle:
         return [int(self.unit.get(self.names[place])) for place in places]
 
     def set_real(self, places: Sequence[int], values: Sequence[float]) -> None:
-        """Give inputs and parameters."""
+        """Set inputs and parameters."""
         for place, value in zip(places, values, strict=True):
             self.unit.set(self.names[place], float(value))
 
     def set_integer(self, places: Sequence[int], values: Sequence[int]) -> None:
-        """Give the seed."""
+        """Set the seed."""
         for place, value in zip(places, values, strict=True):
             self.unit.set(self.names[place], int(value))
 

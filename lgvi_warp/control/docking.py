@@ -21,7 +21,7 @@ class Docking(Guidance):
     """Approach a dock along its centre line at decreasing speed, and start again if the vehicle is outside the funnel.
 
     Let e be the distance to starboard of the centre line and D the look-ahead. The wanted heading is the dock's heading
-    minus atan((e + kappa J) / D), where dJ/dt = D e / (D^2 + (e + kappa J)^2), as in `Waypoints` with "ilos". The wanted
+    minus atan((e + kappa J) / D), with dJ/dt = D e / (D^2 + (e + kappa J)^2) as in the "ilos" of `Waypoints`. The wanted
     speed over ground falls linearly with the distance, from `speed` at the distance `slowing` to `contact_speed` at the
     dock. The funnel's radius is `mouth` at the dock and grows by tan(`funnel`) per metre of distance. A vehicle that is
     nearer than `judged` and outside the funnel starts again. It goes to the beginning of the line, which is `approach`

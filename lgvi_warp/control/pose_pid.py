@@ -14,9 +14,9 @@ from lgvi_warp.physics.terms.base import number
 class PosePID(PoseLaw):
     """Geometric PID of the pose, without Euler angles, stable from almost every attitude (Bullo & Murray 1995).
 
-    The demand is f = R^T (kp e_b + ki I) + kd (R^T v_d - nu) and tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R,
-    where e_b = b_d - b, e_R = vee(R_d^T R - R^T R_d) / 2, and d marks wanted values. The integrals I and I_R grow by e_b and
-    e_R times the period at each tick.
+    The demand is f = R^T (kp e_b + ki I) + kd (R^T v_d - nu) and tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R.
+    The errors are e_b = b_d - b and e_R = vee(R_d^T R - R^T R_d) / 2; the index d marks wanted values. The integrals I and
+    I_R grow by e_b and e_R times the period at each tick.
 
     Args:
         kp: Gains of the position error (3,) [N/m], inertial axes.

@@ -75,7 +75,7 @@ class Commanded(Term):
 
     @property
     def idle_fields(self) -> tuple[str, ...]:
-        """Those fields of the commands that follow from the other fields."""
+        """Fields of the commands that follow from the other fields."""
         return SCHEDULE if self.holds else ("command",)
 
     @property

@@ -47,9 +47,9 @@ class ControlFins(Commanded, Fins):
         lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; none by default.
         lift_coefficients: Lift coefficients at these angles, (k,) [1], linear between the angles and constant beyond the
             last one. At negative angles they have the opposite sign.
-        flow_angle: Whether the angle of the flow adds to the deflection, True by default. If False, the lift is rho A/2
-            lift_slope d u^2 for a deflection d and a flow u along the chord, and the drag is rho A/2 (drag + drag_normal
-            d^2) |u| u.
+        flow_angle: Whether the angle of the flow adds to the deflection, True by default. If False, let d be the deflection
+            and u the flow along the chord: the lift is rho A/2 lift_slope d u^2, and the drag is
+            rho A/2 (drag + drag_normal d^2) |u| u.
         limit: Largest size of the deflection, (n,) [rad]; 0.35 by default.
         rate_limit: Largest rate of the deflection, (n,) [rad/s]; by default no limit.
         time_constant: Time constant of the lag of the deflection, (n,) [s]; by default no lag.

@@ -33,7 +33,7 @@ class EachLaunch(Launches):
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
-        """As in `Launches`, but with the present launch's step as the only step with a sample."""
+        """Times as in `Launches`, but with the present launch's step as the only step with a sample."""
         stages, leads, _ = super().times
         return stages, leads, wp.array(np.array([NEVER, NEVER], np.int32), dtype=wp.int32, device="cpu")
 

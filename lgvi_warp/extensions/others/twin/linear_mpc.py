@@ -173,7 +173,7 @@ def interior(H: Array, f: Array, C: Array, d: Array, slacks: Array, iterations: 
 
 
 def softened(H: Array, f: Array, C: Array, room: Array, cost: Array, iterations: int) -> Array:
-    """Minimiser v of v H v / 2 + f v + cost e with C v <= room + e, e >= 0, and e = 0 for infinite costs.
+    """Minimiser v of v H v / 2 + f v + cost e with C v <= room + e and e >= 0; infinite costs mean e = 0.
 
     Mehrotra's predictor-corrector method, with the excess e and the multiplier of e >= 0, cost - multiplier, eliminated.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PID of the depth by way of the pitch angle."""
+"""PID of the depth through the pitch angle."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def taken_tables(law: Any) -> dict[str, GainTable]:
 
 
 def _read(name: str, table: Mapping[str, Any]) -> GainTable:
-    """The nodes of a table."""
+    """Check a table of a gain and return its nodes."""
     faults, at = Faults(), None
     faults.keys(name, table, KEYS)
     for key in (key for key in KEYS if key not in table):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""PID of the depth by a force."""
+"""PID of the depth with a heave force."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lgvi_warp.physics.terms.base import number
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HeavePID(IntegralLaw):
-    """PID of the depth by a force: Z = kp e + ki I + kd (wanted - measured depth rate).
+    """PID of the depth with a heave force: Z = kp e + ki I + kd (wanted - measured depth rate).
 
     e is the wanted minus the measured depth. The integral I grows by e times the period at each tick. The law suits
     vehicles with actuators that push up and down.

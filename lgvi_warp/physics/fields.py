@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The fields of a vehicle's motion: shape, unit and meaning of each, by name."""
+"""The fields of a vehicle's motion, with the shape, unit and meaning of each."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def rates(
 def drag_rate(
     parameters: Mapping[str, np.ndarray], I6: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray
 ) -> np.ndarray:
-    """The largest (l_ii + 2 q_ii |v_i|) / I_ii over the six axes, summed over all drag terms, (n,) [1/s]; 0 without drag."""
+    """The largest (l_ii + 2 q_ii |v_i|) / I_ii of the six axes (n,) [1/s], with the sums l and q of all drag terms."""
     speeds = np.abs(np.concatenate([velocity, angular_velocity], axis=1))
     total = np.zeros_like(speeds)
     for key in drag_keys(parameters):

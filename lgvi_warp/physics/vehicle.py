@@ -337,7 +337,7 @@ def displaced_mass(p: Numbers) -> np.ndarray:
 
 
 def center_of_mass(p: Numbers) -> np.ndarray:
-    """Centre of the rigid body's mass (n, 3) [m] from the user's origin; zero, (1, 3), for a vehicle in the simple form."""
+    """Centre of mass (n, 3) [m] of the rigid body from the user's origin; zero, (1, 3), for the simple form."""
     if "vehicle.rigid_body_mass_matrix" in p:
         rigid = p["vehicle.rigid_body_mass_matrix"]
         return np.asarray(-inertias.vee(rigid[:, :3, 3:]) / rigid[:, 0, 0, None])

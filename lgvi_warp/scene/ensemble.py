@@ -431,7 +431,7 @@ class Ensemble(Summarized, Documented):
         return [name for name in self._draws.scene.parameters if name in varied]
 
     def varied_starts(self) -> list[str]:
-        """Return the names of the numbers of the start that vary from member to member, such as "start.position"."""
+        """Return the names of the numbers of the start that vary between members, such as "start.position"."""
         return list(self._draws.varied_starts)
 
     def starts(self, first: int, stop: int) -> dict[str, np.ndarray]:

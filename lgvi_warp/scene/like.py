@@ -39,7 +39,7 @@ class SceneLike(Protocol):
 
     @property
     def parts(self) -> Sequence[Any]:
-        """Everything that has numbers of its own: terms, events, and the parts of the controller."""
+        """All objects that have numbers: terms, events, and the parts of the controller."""
 
     @property
     def start(self) -> Start:

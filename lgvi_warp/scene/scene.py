@@ -177,7 +177,7 @@ class Scene(Summarized):
 
     @property
     def parts(self) -> tuple[Any, ...]:
-        """Everything that has numbers of its own: terms, events, and the parts of the controller."""
+        """All objects that have numbers: terms, events, and the parts of the controller."""
         parts = () if self.controller is None else (self.controller.delay_part, *self.controller.parts)
         return (*self.terms, *self.events, *parts)
 
@@ -332,7 +332,7 @@ class Scene(Summarized):
 
 
 def _copied(content: Any) -> Any:
-    """Tables and lists of plain values, copied down to the values."""
+    """A deep copy of tables and lists of plain values."""
     if type(content) is dict:
         return {key: _copied(value) for key, value in content.items()}
     if type(content) is not list:

@@ -77,7 +77,7 @@ def _alone(kinds: Mapping[str, Schema]) -> Schema:
 
 
 def _list(kinds: Mapping[str, Any], default: str | None = None) -> Schema:
-    """A list of tables, each with its type; default: the type of a table without one."""
+    """A list of tables, each with its type; default: The type of a table that names none."""
     able = {
         word: kind for word, kind in kinds.items() if not any("Callable" in str(item.type) for item in _fields(kind))
     }

@@ -160,7 +160,7 @@ def positions_of(environment: Environment, key: str, places: np.ndarray) -> np.n
 
 
 def _in_threes(key: str, values: Any, remedy: str) -> np.ndarray:
-    """Read real numbers (..., 3), which may be NaN."""
+    """Read real numbers (..., 3); they may be NaN."""
     faults = Faults()
     array_given = faults.real(key, values, remedy)
     if array_given is not None and array_given.shape[-1:] != (3,):

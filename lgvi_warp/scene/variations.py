@@ -124,7 +124,7 @@ def diagonal(matrix: np.ndarray) -> bool:
 
 
 def drawn_entries(matrix: np.ndarray) -> np.ndarray:
-    """The entries of a symmetric matrix (d, d) that vary: its diagonal if it is diagonal, else the upper triangle by rows."""
+    """The varied entries of a symmetric matrix (d, d): its diagonal if it is diagonal, else the upper triangle by rows."""
     return np.diag(matrix) if diagonal(matrix) else matrix[np.triu_indices(len(matrix))]
 
 

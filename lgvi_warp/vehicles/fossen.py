@@ -415,7 +415,7 @@ def turned(value: Any, axes: np.ndarray) -> Any:
 
 
 def read_text(source: str | os.PathLike[str], is_text: bool, format_name: str) -> str:
-    """Return a text, or the content of the file that it names."""
+    """Return `source` itself if it is a text, or else the content of the file that it names."""
     if is_text:
         text = str(source)
         if len(text) > (most := MOST_BYTES.get(format_name, MOST_OTHERS)):

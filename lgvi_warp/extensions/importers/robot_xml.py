@@ -29,7 +29,7 @@ TEMPLATES = {
 
 
 class Refused(Exception):  # noqa: N818
-    """Raised for XML that is well-formed but not read; the text names the problem and the remedy."""
+    """Error for XML that is well-formed but refused; the text names the problem and the remedy."""
 
 
 class Reader:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`lw.gym.VectorEnv`: thousands of vehicles as one vector environment of Gymnasium, whose steps are a controller's periods."""
+"""`lw.gym.VectorEnv`: many vehicles as one vector environment of Gymnasium; a step is a period of the controller."""
 
 from __future__ import annotations
 

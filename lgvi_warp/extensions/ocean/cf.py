@@ -133,7 +133,7 @@ class Gridded:
         )
 
     def values(self, scenario: int = 0, time: int = 0) -> np.ndarray:
-        """One field (k, y, x), float64, NaN where values are missing; k is 1 for a variable without depth."""
+        """One field (k, y, x), float64; missing values are NaN, and k is 1 for a variable without depth."""
         at = {"scenario": scenario, "time": time}
         index = {self.dims[part]: at[part] for part in at if part in self.dims}
         parts = [np.asarray(piece.isel(index).values, dtype=np.float64) for piece in self.pieces]

@@ -28,7 +28,7 @@ MOST_NODES = 4_000_000
 
 
 class DepthSource(Protocol):
-    """Depths of a data set in the plane of a scene. positive: whether its numbers grow "up" or "down"."""
+    """Depths of a data set in the plane of a scene. positive: "up" if its numbers are elevations, "down" if depths."""
 
     positive: str
 

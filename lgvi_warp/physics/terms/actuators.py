@@ -25,7 +25,7 @@ SCHEDULE = ("times", "command_schedule")
 
 
 def are_finite(values: Any) -> bool:
-    """Return whether these are finite numbers."""
+    """Return whether values are finite numbers."""
     try:
         return bool(np.all(np.isfinite(np.asarray(values, float))))
     except (TypeError, ValueError):

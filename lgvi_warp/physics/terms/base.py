@@ -67,7 +67,7 @@ class PackingContext:
             term: A term of the scene.
 
         Returns:
-            Its numbers by field, each of shape (1, ...) or (n, ...).
+            The term's numbers by field, each of shape (1, ...) or (n, ...).
         """
         return own(term, self.parameters)
 
@@ -743,7 +743,7 @@ def _checked(
 
 
 def _amount(shape: tuple[Any, ...]) -> str:
-    """Count of numbers in a shape, in words."""
+    """Text that states how many numbers a shape has."""
     return f"numbers of shape {shape}" if shape else "a number"
 
 

@@ -160,7 +160,7 @@ class Thrusters(Commanded):
 
     @property
     def propels(self) -> bool:
-        """Whether thrust falls with the advance speed, or propellers turn the vehicle."""
+        """Whether thrust falls with the advance speed, or propellers exert a torque on the vehicle."""
         return any(getattr(self, name) is not None for name in PROPELLER)
 
     @property
@@ -177,7 +177,7 @@ class Thrusters(Commanded):
 
     @property
     def is_square(self) -> bool:
-        """Whether the curves ahead and astern are both w^2."""
+        """Whether the curves ahead and astern are w^2."""
         return all(np.array_equal(curve, SQUARE) for curve in (self.polynomial, self.polynomial_astern))
 
     @property

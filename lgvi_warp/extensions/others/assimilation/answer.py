@@ -170,7 +170,7 @@ class Assimilated(Summarized, Saved):
 
 
 def _text(values: Any) -> str:
-    """A few numbers, to four digits."""
+    """A few numbers as text, to four digits."""
     return ", ".join(f"{value:.4g}" for value in np.atleast_1d(values).ravel())
 
 

@@ -362,7 +362,7 @@ class _Track:
         self._take(mean + np.sqrt(self.inflation) * (ensemble - mean), centre)
 
     def _move(self, Y: np.ndarray, y: np.ndarray, sigma: np.ndarray) -> None:
-        """Kalman's update of states and learned numbers."""
+        """Kalman update of states and learned numbers."""
         w = np.full(self.fleet.members, 1.0 / self.fleet.members)
         self.log_likelihood += filters.whitened(*filters.innovation(Y, y, sigma, w))[2]
         ensemble, centre = rows_of(self.states, self.learned, w)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The side of a unit that PythonFMU's wrapper calls; the class in the unit's own file adds PythonFMU's base class."""
+"""The methods of a unit that PythonFMU's wrapper calls; the class in the unit's own file adds PythonFMU's base class."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class UnitOfVehicle:
             )
 
     def setup_experiment(self, start_time: float, *others: Any) -> None:
-        """Begin at t = 0."""
+        """Begin the experiment at t = 0."""
         if start_time != 0.0:
             raise ValueError(f"start time {start_time:.9g} s: a vehicle begins at 0. Give 0, and [start] in the scene")
 
     def exit_initialization_mode(self) -> None:
-        """Load the kernel, compiled first if Warp's cache has none."""
+        """Load the kernel, and compile it first if Warp's cache does not have it."""
         self.unit.begin()
 
     def do_step(self, current_time: float, step_size: float) -> bool:

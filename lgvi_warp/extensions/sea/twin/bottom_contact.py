@@ -15,7 +15,7 @@ class BottomContact(Law):
     """
 
     def start(self) -> Array:
-        """No anchors."""
+        """Memory at the start, without anchors."""
         return np.zeros(4 * len(self.points))
 
     @property

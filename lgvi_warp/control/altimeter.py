@@ -35,7 +35,7 @@ class Altimeter(Sensor):
         latency: Ticks until a reading arrives, a whole number; 0 by default.
         dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default.
         burst: Mean length of a run of lost readings [ticks]; by default losses are independent.
-        outlier: Probability that a reading is an outlier; by default no reading is.
+        outlier: Probability that a reading is an outlier; by default there are no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading [m].
 
     Raises:

@@ -68,7 +68,7 @@ class Sensor(MeasuringPart):
         dropout: Probability that a reading is lost, so that the last reading is kept; 0 by default. The first is never lost.
         burst: Mean length of a run of lost readings [ticks], at least 1 and dropout / (1 - dropout); by default, or at 0,
             losses are independent. The share of lost readings stays `dropout` (Gilbert 1960, a chain of two states).
-        outlier: Probability that a reading is an outlier; by default no reading is.
+        outlier: Probability that a reading is an outlier; by default there are no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading.
         deepest: Depth of the sensor below which readings are lost [m], as for GPS; inf by default.
         place: Position of a sensor of position or depth on the body, such as an antenna, (3,) [m], body axes; by default the

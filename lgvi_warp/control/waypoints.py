@@ -30,7 +30,7 @@ OF_POINTS = ("times", *CIRCLES)
 class Waypoints(Guidance):
     """Waypoints joined by straight legs; the heading follows by line of sight (Fossen 2021, 12.3-12.5).
 
-    Let y be the distance to starboard of the leg and D the look-ahead. The wanted heading is the leg's heading minus
+    Let y be the distance to starboard of the leg and D the look-ahead. The wanted heading is the leg's heading minus an angle:
     "los": atan(y / D);
     "ilos": atan((y + kappa J) / D), where dJ/dt = D y / (D^2 + (y + kappa J)^2) (Borhaug, Pavlov & Pettersen 2008);
     "alos": beta + atan(y / D), where beta is an estimate of the crab angle with d beta/dt = gamma D y / sqrt(D^2 + y^2)
@@ -49,8 +49,9 @@ class Waypoints(Guidance):
         method: "los", "ilos" or "alos"; by default "los".
         kappa: Gain of "ilos" [1/s]; 0.1 by default.
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
-        at_end: Behaviour at the last point. "stop", the default, wants the heading of the last leg, the speed 0 and the last
-            point as position. "go_on" continues along the last leg beyond its end. "loiter" circles the last point.
+        at_end: Behaviour at the last point. With "stop", the default, the wanted heading is that of the last leg, the wanted
+            speed 0 and the wanted position the last point. With "go_on", the vehicle continues along the last leg beyond its
+            end. With "loiter", it circles the last point.
         times: Arrival time at each point, (k,) [s], rising. Before the first time the wanted speed is 0. By default there are
             no times.
         loiter_radius: Radius [m] of circles about points.

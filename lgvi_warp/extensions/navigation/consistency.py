@@ -128,9 +128,9 @@ def consistency(result: Any, level: float = 0.95) -> Consistency:
     Each squared innovation divided by its variance (NIS) has one degree of freedom. Members are independent, so the degrees
     of freedom of sums over members add up (Bar-Shalom, Li & Kirubarajan 2001, *Estimation with Applications to Tracking and
     Navigation*, section 5.4). Errors of one member at two times are not independent, so an ensemble may by chance be
-    outside its NEES band for long. The fraction of the times in the band is therefore no test, but the mean over all times
-    is. Its effective sample size is the number of values divided by 1 + 2 times the sum of their autocorrelations. The sum
-    of that many values of a consistent filter has a chi-square distribution.
+    outside its NEES band for long. The fraction of the times in the band is therefore not a test; the mean over all times
+    is tested instead. Its effective sample size is the number of values divided by 1 + 2 times the sum of their
+    autocorrelations. The sum of that many values of a consistent filter has a chi-square distribution.
 
     Args:
         result: Result of a run with an `lw.control.ErrorStateFilter` that saved "nees", "nis" and "nis_count".

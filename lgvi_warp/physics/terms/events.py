@@ -19,7 +19,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Event(Term):
-    """Base class of events: a condition that stops a member as soon as the event's distance function is 0 or below.
+    """Base class of events: a condition that stops a member as soon as a distance function is 0 or negative.
 
     Distances depend on the position of the body's origin, in inertial axes.
 
@@ -60,7 +60,7 @@ class Surface(Event):
     """Stop a member when the body's origin rises to a depth.
 
     Args:
-        depth: Depth [m]; 0 by default, the surface.
+        depth: Depth at which members stop [m]; 0 by default, the surface.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -112,7 +112,7 @@ class StopTime(Event):
     """Stop a member at a time.
 
     Args:
-        at: Time [s], from 0.
+        at: Time at which members stop [s], at least 0.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -43,9 +43,9 @@ from lgvi_warp.physics.terms.thrust_curves import (
 class Thrusters(Commanded):
     """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
 
-    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u follows the command within the limit and
-    the rate limit and after the lag. A single number stands for n equal numbers. The user chooses the unit of the command:
-    1, V or rad/s.
+    f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u follows the command after the lag, within
+    the limit and the rate limit. A single number stands for n equal numbers. The user chooses the unit of the command, such
+    as 1, V or rad/s.
 
     Beyond the dead band, w = sign(u) max(|u| - band, 0). Thrust falls by advance_loss |w| a and torque by torque_loss |w| a,
     where a is the speed of the thruster through the water along its direction (Fossen 2021, 9.1).

@@ -32,9 +32,9 @@ from lgvi_warp.physics.terms.wrench import at_start, commands
 class Ballast(Commanded):
     """n volumes V displaced in addition to the hull: force -rho g V R^T e3 at points of the body (Graver 2005, ch. 4).
 
-    V follows the command, within the limit and the rate limit and after the lag. A positive V lifts, a negative V sinks.
-    A weight of N newtons in water is V = -N / (rho g). The vehicle's mass does not change, as when oil is pumped into a
-    bladder.
+    V follows the command after the lag, within the limit and the rate limit. A positive V lifts the vehicle, a negative V
+    sinks it. A weight of N newtons in water is V = -N / (rho g). The vehicle's mass does not change, as when oil is pumped
+    into a bladder.
 
     With an efficiency, the pump's work is part of the energy used (`EnergyUse`). The energy is the water's pressure relative
     to the surface, times the volume that is pumped out, divided by the efficiency. If the pressure pushes volume back in,

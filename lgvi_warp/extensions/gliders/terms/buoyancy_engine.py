@@ -26,9 +26,9 @@ NUMBERS = ("pump_rate", "volume_down", "volume_up", "depth_top", "depth_bottom",
 class BuoyancyEngine(Term):
     """A volume V in addition to the hull, which a pump changes to `volume_down` or `volume_up`: force -rho(d) g V R^T e3.
 
-    In a dive, the pump starts towards `volume_up` when the body's origin reaches `depth_bottom`. In an ascent, it starts
-    towards `volume_down` when the origin reaches `depth_top` (Graver 2005, 4; Eriksen et al. 2001). The time of this change
-    is found within the step, to second order.
+    In a dive, the pump starts to pump to `volume_up` when the body's origin reaches `depth_bottom`. In an ascent, it starts
+    to pump to `volume_down` when the origin reaches `depth_top` (Graver 2005, 4; Eriksen et al. 2001). The start of pumping
+    is located within the step, to second order.
 
     With an efficiency, the pump's work is part of the energy used (`EnergyUse`). The energy is the water's pressure relative
     to the surface, times the volume that is pumped out, divided by the efficiency. If the pressure pushes volume back in,

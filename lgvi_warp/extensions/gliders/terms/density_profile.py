@@ -39,7 +39,7 @@ class DensityProfile(Term):
 
     Args:
         depths: Depths, (k,) [m], rising.
-        densities: Densities at these depths and at the pressure there, (k,) [kg/m3].
+        densities: In-situ densities at these depths, (k,) [kg/m3], that is, at the pressure of the depth.
         compressibility: Relative loss of the hull's volume per depth [1/m]; none by default.
         reference_depth: The depth d0 at which the hull has its volume B / (rho0 g) [m]; 0 if omitted.
 

@@ -63,7 +63,7 @@ class MovingMass(Term):
 
     Raises:
         SceneError: If times do not rise or are missing, a direction has length 0, numbers of channels are given without
-            channels, or a number is invalid (see `Term`). Also in a scene whose vehicle cannot include the mass at its
+            channels, or a number is invalid (see `Term`). A scene refuses the mass if its vehicle cannot include it at the
             reference position.
 
     Examples:

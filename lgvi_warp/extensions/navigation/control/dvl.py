@@ -45,7 +45,7 @@ class DVL(MeasuringPart):
         dropout: Probability that a beam is lost at a tick; 0 by default.
         burst: Mean length of a run of losses of a beam [ticks], as in `lw.control.Sensor`; by default losses are
             independent.
-        outlier: Probability that the reading of a beam is an outlier, independently for each beam; by default none is.
+        outlier: Probability that the reading of a beam is an outlier, independently for each beam; by default no outliers.
         outlier_std: Standard deviation of the error that an outlier adds to the reading [m/s].
         every: Ticks from one new reading to the next, a whole number; 1 by default.
         floor: Key of the scene's `lw.events.Floor` that reflects the beams; with "", the default, every beam has an echo.

@@ -32,9 +32,9 @@ class Assimilated(Summarized, Saved):
             angular_velocity (k, 3) [rad/s] in body axes, attitude (k, 3, 3), and the learned numbers by name, (k, ...).
         std: Standard deviations of the same quantities; those of the attitude are (k, 3) [rad], about the body's axes.
         innovations: {series: measured minus predicted values (k, m)}; NaN if a series has no value at a time.
-        innovation_std: Expected standard deviations of the innovations, (k, m): root of the sum of the predictions' variance
-            and the instrument's variance.
-        whitened: {series: innovations multiplied by the inverse root of their covariance (k, m)}.
+        innovation_std: Expected standard deviations of the innovations, (k, m): square root of the predictions' variance plus
+            the instrument's variance.
+        whitened: {series: innovations multiplied by the inverse square root of their covariance (k, m)}.
         left_out: {series: whether the gate left its values out at each time (k,)}.
         log_likelihood: Logarithm of the probability density of all measured values, each given the values before it, without
             values left out by the gate. It can be used to compare scenes that assimilate the same series.

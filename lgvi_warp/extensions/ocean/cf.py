@@ -262,7 +262,7 @@ def says_along(ds: Any, name: str, quantity: OceanQuantity) -> bool:
 
 
 def seconds_since(time: np.ndarray, start: datetime.datetime | np.datetime64 | str | None) -> np.ndarray:
-    """Times [s] from `start`, or from the first time for None. `start` is in UTC unless it names a time zone."""
+    """Times [s] from `start`, or from the first time for None, in the file's calendar; `start` is in UTC without a zone."""
     if start is None:
         return elapsed(time)
     first: Any = instant("start", start)

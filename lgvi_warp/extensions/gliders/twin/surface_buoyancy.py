@@ -29,7 +29,7 @@ class SurfaceBuoyancy(Law):
         return type(self)(**vars(self) | {"waves": tuple(law.beside(laws) for law in laws if isinstance(law, Waves))})
 
     def parts(self) -> Iterator[tuple[float, float, float, float]]:
-        """Parts of the hull: position relative to the centre of buoyancy [m], buoyancy [N], height [m], and length [m]."""
+        """Parts of the hull: position from the centre of buoyancy [m], buoyancy [N], height, length [m] (0 for one part)."""
         if len(self.stations) == 1:
             yield 0.0, float(self.buoyancy), float(self.heights[0]), 0.0
             return

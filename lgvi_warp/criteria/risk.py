@@ -69,7 +69,7 @@ class _Risk:
 
 
 def risk_of(faults: Faults, risk: Any) -> Any:
-    """Read a risk, "mean", the level of a quantile, or a `CVaR`: a function of costs (k, members); the mean after a fault."""
+    """Read a risk: "mean", a quantile's level or a `CVaR`. Returns a function of costs (k, members)."""
     if isinstance(risk, CVaR):
         return risk
     if isinstance(risk, float) and 0.0 < risk < 1.0:

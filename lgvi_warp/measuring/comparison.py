@@ -273,7 +273,7 @@ def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, floa
 
 
 def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
-    """Quantity -> largest distance of two results up to each time (k,), over all members; infinite where a member failed."""
+    """Quantity -> largest distance of two results over all members, up to each time (k,); inf if a member failed."""
     if failed(a) or failed(b):
         names = dict.fromkeys([*QUANTITIES, *([distance.name] if distance else [])])
         return {name: np.where(a.time > 0.0, np.inf, 0.0) for name in names}

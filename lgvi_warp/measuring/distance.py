@@ -60,7 +60,7 @@ class Distance:
 
 
 def _bias(apart: np.ndarray) -> np.ndarray:
-    """Length of the mean of paired differences (k, n, components) and of two standard errors of it, (k,)."""
+    """Length (k,) of |mean| plus two standard errors, per component, of paired differences (k, n, components)."""
     n = apart.shape[1]
     error = 2.0 * apart.std(axis=1, ddof=1) / np.sqrt(n) if n > 1 else np.zeros(apart[:, 0].shape)
     return np.asarray(np.linalg.norm(np.abs(apart.mean(axis=1)) + error, axis=-1))

@@ -77,9 +77,8 @@ class Suggestion:
         error: requested error [`unit`].
         of: name of the quantity whose error is limited.
         unit: unit of that quantity.
-        expected: largest error over members and path [`unit`]: the largest error of the checked members, extrapolated
-            to the size of the fleet by the tail of their errors. One in ten fleets of this size and distribution
-            exceeds it.
+        expected: largest error over members and path [`unit`]: the largest error of the checked members, extrapolated to
+            the size of the fleet by the tail of their errors. One in ten fleets of this size and distribution exceeds it.
         us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
         run_seconds: predicted run time of all members on `threads` threads, without compiling [s].
         threads: threads that `run_seconds` assumes.
@@ -167,8 +166,7 @@ def suggest(
             as "mean position[0]": then its bias at the end is limited, and reported with its interval as by
             `lw.estimate`. Default "position".
         t1: end time [s]. Default: run.duration of the scene.
-        methods: names of the methods to try. Default: a few that suit the terms of the scene; if these fail, the
-            others.
+        methods: names of the methods to try. Default: a few that suit the terms of the scene; if these fail, the others.
         members: number of members in the sample that the search runs. Default 128.
         threads: number of threads of the predicted run. Default: all threads of this machine.
         seconds: approximate processor time of the search, without compiling [s]. Default 30.

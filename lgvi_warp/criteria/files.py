@@ -140,7 +140,10 @@ class Saved(ABC):
         """Write the rows to a CSV file.
 
         Args:
-            path: path of the file. Returns: Path of the file.
+            path: path of the file.
+
+        Returns:
+            Path of the file.
 
         Raises:
             OSError: if the file cannot be written.
@@ -195,7 +198,9 @@ class Saved(ABC):
             path: path of the file, or of its folder.
 
         Returns:
-            The answer of the study. Raises:
+            The answer of the study.
+
+        Raises:
             OSError: if the file cannot be read.
             SceneError: if it is not a regular file, is damaged, or was written by another version.
         """

@@ -28,8 +28,8 @@ NO_MATTER = ("threads", "executor", "scheduler")
 class Remembered:
     """Call functions of arrays, and store each call as a numbered file of a folder: a stored call is not run again.
 
-    store: the folder, created if needed; None stores nothing. fleets: ensembles that are run. asked: all other
-    arguments on which the calls depend.
+    store: the folder, created if needed; None stores nothing.
+    fleets: ensembles that are run. asked: all other arguments on which the calls depend.
     """
 
     def __init__(

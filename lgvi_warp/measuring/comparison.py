@@ -100,11 +100,14 @@ class Sample:
     Steps are spacing / m for whole m. The spacing is run.save_every of the scene if it divides t1, else t1 / samples.
     If noise is drawn on a grid, m divides the number of draws in the spacing, so that all runs share one noise path.
 
-    samples: maximum number of sample times after 0. kernels: object that compiles and runs plans and measures their
-    cost. whole, ensemble: the fleet, and the members of the sample. spacing: a Fraction [s]. index, times: the times as
-    multiples of the spacing (k,), and in seconds (k,) [s]. rate: largest angular rate at the start, at least one turn
-    in t1 [rad/s]. draws: number of noise draws in the spacing; 0 if runs draw once per step. fixed_draws: largest
-    number of draws that the noise_steps of the scene allow; 0 if no term has a noise_step.
+    samples: maximum number of sample times after 0.
+    kernels: object that compiles and runs plans and measures their cost.
+    whole, ensemble: the fleet, and the members of the sample.
+    spacing: a Fraction [s].
+    index, times: the times as multiples of the spacing (k,), and in seconds (k,) [s].
+    rate: largest angular rate at the start, at least one turn in t1 [rad/s].
+    draws: number of noise draws in the spacing; 0 if runs draw once per step.
+    fixed_draws: largest number of draws that the noise_steps of the scene allow; 0 if no term has a noise_step.
     """
 
     def __init__(
@@ -300,8 +303,8 @@ def biases(result: Result, reference: Result, distance: Distance | None = None) 
     """Compare means and standard deviations of two results.
 
     Each difference is measured in standard errors of the sample: its root mean square over components and times after
-    0. Two independent samples of the same distribution differ by about 1.4. Returns: "NAME_mean" and "NAME_std" ->
-    difference; empty if there is only one member or if a member failed.
+    0. Two independent samples of the same distribution differ by about 1.4.
+    Returns: "NAME_mean" and "NAME_std" -> difference; empty if there is only one member or if a member failed.
     """
     n = result.members
     if n < 2 or failed(result):

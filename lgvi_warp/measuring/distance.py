@@ -24,8 +24,8 @@ QUANTITIES = {name: TABLE[name].unit for name in (*FIELDS, "energy")} | {"attitu
 class Distance:
     """Quantity in which errors are measured.
 
-    functional: computes the quantity at each time; None for the names in QUANTITIES. mean: True if the error is the
-    error of the mean over the members, False for the largest error of a member.
+    functional: computes the quantity at each time; None for the names in QUANTITIES.
+    mean: True if the error is the error of the mean over the members, False for the largest error of a member.
     """
 
     name: str

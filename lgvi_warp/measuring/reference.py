@@ -38,10 +38,11 @@ STEEPEST = 3.0
 class Reference:
     """Reference of errors: the finer of two runs with different steps and, if possible, different methods.
 
-    text: description of the two methods and their steps. own: quantity -> (k,), largest difference of the two runs over
-    all members up to each time [its unit]. asked: quantity of the errors, if it is not in QUANTITIES. more: predicted
-    time that would have sufficed, if the time was spent before the runs agreed [s]; infinite if no prediction is
-    possible; 0 if the runs do not agree better with more time.
+    text: description of the two methods and their steps.
+    own: quantity -> (k,), largest difference of the two runs over all members up to each time [its unit].
+    asked: quantity of the errors, if it is not in QUANTITIES.
+    more: predicted time that would have sufficed, if the time was spent before the runs agreed [s]; infinite if no
+        prediction is possible; 0 if the runs do not agree better with more time.
     """
 
     result: Result
@@ -182,8 +183,7 @@ class Growth:
         predictable: dtype -> time at which a round-off error has grown to 1e-2, extrapolated beyond the run if needed
             [s]; may be infinite.
         times: times of the curve (k,) [s].
-        curve: size of the difference (k,): root mean square over the members, of position [m] and attitude [rad]
-            together.
+        curve: size of the difference (k,): root mean square over the members, of position [m] and attitude [rad] together.
     """
 
     rate: float

@@ -36,9 +36,9 @@ HOPELESS = 10.0
 class Trial:
     """A setting that was run on a sample.
 
-    plan: plan by which its cost is measured; noise without a noise_step is drawn once per step. errors: quantity ->
-    kind -> error; empty if a member failed or there is no reference. cpu_seconds: processor time of the run, without
-    compiling [s].
+    plan: plan by which its cost is measured; noise without a noise_step is drawn once per step.
+    errors: quantity -> kind -> error; empty if a member failed or there is no reference.
+    cpu_seconds: processor time of the run, without compiling [s].
     """
 
     candidate: Candidate
@@ -77,8 +77,8 @@ class StepSeries:
     """Steps of one setting, each half of the one before.
 
     m: number of steps in the sample's spacing.
-    best: smallest error of the steps so far; the error is the larger of position [m] and attitude [rad]. worse: number
-    of successive steps with little gain.
+    best: smallest error of the steps so far; the error is the larger of position [m] and attitude [rad].
+    worse: number of successive steps with little gain.
     """
 
     method: str
@@ -102,8 +102,8 @@ def trials_of(
     """Run every method, precision and solver: each first at a coarse step, then in turn at half its last step.
 
     whole: budget of the study, including compiling; once it is spent, only methods that the user named are compiled.
-    named: True if the user named the methods; then each is started, however long its kernel compiles. Returns: The
-    trials, and the names of the settings that were left out for lack of time.
+    named: True if the user named the methods; then each is started, however long its kernel compiles.
+    Returns: The trials, and the names of the settings that were left out for lack of time.
     """
     solvers = SOLVERS if solvers is None else solvers
     every = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)

@@ -41,10 +41,9 @@ class Axis:
     """Quantity along an axis of a map, from a low to a high value.
 
     Attributes:
-        name: "h": step [s]; "angular_velocity" [rad/s] or "speed" [m/s]: magnitude at the start (the direction is
-            kept); "added_mass_ratio": largest added mass divided by the mass [1]; "drag_number": largest damping rate
-            (l + 2 q |v|) / I at the start [1/s] (h times this rate is the drag number); or a name of
-            scene.parameters().
+        name: "h": step [s]; "angular_velocity" [rad/s] or "speed" [m/s]: magnitude at the start (the direction is kept);
+            "added_mass_ratio": largest added mass divided by the mass [1]; "drag_number": largest damping rate (l + 2 q
+            |v|) / I at the start [1/s] (h times this rate is the drag number); or a name of scene.parameters().
         low: lowest value; None derives it from the scene.
         high: highest value; None derives it from the scene.
         log: True for values with equal ratios, False for equal differences. Default True.
@@ -171,11 +170,13 @@ class StabilityGrid:
 
     points: number of cells (nx, ny).
     base: the scene's start as one member.
-    rate: angular rate of the fastest motion at the scene's start [rad/s]. step: the step if no axis varies it; by
-    default run.step of the scene [s]. shape: (ny, nx, directions). state: position, attitude, velocity and angular
-    velocity of every member (n, ...). varied: name -> values of the parameters that differ between members (n, ...).
-    direction: name -> unit vectors (n, 3) of velocity and angular velocity, body axes. h: step of every member (n,)
-    [s].
+    rate: angular rate of the fastest motion at the scene's start [rad/s].
+    step: the step if no axis varies it; by default run.step of the scene [s].
+    shape: (ny, nx, directions).
+    state: position, attitude, velocity and angular velocity of every member (n, ...).
+    varied: name -> values of the parameters that differ between members (n, ...).
+    direction: name -> unit vectors (n, 3) of velocity and angular velocity, body axes.
+    h: step of every member (n,) [s].
     """
 
     def __init__(

@@ -46,9 +46,9 @@ SHORTEST = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
 class CellRuns:
     """Outcomes of a method's runs, per member (n,).
 
-    error: largest error up to the error time [unit of the quantity]; infinite if it could not be measured. growth:
-    largest growth of energy divided by the energy available [1]. status: Status codes; REFUSED where the program
-    refused to run the member.
+    error: largest error up to the error time [unit of the quantity]; infinite if it could not be measured.
+    growth: largest growth of energy divided by the energy available [1].
+    status: Status codes; REFUSED where the program refused to run the member.
     """
 
     error: np.ndarray
@@ -62,7 +62,8 @@ class Column:
     """One step h [s], the members that take it (k,), and their reference.
 
     error_steps: numbers of the steps at which errors are measured. steps: those at which energies are measured; they
-    include error_steps. verified: True for each member whose reference is accurate enough (k,).
+        include error_steps.
+    verified: True for each member whose reference is accurate enough (k,).
     """
 
     h: float

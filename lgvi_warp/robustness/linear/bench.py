@@ -65,8 +65,7 @@ class Motion:
     def moved(self, by: np.ndarray) -> Motion:
         """The motions, changed by small amounts.
 
-        by: changes (m, 12): position [m] in inertial axes; rotation vector [rad] in body axes; velocity and angular
-        velocity.
+        by: (m, 12): position [m], inertial axes; rotation vector [rad], body axes; velocity and angular velocity.
         """
         place, turn, velocity, rate = np.split(by, 4, axis=1)
         attitude = self.attitude @ notation.matrix_from_rotation_vector(turn)
@@ -88,8 +87,7 @@ class Motion:
 class MotionBench:
     """A plan whose members start from any motion, with any memory, after any step but the first.
 
-    Its kernel does not merge the first part of a step with the last, so its state between two launches is the motion
-    itself.
+    Its kernel does not merge parts of successive steps, so its state between two launches is the motion itself.
 
     h: step [s]; None for the scene's step. t1: the longest run [s]. spacing: time between two samples [s]. The
     attribute `every` is the number of steps between two ticks, 1 without a controller.
@@ -148,9 +146,9 @@ class MotionBench:
     ) -> Motion:  # fmt: skip
         """Advance members (m,) from step k0 to step k1; numbers: name -> (m, ...) that replace the members' own.
 
-        motion: motions after the tick at step k0; None starts from the members' own at t = 0, with k0 = 0. watch:
-        called for each block of samples, with the number of its first sample and the samples. Returns: The motions
-        after step k1 and its tick; NaN for members that failed.
+        motion: motions after the tick at step k0; None starts from the members' own at t = 0, with k0 = 0.
+        watch: called for each block of samples, with the number of its first sample and the samples.
+        Returns: The motions after step k1 and its tick; NaN for members that failed.
         """
         plan, m = self.plan, len(places)
         packets = self._filled(places, motion, numbers or {})

@@ -142,9 +142,8 @@ def linearize(
 
     Args:
         scene: The scene, without waves and noise; or an Ensemble, whose scene is used.
-        about: The motion: the answer of `lw.linear.trim`; or, for a closed loop, a time [s], for the motion of the run
-            at that time. None, the default: the start of the scene with commands of 0; a closed loop after its first
-            period.
+        about: The motion: the answer of `lw.linear.trim`; or, for a closed loop, a time [s], for the motion of the run at
+            that time. None, the default: the start of the scene with commands of 0; a closed loop after its first period.
         inputs: "commands" of the actuators, the default; or "wrench", for a plant only: X, Y, Z [N], K, M, N [N m] in
             body axes about the body's origin, held for a period, while the actuators keep their commands.
         closed: True includes the controller in the model; the inputs are then added to its commands. Default False.

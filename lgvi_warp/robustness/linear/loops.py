@@ -73,8 +73,7 @@ class Study:
     def loops(self, places: np.ndarray) -> tuple[list[Loops], np.ndarray]:
         """The loops of members (n,) at their steady motions, grouped by time; reasons (n,) of members without a loop.
 
-        Members whose motion does not repeat after `about`, or that are at a limit, run on for twice the time, and
-        again.
+        Members whose motion does not repeat after `about`, or that are at a limit, run on for twice the time, and again.
         """
         bench, n, groups = self.bench, len(places), list[Loops]()
         parameters = self.fleet.subset(places).parameters(0, n)
@@ -155,8 +154,7 @@ def _apart(repeating: np.ndarray, before: np.ndarray, limits: np.ndarray) -> np.
 class Loops:
     """Loops of members (n,) at their steady motions; runs test whether they settle with other factors and delays.
 
-    delay: the loops' own delays, in steps. limits: (n, channels), the largest commands. repeating: as in
-    `_what_repeats`.
+    delay: the loops' own delays, in steps. limits: (n, channels), the largest commands. repeating: as in `_what_repeats`.
     """
 
     def __init__(

@@ -24,8 +24,7 @@ class Regulator:
 
     Attributes:
         K: the gains (m, n), from each state to each input.
-        P: matrix (n, n) of the minimal cost from a state x, which is x^T P x; the cost is the sum over ticks of x^T Q x
-            + u^T R u.
+        P: (n, n); x^T P x is the minimal cost from x, the sum over ticks of x^T Q x + u^T R u.
         poles: eigenvalues of A - B K (n,), the largest first.
         model: the linear model.
     """
@@ -42,7 +41,8 @@ class Regulator:
             name: Name of the law in the controller; by default its type.
 
         Returns:
-            The law. Unlike in the model, its error takes the desired velocity in the axes of the desired attitude.
+            The law. Its attitude gains are corrected, as its velocity error nu - R^T v_d is not the model's deviation
+            of nu.
 
         Raises:
             SceneError: If an input is not a component of a wrench, or a state is not a coordinate of the motion.
@@ -68,8 +68,7 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
     """Design a linear quadratic regulator: gains that minimise the sum over ticks of x^T Q x + u^T R u.
 
     Args:
-        model: The linear model from `lw.linear.linearize`; with inputs="wrench" if the gains are for
-            `lw.control.StateFeedback`.
+        model: The linear model, as from `lw.linear.linearize`; for `lw.control.StateFeedback` with inputs="wrench".
         Q: Weights of the states: a matrix (n, n) or its diagonal (n,), >= 0.
         R: Weights of the inputs: a matrix (m, m) or its diagonal (m,), > 0.
 
@@ -77,8 +76,8 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
         The gains, the matrix of the cost, and the poles of the closed loop.
 
     Raises:
-        SceneError: If a matrix is at fault, or if no gains stabilise every state: the message names the poles that no
-            gain moves.
+        SceneError: If a matrix is at fault, or no gains stabilise every state; the message names poles that no gain
+            moves.
 
     Examples:
         >>> import lgvi_warp as lw

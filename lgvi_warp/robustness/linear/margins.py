@@ -304,11 +304,10 @@ def margins(
     + skew) d / 2), |d| < margin (Seiler, Packard, Gahinet 2020, IEEE Control Systems 40(5)). The margin is 1 / (largest
     structured singular value of S + (skew - 1) / 2).
 
-    A peak gain is the largest gain over frequency from a disturbance that is added to the law's demand. Its outputs are
-    the demand that acts (S, the sensitivity), the law's response (T), and each number of the motion in `to`, per unit
-    of the demand. With several components the gain is the largest singular value, so the peak is the H-infinity norm.
-    It is infinite if the gain grows towards frequency 0. The largest peak of all members is the worst-case gain of the
-    ensemble.
+    A peak gain is the largest gain over frequency from a disturbance that is added to the law's demand. Its outputs are the
+    demand that acts (S, the sensitivity), the law's response (T), and each number of the motion in `to`, per unit of the
+    demand. With several components the gain is the largest singular value, so the peak is the H-infinity norm. It is
+    infinite if the gain grows towards frequency 0. The largest peak of all members is the worst-case gain of the ensemble.
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise.

@@ -80,8 +80,10 @@ class OpenLoops:
         """Compute the frequency responses L(e^(i w dt)).
 
         Args:
-            frequencies: frequencies w (k,) [rad/s]. Returns: Complex responses (n, k, r, r); NaN for members without a
-loop, and at a pole.
+            frequencies: frequencies w (k,) [rad/s].
+
+        Returns:
+            Complex responses (n, k, r, r); NaN for members without a loop, and at a pole.
         """
         angles, r = np.asarray(frequencies, float) * self.dt, len(self.names)
         found = np.full((self.members, len(angles), r, r), np.nan, complex)
@@ -95,8 +97,10 @@ loop, and at a pole.
         """Compute the characteristic loci, the eigenvalues of L; with one input, they are L itself.
 
         Args:
-            frequencies: frequencies w (k,) [rad/s]. Returns: Eigenvalues (n, k, r), the largest first; NaN as in
-`response`.
+            frequencies: frequencies w (k,) [rad/s].
+
+        Returns:
+            Eigenvalues (n, k, r), the largest first; NaN as in `response`.
         """
         L = self.response(frequencies)
         lost = np.isnan(L).any(axis=(2, 3))
@@ -183,10 +187,9 @@ def loop(
 
     Args:
         fleet: An Ensemble, or a Scene whose [ensemble] is used; without waves and noise of the water.
-        at: Input at which the loop is opened: key of a law, such as "heading_pid", for all components of its demand;
-            "X" to "N" for a component of the demand of all laws; a command, such as "control_fins[0]"; or an actuator,
-            such as "control_fins", for all of its commands. None, the default, opens it at the whole demand of all
-            laws.
+        at: Input at which the loop is opened: key of a law, such as "heading_pid", for all components of its demand; "X" to
+            "N" for a component of the demand of all laws; a command, such as "control_fins[0]"; or an actuator, such as
+            "control_fins", for all of its commands. None, the default, opens it at the whole demand of all laws.
         about: Time at which the loop is examined [s]; 60 by default.
         settle: Longest time until a member must be steady [s]; 1200 by default.
         method: As in `lw.solve`; default the scene's method.

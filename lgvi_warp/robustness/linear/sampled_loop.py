@@ -116,8 +116,7 @@ class SampledLoop:
     def _decomposed(self) -> tuple[np.ndarray, np.ndarray]:
         """Axes of motion and parts (n, s + m, s + m), those that laws observe first, and the number of these.
 
-        States that laws do not observe have no effect on observed ones, so they evolve independently of factor and
-        delay.
+        States that laws do not observe have no effect on observed ones, so they evolve independently of factor and delay.
         """
         s, m, C = self._s, self._m, self._C
         size = s + m

@@ -41,8 +41,8 @@ class WorstCase(Saved):
         at_bounds: name of a number -> the bound at which it lies: "low", "high", or "" for none.
         restarts: (r,), the worst value of each evolution; if they differ, a longer search may find a worse value.
         runs: number of members that were run.
-        fleet: ensemble of this one member, to run it again; None if this answer was read from a file. Then the saved
-            table has the member's numbers: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")).
+        fleet: ensemble of this one member, to run it again; None if this answer was read from a file. The table worst_case.csv
+            in its folder also gives the member: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")).
         of_metric: True if the quantity is a metric, which may be infinite without a failure, as for a loop that never
             settles; by default False.
         points: number of members that were spread evenly over the box.
@@ -122,11 +122,10 @@ def worst_case(
 ) -> WorstCase:
     """Search for the worst case of a quantity within bounds of the scene's numbers.
 
-    Differential evolution runs several times from different starts; each generation is an ensemble. Then come the
-    corners of the box, if they are few, and a local search from the worst point. The rest of the budget goes to Sobol
-    points over the whole box, and to local searches from the worst of them. All members get the same noise. A worse
-    case may remain unseen: `unseen` of the answer is the fraction of the box that a separate peak must fill to be found
-    with probability 95 %.
+    Differential evolution runs several times from different starts; each generation is an ensemble. Then come the corners
+    of the box, if they are few, and a local search from the worst point. The rest of the budget goes to Sobol points over
+    the whole box, and to local searches from the worst of them. All members get the same noise. A worse case may remain
+    unseen: `unseen` of the answer is the fraction of the box that a peak must fill to be found with probability 95 %.
 
     Args:
         fleet: A Scene, or an Ensemble, whose scene is used. Numbers that are not searched keep the scene's values.

@@ -36,8 +36,7 @@ class Case:
         replace: lists that replace the scene's: {"laws": [...]} or another list of the controller, "events", the whole
             "controller", or "terms". An entry of "terms" replaces the term of the same name, or is added if there is no
             such term.
-        vehicle: another vehicle, lw.Vehicle(...), or some of its numbers by field; None (default) for the scene's
-            vehicle.
+        vehicle: another vehicle, lw.Vehicle(...), or some of its numbers by field; None (default) for the scene's vehicle.
         scene: another scene, to which the rest is applied; None (default) for the sweep's scene.
         rare: True estimates the probability that a member does not pass, even if it is very small, by lw.rare_event; or
             a dict with some arguments of lw.rare_event, {"relative_error": 0.2, "cheaper": [{"h": 0.1}], "most":

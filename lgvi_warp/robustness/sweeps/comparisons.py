@@ -23,8 +23,9 @@ from lgvi_warp.statistics.estimates import paired
 class PairedComparison:
     """A difference between two cases on the same members, at one point of the grid.
 
-    only: number of members that pass only with the first case, and only with the second case. matters: the smallest
-    difference that matters, in its unit; NaN if none was given. more_is_better: True if a larger value is better.
+    only: number of members that pass only with the first case, and only with the second case.
+    matters: the smallest difference that matters, in its unit; NaN if none was given.
+    more_is_better: True if a larger value is better.
     """
 
     first: str

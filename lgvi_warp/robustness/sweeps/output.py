@@ -127,8 +127,10 @@ class Sweep(SweepTable):
 
         Args:
             case: name of the case.
-            at: values of the grid by name; may be left out if there is no grid. Returns: The answer of `lw.rare_event`:
-probability, interval, failing members, and the likeliest of them.
+            at: values of the grid by name; may be left out if there is no grid.
+
+        Returns:
+            The answer of `lw.rare_event`: probability, interval, failing members, and the likeliest of them.
 
         Raises:
             SceneError: there is no such case or point, the case did not request it, or it was refused.

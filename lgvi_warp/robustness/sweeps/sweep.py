@@ -66,8 +66,7 @@ def sweep(
     holds the numbers of all cells.
 
     Args:
-        scene: The scene, the path of a scene file, or an Ensemble, whose scene, members, seed, vary and sampling are
-            used.
+        scene: The scene, the path of a scene file, or an Ensemble, whose scene, members, seed, vary and sampling are used.
         cases: Cases, or tables with `name`, `set` (numbers by name), `replace` (lists of parts, such as "laws"),
             `vehicle` (another vehicle, or some of its numbers) and `scene` (another scene); or {name of a case: numbers
             that it sets}. Default: the scene alone.

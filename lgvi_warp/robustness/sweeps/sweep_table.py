@@ -101,7 +101,8 @@ class SweepTable:
         """Return the cells of a case.
 
         Args:
-            case: name of the case. at: values of the grid by name that select cells; None (default) for all.
+            case: name of the case.
+            at: values of the grid by name that select cells; None (default) for all.
 
         Returns:
             The cells, in the order of the grid.
@@ -124,7 +125,8 @@ class SweepTable:
         """Return the one cell of a case at a point of the grid, which has run.
 
         Args:
-            case: name of the case. at: values of all axes of the grid by name; may be left out if there is no grid.
+            case: name of the case.
+            at: values of all axes of the grid by name; may be left out if there is no grid.
 
         Returns:
             The cell.

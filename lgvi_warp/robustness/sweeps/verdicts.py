@@ -37,7 +37,7 @@ def verdict(difference: Difference, matters: float, real: bool, more_is_better: 
     """Verdict on a difference, given the smallest difference that matters, in its unit.
 
     Equivalent: the interval lies within +-matters. Better and worse: the difference is significant, and its interval
-    lies beyond `matters`.
+        lies beyond `matters`.
     """
     lower, upper = difference.lower, difference.upper
     if not more_is_better:

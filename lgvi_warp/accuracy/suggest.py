@@ -170,16 +170,14 @@ def suggest(
         members: number of members in the sample that the search runs. Default 128.
         threads: number of threads of the predicted run. Default: all threads of this machine.
         seconds: approximate processor time of the search, without compiling [s]. Default 30.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction of the
-            work, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         The cheapest setting, its expected error, its predicted time and memory, and the next best settings.
 
     Raises:
         SceneError: if arguments are faulty (one message lists all), if noise acts that is not a NoisyTerm, or if no
-            reference is ten times more accurate than the error. In that case the message gives the time up to which the
-            reference is.
+            reference is ten times more accurate than the error. The message then gives the time up to which it is.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -51,8 +51,7 @@ class Measurement:
         errors: quantity -> {"end_max", "end_rms", "path_max", "path_rms"} over the members, in the units of
             Tradeoff.units; empty if a member failed or the errors of members cannot be measured.
         energy_drift: largest |E(t) - E(0)| [J]; NaN if a force of the scene supplies or removes energy.
-        biases: name, such as "position_mean" -> difference of the mean or standard deviation from the reference's, in
-            standard errors.
+        biases: name, such as "position_mean" -> difference of the statistic from the reference, in standard errors.
         order: order of the method.
         trusted: quantity -> True if the error is at least ten times the error of the reference.
         cost_spread: median of the readings of the cost divided by the smallest reading, which is the cost.
@@ -260,13 +259,11 @@ def tradeoff(
         of: quantity whose error decides whether the reference is accepted: a name that statistics accept ("position",
             "attitude", "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position,
             attitude, velocity, angular_velocity and energy are always measured. Default "position".
-        methods: names of the methods to try. A method without any measurement is listed in `missing`. Default: all
-            methods that can run the scene.
+        methods: names of the methods to try. `missing` lists methods without any measurement. Default: all possible ones.
         members: number of members in the sample. Default 128.
         seconds: processor time to spend [s]; compiling kernels may take as much again. Every method first runs one
             coarse setting; then each step is halved in turn. The messages list what is left out. Default 45.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction of the
-            work, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         Measurements of every setting, with their Pareto front.

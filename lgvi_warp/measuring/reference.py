@@ -180,8 +180,7 @@ class Growth:
         doubling: time in which the difference doubles, ln 2 / rate [s]; infinite if growth is not exponential.
         power: exponent p of the fit t^p, if it fits better than an exponential; else None.
         factor: factor of growth over the whole run.
-        predictable: dtype -> time at which a round-off error has grown to 1e-2, extrapolated beyond the run if needed
-            [s]; may be infinite.
+        predictable: dtype -> time at which round-off has grown to 1e-2, extrapolated if needed [s]; may be infinite.
         times: times of the curve (k,) [s].
         curve: size of the difference (k,): root mean square over the members, of position [m] and attitude [rad] together.
     """

@@ -62,8 +62,7 @@ def oscillation_limit(name: str, kind: str = "munk") -> float:
 def rotation_limit(name: str) -> float:
     """The largest h |J^-1 pi| of a method [rad]; NaN for gauss*.
 
-    The limit is |J^-1 a| = 1 for equation (24), a half angle of 1 for turns about axes, and for rk* the step at which
-    the entries of R grow.
+    The limit is |J^-1 a| = 1 for equation (24), a half angle of 1 for turns about axes; for rk* it is where R grows.
     """
     method = Method(name)
     if method.tableau:

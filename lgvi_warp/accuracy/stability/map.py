@@ -93,8 +93,7 @@ class StabilityMap(Saved):
         y: vertical axis, with ny values.
         classes: method -> Cell codes (ny, nx).
         errors: method -> largest error up to error_time (ny, nx) [unit]; infinite if it could not be measured.
-        energies: method -> largest growth of energy divided by energy_bound (ny, nx) [1]; a value above 1 counts as
-            unbounded.
+        energies: method -> largest growth of energy divided by energy_bound (ny, nx) [1]; unbounded above 1.
         statuses: method -> worst Status code (ny, nx); 255 where the program refused to run the cell.
         ratios: method -> limit -> step h divided by the analytic step limit of the fastest start (ny, nx) [1]; above 1
             the step exceeds the limit. The names of the limits are in accuracy.stability.limits.LIMITS.
@@ -296,8 +295,7 @@ def stability_map(
 
     Classes of a cell:
 
-    * accurate: the error stays below the bound up to error_time; its reference is two runs with fine steps, which agree
-      ten times better than the bound;
+    * accurate: the error stays below the bound up to error_time, against two fine runs that agree ten times better;
     * bounded: not accurate, but energy and rotation stay bounded up to t1;
     * flagged: bounded, and a member got a status or a warning;
     * failed: unbounded, and a member got a status or a warning; or some numbers are not finite;
@@ -328,15 +326,13 @@ def stability_map(
         dtype: precision. Default: the scene's precision.
         seed: seed of the random turns. Default 0.
         threads: number of threads. Default: all threads of this machine.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction of the
-            work, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         The map.
 
     Raises:
-        SceneError: if arguments are faulty (one message lists all), if none of the methods can run the scene, or if
-            noise acts.
+        SceneError: if arguments are faulty (one message lists all), if no method can run the scene, or if noise acts.
 
     Examples:
         >>> import lgvi_warp as lw

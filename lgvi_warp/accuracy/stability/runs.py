@@ -61,8 +61,7 @@ class CellRuns:
 class Column:
     """One step h [s], the members that take it (k,), and their reference.
 
-    error_steps: numbers of the steps at which errors are measured. steps: those at which energies are measured; they
-        include error_steps.
+    error_steps: numbers of the steps at which errors are measured. steps: the same for energies, including error_steps.
     verified: True for each member whose reference is accurate enough (k,).
     """
 

@@ -33,9 +33,8 @@ INPUTS = ("commands", "wrench")
 class LinearModel:
     """Discrete linear model of deviations from a motion: x' = A x + B u after one period, y = C x + D u.
 
-    The first twelve states are position [m] in inertial axes, rotation vector [rad] in body axes, and velocity [m/s]
-    and angular velocity [rad/s] in body axes. They are also the outputs. Further states are the memory of actuators and
-    of parts of a controller.
+    The first twelve states are position [m] in inertial axes, rotation vector [rad] in body axes, and velocity [m/s] and
+    angular velocity [rad/s] in body axes. They are also the outputs. The memory of actuators and of control parts follows.
 
     Attributes:
         A: state matrix (n, n).
@@ -46,8 +45,7 @@ class LinearModel:
         states: names of the states (n,), such as "velocity[0]", "control_fins.place[1]", "heading_pid.memory[0]".
         inputs: names of the inputs (m,), such as "control_fins[0]", or "X" to "N" of a wrench.
         about: the motion at the start of the period: position, attitude, velocity and angular_velocity by name.
-        messages: texts that name the parts of the scene that the model leaves out: noise, drift and rounding of
-            sensors, faults.
+        messages: notes on parts of the scene that the model leaves out: noise, drift and rounding of sensors, faults.
     """
 
     A: np.ndarray

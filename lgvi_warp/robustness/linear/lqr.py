@@ -41,8 +41,7 @@ class Regulator:
             name: Name of the law in the controller; by default its type.
 
         Returns:
-            The law. Its attitude gains are corrected, as its velocity error nu - R^T v_d is not the model's deviation
-            of nu.
+            The law, with attitude gains corrected for its velocity error nu - R^T v_d, unlike the model's deviation of nu.
 
         Raises:
             SceneError: If an input is not a component of a wrench, or a state is not a coordinate of the motion.
@@ -76,8 +75,7 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
         The gains, the matrix of the cost, and the poles of the closed loop.
 
     Raises:
-        SceneError: If a matrix is at fault, or no gains stabilise every state; the message names poles that no gain
-            moves.
+        SceneError: If a matrix is at fault, or no gains stabilise every state; the message names the poles at fault.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -185,8 +185,7 @@ class Margins(Saved):
             by: "eigenvalues" or "runs"; None, the default, takes the first of them that was computed.
 
         Returns:
-            (rising margins of the members whose unchanged loop settles; fraction of these members with at most this
-            margin).
+            (rising margins of members whose unchanged loop settles; fraction of these with at most this margin).
         """
         ways = dict(zip(WAYS, (self.values, self.by_runs), strict=True))
         columns = self._columns() if by is None else _named("by", by, ways)
@@ -284,15 +283,13 @@ def margins(
     Neutral modes that no law observes do not count.
 
     By runs: every member runs with its own factor or delay, and each run bisects the brackets of all members. The runs
-    start from the same motion, turned by `tilt`. A loop settles if two conditions hold. The swing of its rates and
-    commands shrinks from the second to the last third of the run, and is smaller than in the first third. In the last
-    third no command is at its limit, and the body is off the motion by less than 10 tilts and turns by less within a
-    period. If the swing shrinks only slightly, a run of 1.5 times the length is examined, too. The tracking error is
-    not examined, because a slow integral hides a small fast limit cycle in it. If stability changes more than once, the
-    margin is at one of the changes.
+    start from the same motion, turned by `tilt`. A loop settles if two conditions hold. The swing of its rates and commands
+    shrinks from the second to the last third of the run, and is smaller than in the first third. In the last third no
+    command is at its limit, and the body is off the motion by less than 10 tilts and turns by less within a period. If the
+    swing shrinks only slightly, a run of 1.5 times the length is examined, too. The tracking error is not examined: a slow
+    integral hides a small fast limit cycle in it. If stability changes repeatedly, the margin is at one of the changes.
 
-    Noise and drift of sensors are set to their mean, 0, and faults are off. By eigenvalues, rounding is 0, too: see
-    `messages`.
+    Noise and drift of sensors are set to their mean, 0, and faults are off; by eigenvalues rounding, too: see `messages`.
 
     The phase margin is the smallest phase, lag or lead, at which the loop becomes unstable if it is applied to all
     components of the law's demand at once. For one component it follows from the crossovers of the gain; for several,

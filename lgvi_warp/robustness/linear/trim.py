@@ -119,16 +119,14 @@ def trim(
 ) -> Trim:
     """Find a steady straight and level motion at the position and heading of the scene's start.
 
-    Velocities and rates are the same after a step of the method, so a run that starts there stays there, to round-off.
-    The motion differs from the steady motion of the equations by the method's error of one step. The controller of the
-    scene is left out.
+    Velocities and rates are the same after a step of the method, so a run from there stays there, to round-off. The motion
+    differs from the equations' steady motion by the method's error of one step. The scene's controller is left out.
 
     Args:
         scene: The scene, or an Ensemble, whose scene is used.
         speed: Speed over ground [m/s]; None, the default, leaves it free, as for a propeller with constant thrust.
         free: Names of the quantities that may be chosen: "roll", "pitch", "drift" (course minus heading), "speed", and
-            commands, such as "thrusters[0]", or "thrusters" for all of a term; None, the default, for all. The others
-            are 0.
+            commands, such as "thrusters[0]", or "thrusters" for all of a term; None, the default, for all. Others are 0.
         fixed: Values of quantities that are not free, by the same names; None, the default, for 0.
         method: As in `lw.solve`; default the scene's method.
         h: Step [s]; default the scene's step.

@@ -43,8 +43,7 @@ class WorstCase(Saved):
         runs: number of members that were run.
         fleet: ensemble of this one member, to run it again; None if this answer was read from a file. The table worst_case.csv
             in its folder also gives the member: lw.Ensemble(scene, sampling=lw.designs.Table("worst_case.csv")).
-        of_metric: True if the quantity is a metric, which may be infinite without a failure, as for a loop that never
-            settles; by default False.
+        of_metric: True if the quantity is a metric, which is infinite for a loop that never settles; by default False.
         points: number of members that were spread evenly over the box.
         units: unit of the quantity and of the numbers, by name.
     """

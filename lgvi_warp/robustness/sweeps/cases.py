@@ -34,8 +34,7 @@ class Case:
         set: numbers by name that replace the scene's: {"heading_pid.kp": 2.0, "drag.quadratic[0]": 3.0}. A number that
             varies in the fleet is constant in this case.
         replace: lists that replace the scene's: {"laws": [...]} or another list of the controller, "events", the whole
-            "controller", or "terms". An entry of "terms" replaces the term of the same name, or is added if there is no
-            such term.
+            "controller", or "terms". An entry of "terms" replaces the term of its name, or is added.
         vehicle: another vehicle, lw.Vehicle(...), or some of its numbers by field; None (default) for the scene's vehicle.
         scene: another scene, to which the rest is applied; None (default) for the sweep's scene.
         rare: True estimates the probability that a member does not pass, even if it is very small, by lw.rare_event; or

@@ -86,8 +86,7 @@ class Sweep(SweepTable):
 
         Success: difference of the paired proportions, with Tango's interval and McNemar's exact test. Metrics: paired t
         test over members that failed in neither case and whose numbers are finite; for a quantile, a bootstrap over
-        members. Holm's method corrects p for the number of comparisons. docs/guide/is_my_controller_robust.md explains
-        the output.
+        members. Holm's method corrects p for the number of comparisons. See docs/guide/is_my_controller_robust.md.
 
         Args:
             first: name of a case.
@@ -114,8 +113,7 @@ class Sweep(SweepTable):
             rows: the comparisons, as in `compare`.
 
         Returns:
-            The same comparisons with corrected `p`; `real` is True if the difference is significant at the sweep's
-            confidence.
+            The same comparisons with corrected `p`; `real` is True if the difference is significant.
         """
         kind = "difference p real", "a comparison", "give those of Sweep.compare"
         return corrected([of_kind(f"rows[{i}]", row, *kind) for i, row in enumerate(rows)], self.confidence)
@@ -149,8 +147,7 @@ class Sweep(SweepTable):
         """Compare the rare failures of two cases at each point of the grid: ratio of their failure probabilities.
 
         Failing members of each case are run in the other case, with the same numbers and noise: P(B) / P(A) = P(B | A)
-        / P(A | B). If too few fail in both, the ratio of the two answers is taken. Holm's method corrects p for the
-        number of comparisons.
+        / P(A | B). If too few fail in both, the ratio of the two answers is used. Holm's method corrects p.
 
         Args:
             first: name of a case.
@@ -158,8 +155,7 @@ class Sweep(SweepTable):
             at: values of the grid by name; None (default) for all points.
 
         Returns:
-            The comparisons at points at which both cases have a rare failure; `row()` of a comparison is a record of a
-            table.
+            The comparisons at points at which both cases have a rare failure; `row()` of each is a record of a table.
 
         Raises:
             SceneError: there is no such case or point.
@@ -226,10 +222,9 @@ class Sweep(SweepTable):
     def causes(self, case: str, at: Mapping[str, Any] | None = None, of: str = SUCCESS) -> list[dict[str, Any]]:
         """Find which of the inputs that vary explain success or a metric, the most important first.
 
-        share: fraction of the variance over members that the conditional mean given this input explains. It is
-        estimated by bins of the members at hand, with its interval and the p of an F test, corrected for the number of
-        inputs by Holm's method. slope: standardised coefficient of a linear regression on all inputs. The inputs are
-        assumed to be independent.
+        share: fraction of the variance over members that the conditional mean given this input explains. It is estimated by
+        bins of the members at hand, with its interval and the p of an F test, corrected for the number of inputs by Holm's
+        method. slope: standardised coefficient of a linear regression on all inputs. Inputs should be independent.
 
         Args:
             case: name of the case.
@@ -237,8 +232,7 @@ class Sweep(SweepTable):
             of: "success" (default), or the name of a metric, over members that did not fail.
 
         Returns:
-            Records with input, share, lower, upper, p, slope, and the input's medians over members that pass and
-            members that do not.
+            Records with input, share, lower, upper, p, slope, and the input's medians over passing and other members.
 
         Raises:
             SceneError: there is no such case, point or metric, or it was refused.

@@ -62,8 +62,7 @@ def sweep(
     not vary in it. Cells that differ only in numbers share a kernel. If a case is refused or does not compile, this is
     recorded, and the others continue.
 
-    With `out`, memory holds the numbers of one cell at a time, 8 bytes for each member and metric; without `out`, it
-    holds the numbers of all cells.
+    With `out`, memory holds the numbers of one cell at a time, 8 bytes for each member and metric; else of all cells.
 
     Args:
         scene: The scene, the path of a scene file, or an Ensemble, whose scene, members, seed, vary and sampling are used.
@@ -76,10 +75,8 @@ def sweep(
         seed: Seed of the members; default the scene's.
         sampling: As for Ensemble; default the scene's.
         metrics: Metrics, each one number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of":
-            "heading"}, "iae heading", or an expression over the path, "max(norm(demand))". "time_to_failure" is always
-            included.
-        success: Conditions that a member must fulfil: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: it
-            reaches the end.
+            "heading"}, "iae heading", or an expression over the path, "max(norm(demand))". "time_to_failure" is added.
+        success: Conditions for a member: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: it reaches the end.
         baseline: Name of the case that others are compared with; default the first case.
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
         interval: Kind of the intervals of probabilities: "wilson" (default) or "clopper_pearson".

@@ -92,8 +92,7 @@ class SweepTable:
             cell: one of `cells`.
 
         Returns:
-            The record: `status` (n,), `numbers`, metric -> (n,), `messages`, and `refused`, which is "" if the cell has
-            run.
+            The record: `status` (n,), `numbers`, metric -> (n,), `messages`, and `refused`, "" for a cell that has run.
         """
         return self.records[cell.key]
 

@@ -121,7 +121,7 @@ class Distribution(Documented):
         return self
 
     def nothing_of(self, bases: Sequence[np.ndarray]) -> str | None:
-        """The width, relative to a scene's value of 0, by which it varies nothing; None where it does vary it."""
+        """Name of a width relative to a scene's value of 0, so that nothing varies; else None."""
         return varies_nothing(self, bases)
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:

@@ -30,13 +30,11 @@ class Derivatives(Saved):
         units: units of the quantities (m,), "" if unknown.
         by: names of the numbers (k,).
         value: values of the quantities (m,).
-        jacobian: derivative of each quantity by each number (m, k) [unit of the quantity / unit of the number]; NaN if
-            undefined.
+        jacobian: derivative of each quantity by each number (m, k) [unit of quantity / unit of number]; NaN if undefined.
         error: estimated error of each derivative (m, k), from the disagreement of differences at several increments,
             and from round-off. It is not a bound: the true error is sometimes up to about 3 times as large. It excludes
             the error of the method's step. NaN if there is no derivative.
-        increments: the largest increment that each derivative uses (m, k) [unit of the number]; NaN if there is no
-            derivative.
+        increments: the largest increment that each derivative uses (m, k) [unit of the number]; NaN if undefined.
         undefined: "quantity by number" -> sentence on the reason why it has no derivative.
         messages: notes for the user.
         members: number of copies of members that were run.

@@ -32,8 +32,7 @@ class Extrapolated:
 
     value, error: the derivative and its error. first: index of the largest increment used. jump: derivative from above
     minus derivative from below. rounding: error of a value, by the scatter at the smallest increments. code: FINE; FEW:
-    few increments without failed copies; ROUGH: increments disagree; STEPS: a jump between two increments; KINK: the
-    two sides differ.
+    few increments without failed copies; ROUGH: increments disagree; STEPS: a jump between two; KINK: the sides differ.
     """
 
     value: np.ndarray

@@ -26,8 +26,7 @@ class Estimated(Summarized, Saved):
         error: requested root mean square error [`unit`].
         sampling_error: standard error of sampling [`unit`].
         bias: estimated bias, the difference from a finer setting; it is not subtracted from the value [`unit`].
-        bias_interval: 95 % interval of the bias, which includes the remaining bias of the finer setting, (low, high)
-            [`unit`].
+        bias_interval: 95 % interval of the bias, including the finer setting's remaining bias, (low, high) [`unit`].
         setting: the setting whose statistic is estimated, such as "psi_x 0.025".
         settings: this setting as arguments of `lw.solve`: method, h and dtype.
         reference: text with the finer setting of the bias estimate, and its number of members.

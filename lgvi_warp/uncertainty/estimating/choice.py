@@ -64,8 +64,7 @@ class Observed:
     """Observations of a pilot: contributions of the same members in several settings, the finest first.
 
     z: contributions (settings, n). normals: (n, d) of the members' numbers. least: smallest change of a contribution.
-    costs: cost of a member of each setting [s]. pair: cost of a member in two settings, by index [s]. settings: the
-        settings.
+    costs: cost of a member in each of `settings` [s]. pair: cost of a member in two settings, by index [s].
     at: the solved target that defines the contributions. alone: index of a setting -> contributions of more members.
     call: fixed cost of a call [s]. weight: weight of all contributions. reach: as in `Level`.
     """

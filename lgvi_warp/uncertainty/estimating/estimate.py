@@ -80,22 +80,19 @@ def estimate(
     message gives the fraction that a mean may have missed. Rare values of a Choice are separate strata.
 
     Args:
-        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions; its own members and
-            sampling do not matter.
+        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions, regardless of its sampling.
         of: statistic to estimate, at the end of the run: a text such as "mean position[0]", "depth above 3", "outcome
             floor" or "max(depth)"; lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles with one level;
             or a metric such as lw.metrics.ITAE("depth").
         error: requested root mean square error from sampling and bias together, in the unit of the statistic; above 0.
         relative_error: requested error as a fraction of the statistic, instead of `error`.
         t1: end time [s]. Default: run.duration of the scene.
-        risk: risk of a quantity or a metric: "mean" (the default), the level of a quantile, such as 0.95, or
-            lw.metrics.CVaR(0.05).
+        risk: for a quantity or a metric: "mean" (the default), a quantile's level, such as 0.95, or lw.metrics.CVaR(0.05).
         cheaper: scenes that cost less and behave similarly, as tables of changed numbers, such as {"controller.delay":
             0.0}, or as Scenes. They serve only as coarse levels. Default none.
         method: fixes the method. Default: the scene's own, and one that suits its terms.
         h: fixes the step [s], and its bias is reported; the method is the scene's unless `method` is given.
-        dtype: fixes the precision, also of coarse levels. Default: the scene's precision, and "float32" for coarse
-            levels if this pays.
+        dtype: fixes the precision, also of coarse levels. Default: the scene's, and "float32" for some coarse levels.
         estimator: fixes the estimator: "plain Monte Carlo", "sobol", "regression", "levels" or "levels of sobol".
             Default: the estimator with the lowest predicted cost.
         recipe: `found.recipe` of an earlier answer: the same members are run again, without a pilot. Error, setting,
@@ -103,13 +100,12 @@ def estimate(
         heavy_tail: True reports a mean even if its variance seems to be infinite. Default False: such a mean is refused.
         seed: seed of points and noise. Default: the ensemble's seed.
         threads: threads of the runs. Default: as in `lw.solve`.
-        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Without threads, costs are
-            elapsed times.
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Without threads, cost is
+            wall time.
         scheduler: address of Dask's scheduler.
         store: folder for the results of runs: the same call continues from there after an interruption, with the same
             answer. A folder with results for other arguments is refused. Default: none.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction of the
-            work, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
 
     Returns:
         The value, its interval and its cost; `print` shows a report.

@@ -47,8 +47,7 @@ class MeanEstimate:
 def plain(y: np.ndarray, least: float = 0.0) -> MeanEstimate:
     """The mean of independent members (n,).
 
-    least: change of a member's number that the sample may have missed; the variance that missed members may add is
-        included.
+    least: change of a member's number that the sample may have missed; its possible variance is included.
     """
     n = len(y)
     return MeanEstimate(float(np.mean(y)), float(np.var(y, ddof=1)) / n + (UNSEEN * least / n) ** 2, n - 1.0)

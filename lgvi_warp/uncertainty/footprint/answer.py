@@ -73,8 +73,7 @@ class Footprint(Saved):
             because they are far away; a message counts them.
         covariance: Covariance of the same members (2, 2) [m2].
         regions: The regions of 50, 90, 95 and 99 %, if there are enough members for them.
-        growth: For an eighth, a quarter, half and all of the members: their number, area of the 95 % region and its
-            interval [m2].
+        growth: For an eighth, a quarter, half and all of the members: number, area of the 95 % region and interval [m2].
         origin: Latitude and longitude of the axes' origin [deg]; None if the scene has none.
         places: North and east of members (m, 2) [m], for figures; a subset if there are more than 1,000 members.
         messages: Notes for the user.

@@ -67,8 +67,8 @@ def footprint(result: Result, at: str | float = "end") -> Footprint:
 
     Args:
         result: A result with positions, in memory or in a store.
-        at: "end"; the name of an event or outcome, such as "floor", for the positions where it stopped members; or the
-            time of a sample [s].
+        at: "end"; the name of an event or outcome, such as "floor", for the positions where it stopped members; or a
+            sample time [s].
 
     Returns:
         Regions, centre, covariance, and the answer in one sentence.

@@ -36,13 +36,12 @@ class RareEvent(Saved):
         interval: (lower, upper), 95 % interval by Student's t for the logarithm.
         relative_error: relative standard error of the probability.
         estimator: "importance", "subset", "plain" or "splitting".
-        members: number of members that were run, by setting: "scene" and the entries of `cheaper`; with splitting, in
-            whole runs.
+        members: number of members run, by setting: "scene" and the entries of `cheaper`; with splitting, in whole runs.
         failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None
             if only noise varies. With splitting a member may occur several times, with different noise.
         normals: (m, d), the varied numbers of the failing members as standard normals, in the order of `moved`.
-        draws: (m, k), standard normals of the failing members' noise, for lw.prepare(..., draws="given"); k = 0 without
-            noise, and with splitting.
+        draws: (m, k), normals of the failing members' noise, for lw.prepare(..., draws="given"); k = 0 without noise,
+            or by splitting.
         weights: (m,), weights of the failing members, with the sum 1.
         failed_share: fraction of the probability from members that failed, or have a number that is not finite.
         likeliest: values by name of the likeliest failing member, which has the smallest distance from the middle.
@@ -62,12 +61,11 @@ class RareEvent(Saved):
             it has the noise of this index, with the seed of the call, as in `run.states(final, indices=, seed=)`.
         moved_size: name -> mean absolute value of the failing members, in standard deviations; for all members it is 0.80.
         moved_spread: name -> standard deviation of the failing members divided by that of all members.
-        moved_z: name -> z-score farthest from 0 of these three differences from all members; from 4.5 on, it is
-            significant.
+        moved_z: name -> z-score farthest from 0 of these three differences from all members; significant from 4.5 on.
         by_condition: if the event is any of several conditions, text of a condition -> (probability, lower, upper) of this
             condition alone, and of "any" and "all" of them, over the whole run; otherwise, or with a status, empty.
-        ancestors: (m,), for each failing member its ancestor in the first level; with splitting, its run. Members with
-            the same ancestor are related.
+        ancestors: (m,), ancestor of each failing member in the first level, or its run with splitting. Equal ones are
+            related.
     """
 
     study: ClassVar[str] = "rare"

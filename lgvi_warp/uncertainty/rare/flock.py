@@ -21,8 +21,8 @@ class Flock:
 
     look: number of the checkpoint; 0 at the start. place: states from which a walk continues, with `part(rows)`.
     values: (c, n), the event's numbers so far. distances: (c, n), their distances beyond the bounds. features: (n, f),
-    numbers that may predict the event. happened, over, lost: (n,), True if the event has happened, the member has
-    ended, it failed.
+    numbers that may predict the event. happened, over, lost: (n,), True if the event happened, the member ended, or
+    failed.
     """
 
     look: int
@@ -57,8 +57,7 @@ class Walk(Protocol):
     """Motion of members from checkpoint to checkpoint.
 
     looks: number of the last checkpoint. d: number of normals of a member's start. lasting: (c,), for each number of
-    the event, True if the event has happened once the number is beyond its bounds, False if the last checkpoint
-    decides.
+    the event, True if the event happens once the number is beyond its bounds, False if only the last checkpoint counts.
     stretches: store of the runs from level to level, as `Stretches`; None for none.
     """
 

@@ -219,8 +219,7 @@ def doubts(
     """Reasons why the weights are not the answer; empty if they are.
 
     probability, spread: the chains' answer; None if they did not arrive. failing: each run's failing members (m, d).
-    asked: the requested relative error. seen: (m,), mask of weighted members in regions that chains reached; None for
-    all.
+    asked: the requested relative error. seen: (m,), mask of weighted members where chains went; None for all.
     """
     reasons = []
     if weighted.spread > asked:

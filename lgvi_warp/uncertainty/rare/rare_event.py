@@ -78,21 +78,18 @@ def rare_event(
 
     Args:
         fleet: A Scene or an Ensemble, whose distributions in `vary` and whose noise vary the members.
-        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, that is positive in the
-            event; conditions as in a sweep, {"peak depth": {"above": 12.0}}, any of which is the event; or the name of
-            an event of the scene.
+        limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, that is positive in the event;
+            conditions as in a sweep, {"peak depth": {"above": 12.0}}, any of which is the event; or an event's name.
         relative_error: Target relative standard error of the probability, 0.005 to 0.5; 0.1 by default.
         by: "chains", the default, or "splitting", for a scene with noise and an event that can be followed in time: a
             number at the end, its max or min over the path, "max_error depth", "iae depth", or an event of the scene.
         cheaper: Coarser settings that the first chains may use; the answer is always for the scene's own setting. Each
-            is a table of changed numbers and settings of the run, [{"h": 0.1, "dtype": "float32", "controller.delay":
-            0.0}]. None by default.
+            is a table of changed numbers and run settings, [{"h": 0.1, "dtype": "float32", "controller.delay": 0.0}].
+            None by default.
         intervals: Splitting: maximum number of time intervals, 2 to 1,000; 50 by default. More intervals need fewer
             members, but each costs a call. Intervals begin at samples and at ticks of a controller.
-        failed: "event", the default: a member that fails counts as the event, and is reported separately; "refuse"
-            raises an error.
-        most: Approximate maximum number of members to run, at least 10,000; 1,000,000 by default. Members of the pilot
-            are not counted.
+        failed: "event", the default: a failed member counts as the event, and is reported separately; "refuse": error.
+        most: Approximate maximum number of members to run, without the pilot, at least 10,000; 1,000,000 by default.
         seed: Seed of all random draws; 0 by default.
         store: Folder for the results of runs: the same call continues from there after an interruption, with the same
             answer. Splitting repeats its pilot and continues after the last complete level. A folder with results for

@@ -116,10 +116,8 @@ def _next_bound(reach: np.ndarray, bounds: Sequence[float]) -> float | None:
 class SplitRuns:
     """Independent runs with fixed levels.
 
-    runs: the runs. failing: (m, d), normals at the start of members for which the event happens. limits: (m,), their
-        limits.
-    weights: (m,), probabilities. paths: for each failing member, checkpoints (k + 1,) and the keys (k,) of its noise
-        between them.
+    runs: the runs. failing: (m, d), starting normals of members for which the event happens. limits: (m,), their limits.
+    weights: (m,), probabilities. paths: for each failing member, checkpoints (k + 1,) and keys (k,) of noise between them.
     rows: (c, m), limits for each condition at the last checkpoint. of_run: (m,), run of each failing member.
     """
 

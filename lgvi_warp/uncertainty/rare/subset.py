@@ -32,8 +32,7 @@ FEWEST_SEEDS = 10
 class NoProgress(Exception):  # noqa: N818  (what happened, and no fault of the program)
     """Raised if the levels come no nearer to the event.
 
-    kind: "steps" if the limit takes few values, "never" if the event is too rare to be found. largest: the largest
-    limit so far.
+    kind: "steps" if the limit takes few values, "never" if the event is too rare. largest: the largest limit so far.
     """
 
     def __init__(self, kind: str, largest: float):
@@ -45,9 +44,8 @@ class NoProgress(Exception):  # noqa: N818  (what happened, and no fault of the 
 class ChainLevel:
     """The members of one level; all their limits are at or above the threshold.
 
-    u: (n, d), chain by chain. limits: (n,). chains: number of chains; n if the members are independent. threshold: -inf
-    for the first level. log_probability: logarithm of the level's probability. variance: of its relative error,
-    estimated from the chains.
+    u: (n, d), chain by chain. limits: (n,). chains: number of chains; n if the members are independent. threshold: -inf for
+    the first level. log_probability: logarithm of the level's probability. variance: of its relative error, by the chains.
     """
 
     u: np.ndarray

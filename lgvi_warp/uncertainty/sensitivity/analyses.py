@@ -48,13 +48,11 @@ def sobol(
 ) -> SobolIndices:
     """Estimate Sobol indices of quantities of interest, by Saltelli's design and estimators.
 
-    The factors vary independently; a joint distribution counts as one factor. The design consists of independently
-    scrambled Sobol sequences, whose spread gives the intervals. Source: Saltelli et al. (2010), Computer Physics
-    Communications 181.
+    The factors vary independently; a joint distribution counts as one factor. It uses independently scrambled Sobol
+    sequences, whose spread gives the intervals. Source: Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
-        scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, whose scene, vary and seed
-            are used.
+        scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, for its scene, vary and seed.
         of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), "outcome floor", a lw.statistics.Quantity, a
             function of a Result to (n,) or (n, m), or several of these.
         samples: N, a multiple of `replicates`, best a power of two; N (2 d + 2) members are run for d factors, N (d + 2)
@@ -175,8 +173,7 @@ def morris(
     """Screen for the factors that matter, by Morris' elementary effects, with few members.
 
     Args:
-        scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, whose scene, vary and seed
-            are used.
+        scene: a Scene, with distributions in its [ensemble] or in `vary`; or an Ensemble, for its scene, vary and seed.
         of: one or several quantities of interest, as in `sobol`.
         samples: number of paths; samples (d + 1) members are run for d factors. Default 64.
         levels: number of levels of the paths' grid, even; a step moves a factor by half the grid. Default 4.

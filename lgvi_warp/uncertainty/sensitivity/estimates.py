@@ -28,8 +28,7 @@ class SobolEstimates(NamedTuple):
 def sobol_estimates(Y: np.ndarray, replicate: np.ndarray, second_order: bool, confidence: float) -> SobolEstimates:
     """Estimate the indices of one quantity (Saltelli et al. 2010, Computer Physics Communications 181).
 
-    Intervals follow from Student's t over the replicates' linearised ratios: only the scrambles are independent, not
-    the points.
+    Intervals follow from Student's t over the replicates' linearised ratios: scrambles are independent, points are not.
 
     Y: (N, group size), in the order of the design: A, A with each factor of B, B with each factor of A, and B.
     replicate: (N,), index of each group's scramble.
@@ -59,8 +58,7 @@ def sobol_estimates(Y: np.ndarray, replicate: np.ndarray, second_order: bool, co
 def _ratio(parts: np.ndarray, totals: np.ndarray, replicate: np.ndarray, confidence: float) -> Ratio:
     """The ratio of the means of `parts` (N, d) and `totals` (N,), with the interval of its linearisation.
 
-    For R replicates with sums n_r and w_r, the error of T = n / w is the error of the sum of u_r = n_r - T w_r, divided
-    by w.
+    For R replicates with sums n_r and w_r, the error of T = n / w is that of the sum of u_r = n_r - T w_r, divided by w.
     """
     value = parts.mean(axis=0) / totals.mean()
     _, place = np.unique(replicate, return_inverse=True)

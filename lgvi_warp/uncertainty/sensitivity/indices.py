@@ -180,8 +180,7 @@ class SobolIndices(Indices):
         first_confidence: half width of the interval of `first` (m, d).
         total: fraction due to each factor with all its interactions (m, d) [1].
         total_confidence: half width of the interval of `total` (m, d).
-        second: fraction due to the interaction of two factors (m, d, d) [1]; symmetric, NaN on the diagonal; None if
-            not requested.
+        second: fraction due to the interaction of two factors (m, d, d) [1]; symmetric, with NaN on the diagonal; or None.
         second_confidence: half width of the interval of `second` (m, d, d), or None.
     """
 
@@ -249,8 +248,7 @@ class MorrisEffects(Indices):
         mu_star: mean absolute effect (m, d) [the quantity's unit].
         mu_star_confidence: half width of the interval of `mu_star` (m, d).
         mu: mean effect (m, d) [the quantity's unit].
-        sigma: standard deviation of the effects (m, d) [the quantity's unit]; large if the effect is nonlinear or
-            interacts with other factors.
+        sigma: standard deviation of the effects (m, d) [the quantity's unit]; large for nonlinear effects or interactions.
     """
 
     mu_star: np.ndarray

@@ -62,15 +62,13 @@ def evaluate(
 ) -> Outputs:
     """Run an ensemble, some thousands of members at a time, and keep only its quantities of interest.
 
-    A member counts as failed if its status is a failure or one of its quantities is not finite. A stop by an event is
-    not a failure.
+    A member counts as failed if its status is a failure or a quantity is not finite. A stop by an event is no failure.
 
     Args:
         fleet: the ensemble.
         of: one or several quantities of interest, as in `sobol`.
         common_noise: True gives every member the same noise of forces. Default False.
-        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction of the
-            members, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the completed fraction, from 0 to 1.
         save: samples to save in each run. Default: those that the quantities need.
         settings: arguments of `lw.solve` (method, h, t1, dtype, width, checks, on_failure, threads, executor, scheduler).
 

@@ -259,7 +259,8 @@ def tradeoff(
         of: quantity whose error decides whether the reference is accepted: a name that statistics accept ("position",
             "attitude", "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position,
             attitude, velocity, angular_velocity and energy are always measured. Default "position".
-        methods: names of the methods to try. `missing` lists methods without any measurement. Default: all possible ones.
+        methods: names of the methods to try. `missing` lists methods without any measurement. Default: all that fit the
+            scene.
         members: number of members in the sample. Default 128.
         seconds: processor time to spend [s]; compiling kernels may take as much again. Every method first runs one
             coarse setting; then each step is halved in turn. The messages list what is left out. Default 45.

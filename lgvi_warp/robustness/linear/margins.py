@@ -289,7 +289,7 @@ def margins(
     swing shrinks only slightly, a run of 1.5 times the length is examined, too. The tracking error is not examined: a slow
     integral hides a small fast limit cycle in it. If stability changes repeatedly, the margin is at one of the changes.
 
-    Noise and drift of sensors are set to their mean, 0, and faults are off; by eigenvalues rounding, too: see `messages`.
+    Noise and drift of sensors are set to 0, their mean, and faults are off; by eigenvalues, so is rounding: see `messages`.
 
     The phase margin is the smallest phase, lag or lead, at which the loop becomes unstable if it is applied to all
     components of the law's demand at once. For one component it follows from the crossovers of the gain; for several,

@@ -76,7 +76,7 @@ def sweep(
         sampling: As for Ensemble; default the scene's.
         metrics: Metrics, each one number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of":
             "heading"}, "iae heading", or an expression over the path, "max(norm(demand))". "time_to_failure" is added.
-        success: Conditions for a member: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: it reaches the end.
+        success: Conditions of success: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: it reaches the end.
         baseline: Name of the case that others are compared with; default the first case.
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
         interval: Kind of the intervals of probabilities: "wilson" (default) or "clopper_pearson".

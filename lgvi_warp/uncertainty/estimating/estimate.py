@@ -80,7 +80,7 @@ def estimate(
     message gives the fraction that a mean may have missed. Rare values of a Choice are separate strata.
 
     Args:
-        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions, regardless of its sampling.
+        fleet: the ensemble, or a Scene with one. New members are drawn from its distributions; its sampling is not used.
         of: statistic to estimate, at the end of the run: a text such as "mean position[0]", "depth above 3", "outcome
             floor" or "max(depth)"; lw.statistics.Mean, Exceedance, Outcome, FirstPassage or Quantiles with one level;
             or a metric such as lw.metrics.ITAE("depth").
@@ -100,8 +100,8 @@ def estimate(
         heavy_tail: True reports a mean even if its variance seems to be infinite. Default False: such a mean is refused.
         seed: seed of points and noise. Default: the ensemble's seed.
         threads: threads of the runs. Default: as in `lw.solve`.
-        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Without threads, cost is
-            wall time.
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks. Costs are processor times
+            with threads, else wall times.
         scheduler: address of Dask's scheduler.
         store: folder for the results of runs: the same call continues from there after an interruption, with the same
             answer. A folder with results for other arguments is refused. Default: none.

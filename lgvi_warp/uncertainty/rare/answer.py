@@ -40,8 +40,8 @@ class RareEvent(Saved):
         failing: the members for which the event happens, a `Table` for lw.Ensemble(scene, sampling=found.failing); None
             if only noise varies. With splitting a member may occur several times, with different noise.
         normals: (m, d), the varied numbers of the failing members as standard normals, in the order of `moved`.
-        draws: (m, k), normals of the failing members' noise, for lw.prepare(..., draws="given"); k = 0 without noise,
-            or by splitting.
+        draws: (m, k), normals of the failing members' noise, for lw.prepare(..., draws="given"); k = 0 without noise
+            and with splitting.
         weights: (m,), weights of the failing members, with the sum 1.
         failed_share: fraction of the probability from members that failed, or have a number that is not finite.
         likeliest: values by name of the likeliest failing member, which has the smallest distance from the middle.
@@ -64,8 +64,8 @@ class RareEvent(Saved):
         moved_z: name -> z-score farthest from 0 of these three differences from all members; significant from 4.5 on.
         by_condition: if the event is any of several conditions, text of a condition -> (probability, lower, upper) of this
             condition alone, and of "any" and "all" of them, over the whole run; otherwise, or with a status, empty.
-        ancestors: (m,), ancestor of each failing member in the first level, or its run with splitting. Equal ones are
-            related.
+        ancestors: (m,), ancestor of each failing member in the first level, or its run with splitting. Members with the
+            same ancestor are related.
     """
 
     study: ClassVar[str] = "rare"

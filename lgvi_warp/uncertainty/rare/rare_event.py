@@ -77,7 +77,7 @@ def rare_event(
     its checks; otherwise more chains give it. Events more likely than 1e-3 are sampled directly.
 
     Args:
-        fleet: A Scene or an Ensemble, whose distributions in `vary` and whose noise vary the members.
+        fleet: A Scene or an Ensemble; its distributions in `vary` and its noise make the members differ.
         limit: The event: a quantity, such as "max(depth) - 40.0", or a function of a Result, that is positive in the event;
             conditions as in a sweep, {"peak depth": {"above": 12.0}}, any of which is the event; or an event's name.
         relative_error: Target relative standard error of the probability, 0.005 to 0.5; 0.1 by default.
@@ -88,7 +88,8 @@ def rare_event(
             None by default.
         intervals: Splitting: maximum number of time intervals, 2 to 1,000; 50 by default. More intervals need fewer
             members, but each costs a call. Intervals begin at samples and at ticks of a controller.
-        failed: "event", the default: a failed member counts as the event, and is reported separately; "refuse": error.
+        failed: "event" (default): a failed member counts as the event, and is reported separately; "refuse" raises an
+            error.
         most: Approximate maximum number of members to run, without the pilot, at least 10,000; 1,000,000 by default.
         seed: Seed of all random draws; 0 by default.
         store: Folder for the results of runs: the same call continues from there after an interruption, with the same

@@ -126,7 +126,7 @@ class FirstPassage(Condition, Counted):
 
     Arrays of the estimate, in addition to lower and upper:
 
-    * value (k,): probability to have passed by each time; survival is 1 - value.
+    * value (k,): probability of passing by each time; survival is 1 - value.
     * passed (k,): number of members that pass at each time.
     * lost (k,): number of members that failed before each time without passing.
     * stopped (k,): number of members that an event stopped at each time, or since the time before, without passing.
@@ -287,11 +287,11 @@ class PassageCurve:
         """Number of members whose fraction has the variance of a sum of Dirichlet variables, one for each time.
 
         If x of n members pass and o end otherwise, the shares of those that pass, end otherwise and stay are
-        Dirichlet(x, o, n - x - o + 1); of the last ones at risk, Beta(1/2, staying + 1/2) pass. If none ends otherwise,
-        this lies between the two beta products of Fay, Brittain & Proschan (2013, Biostatistics 14), as Jeffreys'
-        interval lies between Clopper & Pearson's limits. If none is lost, it is Jeffreys' Beta(m + 1/2, n - m + 1/2),
-        and the result is the number of all members. With few members at risk, Greenwood's variance would be far too
-        small.
+        Dirichlet(x, o, n - x - o + 1); of those that finally stay, a share Beta(1/2, staying + 1/2) passes. If none
+        ends otherwise, this lies between the two beta products of Fay, Brittain & Proschan (2013, Biostatistics 14), as
+        Jeffreys' interval lies between Clopper & Pearson's limits. If none is lost, it is Jeffreys' Beta(m + 1/2, n - m
+        + 1/2), and the result is the number of all members. With few members at risk, Greenwood's variance would be far
+        too small.
 
         n: (k, 1), members at risk at each time.
         now: (k, pieces), members that passed since the time before.

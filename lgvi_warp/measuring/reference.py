@@ -182,7 +182,8 @@ class Growth:
         factor: factor of growth over the whole run.
         predictable: dtype -> time at which round-off has grown to 1e-2, extrapolated if needed [s]; may be infinite.
         times: times of the curve (k,) [s].
-        curve: size of the difference (k,): root mean square over the members, of position [m] and attitude [rad] together.
+        curve: growth factor (k,) of the difference: root mean square over members, of position [m] and attitude [rad]
+            together.
     """
 
     rate: float

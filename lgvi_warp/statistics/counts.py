@@ -191,7 +191,7 @@ class Condition(Statistic):
         return above, below
 
     def holds(self, values: Values) -> np.ndarray:
-        """Return the mask (k, d, n) of where the condition holds; false if a member does not count."""
+        """Return the mask (k, d, n) of the condition; false if a member does not count."""
         above, below = self.limits(values.x.shape[1])
         if below is None:
             mask = values.x != 0.0 if above is None else values.x > above

@@ -35,8 +35,7 @@ def both_measures(own: Part, squares: Part, members: np.ndarray) -> Part:
 class Weighted:
     """Content of a part of weighted members: its sums under the weights and under their squares.
 
-    own, squares: parts with "count", the sum (k,) of weights or of squares. members: (k,), number of members that
-        count.
+    own, squares: parts with "count", the sum (k,) of weights or squares. members: (k,), number of members that count.
     """
 
     own: Part

@@ -94,7 +94,7 @@ class StabilityMap(Saved):
         classes: method -> Cell codes (ny, nx).
         errors: method -> largest error up to error_time (ny, nx) [unit]; infinite if it could not be measured.
         energies: method -> largest growth of energy divided by energy_bound (ny, nx) [1]; unbounded above 1.
-        statuses: method -> worst Status code (ny, nx); 255 where the program refused to run the cell.
+        statuses: method -> worst Status code (ny, nx); 255 if the program refused to run the cell.
         ratios: method -> limit -> step h divided by the analytic step limit of the fastest start (ny, nx) [1]; above 1
             the step exceeds the limit. The names of the limits are in accuracy.stability.limits.LIMITS.
         of: name of the quantity whose error is measured.
@@ -109,7 +109,7 @@ class StabilityMap(Saved):
         refused: method -> reason why it cannot run the scene.
         messages: notes for the user.
         seconds: time in which the map was computed [s].
-        unit: unit of the errors. Default: that of `of`.
+        unit: unit of the errors. Default: the unit of `of`.
     """
 
     x: Line

@@ -48,7 +48,7 @@ class CellRuns:
 
     error: largest error up to the error time [unit of the quantity]; infinite if it could not be measured.
     growth: largest growth of energy divided by the energy available [1].
-    status: Status codes; REFUSED where the program refused to run the member.
+    status: Status codes; REFUSED if the program refused to run the member.
     """
 
     error: np.ndarray

@@ -228,7 +228,7 @@ class Sweep(SweepTable):
 
         Args:
             case: name of the case.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
             of: "success" (default), or the name of a metric, over members that did not fail.
 
         Returns:
@@ -262,7 +262,7 @@ class Sweep(SweepTable):
         Args:
             case: name of the case.
             members: indices of the members.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
             save: sample times and fields; default those of the scene.
             threads: number of threads; default as in `lw.solve`.
 
@@ -329,7 +329,7 @@ def provenance(table: SweepTable) -> dict[str, Any]:
 
 
 def as_json(value: Any) -> Any:
-    """Convert a value for JSON: plain types as they are, others as text."""
+    """Convert a value for JSON: plain types unchanged, others to text."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float) and not np.isfinite(value):

@@ -125,7 +125,7 @@ class RareFailures:
         return {name: defaults[name].default for name in RARE} | (dict(rare) if isinstance(rare, Mapping) else {})
 
     def of(self, cell: SweepCell) -> RareFailure | None:
-        """Rare failure of a cell; None where none was requested."""
+        """Rare failure of a cell; None if none was requested."""
         return self._answers.get(self._key(cell))
 
     def _key(self, cell: SweepCell) -> str:

@@ -48,7 +48,7 @@ def rare_rows(sweep: SweepTable) -> list[dict[str, Any]]:
 
 
 def provenance_of_rare(sweep: SweepTable, cell: SweepCell) -> dict[str, Any]:
-    """Content of a sweep's file on a cell's rare failure; empty where none was requested."""
+    """Content of a sweep's file on a cell's rare failure; empty if none was requested."""
     if sweep.rares is None or (answer := sweep.rares.of(cell)) is None:
         return {}
     said: dict[str, Any] = {"asked": sweep.rares.asked(cell.case), "refused": answer.refused}

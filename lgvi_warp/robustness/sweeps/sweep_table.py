@@ -160,7 +160,7 @@ class SweepTable:
         Args:
             case: name of the case.
             metric: name of the metric.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
             Values (n,) in the unit of the metric; NaN if a member has none.
@@ -177,7 +177,7 @@ class SweepTable:
 
         Args:
             case: name of the case.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
             (value, lower, upper), between 0 and 1: the fraction of the members, and its confidence interval.
@@ -193,7 +193,7 @@ class SweepTable:
         Args:
             case: name of the case.
             times: times (k,) [s].
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
             (value, lower, upper) at each time, as in `success`.
@@ -213,7 +213,7 @@ class SweepTable:
         Args:
             case: name of the case.
             failed: True for members that do not pass, False for members that pass; by default True.
-            at: values of the grid by name; may be left out where there is no grid.
+            at: values of the grid by name; may be left out if there is no grid.
 
         Returns:
             Indices of the members, rising.
@@ -312,5 +312,5 @@ class SweepTable:
 
 
 def coordinates(values: Sequence[Any]) -> list[Any]:
-    """Values of an axis as coordinates: numbers and texts as they are, others as texts."""
+    """Values of an axis as coordinates: numbers and texts unchanged, others as texts."""
     return [value if isinstance(value, int | float | str) else str(value) for value in values]

@@ -81,7 +81,7 @@ def members_of(found: RareEvent) -> FailingMembers:
 def carried(u: np.ndarray, own: VehicleLimit, other: VehicleLimit, seed: int) -> np.ndarray:
     """Convert the normals of members from one limit to another, by the names of numbers and draws.
 
-    Normals that the first limit does not have are drawn anew, since they have no effect there.
+    Normals that the first limit does not have are redrawn, since they have no effect there.
     """
     v = generator(seed, "rare carried").standard_normal((len(u), other.d))
     columns = {name: i for i, name in enumerate(own.names)}
